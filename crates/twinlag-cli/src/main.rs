@@ -1,0 +1,2 @@
+//! The twinlag program.
+fn main() {}

@@ -1,0 +1,1 @@
+//! How badly two sensors disagree about the gas temperature both were in.

@@ -1,0 +1,1 @@
+//! The minimum of any smooth cost within bounds, with a report of how it was found.

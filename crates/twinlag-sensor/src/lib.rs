@@ -1,0 +1,1 @@
+//! How a temperature sensor maps gas temperature to its reading, and back.

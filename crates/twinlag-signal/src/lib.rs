@@ -1,0 +1,1 @@
+//! Two-sensor records from a described rig, integrated in continuous time.

@@ -1,0 +1,1 @@
+//! Two temperature sensors' time constants, and the gas temperature, from their readings alone.
