@@ -1,1 +1,32 @@
 //! What measurement noise adds to a two-sensor cost, and how to take it off.
+//!
+//! For anyone who uses the published cross-relation cost on noisy data: the noise gain of the synthetic filters for white
+//! and coloured noise, the compensated cost for known levels, the normalised cost for a known ratio, and the levels
+//! themselves from the data. Where you are free to choose, prefer the exactly whitened cost of `twinlag-cross-relation`,
+//! which needs no compensation and is up to several times more precise; for whole records take `twinlag`. This crate knows
+//! no optimiser.
+//!
+//! ```
+//! use twinlag_bias::{Compensated, Noise};
+//! use twinlag_cross_relation::{CrossRelation, Readings};
+//! # let (y1, y2): (Vec<f64>, Vec<f64>) = (0..400).map(|k| (0.1 * f64::from(k)).sin_cos()).unzip();
+//!
+//! let readings = Readings::even(&y1, &y2, 0.002)?;
+//! let cost = Compensated::new(CrossRelation::new(&readings, 100)?, [Noise::white(0.05)?, Noise::white(0.05)?]);
+//! let at = [0.0238, 0.1168];
+//! let plain = cost.cost().evaluate(&at).value;
+//! // White noise of 0.05 K adds 0.05² (h(c) + h(a)).
+//! let gain = (0.002_f64 / (2.0 * at[0])).tanh() + (0.002_f64 / (2.0 * at[1])).tanh();
+//! assert!((plain - cost.evaluate(&at).value - 0.0025 * gain).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod compensated;
+mod error;
+mod levels;
+mod noise_gain;
+
+pub use compensated::{Compensated, Normalised};
+pub use error::NoiseError;
+pub use levels::{NoiseLevel, estimate_noise};
+pub use noise_gain::Noise;

@@ -1,1 +1,49 @@
 //! The minimum of any smooth cost within bounds, with a report of how it was found.
+//!
+//! For anyone with a cost of a few variables who wants to swap solvers by name, keep bounds, and be told when an answer is
+//! none: on a bound, on a plateau, out of budget. The solvers are [argmin](https://argmin-rs.org)'s, and a bounded
+//! Levenberg-Marquardt of our own; argmin itself does not show in this crate's signatures. The crate knows nothing of
+//! thermocouples: the costs are in `twinlag-cross-relation`, their use on records in `twinlag`.
+//!
+//! ```
+//! use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Variable};
+//!
+//! /// `(ln(x/3))² + (y − 1)²`, with its derivatives.
+//! struct Bowl;
+//!
+//! impl Cost for Bowl {
+//!     fn value(&self, x: &[f64]) -> f64 {
+//!         (x[0] / 3.0).ln().powi(2) + (x[1] - 1.0).powi(2)
+//!     }
+//!
+//!     fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
+//!         let l = (x[0] / 3.0).ln();
+//!         Some(Derivatives {
+//!             value: self.value(x),
+//!             gradient: vec![2.0 * l / x[0], 2.0 * (x[1] - 1.0)],
+//!             curvature: vec![vec![2.0 * (1.0 - l) / (x[0] * x[0]), 0.0], vec![0.0, 2.0]],
+//!         })
+//!     }
+//! }
+//!
+//! let variables = vec![Variable::logarithmic("x", 1e-3, 1e3), Variable::linear("y", 1.0, -10.0, 10.0)];
+//! let problem = Problem::new(&Bowl, variables)?;
+//! for name in Optimiser::NAMES {
+//!     let fit = Optimiser::by_name(name)?.minimise(&problem, &[100.0, -4.0], &Budget::default())?;
+//!     assert_eq!(fit.end, End::Converged);
+//!     assert!((fit.x[0] - 3.0).abs() < 1e-5 && (fit.x[1] - 1.0).abs() < 1e-5);
+//! }
+//! # Ok::<(), twinlag_optimise::ProblemError>(())
+//! ```
+
+mod adapter;
+mod levenberg_marquardt;
+mod minimiser;
+mod multi_start;
+mod problem;
+mod report;
+
+pub use minimiser::{Minimiser, Optimiser};
+pub use multi_start::MultiStart;
+pub use problem::{Cost, Derivatives, Problem, ProblemError, Scale, Variable};
+pub use report::{Budget, End, Evaluations, Fit};

@@ -1,1 +1,81 @@
 //! Two-sensor records from a described rig, integrated in continuous time.
+//!
+//! A [`Rig`] says what gas flows past two temperature sensors, how each sensor follows it and how it is read: it is a
+//! TOML (or JSON) file, or built in Rust. [`Rig::simulate`] returns the record that such a rig would have written, with
+//! the true gas temperature beside it. The sensors are differential equations, integrated by the classical fourth-order
+//! Runge-Kutta rule on a grid much finer than the sampling; noise and rounding come last.
+//!
+//! Who should use it: someone who tests an identification method, or teaches one, and needs records whose truth is
+//! known. Someone who wants the *formulae* of a sensor (its discrete pole, its inverse, its frequency response) should
+//! take `twinlag-sensor` instead, and someone with measured records `twinlag-record`. This crate depends on neither, on
+//! purpose: a record is never made by the code that explains it.
+//!
+//! # Example
+//!
+//! ```
+//! use twinlag_signal::Rig;
+//!
+//! let rig: Rig = toml::from_str(
+//!     r#"
+//!     seed = 1
+//!     [record]
+//!     samples = 2500
+//!     sample_period_s = 0.002
+//!     [gas]
+//!     kind = "sine"
+//!     mean_c = 450.0
+//!     amplitude_k = 20.0
+//!     frequency_hz = 5.0
+//!     [[sensors]]
+//!     channel = "T1"
+//!     time_constant_s = 0.0238
+//!     [[sensors]]
+//!     channel = "T2"
+//!     time_constant_s = 0.1168
+//!     noise = { std_k = 0.5 }
+//!     "#,
+//! )?;
+//!
+//! // Without noise: T1 swings by 20 K / √(1 + (ωτ)²) about the mean.
+//! let clean = rig.clean(0)?;
+//! let largest_c = clean.readings_c[0].iter().copied().fold(f64::MIN, f64::max);
+//! let omega_tau = std::f64::consts::TAU * 5.0 * 0.0238;
+//! assert!((largest_c - 450.0 - 20.0 / f64::hypot(1.0, omega_tau)).abs() < 0.05);
+//!
+//! // Many trials of one gas signal: integrate once, draw noise for each.
+//! let first = clean.with_noise(&mut rig.noise_streams(0));
+//! let second = clean.with_noise(&mut rig.noise_streams(1));
+//! assert_eq!(first, rig.simulate()?);
+//! assert_eq!(first.t1_c, second.t1_c); // T1 has no noise
+//! assert_ne!(first.t2_c, second.t2_c);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # What the numbers mean
+//!
+//! Temperatures are in °C (`_c`), differences of temperature in K (`_k`), times in s, frequencies in Hz. The record's
+//! first sample is at time zero; the run-in before it ([`Record::settle_s`]) has negative times. Random numbers are
+//! ChaCha with eight rounds, one stream per trial and purpose ([`Rig::noise_streams`]): the same rig and trial give the
+//! same bytes on any number of threads.
+
+mod adc;
+mod check;
+mod dynamics;
+mod error;
+mod gas;
+mod grid;
+mod noise;
+mod record;
+mod rig;
+mod sensor;
+mod simulated;
+mod streams;
+
+pub use adc::Adc;
+pub use error::SignalError;
+pub use gas::{Broadband, Engine, Gas, Hold, MultiTone, Plunge, Series, Signal, Tone, Turbulence};
+pub use noise::Noise;
+pub use record::Record;
+pub use rig::Rig;
+pub use sensor::{Sensor, SlowMode};
+pub use simulated::{Clean, Simulated};

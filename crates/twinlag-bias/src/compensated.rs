@@ -1,0 +1,123 @@
+//! The published cost with the noise taken out of its expectation.
+//!
+//! `E[J] = J_clean + N2(τ2) + N1(τ1)/g²`, where `N_i` is what the noise of the *other* channel's synthetic filter passes:
+//! channel 1's noise goes through the model of sensor 2 and the other way round. `N` falls as the time constant grows, so
+//! the plain cost is dragged to long time constants. Exact in expectation for stationary noise independent of the gas.
+
+use twinlag_cross_relation::{CostValue, CrossRelation};
+
+use crate::error::NoiseError;
+use crate::noise_gain::Noise;
+
+/// Cross-relation cost less what noise of known autocovariance adds to it on average.
+#[derive(Clone, Debug)]
+pub struct Compensated<'a> {
+    cost: CrossRelation<'a>,
+    noise: [Noise; 2],
+}
+
+impl<'a> Compensated<'a> {
+    /// `cost` compensated for the noise of channels 1 and 2.
+    pub fn new(cost: CrossRelation<'a>, noise: [Noise; 2]) -> Self {
+        Self { cost, noise }
+    }
+
+    /// The cost without compensation.
+    pub fn cost(&self) -> &CrossRelation<'a> {
+        &self.cost
+    }
+
+    /// `J_BC = J_CR − s1² h(c) − s2² h(a)/g²` for white noise, with gradient and Hessian, at `theta` (`P` 2 or 4). Can be
+    /// negative: it is a difference.
+    ///
+    /// # Source
+    /// Gillespie, Hung, Kee, McLoone 2016 (abstract seen). Formula: own derivation, docs, chapter "Theory", section 2.
+    pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
+        let mut out = self.cost.evaluate(theta);
+        let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
+        out.value -= noise.value;
+        for i in 0..P {
+            out.gradient[i] -= noise.gradient[i];
+            for j in 0..P {
+                out.hessian[i][j] -= noise.hessian[i][j];
+            }
+        }
+        out
+    }
+}
+
+/// Cross-relation cost over what noise adds to it, for levels known up to a common factor.
+///
+/// `J_N = J_CR / (s1² h(c) + s2² h(a)/g²)`. Its minimum is at the truth whatever the level: it is the fixed point of
+/// "estimate the level from the cost, compensate, minimise again" (Dinkelbach's iteration). With the true levels it is 1
+/// there on average.
+#[derive(Clone, Debug)]
+pub struct Normalised<'a> {
+    cost: CrossRelation<'a>,
+    noise: [Noise; 2],
+}
+
+impl<'a> Normalised<'a> {
+    /// `cost` normalised by white noise of standard deviation ratio `s2/s1 = ratio`, in units of `s1² = 1 K²`.
+    ///
+    /// # Errors
+    /// [`NoiseError::Ratio`] unless the ratio is finite and positive.
+    pub fn with_ratio(cost: CrossRelation<'a>, ratio: f64) -> Result<Self, NoiseError> {
+        if ratio.is_finite() && ratio > 0.0 {
+            Ok(Self { cost, noise: [Noise::white(1.0)?, Noise::white(ratio)?] })
+        } else {
+            Err(NoiseError::Ratio { value: ratio })
+        }
+    }
+
+    /// `cost` normalised by noise of the given description.
+    pub fn new(cost: CrossRelation<'a>, noise: [Noise; 2]) -> Self {
+        Self { cost, noise }
+    }
+
+    /// The cost without normalisation.
+    pub fn cost(&self) -> &CrossRelation<'a> {
+        &self.cost
+    }
+
+    /// The normalised cost with gradient and Hessian at `theta` (`P` 2 or 4).
+    ///
+    /// # Source
+    /// Own reading of the published normalisation; docs, chapter "Theory", section 2.
+    pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
+        let above = self.cost.evaluate(theta);
+        let below = added_by_noise(&self.noise, theta, self.cost.period_s());
+        let value = above.value / below.value;
+        let gradient: [f64; P] = std::array::from_fn(|i| (above.gradient[i] - value * below.gradient[i]) / below.value);
+        let hessian = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                (above.hessian[i][j]
+                    - value * below.hessian[i][j]
+                    - gradient[i] * below.gradient[j]
+                    - gradient[j] * below.gradient[i])
+                    / below.value
+            })
+        });
+        CostValue { value, gradient, hessian }
+    }
+}
+
+/// What noise adds to the expected cost, with derivatives.
+fn added_by_noise<const P: usize>(noise: &[Noise; 2], theta: &[f64; P], period_s: f64) -> CostValue<P> {
+    let [through2, d2, dd2] = noise[0].passed(theta[1], period_s);
+    let [through1, d1, dd1] = noise[1].passed(theta[0], period_s);
+    let gain = theta.get(2).copied().unwrap_or(1.0);
+    let share = 1.0 / (gain * gain);
+    let by_gain = -2.0 * share / gain;
+    let mut all = [[0.0; 4]; 4];
+    all[0][0] = dd1 * share;
+    all[1][1] = dd2;
+    all[0][2] = d1 * by_gain;
+    all[2][2] = -3.0 * through1 * by_gain / gain;
+    let gradient = [d1 * share, d2, through1 * by_gain, 0.0];
+    CostValue {
+        value: through2 + through1 * share,
+        gradient: std::array::from_fn(|i| gradient[i]),
+        hessian: std::array::from_fn(|i| std::array::from_fn(|j| all[i.min(j)][i.max(j)])),
+    }
+}

@@ -1,0 +1,18 @@
+use thiserror::Error;
+
+/// Why a noise description cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum NoiseError {
+    #[error("{name} must be finite and not negative, got {value}")]
+    Negative { name: &'static str, value: f64 },
+    #[error("a noise ratio must be finite and positive, got {value}")]
+    Ratio { value: f64 },
+    #[error(
+        "an autocovariance starts with the variance, which no lag exceeds: lag {lag} is {value}, the variance {variance}"
+    )]
+    Autocovariance { lag: usize, value: f64, variance: f64 },
+    #[error("at least {needed} neighbouring samples are needed to tell noise from signal, got {samples}")]
+    TooShort { samples: usize, needed: usize },
+}

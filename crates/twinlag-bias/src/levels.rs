@@ -1,0 +1,155 @@
+//! Noise levels from the data: what a smooth signal cannot do from one sample to the next.
+//!
+//! Sensors are low-pass, so their highest frequencies usually show the noise floor. The third difference
+//! `y[k] − 3 y[k+1] + 3 y[k+2] − y[k+3]` of a smooth signal is small; of white noise it has variance `20 s²`. It fails where
+//! the samples lie as far apart as the faster time constant, with coloured noise, and below the step of the converter,
+//! which therefore sets a floor of `q/√12`.
+
+use twinlag_cross_relation::{Readings, Segment, Steps};
+
+use crate::error::NoiseError;
+
+/// Noise of one channel as the data show it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseLevel {
+    /// Standard deviation, K: the larger of the third-difference estimate and the quantisation floor.
+    pub std_k: f64,
+    /// Standard error of `std_k`, K, for white Gaussian noise.
+    pub standard_error_k: f64,
+    /// Step of the converter, K, if the readings lie on a grid.
+    pub quantisation_step_k: Option<f64>,
+}
+
+/// Noise levels `[s1, s2]` of both channels.
+///
+/// For uneven steps the third divided difference takes the place of the third difference, each scaled to unit noise.
+///
+/// # Errors
+/// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.
+pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError> {
+    let level = |channel: fn(&Segment) -> &[f64]| -> Result<NoiseLevel, NoiseError> {
+        let (mut sum, mut count) = (0.0, 0_usize);
+        for segment in readings.segments() {
+            let y = channel(segment);
+            for (k, four) in y.windows(4).enumerate() {
+                let weights = third_difference(segment.steps(), k);
+                let difference: f64 = weights.iter().zip(four).map(|(w, y)| w * y).sum();
+                sum += difference * difference;
+                count += 1;
+            }
+        }
+        if count < 8 {
+            return Err(NoiseError::TooShort { samples: readings.len(), needed: 11 });
+        }
+        let from_differences = (sum / count as f64).sqrt();
+        let step = quantisation_step(readings.segments().iter().map(channel));
+        let floor = step.map_or(0.0, |q| q / 12.0_f64.sqrt());
+        let std_k = from_differences.max(floor);
+        // The third differences of white noise have autocorrelations −3/4, 3/10, −1/20: their mean square over n has
+        // relative variance 2 (1 + 2 (9/16 + 9/100 + 1/400))/n = 4.62/n, half of it in the standard deviation.
+        Ok(NoiseLevel {
+            std_k,
+            standard_error_k: 0.5 * std_k * (4.62 / count as f64).sqrt(),
+            quantisation_step_k: step,
+        })
+    };
+    Ok([level(Segment::y1)?, level(Segment::y2)?])
+}
+
+/// Weights of unit sum of squares that take any parabola through samples `k..k+4` to zero.
+fn third_difference(steps: &Steps, k: usize) -> [f64; 4] {
+    match steps {
+        Steps::Even(_) => [1.0, -3.0, 3.0, -1.0].map(|w: f64| w / 20.0_f64.sqrt()),
+        Steps::Uneven(each) => {
+            let mut t = [0.0; 4];
+            for i in 1..4 {
+                t[i] = t[i - 1] + each[k + i - 1];
+            }
+            let raw: [f64; 4] =
+                std::array::from_fn(|i| (0..4).filter(|&j| j != i).map(|j| t[i] - t[j]).product::<f64>().recip());
+            let norm = raw.iter().map(|w| w * w).sum::<f64>().sqrt();
+            raw.map(|w| w / norm)
+        }
+    }
+}
+
+/// The grid that all differences between neighbouring readings lie on, if it is coarse enough to matter.
+///
+/// A grid counts if nearly all differences are whole multiples of the smallest one. Written decimals always make some
+/// grid; it is the floor that they imply that is used, and it is small where the decimals are fine.
+fn quantisation_step<'a>(channels: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
+    let differences: Vec<f64> =
+        channels.flat_map(|y| y.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 1e-9).collect();
+    let step = differences.iter().copied().fold(f64::INFINITY, f64::min);
+    if !step.is_finite() {
+        return None;
+    }
+    let on_grid = differences.iter().filter(|d| ((*d / step) - (*d / step).round()).abs() < 0.05).count();
+    (on_grid as f64 >= 0.95 * differences.len() as f64).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn noisy(n: usize, std_k: [f64; 2], t: impl Fn(usize) -> f64) -> [Vec<f64>; 2] {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        std_k.map(|s| {
+            (0..n)
+                .map(|k| {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    40.0 + 10.0 * (std::f64::consts::TAU * t(k) / 50.0).sin() + s * noise
+                })
+                .collect()
+        })
+    }
+
+    /// A sine of 50 samples a period leaves `10 (2π/50)³/√2 = 0.014 K` of third difference, over √20: 3 mK, against a noise
+    /// of 0.3 K. Four standard errors.
+    #[test]
+    fn white_noise_on_a_smooth_signal_is_found_in_both_channels() {
+        let [y1, y2] = noisy(5000, [0.3, 1.1], |k| k as f64);
+        let levels = estimate_noise(&Readings::even(&y1, &y2, 0.01).expect("valid")).expect("long enough");
+        for (level, want) in levels.iter().zip([0.3, 1.1]) {
+            let tol = 4.0 * level.standard_error_k;
+            assert!((level.std_k - want).abs() < tol, "got {}, want {want} ± {tol}", level.std_k);
+            // √(4.62/4997)/2
+            assert!((level.standard_error_k / level.std_k - 0.0152).abs() < 1e-4);
+        }
+    }
+
+    /// Uneven steps, the signal a parabola in time, which the divided differences take to zero whatever the steps: what is
+    /// left is the noise. Neighbouring differences correlate more than at even steps: eight standard errors.
+    #[test]
+    fn uneven_steps_do_not_let_the_signal_through() {
+        let steps: Vec<f64> = (0..4999).map(|k| 1.0 + 0.7 * f64::from(k % 3)).collect();
+        let mut t = vec![0.0];
+        steps.iter().for_each(|s| t.push(t[t.len() - 1] + s));
+        let [n1, n2] = noisy(5000, [0.3, 1.1], |_| 0.0);
+        let bent = |n: &[f64]| n.iter().zip(&t).map(|(n, t)| n + 1e-3 * t * t).collect::<Vec<_>>();
+        let segment = Segment::new(bent(&n1), bent(&n2), Steps::Uneven(steps)).expect("valid");
+        let levels = estimate_noise(&Readings::new(vec![segment]).expect("valid")).expect("long enough");
+        for (level, want) in levels.iter().zip([0.3, 1.1]) {
+            let tol = 8.0 * level.standard_error_k;
+            assert!((level.std_k - want).abs() < tol, "got {}, want {want} ± {tol}", level.std_k);
+        }
+    }
+
+    #[test]
+    fn a_coarse_converter_sets_the_floor() {
+        let y: Vec<f64> = (0..200).map(|k| (f64::from(k) * 0.01 / 0.0625).round() * 0.0625).collect();
+        let levels = estimate_noise(&Readings::even(&y, &y, 1.0).expect("valid")).expect("long enough");
+        let step = levels[0].quantisation_step_k.expect("all readings lie on a grid");
+        assert!((step - 0.0625).abs() < 1e-12, "got {step}"); // what taking off the mean rounds
+        assert!(levels[0].std_k >= 0.0625 / 12.0_f64.sqrt());
+    }
+
+    #[test]
+    fn a_handful_of_samples_is_refused() {
+        let y = [1.0, 2.0, 4.0, 3.0, 1.0, 7.0];
+        assert!(estimate_noise(&Readings::even(&y, &y, 1.0).expect("valid")).is_err());
+    }
+}

@@ -1,0 +1,160 @@
+//! The two channels as the costs take them: cut where samples are missing, with the common mean taken off.
+
+use crate::error::CostError;
+
+/// Times between the samples of one segment, s.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Steps {
+    /// All the same.
+    Even(f64),
+    /// One for each pair of neighbours, `[n − 1]`.
+    Uneven(Vec<f64>),
+}
+
+/// An unbroken stretch of both channels, in one temperature unit (°C or K).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Segment {
+    y1: Vec<f64>,
+    y2: Vec<f64>,
+    steps: Steps,
+}
+
+impl Segment {
+    /// Channels `y1`, `y2`, `[n]` each, `n ≥ 2`, with `steps` between their samples.
+    ///
+    /// # Errors
+    /// [`CostError::LengthMismatch`], [`CostError::StepCount`], [`CostError::TooShort`], [`CostError::NotFinite`] or
+    /// [`CostError::BadStep`].
+    pub fn new(y1: Vec<f64>, y2: Vec<f64>, steps: Steps) -> Result<Self, CostError> {
+        if y1.len() != y2.len() {
+            return Err(CostError::LengthMismatch { first: y1.len(), second: y2.len() });
+        }
+        if y1.len() < 2 {
+            return Err(CostError::TooShort { samples: y1.len(), needed: 2 });
+        }
+        for (channel, y) in [(1, &y1), (2, &y2)] {
+            if let Some((index, &value)) = y.iter().enumerate().find(|(_, v)| !v.is_finite()) {
+                return Err(CostError::NotFinite { channel, index, value });
+            }
+        }
+        let all = match &steps {
+            Steps::Even(period) => std::slice::from_ref(period),
+            Steps::Uneven(each) if each.len() + 1 == y1.len() => each,
+            Steps::Uneven(each) => {
+                return Err(CostError::StepCount { samples: y1.len(), steps: each.len(), expected: y1.len() - 1 });
+            }
+        };
+        match all.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
+            Some(&value) => Err(CostError::BadStep { value }),
+            None => Ok(Self { y1, y2, steps }),
+        }
+    }
+
+    /// Reading of sensor 1, the common mean taken off once the segment is part of [`Readings`].
+    pub fn y1(&self) -> &[f64] {
+        &self.y1
+    }
+
+    /// Reading of sensor 2, likewise.
+    pub fn y2(&self) -> &[f64] {
+        &self.y2
+    }
+
+    /// Times between samples.
+    pub fn steps(&self) -> &Steps {
+        &self.steps
+    }
+
+    /// Number of samples.
+    #[expect(clippy::len_without_is_empty, reason = "a segment has two samples at least")]
+    pub fn len(&self) -> usize {
+        self.y1.len()
+    }
+}
+
+/// Both channels of a record: one or more segments, the mean of all samples of both channels taken off.
+///
+/// The costs do not depend on a common constant; taking it off keeps it out of the rounding.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Readings {
+    segments: Vec<Segment>,
+    common_mean: f64,
+}
+
+impl Readings {
+    /// Joins `segments` into one record.
+    ///
+    /// # Errors
+    /// [`CostError::TooShort`] if they hold fewer than 4 samples in all.
+    pub fn new(mut segments: Vec<Segment>) -> Result<Self, CostError> {
+        let samples: usize = segments.iter().map(Segment::len).sum();
+        if samples < 4 {
+            return Err(CostError::TooShort { samples, needed: 4 });
+        }
+        // The mean of the two channel means, as the published method has it.
+        let mean_of = |channel: fn(&Segment) -> &[f64]| {
+            segments.iter().flat_map(|s| channel(s).iter()).sum::<f64>() / samples as f64
+        };
+        let common_mean = 0.5 * (mean_of(Segment::y1) + mean_of(Segment::y2));
+        for segment in &mut segments {
+            segment.y1.iter_mut().chain(&mut segment.y2).for_each(|y| *y -= common_mean);
+        }
+        Ok(Self { segments, common_mean })
+    }
+
+    /// One unbroken, evenly sampled record: `y1`, `y2` `[n]`, `period_s` between samples.
+    ///
+    /// # Errors
+    /// As [`Segment::new`] and [`Readings::new`].
+    pub fn even(y1: &[f64], y2: &[f64], period_s: f64) -> Result<Self, CostError> {
+        Self::new(vec![Segment::new(y1.to_vec(), y2.to_vec(), Steps::Even(period_s))?])
+    }
+
+    /// The unbroken stretches, common mean taken off.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// What was taken off: the mean of all samples of both channels.
+    pub fn common_mean(&self) -> f64 {
+        self.common_mean
+    }
+
+    /// Samples of each channel.
+    #[expect(clippy::len_without_is_empty, reason = "there are four samples at least")]
+    pub fn len(&self) -> usize {
+        self.segments.iter().map(Segment::len).sum()
+    }
+
+    /// The sample period, if it is the same throughout.
+    pub fn even_period_s(&self) -> Option<f64> {
+        let mut periods = self.segments.iter().map(|s| match s.steps {
+            Steps::Even(period) => Some(period),
+            Steps::Uneven(_) => None,
+        });
+        let first = periods.next()??;
+        periods.all(|p| p == Some(first)).then_some(first)
+    }
+
+    /// Mean time between neighbouring samples of a segment, s.
+    pub fn mean_step_s(&self) -> f64 {
+        let (time, count) = self.segments.iter().fold((0.0, 0), |(time, count), s| {
+            let steps = s.len() - 1;
+            let span = match &s.steps {
+                Steps::Even(period) => period * steps as f64,
+                Steps::Uneven(each) => each.iter().sum(),
+            };
+            (time + span, count + steps)
+        });
+        time / count as f64
+    }
+
+    /// Longest unbroken stretch, s.
+    pub fn longest_span_s(&self) -> f64 {
+        let span = |s: &Segment| match &s.steps {
+            Steps::Even(period) => period * (s.len() - 1) as f64,
+            Steps::Uneven(each) => each.iter().sum(),
+        };
+        self.segments.iter().map(span).fold(0.0, f64::max)
+    }
+}

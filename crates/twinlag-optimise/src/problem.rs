@@ -1,0 +1,228 @@
+//! What is minimised: a cost over named variables with bounds, seen in coordinates in which they are all of size one.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A scalar function to be minimised. Implement [`Cost::derivatives`] as well if you have them: most solvers are then far
+/// faster, and the report can tell a minimum from a plateau.
+pub trait Cost {
+    /// The cost at `x`, in the variables' own units. A value that is not finite counts as infinitely bad.
+    fn value(&self, x: &[f64]) -> f64;
+
+    /// The cost with its derivatives at `x`; `None` if there are none.
+    fn derivatives(&self, _x: &[f64]) -> Option<Derivatives> {
+        None
+    }
+}
+
+/// Value, gradient and curvature of a cost at one point, from one evaluation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Derivatives {
+    /// The cost.
+    pub value: f64,
+    /// First derivatives, `[n]`.
+    pub gradient: Vec<f64>,
+    /// Second derivatives, `[n][n]`, or the Gauss-Newton part of them: it must be symmetric.
+    pub curvature: Vec<Vec<f64>>,
+}
+
+/// How a variable is scaled inside the solvers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scale {
+    /// The solver sees `ln x`: for times, rates and other positive numbers.
+    Logarithmic,
+    /// The solver sees `x / typical`.
+    Linear {
+        /// The size of a change that matters.
+        typical: f64,
+    },
+}
+
+/// A variable of the cost. `lower == upper` holds it there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Variable {
+    /// What reports call it.
+    pub name: String,
+    /// How solvers see it.
+    pub scale: Scale,
+    /// Smallest value allowed.
+    pub lower: f64,
+    /// Largest value allowed.
+    pub upper: f64,
+}
+
+impl Variable {
+    /// A positive variable, scaled by its logarithm.
+    pub fn logarithmic(name: impl Into<String>, lower: f64, upper: f64) -> Self {
+        Self { name: name.into(), scale: Scale::Logarithmic, lower, upper }
+    }
+
+    /// A variable of any sign for which a change of `typical` matters.
+    pub fn linear(name: impl Into<String>, typical: f64, lower: f64, upper: f64) -> Self {
+        Self { name: name.into(), scale: Scale::Linear { typical }, lower, upper }
+    }
+
+    /// The same variable, held at `value`.
+    #[must_use]
+    pub fn held_at(mut self, value: f64) -> Self {
+        (self.lower, self.upper) = (value, value);
+        self
+    }
+
+    pub(crate) fn is_held(&self) -> bool {
+        self.lower == self.upper
+    }
+
+    fn coordinate(&self, x: f64) -> f64 {
+        match self.scale {
+            Scale::Logarithmic => x.ln(),
+            Scale::Linear { typical } => x / typical,
+        }
+    }
+
+    fn value(&self, z: f64) -> f64 {
+        match self.scale {
+            Scale::Logarithmic => z.exp(),
+            Scale::Linear { typical } => z * typical,
+        }
+        // The way there and back may round past a bound.
+        .clamp(self.lower, self.upper)
+    }
+}
+
+/// Why a problem could not be set up.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum ProblemError {
+    #[error("the bounds of {name} must be finite and in order, got [{lower}, {upper}]")]
+    Bounds { name: String, lower: f64, upper: f64 },
+    #[error("{name} is scaled by its logarithm, so its bounds must be positive, got [{lower}, {upper}]")]
+    NotPositive { name: String, lower: f64, upper: f64 },
+    #[error("the typical change of {name} must be finite and positive, got {typical}")]
+    Typical { name: String, typical: f64 },
+    #[error("every variable is held: there is nothing to minimise over")]
+    NothingFree,
+    #[error("a start needs {expected} finite values, one for each variable, got {got:?}")]
+    Start { expected: usize, got: Vec<f64> },
+    #[error("at least one start is needed")]
+    NoStart,
+    #[error("there is no optimiser called \"{name}\"; there are {known}")]
+    UnknownOptimiser { name: String, known: String },
+}
+
+/// A cost with its variables.
+pub struct Problem<'a> {
+    cost: &'a dyn Cost,
+    variables: Vec<Variable>,
+    free: Vec<usize>,
+}
+
+impl<'a> Problem<'a> {
+    /// Minimise `cost` over `variables`, in the order in which the cost takes them.
+    ///
+    /// # Errors
+    /// [`ProblemError`] for bounds out of order, not finite, or not positive where they must be, and where no variable is
+    /// free.
+    pub fn new(cost: &'a dyn Cost, variables: Vec<Variable>) -> Result<Self, ProblemError> {
+        for v in &variables {
+            let Variable { name, lower, upper, .. } = v.clone();
+            if !(lower.is_finite() && upper.is_finite() && lower <= upper) {
+                return Err(ProblemError::Bounds { name, lower, upper });
+            }
+            match v.scale {
+                Scale::Logarithmic if lower <= 0.0 => return Err(ProblemError::NotPositive { name, lower, upper }),
+                Scale::Linear { typical } if !(typical.is_finite() && typical > 0.0) => {
+                    return Err(ProblemError::Typical { name, typical });
+                }
+                _ => {}
+            }
+        }
+        let free: Vec<usize> = (0..variables.len()).filter(|&i| !variables[i].is_held()).collect();
+        if free.is_empty() { Err(ProblemError::NothingFree) } else { Ok(Self { cost, variables, free }) }
+    }
+
+    /// The variables.
+    pub fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    /// Indices of the variables that are not held.
+    pub fn free(&self) -> &[usize] {
+        &self.free
+    }
+
+    /// `x`, moved inside the bounds, as coordinates of the free variables.
+    ///
+    /// # Errors
+    /// [`ProblemError::Start`] unless `x` has one finite value for each variable.
+    pub(crate) fn coordinates(&self, x: &[f64]) -> Result<Vec<f64>, ProblemError> {
+        if x.len() != self.variables.len() || !x.iter().all(|v| v.is_finite()) {
+            return Err(ProblemError::Start { expected: self.variables.len(), got: x.to_vec() });
+        }
+        Ok(self
+            .free
+            .iter()
+            .map(|&i| {
+                let v = &self.variables[i];
+                v.coordinate(x[i].clamp(v.lower, v.upper))
+            })
+            .collect())
+    }
+
+    /// Bounds of the free coordinates.
+    pub(crate) fn bounds(&self) -> Vec<(f64, f64)> {
+        self.free
+            .iter()
+            .map(|&i| {
+                let v = &self.variables[i];
+                (v.coordinate(v.lower), v.coordinate(v.upper))
+            })
+            .collect()
+    }
+
+    /// All variables, in their own units, at coordinates `z` (inside the bounds).
+    pub(crate) fn point(&self, z: &[f64]) -> Vec<f64> {
+        let mut x: Vec<f64> = self.variables.iter().map(|v| v.lower).collect();
+        for (&i, &z) in self.free.iter().zip(z) {
+            x[i] = self.variables[i].value(z);
+        }
+        x
+    }
+
+    pub(crate) fn value_at(&self, z: &[f64]) -> f64 {
+        let value = self.cost.value(&self.point(z));
+        if value.is_finite() { value } else { f64::INFINITY }
+    }
+
+    /// Derivatives with respect to the coordinates. `None` without derivatives, or where they are not finite.
+    pub(crate) fn derivatives_at(&self, z: &[f64]) -> Option<Derivatives> {
+        let x = self.point(z);
+        let full = self.cost.derivatives(&x)?;
+        // x = exp z has dx/dz = d²x/dz² = x; the second derivative enters through the gradient.
+        let (slope, bend): (Vec<f64>, Vec<f64>) = self
+            .free
+            .iter()
+            .map(|&i| match self.variables[i].scale {
+                Scale::Logarithmic => (x[i], x[i]),
+                Scale::Linear { typical } => (typical, 0.0),
+            })
+            .unzip();
+        let gradient: Vec<f64> = self.free.iter().zip(&slope).map(|(&i, s)| full.gradient[i] * s).collect();
+        let curvature = (0..self.free.len())
+            .map(|p| {
+                (0..self.free.len())
+                    .map(|q| {
+                        let own = if p == q { full.gradient[self.free[p]] * bend[p] } else { 0.0 };
+                        full.curvature[self.free[p]][self.free[q]] * slope[p] * slope[q] + own
+                    })
+                    .collect()
+            })
+            .collect();
+        let out = Derivatives { value: full.value, gradient, curvature };
+        let finite = out.value.is_finite()
+            && out.gradient.iter().chain(out.curvature.iter().flatten()).all(|v: &f64| v.is_finite());
+        finite.then_some(out)
+    }
+}

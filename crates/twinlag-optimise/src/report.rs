@@ -1,0 +1,70 @@
+//! How a fit ended. A fit that ran always returns a report, however badly it ended.
+
+use serde::{Deserialize, Serialize};
+
+/// How a fit ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum End {
+    /// A minimum inside all bounds: the solver stopped there, and gradient and curvature agree that it is one.
+    Converged,
+    /// The solver stopped by its own rule; the cost has no derivatives to check it with.
+    Unchecked,
+    /// The lowest point lies on a bound of these variables (by index): it is no estimate of them.
+    OnBound(Vec<usize>),
+    /// The solver claimed to be done, or could not go on, where the cost still falls or is flat.
+    Stalled(String),
+    /// Iterations or evaluations ran out.
+    LimitReached,
+}
+
+impl End {
+    /// Whether the point may be reported as an estimate.
+    pub fn is_usable(&self) -> bool {
+        matches!(self, Self::Converged | Self::Unchecked)
+    }
+}
+
+/// Work done by a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Evaluations {
+    /// Calls for the value alone.
+    pub values: u64,
+    /// Calls for value, gradient and curvature.
+    pub derivatives: u64,
+}
+
+/// How much work a fit may do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Budget {
+    /// Solver iterations.
+    pub iterations: u64,
+    /// Evaluations of the cost, of either kind.
+    pub evaluations: u64,
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { iterations: 500, evaluations: 5_000 }
+    }
+}
+
+/// One fit from one start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// Name of the solver.
+    pub optimiser: String,
+    /// Where it started.
+    pub start: Vec<f64>,
+    /// The best point seen, all variables, in their own units.
+    pub x: Vec<f64>,
+    /// The cost there.
+    pub value: f64,
+    /// How it ended.
+    pub end: End,
+    /// Iterations of the solver.
+    pub iterations: u64,
+    /// Evaluations of the cost.
+    pub evaluations: Evaluations,
+}

@@ -1,0 +1,166 @@
+//! The gas temperature: the `[gas]` table. Each kind of signal has its own file.
+
+mod broadband;
+mod engine;
+mod plunge;
+mod series;
+mod tones;
+mod turbulence;
+
+use std::path::Path;
+
+use rand::Rng;
+use serde::{Deserialize, Serialize};
+
+use crate::check::{finite, path};
+use crate::grid::Grid;
+use crate::{Record, SignalError};
+
+pub use broadband::Broadband;
+pub use engine::Engine;
+pub use plunge::Plunge;
+pub use series::Series;
+pub use tones::{MultiTone, Tone};
+pub use turbulence::Turbulence;
+
+/// The gas that both sensors see: a mean and a signal about it.
+///
+/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Gas::new`]; fields may be added.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Gas {
+    /// Mean temperature, °C, about which the signal moves; added to a series. 0 if left out.
+    #[serde(default)]
+    pub mean_c: f64,
+    /// What happens between the samples.
+    #[serde(default)]
+    pub hold: Hold,
+    /// Whether every trial has its own signal; otherwise all have that of trial 0, and differ by their noise alone.
+    #[serde(default)]
+    pub per_trial: bool,
+    /// The signal, named by `kind` in a rig file; its fields stand beside those above.
+    // Unknown fields land here, and each kind refuses them: `deny_unknown_fields` and `flatten` exclude each other.
+    #[serde(flatten)]
+    pub signal: Signal,
+}
+
+/// What the gas does between two sample instants.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hold {
+    /// It goes on as the signal does.
+    #[default]
+    Continuous,
+    /// It keeps the value of the sample instant until the next (zero-order hold), so that the discrete model
+    /// `y[k+1] = a y[k] + (1 − a) x[k]`, `a = exp(−Ts/τ)`, of a first-order sensor is exact.
+    ZeroOrder,
+}
+
+/// A gas signal. In a rig file `kind` is the variant's name: `sine`, `multi-tone`, `engine`, `turbulence`, `plunge`,
+/// `broadband` or `series`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Signal {
+    /// One sine.
+    Sine(Tone),
+    /// A sum of sines.
+    MultiTone(MultiTone),
+    /// Pulsation of an engine's exhaust.
+    Engine(Engine),
+    /// Turbulence with a Kolmogorov range.
+    Turbulence(Turbulence),
+    /// Smoothed random steps, as of a probe plunged from one bath into another.
+    Plunge(Plunge),
+    /// First-order random noise.
+    Broadband(Broadband),
+    /// A given series.
+    Series(Series),
+}
+
+impl Gas {
+    /// A continuous gas with one signal for all trials.
+    pub fn new(mean_c: f64, signal: Signal) -> Self {
+        Self { mean_c, hold: Hold::Continuous, per_trial: false, signal }
+    }
+
+    pub(crate) fn check(&self, record: &Record) -> Result<(), SignalError> {
+        let within = "gas";
+        finite(within, "mean_c", self.mean_c)?;
+        // A held gas is taken at the sample instants alone: nothing happens between them that a step could miss.
+        let resolution = Resolution { record: (self.hold == Hold::Continuous).then_some(record) };
+        match &self.signal {
+            Signal::Sine(tone) => tone.check(within, resolution),
+            Signal::MultiTone(tones) => tones.check(within, resolution),
+            Signal::Engine(engine) => engine.check(within, resolution),
+            Signal::Turbulence(turbulence) => turbulence.check(within, resolution, record),
+            Signal::Plunge(plunge) => plunge.check(within, resolution),
+            Signal::Broadband(broadband) => broadband.check(within, resolution),
+            Signal::Series(series) => series.check(within),
+        }
+    }
+}
+
+/// Whether the integration step follows a signal: ten steps per period at least, where the rule's error is
+/// `(2π/10)⁴/2880` of the amplitude or 5e-5.
+#[derive(Clone, Copy)]
+struct Resolution<'a> {
+    record: Option<&'a Record>,
+}
+
+impl Resolution<'_> {
+    const STEPS_PER_PERIOD: f64 = 10.0;
+
+    /// Refuses `frequency_hz` if it is too fast, naming the field `name`, whose own value is `value`.
+    fn check(self, within: &str, name: &str, value: f64, frequency_hz: f64) -> Result<(), SignalError> {
+        let Some(record) = self.record else { return Ok(()) };
+        let step_s = record.step_s();
+        // A hair of tolerance: the number that the message asks for must pass.
+        if Self::STEPS_PER_PERIOD * frequency_hz * step_s <= 1.0 + 1e-9 {
+            return Ok(());
+        }
+        let oversampling = (Self::STEPS_PER_PERIOD * frequency_hz * record.sample_period_s).ceil();
+        Err(SignalError::NotResolved { field: path(within, name), value, step_s, oversampling })
+    }
+
+    /// The same for a raised-cosine rise of `rise_s`, which is half a period.
+    fn check_rise(self, within: &str, name: &str, value: f64, rise_s: f64) -> Result<(), SignalError> {
+        self.check(within, name, value, 0.5 / rise_s)
+    }
+}
+
+/// Half a raised cosine: 0 at 0, 1 at 1, level at both.
+fn smooth_step(u: f64) -> f64 {
+    0.5 * (1.0 - (std::f64::consts::PI * u).cos())
+}
+
+/// The gas temperature on its grid.
+pub(crate) struct GasPath {
+    pub(crate) grid: Grid,
+    pub(crate) hold: Hold,
+    /// °C, one per grid point.
+    pub(crate) values_c: Vec<f64>,
+}
+
+impl GasPath {
+    pub(crate) fn new(gas: &Gas, grid: Grid, base_dir: &Path, rng: &mut impl Rng) -> Result<Self, SignalError> {
+        let mut values_c = match &gas.signal {
+            Signal::Sine(tone) => tone.values_k(grid),
+            Signal::MultiTone(tones) => tones.values_k(grid),
+            Signal::Engine(engine) => engine.values_k(grid, rng),
+            Signal::Turbulence(turbulence) => turbulence.values_k(grid, rng),
+            Signal::Plunge(plunge) => plunge.values_k(grid, rng),
+            Signal::Broadband(broadband) => broadband.values_k(grid, rng),
+            Signal::Series(series) => series.values_c(grid, base_dir)?,
+        };
+        for value_c in &mut values_c {
+            *value_c += gas.mean_c;
+        }
+        Ok(Self { grid, hold: gas.hold, values_c })
+    }
+
+    /// The values at the sample instants from time zero on, °C.
+    pub(crate) fn at_samples(&self) -> impl Iterator<Item = f64> {
+        self.values_c[self.grid.before..].iter().copied().step_by(self.grid.per_sample)
+    }
+}
