@@ -6,6 +6,7 @@
 
 use twinlag_cross_relation::{CostValue, CrossRelation};
 
+use crate::covariance::covariance;
 use crate::error::NoiseError;
 use crate::noise_gain::Noise;
 
@@ -43,6 +44,46 @@ impl<'a> Compensated<'a> {
             }
         }
         out
+    }
+}
+
+/// Covariance `[P][P]` of the minimum `theta` of the *plain* cross-relation cost under white noise of `noise_std` `[s1, s2]`
+/// (K), zero for parameters not in `free`; `None` where `theta` is no minimum. It says how the estimate scatters, not how
+/// far it is off.
+pub fn plain_covariance<const P: usize>(
+    cost: &CrossRelation<'_>,
+    theta: &[f64; P],
+    free: &[usize],
+    noise_std: [f64; 2],
+) -> Option<[[f64; P]; P]> {
+    covariance(cost, &cost.evaluate(theta), 1.0, theta, free, noise_std, &[0.0; P])
+}
+
+impl Compensated<'_> {
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
+    /// in `free`; `None` where `theta` is no minimum.
+    pub fn covariance<const P: usize>(
+        &self,
+        theta: &[f64; P],
+        free: &[usize],
+        noise_std: [f64; 2],
+    ) -> Option<[[f64; P]; P]> {
+        covariance(&self.cost, &self.evaluate(theta), 1.0, theta, free, noise_std, &[0.0; P])
+    }
+}
+
+impl Normalised<'_> {
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
+    /// in `free`; `None` where `theta` is no minimum.
+    pub fn covariance<const P: usize>(
+        &self,
+        theta: &[f64; P],
+        free: &[usize],
+        noise_std: [f64; 2],
+    ) -> Option<[[f64; P]; P]> {
+        let below = added_by_noise(&self.noise, theta, self.cost.period_s());
+        let pull = below.gradient.map(|g| 0.5 * g / below.value);
+        covariance(&self.cost, &self.evaluate(theta), below.value, theta, free, noise_std, &pull)
     }
 }
 

@@ -22,11 +22,12 @@
 //! ```
 
 mod compensated;
+mod covariance;
 mod error;
 mod levels;
 mod noise_gain;
 
-pub use compensated::{Compensated, Normalised};
+pub use compensated::{Compensated, Normalised, plain_covariance};
 pub use error::NoiseError;
 pub use levels::{NoiseLevel, estimate_noise};
 pub use noise_gain::Noise;

@@ -67,7 +67,7 @@ fn derivatives_agree_with_a_public_checker() {
 fn compensation_makes_the_cost_unbiased() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let std_k = [0.5, 0.3];
-    let at = [0.03, 0.1];
+    let at = TAU_S;
     let (n, trials) = (700, 400);
     let without = {
         let readings = Readings::even(&clean(n, TAU_S[0]), &clean(n, TAU_S[1]), PERIOD_S).expect("valid");

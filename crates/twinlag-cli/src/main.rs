@@ -1,2 +1,36 @@
-//! The twinlag program.
-fn main() {}
+//! The `twinlag` program: two temperature sensors' dynamics from their readings alone.
+//!
+//! The program is a thin face of the crate `twinlag`: it reads arguments, shows progress, prints answers. Data go to standard
+//! output, talk to standard error. Exit codes: 0 answered; 2 wrong usage; 3 the file cannot be used; 4 the data were read
+//! but the question cannot be answered (the answer, printed all the same, has a `status` that says why); 1 anything else.
+
+mod arguments;
+mod characterise;
+mod demo;
+mod failure;
+mod print;
+mod progress;
+mod simulate;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::arguments::{Arguments, Command};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let talk = arguments.talk();
+    let result = match arguments.command {
+        Command::Characterise(command) => characterise::run(&command, talk),
+        Command::Simulate(command) => simulate::run(&command, talk),
+        Command::Demo(command) => demo::run(&command, talk),
+    };
+    match result {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            eprintln!("twinlag: {failure}");
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

@@ -1,20 +1,50 @@
-//! wip
+//! How badly two temperature sensors disagree about the gas that both were in.
+//!
+//! For anyone who wants the costs alone, to minimise with an optimiser of their own: the published cross-relation cost with
+//! gradient and Hessian, and the exactly whitened one, the residual it leaves, and the covariance of what it estimates. The
+//! crate knows no optimiser and no files. To take the noise's bias out of the published cost see `twinlag-bias`; for whole
+//! records take `twinlag`.
+//!
+//! ```
+//! use twinlag_cross_relation::{CrossRelation, Readings, Whitened};
+//! use twinlag_sensor::{Discretisation, FirstOrder};
+//!
+//! // Two sensors in the same fluctuating gas, 500 samples a second.
+//! let gas: Vec<f64> = (0..2000).map(|k| 300.0 + 20.0 * (0.13 * k as f64).sin() + 8.0 * (0.037 * k as f64).cos()).collect();
+//! let y1 = FirstOrder::new(0.0238, 0.002)?.respond(&gas);
+//! let y2 = FirstOrder::new(0.1168, 0.002)?.respond(&gas);
+//! let readings = Readings::even(&y1, &y2, 0.002)?;
+//!
+//! // Both costs vanish at the true time constants, and nowhere near.
+//! let published = CrossRelation::new(&readings, 600)?;
+//! assert!(published.evaluate(&[0.0238, 0.1168]).value < 1e-6);
+//! assert!(published.evaluate(&[0.03, 0.1]).value > 1e-2);
+//!
+//! let whitened = Whitened::new(&readings, Discretisation::ZeroOrderHold, [0.1, 0.1])?;
+//! assert!(whitened.evaluate(&[0.0238, 0.1168]).value < 1e-12);
+//! assert!(whitened.evaluate(&[0.03, 0.1]).value > 1e2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod banded;
 mod difference_equation;
 mod error;
 mod free_gains;
+mod information;
 mod inverse;
 mod parameters;
 mod published;
 mod readings;
+mod residual;
 mod spectral;
 mod whitened;
 
 pub use difference_equation::difference_equation_least_squares;
 pub use error::CostError;
 pub use free_gains::FreeGains;
+pub use information::Middle;
 pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
+pub use residual::{ResidualTest, residual_tests};
 pub use whitened::{Form, Whitened};

@@ -125,7 +125,6 @@ fn whitened_value_and_gradient_agree_on_uneven_samples_with_a_gap() {
     check("whitened, uneven", false, |t: &[f64; 4]| cost.evaluate(t));
 }
 
-/// The Gauss-Newton matrix is `2 Σ ∂r ∂r'` of the residual in time, whatever form summed it.
 #[test]
 fn both_forms_are_equal_to_rounding() {
     let (y1, y2) = channels(700);
@@ -144,10 +143,6 @@ fn both_forms_are_equal_to_rounding() {
             for i in 0..4 {
                 let size = (b.hessian[i][i] * b.value).sqrt();
                 assert!((a.gradient[i] - b.gradient[i]).abs() < tol * size, "{hold:?}, gradient {i}");
-                let trace = (b.hessian[i][i], a.hessian[i][i]);
-                // The two residuals are rotations of each other that depend on θ, so only the gradient must agree, and
-                // the Gauss-Newton matrices to the size of the residual's own share.
-                assert!(trace.0 > 0.0 && trace.1 > 0.0);
             }
         }
     }

@@ -1,0 +1,47 @@
+//! `twinlag demo`: a record of an embedded rig, and what can be told of it.
+
+use twinlag::Options;
+use twinlag::record::{Channels, Record, SamplingChoice};
+use twinlag::signal::Rig;
+
+use crate::arguments::{Demo, Talk};
+use crate::characterise::{characterise, exit_code};
+use crate::failure::Failure;
+use crate::print;
+
+const RIG: &str = include_str!("demo.toml");
+
+pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
+    let mut rig: Rig = toml::from_str(RIG).expect("the embedded rig is valid");
+    if let Some(seed) = command.seed {
+        rig = rig.with_seed(seed);
+    }
+    let simulated = rig.simulate().map_err(twinlag::Error::from)?;
+    let channels = Channels {
+        source: "the embedded rig".into(),
+        names: simulated.channels,
+        time_s: simulated.time_s,
+        t1_c: simulated.t1_c,
+        t2_c: simulated.t2_c,
+        reference_c: Some(simulated.gas_c),
+    };
+    let record = Record::from_channels(channels, SamplingChoice::Auto)?;
+    if !talk.json && !talk.quiet {
+        eprintln!("# the rig: two thermocouples in an engine's exhaust; the estimator is told none of this");
+        RIG.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).for_each(|l| eprintln!("#   {l}"));
+    }
+    let answer = characterise(&record, &Options::default(), talk)?;
+    print::characterisation(&answer, talk)?;
+    if !talk.json {
+        println!();
+        for (sensor, truth) in answer.sensors.iter().zip(rig.sensors()) {
+            let inside = match sensor.interval_95_s {
+                Some([low, high]) if (low..=high).contains(&truth.time_constant_s) => "inside the interval",
+                Some(_) => "outside the interval, as one in twenty is",
+                None => "not determined",
+            };
+            println!("truth: {} {} s, {inside}", sensor.channel, truth.time_constant_s);
+        }
+    }
+    Ok(exit_code(answer.status))
+}

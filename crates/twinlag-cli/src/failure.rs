@@ -1,0 +1,53 @@
+//! What can go wrong, as an exit code.
+
+use std::fmt;
+
+use twinlag::record::RecordError;
+
+/// An error with the exit code that it means.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    Usage(String),
+    File(String),
+    Other(String),
+}
+
+impl Failure {
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::File(_) => 3,
+            Self::Other(_) => 1,
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Usage(text) | Self::File(text) | Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl From<twinlag::Error> for Failure {
+    fn from(error: twinlag::Error) -> Self {
+        match error {
+            twinlag::Error::Record(error) => error.into(),
+            error if error.is_usage() => Self::Usage(error.to_string()),
+            error => Self::File(error.to_string()),
+        }
+    }
+}
+
+impl From<RecordError> for Failure {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::CannotWrite { .. } => Self::Other(error.to_string()),
+            RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {
+                Self::Usage(error.to_string())
+            }
+            _ => Self::File(error.to_string()),
+        }
+    }
+}

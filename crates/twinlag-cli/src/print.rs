@@ -1,0 +1,112 @@
+//! Answers for people and for scripts.
+
+use std::io::{Write, stdout};
+
+use serde::Serialize;
+use twinlag::record::Record;
+use twinlag::{Characterisation, IntervalMethod, SensorEstimate, Status};
+
+use crate::arguments::Talk;
+use crate::failure::Failure;
+
+/// Exactly one JSON object on standard output.
+pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Other(format!("the answer has no JSON: {e}")))?;
+    writeln!(stdout(), "{text}").map_err(|e| Failure::Other(format!("standard output: {e}")))
+}
+
+/// How the file was understood, on standard error.
+pub(crate) fn notes(record: &Record, talk: Talk) {
+    if !talk.quiet {
+        record.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    }
+}
+
+/// The answer, as text or as JSON.
+pub(crate) fn characterisation(answer: &Characterisation, talk: Talk) -> Result<(), Failure> {
+    if talk.json {
+        return json(answer);
+    }
+    let text = text(answer);
+    stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
+}
+
+fn text(answer: &Characterisation) -> String {
+    let mut lines = Vec::new();
+    let record = &answer.record;
+    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
+    lines.push(format!("{} estimate, {}, {}", answer.estimator, answer.optimiser, answer.hold));
+    lines.push(String::new());
+    let width = answer.sensors.iter().map(|s| s.channel.chars().count()).max().unwrap_or(0);
+    for sensor in &answer.sensors {
+        lines.push(format!("  {:width$}  time constant {}", sensor.channel, time_constant(sensor)));
+        lines.push(format!("  {:width$}  noise {} K", "", digits(sensor.noise_std_k, 3)));
+    }
+    let difference = &answer.time_constant_difference_s;
+    if let (Some(value), Some([low, high])) = (difference.value, difference.interval_95_s) {
+        let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
+        lines.push(format!("  {a} slower than {b} by {}", interval(value, low, high, " s")));
+    }
+    for (name, estimate, unit) in
+        [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")]
+    {
+        if let Some(e) = estimate {
+            let channel = &answer.sensors[1].channel;
+            lines.push(format!("  {channel}: {name} {}", interval(e.value, e.interval_95[0], e.interval_95[1], unit)));
+        }
+    }
+    lines.push(String::new());
+    let white = if answer.residual.white { "white" } else { "not white" };
+    lines.push(format!("residual: {} times the energy of the noise, {white}", digits(answer.residual.chi2_per_dof, 4)));
+    for test in &answer.residual.tests {
+        lines.push(format!("  {:12} statistic {:>9}  p = {:.2e}", test.test, digits(test.statistic, 4), test.p_value));
+    }
+    let method = match answer.interval_method {
+        IntervalMethod::Information => "95 % intervals from the noise levels",
+        IntervalMethod::ResidualSpectrum => "95 % intervals from the spectrum of the residual",
+        IntervalMethod::Profile => "95 % intervals over all that the record allows",
+        IntervalMethod::None => "no intervals",
+    };
+    lines.push(method.into());
+    lines.push(format!("status: {}", status(answer.status)));
+    if !answer.not_identifiable.is_empty() {
+        lines.push(format!("this record cannot tell: {}", answer.not_identifiable.join(", ")));
+    }
+    lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+fn status(status: Status) -> &'static str {
+    match status {
+        Status::Ok => "ok",
+        Status::AtBound => "at-bound",
+        Status::NotIdentifiable => "not-identifiable",
+        Status::ModelRejected => "model-rejected",
+        _ => "unknown",
+    }
+}
+
+fn time_constant(sensor: &SensorEstimate) -> String {
+    match (sensor.time_constant_s, sensor.interval_95_s) {
+        (Some(value), Some([low, high])) => interval(value, low, high, " s"),
+        (Some(value), None) if sensor.known => format!("{} s (given)", digits(value, 5)),
+        _ => "not determined by this record".into(),
+    }
+}
+
+fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
+    // Enough digits for the interval to be seen: two more than its width has.
+    let width = (high - low).abs();
+    let decimals = if width > 0.0 { (2.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 };
+    format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}]")
+}
+
+/// `value` to `significant` digits, without an exponent.
+fn digits(value: f64, significant: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = (f64::from(significant - 1) - value.abs().log10().floor()).clamp(0.0, 15.0) as usize;
+    format!("{value:.decimals$}")
+}

@@ -1,0 +1,71 @@
+//! `twinlag simulate SPEC.toml --out OUT.csv`.
+
+use std::fs::File;
+use std::io::{BufWriter, Write, stdout};
+use std::path::Path;
+
+use serde_json::json;
+use twinlag::record::{Decimals, write_csv};
+use twinlag::signal::{Rig, Simulated};
+
+use crate::arguments::{Simulate, Talk};
+use crate::failure::Failure;
+use crate::print;
+use crate::progress::Progress;
+
+pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
+    let to_stdout = command.out == Path::new("-");
+    if to_stdout && talk.json {
+        return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
+    }
+    let mut rig = read(&command.spec)?;
+    if let Some(seed) = command.seed {
+        rig = rig.with_seed(seed);
+    }
+    let record = {
+        let _progress = Progress::start(talk, format!("simulating {} samples", rig.record().samples));
+        rig.simulate().map_err(twinlag::Error::from)?
+    };
+    if to_stdout {
+        write(&mut stdout().lock(), &record)?;
+    } else {
+        let mut open = File::options();
+        let open = if command.force { open.create(true).truncate(true) } else { open.create_new(true) };
+        let out = command.out.display();
+        let file = open.write(true).open(&command.out).map_err(|error| match error.kind() {
+            std::io::ErrorKind::AlreadyExists => {
+                Failure::Usage(format!("{out}: exists already; name another file, or overwrite it with --force"))
+            }
+            _ => Failure::Other(format!("{out}: cannot be written: {error}")),
+        })?;
+        write(&mut BufWriter::new(file), &record)?;
+    }
+    if talk.json {
+        print::json(&json!({
+            "schema": "twinlag.simulation/1",
+            "out": command.out,
+            "samples": record.time_s.len(),
+            "channels": record.channels,
+            "rig": rig,
+            "made_by": {"program": "twinlag", "version": env!("CARGO_PKG_VERSION")},
+        }))?;
+    } else if !to_stdout && !talk.quiet {
+        eprintln!("{}: {} samples, {} s apart", command.out.display(), record.time_s.len(), rig.record().sample_period_s);
+    }
+    Ok(0)
+}
+
+/// The rig in `spec`, relative paths in it taken from where it lies.
+fn read(spec: &Path) -> Result<Rig, Failure> {
+    let name = spec.display();
+    let text = std::fs::read_to_string(spec).map_err(|error| Failure::File(format!("{name}: cannot be read: {error}")))?;
+    let rig: Rig = toml::from_str(&text).map_err(|error| Failure::File(format!("{name}: {error}")))?;
+    Ok(rig.with_base_dir(spec.parent().unwrap_or(Path::new(""))))
+}
+
+fn write(out: &mut impl Write, record: &Simulated) -> Result<(), Failure> {
+    let columns: [(&str, &[f64]); 4] =
+        [("time_s", &record.time_s), ("T1", &record.t1_c), ("T2", &record.t2_c), ("Tref", &record.gas_c)];
+    write_csv(out, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+    Ok(())
+}

@@ -1,0 +1,169 @@
+//! How well the record determines the parameters: the covariance of the whitened estimate.
+//!
+//! `Cov = A⁻¹ M A⁻¹`. `A` is half the Hessian of the sum of squares: what the *signal* says about the parameters. `M` is the
+//! variance of half the gradient at the truth, and there are two ways to it:
+//!
+//! - If the residual is white, `M = A + E`, where `E` is what noise multiplied by noise adds:
+//!   `E_ij = Σ_w s1² s2² Re(D_i D_j*)/λ²`, `D_i = ∂_i P Q − ∂_i Q P`, with `P`, `Q` the filters on the two channels in `u`
+//!   and `λ = s1² |P|² + s2² |Q|²`. Negligible at low noise; without it intervals are too short at high noise.
+//! - If it is not, because the model lacks something, `M = Σ_w S_w d_w d_w'` with `S` the smoothed spectrum of the residual
+//!   itself and `d` the transform of its derivatives: the noise that there is, not the noise that was assumed.
+//!
+//! Derivation: docs, chapter "Theory", section 6.
+
+use nalgebra::{Complex, DMatrix};
+use rustdct::DctPlanner;
+
+use crate::inverse::{WIDEST, row};
+use crate::parameters::{Pair, parts};
+use crate::whitened::Whitened;
+
+/// What the variance of the gradient is taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Middle {
+    /// White noise of the stated levels, the noise-noise term included.
+    WhiteNoise,
+    /// The residual's own smoothed spectrum, for records in which model error is not small against noise.
+    ResidualSpectrum,
+}
+
+impl Whitened<'_> {
+    /// Half the Hessian of the sum of squares at `theta`, `[P][P]`.
+    ///
+    /// Central differences of the exact gradient, over a tenth of a standard error each way. Unlike the Gauss-Newton matrix
+    /// it does not count noise as signal. Not positive definite where `theta` is no minimum.
+    pub fn observed_information<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
+        let normal = self.evaluate(theta).hessian;
+        let mut half = [[0.0; P]; P];
+        for i in 0..P {
+            let scale = if i < 2 { 0.05 * theta[i] } else { f64::INFINITY };
+            let step = (0.1 / (0.5 * normal[i][i]).sqrt()).min(scale);
+            let slope = |sign: f64| {
+                let mut moved = *theta;
+                moved[i] += sign * step;
+                self.evaluate(&moved).gradient
+            };
+            let (up, down) = (slope(1.0), slope(-1.0));
+            half[i] = std::array::from_fn(|j| 0.25 * (up[j] - down[j]) / step);
+        }
+        std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (half[i][j] + half[j][i])))
+    }
+
+    /// Covariance of the parameters at the minimum `theta`, `[P][P]`, zero for those not in `free`.
+    ///
+    /// - `free`: indices of the parameters that were fitted
+    /// - `prior_std`: for each parameter, the standard deviation of independent prior knowledge, infinite without any
+    ///
+    /// `None` if the information matrix of the free parameters is not positive definite: the record does not determine
+    /// them.
+    pub fn covariance<const P: usize>(
+        &self,
+        theta: &[f64; P],
+        free: &[usize],
+        prior_std: &[f64; P],
+        middle: Middle,
+    ) -> Option<[[f64; P]; P]> {
+        let full = self.observed_information(theta);
+        let score = match middle {
+            Middle::WhiteNoise => {
+                let noise = self.noise_noise(theta);
+                std::array::from_fn(|i| std::array::from_fn(|j| full[i][j] + noise[i][j]))
+            }
+            Middle::ResidualSpectrum => self.score_variance(theta),
+        };
+        let reduced = |m: &[[f64; P]; P]| {
+            DMatrix::from_fn(free.len(), free.len(), |p, q| {
+                let own = if p == q { prior_std[free[p]].powi(-2) } else { 0.0 };
+                m[free[p]][free[q]] + own
+            })
+        };
+        // The parameters differ by orders of magnitude: scaled to unit diagonal before anything is judged singular.
+        let (a, m) = (reduced(&full), reduced(&score));
+        let scale: Vec<f64> = (0..free.len()).map(|i| a[(i, i)].sqrt()).collect();
+        if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
+            return None;
+        }
+        let scaled =
+            |x: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, j| x[(i, j)] / (scale[i] * scale[j]));
+        let inverse = scaled(&a).cholesky()?.inverse();
+        let covariance = &inverse * scaled(&m) * &inverse;
+        let mut out = [[0.0; P]; P];
+        for (p, &i) in free.iter().enumerate() {
+            for (q, &j) in free.iter().enumerate() {
+                out[i][j] = covariance[(p, q)] / (scale[p] * scale[q]);
+            }
+        }
+        (0..free.len()).all(|p| covariance[(p, p)].is_finite() && covariance[(p, p)] > 0.0).then_some(out)
+    }
+
+    /// The noise-noise term `E`; uneven steps are taken at their mean.
+    fn noise_noise<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
+        let row = row(self.hold(), &Pair::<num_dual::DualSVec64<P>>::variables(theta), self.readings().mean_step_s());
+        let [c1, c2] = [row.c1, row.c2].map(|c| c.map(parts));
+        let [v1, v2] = self.noise_std().map(|s| s * s);
+        let mut out = [[0.0; P]; P];
+        for segment in self.readings().segments() {
+            let n = segment.len() - 1;
+            for bin in 1..=n {
+                let w = std::f64::consts::PI * bin as f64 / (n + 1) as f64;
+                let turn: [Complex<f64>; WIDEST] = std::array::from_fn(|k| Complex::from_polar(1.0, w * k as f64));
+                let at = |c: &[(f64, [f64; P]); WIDEST]| {
+                    let value: Complex<f64> = (0..WIDEST).map(|k| turn[k] * c[k].0).sum();
+                    let slopes: [Complex<f64>; P] =
+                        std::array::from_fn(|i| (0..WIDEST).map(|k| turn[k] * c[k].1[i]).sum());
+                    (value, slopes)
+                };
+                let ((p, dp), (q, dq)) = (at(&c1), at(&c2));
+                let lambda = v1 * p.norm_sqr() + v2 * q.norm_sqr();
+                let d: [Complex<f64>; P] = std::array::from_fn(|i| dp[i] * q - dq[i] * p);
+                let weight = v1 * v2 / (lambda * lambda);
+                for i in 0..P {
+                    for j in 0..P {
+                        out[i][j] += weight * (d[i] * d[j].conj()).re;
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// `Σ_w S_w d_w d_w'` over the sine transform of the residual in time and of its derivatives.
+    fn score_variance<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
+        let mut planner = DctPlanner::new();
+        let mut out = [[0.0; P]; P];
+        for segment in self.jacobian(theta) {
+            let n = segment.len();
+            if n == 0 {
+                continue;
+            }
+            let plan = planner.plan_dst1(n);
+            let scale = (2.0 / (n + 1) as f64).sqrt();
+            let transform = |mut x: Vec<f64>| {
+                plan.process_dst1(&mut x);
+                x.iter_mut().for_each(|v| *v *= scale);
+                x
+            };
+            let spectrum = smoothed(&transform(segment.iter().map(|s| s.0).collect()));
+            let slopes: [Vec<f64>; P] = std::array::from_fn(|i| transform(segment.iter().map(|s| s.1[i]).collect()));
+            for i in 0..P {
+                for j in 0..P {
+                    out[i][j] += (0..n).map(|k| spectrum[k] * slopes[i][k] * slopes[j][k]).sum::<f64>();
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Mean square of `bins` in windows that widen with frequency: from 0.7 to 1.4 times it, a few bins at least.
+fn smoothed(bins: &[f64]) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    bins.iter().for_each(|b| sums.push(sums[sums.len() - 1] + b * b));
+    (0..bins.len())
+        .map(|k| {
+            let low = (0.7 * k as f64 - 3.0).max(0.0) as usize;
+            let high = ((1.4 * k as f64) as usize + 5).min(bins.len());
+            (sums[high] - sums[low]) / (high - low) as f64
+        })
+        .collect()
+}

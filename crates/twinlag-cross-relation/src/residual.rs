@@ -1,0 +1,175 @@
+//! Whether anything is left in the whitened residual that noise would not leave.
+
+use rustdct::DctPlanner;
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+/// One test of the residual against white noise of unit variance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResidualTest {
+    /// What was tested: `total-energy`, `band-energy` or `whiteness`.
+    pub test: String,
+    /// The statistic.
+    pub statistic: f64,
+    /// Its degrees of freedom, where it has any.
+    pub degrees_of_freedom: Option<f64>,
+    /// Probability of a statistic at least as extreme if the model is right.
+    pub p_value: f64,
+}
+
+/// Tests of a whitened residual, `segments` in order of time.
+///
+/// - `fitted`: number of parameters fitted to it
+/// - `level_std`: relative standard deviation of the noise *variance* that the whitening assumed: 0 where it is known
+///
+/// `total-energy`: `Σ r²` over its degrees of freedom, two-sided, as a normal deviate `(χ²/dof − 1)/√(2/dof + level²)`.
+/// `band-energy`: the bin energies of the sine transform in bands of a third of an octave and at least 8 bins, relative to
+/// their mean; the largest deviate of any band (Wilson-Hilferty), its p-value for that many bands (Šidák).
+/// `whiteness`: Ljung-Box statistic of the first 20 autocorrelations, chi-square distributed.
+///
+/// # Source
+/// Ljung and Box 1978; Wilson and Hilferty 1931.
+pub fn residual_tests(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Vec<ResidualTest> {
+    let count: usize = segments.iter().map(Vec::len).sum();
+    let energy: f64 = segments.iter().flatten().map(|r| r * r).sum();
+    let mut tests = Vec::new();
+    if count > fitted {
+        let dof = (count - fitted) as f64;
+        let deviate = (energy / dof - 1.0) / (2.0 / dof + level_std * level_std).sqrt();
+        tests.push(ResidualTest {
+            test: "total-energy".into(),
+            statistic: energy / dof,
+            degrees_of_freedom: Some(dof),
+            p_value: two_sided(deviate),
+        });
+    }
+    tests.extend(band_energy(segments));
+    tests.extend(whiteness(segments));
+    tests
+}
+
+fn two_sided(deviate: f64) -> f64 {
+    let normal = Normal::new(0.0, 1.0).expect("the standard normal exists");
+    2.0 * normal.sf(deviate.abs())
+}
+
+fn band_energy(segments: &[Vec<f64>]) -> Option<ResidualTest> {
+    // Bins of all segments by frequency in cycles per sample.
+    let mut planner = DctPlanner::new();
+    let mut bins: Vec<(f64, f64)> = Vec::new();
+    for r in segments.iter().filter(|r| !r.is_empty()) {
+        let n = r.len();
+        let mut spectrum = r.clone();
+        planner.plan_dst1(n).process_dst1(&mut spectrum);
+        let scale = 2.0 / (n + 1) as f64;
+        bins.extend(spectrum.iter().enumerate().map(|(j, v)| (0.5 * (j + 1) as f64 / (n + 1) as f64, scale * v * v)));
+    }
+    bins.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mean = bins.iter().map(|b| b.1).sum::<f64>() / bins.len() as f64;
+    if bins.len() < 24 || mean <= 0.0 {
+        return None;
+    }
+    let mut bands: Vec<&[(f64, f64)]> = Vec::new();
+    let mut from = 0;
+    while from < bins.len() {
+        let edge = bins[from].0 * 2.0_f64.powf(1.0 / 3.0);
+        let mut to = bins.partition_point(|b| b.0 <= edge).max(from + 8).min(bins.len());
+        if bins.len() - to < 8 {
+            to = bins.len();
+        }
+        bands.push(&bins[from..to]);
+        from = to;
+    }
+    let worst = bands
+        .iter()
+        .map(|band| {
+            let k = band.len() as f64;
+            // The mean is taken from all bins, this band's share among them.
+            let k = k / (1.0 - k / bins.len() as f64).max(1e-6);
+            let ratio = band.iter().map(|b| b.1).sum::<f64>() / (band.len() as f64 * mean);
+            ((ratio.cbrt() - (1.0 - 2.0 / (9.0 * k))) / (2.0 / (9.0 * k)).sqrt()).abs()
+        })
+        .fold(0.0, f64::max);
+    let of_one: f64 = two_sided(worst);
+    let p_value = -((bands.len() as f64) * (-of_one).ln_1p()).exp_m1();
+    Some(ResidualTest {
+        test: "band-energy".into(),
+        statistic: worst,
+        degrees_of_freedom: Some(bands.len() as f64),
+        p_value,
+    })
+}
+
+fn whiteness(segments: &[Vec<f64>]) -> Option<ResidualTest> {
+    let count: usize = segments.iter().map(Vec::len).sum();
+    let lags = 20.min(count / 5);
+    let energy: f64 = segments.iter().flatten().map(|r| r * r).sum();
+    if lags == 0 || energy <= 0.0 {
+        return None;
+    }
+    let statistic: f64 = (1..=lags)
+        .map(|lag| {
+            let product: f64 =
+                segments.iter().map(|r| r.iter().zip(r.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>()).sum();
+            let correlation = product / energy;
+            let n = count as f64;
+            n * (n + 2.0) * correlation * correlation / (n - lag as f64)
+        })
+        .sum();
+    let chi2 = ChiSquared::new(lags as f64).expect("there is a lag");
+    Some(ResidualTest {
+        test: "whiteness".into(),
+        statistic,
+        degrees_of_freedom: Some(lags as f64),
+        p_value: chi2.sf(statistic),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn white(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+        (0..n).map(|_| StandardNormal.sample(rng)).collect()
+    }
+
+    /// 1000 white residuals: each test rejects at 1 % in 10 ± 3.1 of them; four standard deviations.
+    #[test]
+    fn white_noise_is_rejected_as_often_as_stated() {
+        let mut rng = ChaCha8Rng::seed_from_u64(11);
+        let mut rejections = [0; 3];
+        for _ in 0..1000 {
+            let segments = [white(700, &mut rng), white(300, &mut rng)];
+            for (count, test) in rejections.iter_mut().zip(residual_tests(&segments, 0, 0.0)) {
+                *count += i32::from(test.p_value < 0.01);
+            }
+        }
+        for (count, name) in rejections.iter().zip(["total-energy", "band-energy", "whiteness"]) {
+            assert!((count - 10).abs() <= 13, "{name}: {count} of 1000 rejected at 1 %");
+        }
+    }
+
+    /// A lag-one correlation of 0.2 over 2000 samples is nine standard errors; a level 10 % off is six.
+    #[test]
+    fn coloured_and_mis_scaled_residuals_are_rejected() {
+        let mut rng = ChaCha8Rng::seed_from_u64(12);
+        let noise = white(2001, &mut rng);
+        let coloured: Vec<f64> = noise.windows(2).map(|w| (w[1] + 0.2 * w[0]) / 1.04_f64.sqrt()).collect();
+        let tests = residual_tests(&[coloured], 2, 0.0);
+        assert!(tests[1].p_value < 1e-4 && tests[2].p_value < 1e-6, "{tests:?}");
+        let loud: Vec<f64> = noise.iter().map(|r| 1.1 * r).collect();
+        assert!(residual_tests(std::slice::from_ref(&loud), 2, 0.0)[0].p_value < 1e-6);
+        // The same excess is nothing if the level was only known to 20 %.
+        assert!(residual_tests(&[loud], 2, 0.2)[0].p_value > 0.05);
+    }
+
+    #[test]
+    fn short_or_empty_residuals_give_the_tests_that_they_can() {
+        assert!(residual_tests(&[], 2, 0.0).is_empty());
+        assert!(residual_tests(&[vec![0.0; 30]], 2, 0.0).len() == 1);
+        assert!(residual_tests(&[vec![1.0, -1.0, 1.0]], 2, 0.0).len() == 1);
+    }
+}

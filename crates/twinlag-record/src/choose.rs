@@ -1,0 +1,260 @@
+//! Which columns are time, T1 and T2: as the caller says, else from names and units. A guess is noted; where two readings
+//! of a header are possible there is none.
+
+use crate::RecordError;
+use crate::clock;
+use crate::note::Note;
+use crate::selection::Selection;
+use crate::table::{Column, Kind, Table};
+use crate::time_axis::TimeColumns;
+use crate::unit::Unit;
+
+/// The chosen columns, from 0.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Chosen {
+    /// `None`: counted from the period.
+    pub(crate) time: Option<TimeColumns>,
+    pub(crate) channels: [usize; 2],
+    pub(crate) reference: Option<usize>,
+}
+
+const TIME: [&str; 17] = [
+    "time",
+    "zeit",
+    "timestamp",
+    "datetime",
+    "date",
+    "datum",
+    "elapsed",
+    "uhrzeit",
+    "zeitstempel",
+    "uptime",
+    "seconds",
+    "sec",
+    "clock",
+    "datumzeit",
+    "systime",
+    "millis",
+    "epoch",
+];
+const INDEX: [&str; 14] = [
+    "sample", "samples", "no", "nr", "number", "record", "rn", "count", "counter", "index", "scan", "row", "id",
+    "messung",
+];
+const TEMPERATURE: [&str; 20] = [
+    "t",
+    "tc",
+    "temp",
+    "temperature",
+    "temperatur",
+    "thermocouple",
+    "thermo",
+    "te",
+    "thermoelement",
+    "pt",
+    "rtd",
+    "ntc",
+    "sensor",
+    "probe",
+    "ch",
+    "channel",
+    "kanal",
+    "fühler",
+    "tcouple",
+    "therm",
+];
+/// Never T1 or T2, whatever else is there.
+const APART: [&str; 17] = [
+    "ref",
+    "tref",
+    "reference",
+    "referenz",
+    "true",
+    "truth",
+    "ttrue",
+    "tgas",
+    "gas",
+    "set",
+    "setpoint",
+    "sp",
+    "tset",
+    "soll",
+    "sollwert",
+    "target",
+    "setpt",
+];
+/// Perhaps a sensor, perhaps its surroundings: only the caller knows.
+const SURROUNDINGS: [&str; 16] = [
+    "chamber", "ambient", "room", "bath", "oven", "furnace", "block", "housing", "case", "board", "cjc", "junction",
+    "internal", "raum", "kammer", "ofen",
+];
+
+fn words(text: &str) -> impl Iterator<Item = String> {
+    text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase)
+}
+
+/// Whether a word of the name is in the list, with or without a number behind it.
+fn has(column: &Column, list: &[&str]) -> bool {
+    words(column.label()).any(|word| {
+        let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        list.contains(&word.as_str()) || list.contains(&bare)
+    })
+}
+
+fn is_index(column: &Column) -> bool {
+    has(column, &INDEX) && !column.unit().is_temperature() && !matches!(column.unit(), Unit::Time { .. })
+}
+
+fn is_time(column: &Column) -> bool {
+    let named = has(column, &TIME) || column.label() == "t";
+    match column.kind() {
+        Kind::Stamp => true,
+        Kind::Number => {
+            !column.unit().is_temperature()
+                && !has(column, &["constant"])
+                && (named || matches!(column.unit(), Unit::Time { .. }) && !column.label().starts_with('T'))
+        }
+        _ => false,
+    }
+}
+
+fn is_temperature(column: &Column) -> bool {
+    column.kind() == Kind::Number
+        && (column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE)))
+}
+
+/// Makes the choice, and notes what was guessed.
+///
+/// # Errors
+/// Those of [`Table::find`]; [`RecordError::TimeAndPeriod`], [`RecordError::BadPeriod`], [`RecordError::NoTime`],
+/// [`RecordError::ChannelsUnclear`], [`RecordError::SameColumn`].
+pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>) -> Result<Chosen, RecordError> {
+    let find = |wanted: &Option<_>| wanted.as_ref().map(|wanted| table.find(wanted)).transpose();
+    let (named_time, named) = (find(&selection.time)?, [find(&selection.t1)?, find(&selection.t2)?]);
+    let reference = find(&selection.reference)?;
+    let taken: Vec<usize> = [named_time, named[0], named[1]].into_iter().flatten().collect();
+    if let Some((_, &twice)) = taken.iter().enumerate().find(|(at, index)| taken[..*at].contains(index)) {
+        return Err(RecordError::SameColumn { file: table.source().to_owned(), column: table.title(twice) });
+    }
+    if let Some(period_s) = selection.period_s {
+        let file = table.source().to_owned();
+        if let Some(time) = named_time {
+            return Err(RecordError::TimeAndPeriod { file, column: table.title(time), period_s });
+        }
+        if !(period_s.is_finite() && period_s > 0.0) {
+            return Err(RecordError::BadPeriod { file, period_s });
+        }
+    }
+    let guessed_time = match named_time {
+        Some(_) => None,
+        None => guess_time(table, &taken, reference),
+    };
+    // Even where a period is given the time column is told, so that it is not taken for a temperature.
+    let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
+    let channels = match named {
+        [Some(t1), Some(t2)] => [t1, t2],
+        _ => guess_channels(table, named, time, reference, notes)?,
+    };
+    if selection.period_s.is_some() {
+        return Ok(Chosen { time: None, channels, reference });
+    }
+    let Some(time) = time else {
+        return Err(RecordError::NoTime { file: table.source().to_owned(), columns: table.listing() });
+    };
+    if let Some(index) = guessed_time {
+        notes.insert(0, Note::Guessed { role: "time", column: table.title(index) });
+    }
+    Ok(Chosen { time: Some(time), channels, reference })
+}
+
+fn guess_time(table: &Table, taken: &[usize], reference: Option<usize>) -> Option<usize> {
+    let columns = table.columns();
+    let free = |index: &usize| !taken.contains(index) && reference != Some(*index);
+    (0..columns.len()).filter(free).find(|&index| is_time(&columns[index])).or_else(|| {
+        // Without a telling name: the first column, if it rises from row to row and is not a row number.
+        let first = columns.first().filter(|_| free(&0))?;
+        let rises = first.raw().windows(2).all(|pair| pair[1] > pair[0]);
+        let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !has(first, &APART);
+        (first.kind() == Kind::Number && rises && open).then_some(0)
+    })
+}
+
+/// A date without time of day belongs to a time of day without date beside it.
+fn with_partner(table: &Table, index: usize, taken: &[usize]) -> TimeColumns {
+    let parts = |index: usize| {
+        let column = table.columns().get(index).filter(|column| column.kind() == Kind::Stamp)?;
+        let stamp = clock::parse((0..table.rows()).find_map(|row| column.text(row))?)?;
+        Some((stamp.day.is_some(), stamp.time_ns.is_some()))
+    };
+    let neighbours = [Some(index + 1), index.checked_sub(1)];
+    let mut others = neighbours.into_iter().flatten().filter(|other| !taken.contains(other));
+    match parts(index) {
+        Some((true, false)) => match others.find(|&other| parts(other) == Some((false, true))) {
+            Some(time) => TimeColumns::DateAndTime { date: index, time },
+            None => TimeColumns::One(index),
+        },
+        Some((false, true)) => match others.find(|&other| parts(other) == Some((true, false))) {
+            Some(date) => TimeColumns::DateAndTime { date, time: index },
+            None => TimeColumns::One(index),
+        },
+        _ => TimeColumns::One(index),
+    }
+}
+
+fn guess_channels(
+    table: &Table,
+    named: [Option<usize>; 2],
+    time: Option<TimeColumns>,
+    reference: Option<usize>,
+    notes: &mut Vec<Note>,
+) -> Result<[usize; 2], RecordError> {
+    let columns = table.columns();
+    let is_free = |index: usize| {
+        let of_time = match time {
+            Some(TimeColumns::One(time)) => time == index,
+            Some(TimeColumns::DateAndTime { date, time }) => date == index || time == index,
+            None => false,
+        };
+        !of_time && reference != Some(index) && !named.contains(&Some(index))
+    };
+    let has_names = columns.iter().any(|column| !column.name().is_empty());
+    let candidates: Vec<usize> = (0..columns.len())
+        .filter(|&index| is_free(index))
+        .filter(|&index| {
+            let column = &columns[index];
+            let named = is_temperature(column) && !has(column, &APART) && !is_index(column);
+            if has_names { named } else { column.kind() == Kind::Number }
+        })
+        .collect();
+    let first_word = |index: usize| words(columns[index].label()).next().unwrap_or_default();
+    let literal = |want: &str| match *candidates.iter().filter(|&&i| first_word(i) == want).collect::<Vec<_>>() {
+        [&index] => Some(index),
+        _ => None,
+    };
+    let doubtful = candidates.iter().any(|&index| has(&columns[index], &SURROUNDINGS));
+    let found = match (named, &candidates[..]) {
+        ([Some(t1), None], &[t2]) if !doubtful => Some([t1, t2]),
+        ([None, Some(t2)], &[t1]) if !doubtful => Some([t1, t2]),
+        ([Some(t1), None], _) => literal("t2").map(|t2| [t1, t2]),
+        ([None, Some(t2)], _) => literal("t1").map(|t1| [t1, t2]),
+        ([None, None], list) => match (literal("t1"), literal("t2"), list) {
+            (Some(t1), Some(t2), _) => Some([t1, t2]),
+            (_, _, &[t1, t2]) if !doubtful => Some([t1, t2]),
+            _ => None,
+        },
+        _ => None,
+    };
+    let Some(channels) = found else {
+        let titles: Vec<_> = candidates.iter().map(|&index| table.title(index)).collect();
+        let candidates = if titles.is_empty() { "none".to_owned() } else { titles.join(", ") };
+        let found = titles.len() + named.iter().flatten().count();
+        let (file, columns) = (table.source().to_owned(), table.listing());
+        return Err(RecordError::ChannelsUnclear { file, found, candidates, columns });
+    };
+    for (role, (was, index)) in ["T1", "T2"].into_iter().zip(named.into_iter().zip(channels)) {
+        if was.is_none() {
+            notes.push(Note::Guessed { role, column: table.title(index) });
+        }
+    }
+    Ok(channels)
+}

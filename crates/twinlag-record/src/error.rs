@@ -1,0 +1,152 @@
+//! Why a record could not be had: every message says where, what was expected, what came, and what to do.
+
+use std::fmt;
+
+use thiserror::Error;
+
+/// Where in the input something is: a line of a file, or a sample of a vector.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Line of the file, from 1, comments and preamble counted.
+    Line(usize),
+    /// Sample of a vector that never was in a file, from 1.
+    Sample(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Sample(sample) => write!(f, "sample {sample}"),
+        }
+    }
+}
+
+/// Why a record could not be read, built or written. `file` is the name that the caller gave to the source.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum RecordError {
+    #[error("{file}: cannot be read: {reason}; check the path and its permissions")]
+    CannotRead { file: String, reason: String },
+    #[error("{file}: is a directory, expected a file; name one file in it")]
+    IsDirectory { file: String },
+    #[error(
+        "{file}: is not text (a zero byte at offset {offset}), expected delimited text; export the measurement as CSV, \
+         or, if it is UTF-16, save it with a byte-order mark"
+    )]
+    Binary { file: String, offset: usize },
+    #[error("{file}: is empty, expected a header and rows of time and two temperatures")]
+    Empty { file: String },
+    #[error(
+        "{file}: has no row of numbers in its {lines} lines, expected rows under the header; was the logger started?"
+    )]
+    NoData { file: String, lines: usize },
+    #[error(
+        "{file}: line {line}: found one column, expected two temperatures and a time, separated by comma, semicolon, \
+         tab, pipe or blanks; put both channels side by side in one file"
+    )]
+    OneColumn { file: String, line: usize },
+    #[error(
+        "{file}: line {line}: {found} comma-separated whole numbers under {expected} column names: the comma seems to be \
+         both separator and decimal sign, which cannot be told apart; export with semicolons or with decimal points"
+    )]
+    DecimalCommaBetweenCommas { file: String, line: usize, expected: usize, found: usize },
+    #[error(
+        "{file}: line {line}: {found} comma-separated whole numbers and no header: this may be {found} columns or, with \
+         a decimal comma, {half}; export with semicolons or decimal points, or add a header", half = found / 2
+    )]
+    WholeNumbersWithoutHeader { file: String, line: usize, found: usize },
+    #[error(
+        "{file}: line {line}: '{cell}' may be a thousands separator or a decimal comma, and no other cell tells which; \
+         export without thousands separators and with decimal points"
+    )]
+    ThousandsOrDecimal { file: String, line: usize, cell: String },
+    #[error(
+        "{file}: decimal comma ('{comma_cell}', line {comma_line}) and decimal point ('{point_cell}', line {point_line}) \
+         in one file, expected one of them; export with decimal points and without thousands separators"
+    )]
+    MixedDecimals { file: String, comma_line: usize, comma_cell: String, point_line: usize, point_cell: String },
+    #[error(
+        "{file}: line {line}: expected {expected} cells as in the header, found {found}; mend or remove the line \
+         (a decimal comma or an unquoted separator in a text adds cells)"
+    )]
+    CellCount { file: String, line: usize, expected: usize, found: usize },
+    #[error("{file}: line {line}: a quotation mark is opened and not closed; close it or remove it")]
+    OpenQuote { file: String, line: usize },
+    #[error(
+        "{file}: line {line}, column {column}: expected a number or a word for a missing one (empty, NaN, NA, null, ---, \
+         OL, OPEN, Over, inf), found '{cell}'; mend the cell or empty it"
+    )]
+    NotANumber { file: String, line: usize, column: String, cell: String },
+    #[error(
+        "{file}: line {line}, column {column}: expected numbers, found mostly text (first '{cell}'); \
+         choose another column with --t1, --t2, --reference or --time (NAME or number)"
+    )]
+    TextColumn { file: String, line: usize, column: String, cell: String },
+    #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example --t1 2")]
+    UnknownColumn { file: String, wanted: String, columns: String },
+    #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example --t1 {first}", first = numbers[0])]
+    AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
+    #[error("{file}: column {column} was chosen twice; --time, --t1 and --t2 must be three different columns")]
+    SameColumn { file: String, column: String },
+    #[error(
+        "{file}: expected exactly two columns that are clearly the sensors, found {found} that may be ({candidates}); \
+         choose with --t1 NAME --t2 NAME (names or numbers); the columns are {columns}"
+    )]
+    ChannelsUnclear { file: String, found: usize, candidates: String, columns: String },
+    #[error(
+        "{file}: no column is recognisably the time; choose it with --time NAME (or number), or, if there is none, give \
+         the sample period in seconds (--period); the columns are {columns}"
+    )]
+    NoTime { file: String, columns: String },
+    #[error("{file}: the sample period must be finite and positive, got {period_s} s")]
+    BadPeriod { file: String, period_s: f64 },
+    #[error("{file}: both a time column ({column}) and a sample period ({period_s} s) were given; give one of them")]
+    TimeAndPeriod { file: String, column: String, period_s: f64 },
+    #[error("{file}: line {line}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
+    NotATime { file: String, line: usize, column: String, cell: String, expected: &'static str },
+    #[error(
+        "{file}: line {line}, column {column}: '{cell}' may be day/month or month/day, and no date in the file tells \
+         which; write dates as YYYY-MM-DD"
+    )]
+    AmbiguousDate { file: String, line: usize, column: String, cell: String },
+    #[error("{file}: {at}, column {column}: the time is missing or not finite; mend or remove the row")]
+    MissingTime { file: String, at: Place, column: String },
+    #[error(
+        "{file}: {at}: time must increase from row to row, but '{now}' follows '{before}'; sort the rows and remove \
+         repeated ones, or, if several samples share one coarse stamp, give the sample period in seconds (--period)"
+    )]
+    TimeNotIncreasing { file: String, at: Place, before: String, now: String },
+    #[error(
+        "{file}: column {column} is in '{unit}', expected a temperature in °C, K or °F; convert it, or correct the unit \
+         in the header, for example 'T1 [°C]'"
+    )]
+    NotATemperature { file: String, column: String, unit: String },
+    #[error(
+        "{file}: column {column} is in '{unit}', expected a time in s, ms, us, min, h or d, or date-times; convert it, or \
+         correct the unit in the header, for example 'time [s]'"
+    )]
+    NotATimeUnit { file: String, column: String, unit: String },
+    #[error(
+        "{file}: {at}, column {column}: {value} {unit} is not between absolute zero and 5000 °C; is the unit right, is \
+         the thermocouple open? Empty the cells that are not measurements"
+    )]
+    OutOfRange { file: String, at: Place, column: String, value: f64, unit: &'static str },
+    #[error("{file}: columns {first} and {second} are the same in every sample; choose two different sensors")]
+    Identical { file: String, first: String, second: String },
+    #[error(
+        "{file}: column {column} is {value_c} °C in every sample, so that it tells nothing about its sensor; \
+         is it connected, is it a setpoint? Choose another column"
+    )]
+    Constant { file: String, column: String, value_c: f64 },
+    #[error(
+        "{file}: {usable} usable samples of {rows} rows ({missing} with a missing temperature), expected at least \
+         {least}; usable are rows with both temperatures, next to another such row without a gap: record for longer"
+    )]
+    TooShort { file: String, usable: usize, rows: usize, missing: usize, least: usize },
+    #[error("{file}: {name} has {found} samples, expected {expected} as in {like}; give vectors of one length")]
+    LengthMismatch { file: String, name: String, found: usize, like: String, expected: usize },
+    #[error("cannot write the table: {reason}; check the disk and the permissions")]
+    CannotWrite { reason: String },
+}

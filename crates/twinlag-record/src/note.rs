@@ -1,0 +1,173 @@
+//! What a reader should know of how a record was understood: nothing is guessed, converted or left out in silence.
+
+use std::fmt;
+
+use crate::Place;
+use crate::dialect::{Decimal, Delimiter};
+use crate::sampling::{Sampling, SamplingKind};
+
+/// One remark on how a file was understood. Its `Display` is a sentence for people.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Note {
+    /// What kind of text it is.
+    Format {
+        /// Between the cells.
+        delimiter: Delimiter,
+        /// Decimal sign.
+        decimal: Decimal,
+        /// Name of the character encoding.
+        encoding: &'static str,
+        /// Line of the column names, from 1; `None` if there are none.
+        header_line: Option<usize>,
+    },
+    /// A column was chosen from its name or place, not by the caller.
+    Guessed {
+        /// `time`, `T1` or `T2`.
+        role: &'static str,
+        /// The column, as `2 'T1 [°C]'`.
+        column: String,
+    },
+    /// Date and time of day stood in two columns.
+    DateAndTime {
+        /// The column of the dates.
+        date: String,
+        /// The column of the times of day.
+        time: String,
+    },
+    /// Time of day passed midnight and was continued on the next day.
+    Midnight {
+        /// How often.
+        times: usize,
+    },
+    /// The unit of a column and what was done about it.
+    Unit {
+        /// The column.
+        column: String,
+        /// Its unit.
+        unit: String,
+        /// `false`: the header names none and this one was assumed.
+        stated: bool,
+        /// The unit that it was converted to, if another one.
+        to: Option<&'static str>,
+    },
+    /// Time was counted from the row number and a period that the caller gave.
+    PeriodGiven {
+        /// The period.
+        period_s: f64,
+    },
+    /// The very last line was cut off and left out.
+    CutLine {
+        /// The line.
+        line: usize,
+        /// How many cells it had.
+        found: usize,
+        /// How many it should have had.
+        expected: usize,
+    },
+    /// The header came again, as after a change of file.
+    RepeatedHeader {
+        /// How many lines were left out for it.
+        lines: usize,
+        /// The first of them.
+        first_line: usize,
+    },
+    /// Rows with a missing temperature: NaN in the record, in no segment.
+    Masked {
+        /// Rows with either missing.
+        rows: usize,
+        /// Rows with T1 missing.
+        t1: usize,
+        /// Rows with T2 missing.
+        t2: usize,
+    },
+    /// A step in time that ends a segment.
+    Gap {
+        /// The row after the gap.
+        at: Place,
+        /// Time before the gap.
+        from_s: f64,
+        /// From the last row before to the first row after.
+        length_s: f64,
+    },
+    /// Gaps beyond those listed one by one.
+    FurtherGaps {
+        /// How many.
+        count: usize,
+        /// Together.
+        length_s: f64,
+    },
+    /// Complete rows that stand alone between gaps or masked rows and so belong to no segment.
+    LoneRows {
+        /// How many.
+        rows: usize,
+    },
+    /// How the stamps lie in time and what is made of them.
+    Sampling {
+        /// The estimate.
+        sampling: Sampling,
+        /// Whether the caller chose it.
+        chosen: bool,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Format { delimiter, decimal, encoding, header_line } => {
+                write!(f, "read as {delimiter}-separated {encoding} text with decimal {decimal}, ")?;
+                match header_line {
+                    Some(line) => write!(f, "column names on line {line}"),
+                    None => write!(f, "without column names"),
+                }
+            }
+            Self::Guessed { role, column } => write!(f, "{role} guessed to be column {column}"),
+            Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
+            Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
+            Self::Unit { column, unit, stated, to } => {
+                let how = if *stated { "is in" } else { "names no unit and was taken to be in" };
+                write!(f, "column {column} {how} {unit}")?;
+                to.map_or(Ok(()), |to| write!(f, ", converted to {to}"))
+            }
+            Self::PeriodGiven { period_s } => {
+                write!(f, "time counted from the row number, {period_s} s per row as given; no time column was used")
+            }
+            Self::CutLine { line, found, expected } => {
+                write!(f, "last line {line} is cut off ({found} of {expected} cells) and was left out")
+            }
+            Self::RepeatedHeader { lines, first_line } => {
+                write!(f, "the header comes again: {lines} lines left out, the first is line {first_line}")
+            }
+            Self::Masked { rows, t1, t2 } => {
+                write!(f, "{rows} rows masked for a missing temperature (T1 in {t1}, T2 in {t2}); none was filled")
+            }
+            Self::Gap { at, from_s, length_s } => {
+                write!(
+                    f,
+                    "gap of {length_s:.6} s before {at}, from {from_s:.6} s on; the record is cut there, not filled"
+                )
+            }
+            Self::FurtherGaps { count, length_s } => {
+                write!(f, "{count} further gaps, together {length_s:.6} s")
+            }
+            Self::LoneRows { rows } => {
+                write!(f, "{rows} rows stand alone between gaps or masked rows and are not used")
+            }
+            Self::Sampling { sampling, chosen } => {
+                let Sampling { period_s, jitter_s, largest_departure_s, stamp_resolution_s, kind } = sampling;
+                let what = match kind {
+                    SamplingKind::Uniform => "uniform",
+                    SamplingKind::Rounded => "even with rounded stamps, taken as evenly spaced",
+                    SamplingKind::Irregular => "irregular, steps used as stamped",
+                };
+                let who = if *chosen { " (as chosen)" } else { "" };
+                write!(f, "sampling {what}{who}: period {period_s:.9} s, stamps depart from even spacing by ")?;
+                write!(f, "{jitter_s:.3e} s rms and {largest_departure_s:.3e} s at most")?;
+                if let Some(resolution_s) = stamp_resolution_s {
+                    write!(f, ", stamp resolution {resolution_s} s")?;
+                }
+                write!(f, "; nothing was resampled")
+            }
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! Two temperatures over time, checked: what every estimator starts from.
+//!
+//! Nothing is resampled and nothing is filled: a missing temperature is NaN, and `segments` are the runs of rows between
+//! missing ones and gaps.
+
+use std::io::Write;
+use std::ops::Range;
+use std::path::Path;
+
+use crate::choose::{Chosen, choose};
+use crate::note::Note;
+use crate::sampling::{self, Sampling, SamplingKind};
+use crate::selection::{SamplingChoice, Selection};
+use crate::table::{Column, Table};
+use crate::time_axis::{self, TimeAxis};
+use crate::unit::Unit;
+use crate::write::{Decimals, write_csv};
+use crate::{Place, RecordError};
+
+/// Fewest samples in segments that make a record. Fewer do not even determine two time constants and a noise level.
+const LEAST_SAMPLES: usize = 8;
+/// Gaps that get a note each.
+const LISTED_GAPS: usize = 5;
+const ABSOLUTE_ZERO_C: f64 = -273.15;
+/// No thermocouple reaches this; sentinels such as 9999 and 1e37 lie beyond.
+const HOTTEST_C: f64 = 5000.0;
+
+/// Vectors to make a record from; `[n]` each, missing temperatures NaN.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channels {
+    /// Where they are from, for messages.
+    pub source: String,
+    /// Names of the two sensors.
+    pub names: [String; 2],
+    /// Strictly increasing. The first stamp becomes zero.
+    pub time_s: Vec<f64>,
+    /// First sensor.
+    pub t1_c: Vec<f64>,
+    /// Second sensor.
+    pub t2_c: Vec<f64>,
+    /// A trusted temperature, for scoring.
+    pub reference_c: Option<Vec<f64>>,
+}
+
+/// Two temperatures over time. All vectors have one entry per row; built by its constructors alone, which check it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Record {
+    /// The file, or whatever the caller called it.
+    pub source: String,
+    /// Names of the two sensors, without units.
+    pub channels: [String; 2],
+    /// Strictly increasing, from 0, as stamped.
+    pub time_s: Vec<f64>,
+    /// First sensor; NaN where missing.
+    pub t1_c: Vec<f64>,
+    /// Second sensor; NaN where missing.
+    pub t2_c: Vec<f64>,
+    /// A trusted temperature, if one was chosen; NaN where missing.
+    pub reference_c: Option<Vec<f64>>,
+    /// Rows in which T1 or T2 is missing.
+    pub missing: usize,
+    /// How the stamps lie in time.
+    pub sampling: Sampling,
+    /// Maximal runs of rows with both temperatures and no gap in time; at least two rows each, in order.
+    pub segments: Vec<Range<usize>>,
+    /// How the file was understood.
+    pub notes: Vec<Note>,
+}
+
+/// What is known of the rows besides their numbers, for messages.
+struct Origin<'a> {
+    file: &'a str,
+    /// With the columns of time, T1, T2 and the reference.
+    table: Option<(&'a Table, &'a Chosen)>,
+    columns: [String; 3],
+    units: [Unit; 3],
+}
+
+impl Origin<'_> {
+    fn place(&self, row: usize) -> Place {
+        self.table.map_or(Place::Sample(row + 1), |(table, _)| Place::Line(table.line_of(row)))
+    }
+
+    /// A stamp as the file has it.
+    fn stamp(&self, row: usize, time_s: f64) -> String {
+        let cell = |index: usize| {
+            let (table, _) = self.table?;
+            let column = &table.columns()[index];
+            Some(column.text(row).map_or_else(|| column.raw()[row].to_string(), str::to_owned))
+        };
+        let time = match self.table.and_then(|(_, chosen)| chosen.time) {
+            Some(time_axis::TimeColumns::One(index)) => cell(index),
+            Some(time_axis::TimeColumns::DateAndTime { date, time }) => {
+                cell(date).zip(cell(time)).map(|(date, time)| format!("{date} {time}"))
+            }
+            None => None,
+        };
+        time.unwrap_or_else(|| format!("{time_s} s"))
+    }
+}
+
+impl Record {
+    /// Reads a file: [`Table::from_path`], then [`Record::from_table`].
+    ///
+    /// # Errors
+    /// Those of both.
+    pub fn read(path: impl AsRef<Path>, selection: &Selection) -> Result<Self, RecordError> {
+        Self::from_table(&Table::from_path(path)?, selection)
+    }
+
+    /// Takes time and two temperatures from a table; converts them to s and °C, and checks them.
+    ///
+    /// # Errors
+    /// Every variant of [`RecordError`] on columns that cannot be told or used, times that do not increase, and
+    /// temperatures that cannot be: out of range, constant, identical, or fewer than 8 usable.
+    pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
+        let mut notes = Vec::new();
+        let chosen = choose(table, selection, &mut notes)?;
+        let (time_s, unit_s) = match (chosen.time, selection.period_s) {
+            (Some(columns), _) => {
+                let TimeAxis { time_s, unit_s } = time_axis::read(table, columns, &mut notes)?;
+                (time_s, Some(unit_s))
+            }
+            (None, period_s) => {
+                let period_s = period_s.unwrap_or(1.0);
+                notes.push(Note::PeriodGiven { period_s });
+                let time_s = (0..table.rows()).map(|row| row as f64 * period_s).collect();
+                // Row numbers times a period show no clock.
+                (time_s, None)
+            }
+        };
+        let mut temperatures = Vec::new();
+        let indices = chosen.channels.into_iter().chain(chosen.reference);
+        for index in indices.clone() {
+            temperatures.push(celsius(table, index, &mut notes)?);
+        }
+        let last = chosen.channels[1];
+        let of = |at: usize| indices.clone().nth(at).unwrap_or(last);
+        let origin = Origin {
+            file: table.source(),
+            table: Some((table, &chosen)),
+            columns: [0, 1, 2].map(|at| table.title(of(at))),
+            units: [0, 1, 2].map(|at| table.columns()[of(at)].unit().clone()),
+        };
+        let reference_c = if chosen.reference.is_some() { temperatures.pop() } else { None };
+        let (t2_c, t1_c) = (temperatures.pop().unwrap_or_default(), temperatures.pop().unwrap_or_default());
+        let channels = Channels {
+            source: table.source().to_owned(),
+            names: names(table, chosen.channels),
+            time_s,
+            t1_c,
+            t2_c,
+            reference_c,
+        };
+        let mut all = table.notes().to_vec();
+        all.append(&mut notes);
+        Self::build(channels, selection.sampling, unit_s, all, &origin)
+    }
+
+    /// Makes a record of vectors, checked in the same way as a file.
+    ///
+    /// # Errors
+    /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`], [`RecordError::TimeNotIncreasing`],
+    /// [`RecordError::OutOfRange`], [`RecordError::TooShort`], [`RecordError::Constant`], [`RecordError::Identical`].
+    pub fn from_channels(channels: Channels, sampling: SamplingChoice) -> Result<Self, RecordError> {
+        let file = channels.source.clone();
+        let names = [&channels.names[0], &channels.names[1], "reference"].map(str::to_owned);
+        let rows = channels.time_s.len();
+        let reference = channels.reference_c.as_ref().map_or(rows, Vec::len);
+        for (name, found) in names.iter().zip([channels.t1_c.len(), channels.t2_c.len(), reference]) {
+            if found != rows {
+                let (name, like) = (name.clone(), "time_s".to_owned());
+                return Err(RecordError::LengthMismatch { file, name, found, like, expected: rows });
+            }
+        }
+        let units = [Unit::Celsius, Unit::Celsius, Unit::Celsius];
+        let origin = Origin { file: &file, table: None, columns: names, units };
+        Self::build(channels, sampling, Some(1.0), Vec::new(), &origin)
+    }
+
+    fn build(
+        channels: Channels,
+        choice: SamplingChoice,
+        unit_s: Option<f64>,
+        mut notes: Vec<Note>,
+        origin: &Origin<'_>,
+    ) -> Result<Self, RecordError> {
+        let Channels { source, names, mut time_s, t1_c, t2_c, reference_c } = channels;
+        let file = || source.clone();
+        let rows = time_s.len();
+        check_time(&time_s, origin)?;
+        check_range(&t1_c, 0, origin)?;
+        check_range(&t2_c, 1, origin)?;
+        if let Some(reference_c) = &reference_c {
+            check_range(reference_c, 2, origin)?;
+        }
+        let count = |values: &[f64]| values.iter().filter(|value| value.is_nan()).count();
+        let is_whole = |row: usize| !t1_c[row].is_nan() && !t2_c[row].is_nan();
+        let missing = (0..rows).filter(|&row| !is_whole(row)).count();
+        if missing > 0 {
+            notes.push(Note::Masked { rows: missing, t1: count(&t1_c), t2: count(&t2_c) });
+        }
+        let too_short = |usable| RecordError::TooShort { file: file(), usable, rows, missing, least: LEAST_SAMPLES };
+        if rows - missing < LEAST_SAMPLES {
+            return Err(too_short(rows - missing));
+        }
+        let first = time_s[0];
+        if first != 0.0 {
+            for t in &mut time_s {
+                *t -= first;
+            }
+        }
+        let sampling = sampling::judge(&time_s, unit_s, choice);
+        let runs: Vec<_> = sampling::runs(&time_s, sampling.gap_s()).collect();
+        note_gaps(&time_s, &runs, origin, &mut notes);
+        let segments: Vec<_> = runs.into_iter().flat_map(|run| whole_parts(run, &is_whole)).collect();
+        let lone = segments.iter().filter(|segment| segment.len() < 2).count();
+        if lone > 0 {
+            notes.push(Note::LoneRows { rows: lone });
+        }
+        let segments: Vec<_> = segments.into_iter().filter(|segment| segment.len() > 1).collect();
+        let usable = segments.iter().map(Range::len).sum();
+        if usable < LEAST_SAMPLES {
+            return Err(too_short(usable));
+        }
+        for (values, column) in [(&t1_c, &origin.columns[0]), (&t2_c, &origin.columns[1])] {
+            let mut used = segments.iter().cloned().flatten().map(|row| values[row]);
+            if let Some(value_c) = used.next().filter(|&first| used.all(|value| value == first)) {
+                return Err(RecordError::Constant { file: file(), column: column.clone(), value_c });
+            }
+        }
+        if segments.iter().cloned().flatten().all(|row| t1_c[row] == t2_c[row]) {
+            let [first, second, _] = origin.columns.clone();
+            return Err(RecordError::Identical { file: file(), first, second });
+        }
+        notes.push(Note::Sampling { sampling, chosen: choice != SamplingChoice::Auto });
+        Ok(Self { source, channels: names, time_s, t1_c, t2_c, reference_c, missing, sampling, segments, notes })
+    }
+
+    /// Number of rows, missing ones counted.
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Whether there are no rows; a checked record has some.
+    pub fn is_empty(&self) -> bool {
+        self.time_s.is_empty()
+    }
+
+    /// Steps between the rows of a segment, `[n − 1]`: the period throughout if sampling is even, else as stamped.
+    ///
+    /// - `segment`: rows, one of `segments` or a part of one. Panics beyond the record.
+    pub fn steps_s(&self, segment: &Range<usize>) -> Vec<f64> {
+        match self.sampling.kind {
+            SamplingKind::Irregular => self.time_s[segment.clone()].windows(2).map(|pair| pair[1] - pair[0]).collect(),
+            _ => vec![self.sampling.period_s; segment.len().saturating_sub(1)],
+        }
+    }
+
+    /// Writes the record as `time_s,T1,T2[,Tref]`, missing temperatures as empty cells. With [`Decimals::Shortest`]
+    /// it reads back the same to the bit (select `Tref` as reference).
+    ///
+    /// # Errors
+    /// [`RecordError::CannotWrite`].
+    pub fn write_csv(&self, out: &mut impl Write, decimals: Decimals) -> Result<(), RecordError> {
+        let mut columns = vec![("time_s", &self.time_s[..]), ("T1", &self.t1_c[..]), ("T2", &self.t2_c[..])];
+        columns.extend(self.reference_c.as_ref().map(|values| ("Tref", &values[..])));
+        write_csv(out, &columns, decimals)
+    }
+}
+
+/// Names without units, unless that makes them one.
+fn names(table: &Table, channels: [usize; 2]) -> [String; 2] {
+    let [a, b] = channels.map(|index| &table.columns()[index]);
+    let pick = |of: fn(&Column) -> &str| {
+        let pair = [of(a), of(b)];
+        (pair[0] != pair[1] && !pair.contains(&"")).then(|| pair.map(str::to_owned))
+    };
+    pick(Column::label).or_else(|| pick(Column::name)).unwrap_or_else(|| ["T1", "T2"].map(str::to_owned))
+}
+
+fn celsius(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<Vec<f64>, RecordError> {
+    let values = table.numbers(index)?;
+    let unit = table.columns()[index].unit();
+    let column = table.title(index);
+    if unit.to_celsius(0.0).is_none() {
+        return Err(RecordError::NotATemperature { file: table.source().to_owned(), column, unit: unit.to_string() });
+    }
+    let to = matches!(unit, Unit::Kelvin | Unit::Fahrenheit).then_some("°C");
+    notes.push(Note::Unit { column, unit: unit.symbol().to_owned(), stated: *unit != Unit::Unstated, to });
+    Ok(values.iter().map(|&value| unit.to_celsius(value).unwrap_or(f64::NAN)).collect())
+}
+
+fn check_time(time_s: &[f64], origin: &Origin<'_>) -> Result<(), RecordError> {
+    if let Some(row) = time_s.iter().position(|t| !t.is_finite()) {
+        let (file, column) = (origin.file.to_owned(), "time".to_owned());
+        return Err(RecordError::MissingTime { file, at: origin.place(row), column });
+    }
+    match time_s.windows(2).position(|pair| pair[1] <= pair[0]) {
+        None => Ok(()),
+        Some(row) => Err(RecordError::TimeNotIncreasing {
+            file: origin.file.to_owned(),
+            at: origin.place(row + 1),
+            before: origin.stamp(row, time_s[row]),
+            now: origin.stamp(row + 1, time_s[row + 1]),
+        }),
+    }
+}
+
+fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(), RecordError> {
+    let is_outside = |value: &f64| *value < ABSOLUTE_ZERO_C || *value > HOTTEST_C;
+    let Some(row) = values_c.iter().position(is_outside) else { return Ok(()) };
+    let raw = origin.table.map(|(table, chosen)| {
+        let indices = [Some(chosen.channels[0]), Some(chosen.channels[1]), chosen.reference];
+        indices[column].map_or(f64::NAN, |index| table.columns()[index].raw()[row])
+    });
+    Err(RecordError::OutOfRange {
+        file: origin.file.to_owned(),
+        at: origin.place(row),
+        column: origin.columns[column].clone(),
+        value: raw.unwrap_or(values_c[row]),
+        unit: origin.units[column].symbol(),
+    })
+}
+
+fn note_gaps(time_s: &[f64], runs: &[Range<usize>], origin: &Origin<'_>, notes: &mut Vec<Note>) {
+    let gaps = runs.iter().skip(1).map(|run| (run.start, time_s[run.start] - time_s[run.start - 1]));
+    for (row, length_s) in gaps.clone().take(LISTED_GAPS) {
+        notes.push(Note::Gap { at: origin.place(row), from_s: time_s[row - 1], length_s });
+    }
+    let count = gaps.len().saturating_sub(LISTED_GAPS);
+    if count > 0 {
+        notes.push(Note::FurtherGaps { count, length_s: gaps.skip(LISTED_GAPS).map(|gap| gap.1).sum() });
+    }
+}
+
+/// The maximal runs of whole rows within a run.
+fn whole_parts(run: Range<usize>, is_whole: &impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut parts = Vec::new();
+    let mut start = None;
+    for row in run.clone() {
+        match (is_whole(row), start) {
+            (true, None) => start = Some(row),
+            (false, Some(first)) => {
+                parts.push(first..row);
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    parts.extend(start.map(|first| first..run.end));
+    parts
+}

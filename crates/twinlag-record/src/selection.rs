@@ -1,0 +1,80 @@
+//! Which columns the caller wants, and how time is to be taken.
+
+use std::convert::Infallible;
+use std::fmt;
+use std::str::FromStr;
+
+/// A column, by name or by number from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum ColumnRef {
+    /// As in the header, with or without its unit.
+    Name(String),
+    /// From 1, from the left. A column with exactly this name goes before.
+    Number(usize),
+}
+
+impl FromStr for ColumnRef {
+    type Err = Infallible;
+
+    /// A positive whole number is a column number, everything else a name.
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        let text = text.trim();
+        Ok(match text.parse() {
+            Ok(number) if number > 0 => Self::Number(number),
+            _ => Self::Name(text.to_owned()),
+        })
+    }
+}
+
+impl fmt::Display for ColumnRef {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Name(name) => write!(f, "{name}"),
+            Self::Number(number) => write!(f, "{number}"),
+        }
+    }
+}
+
+/// How the stamps are to be understood.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SamplingChoice {
+    /// Judge by the stamps.
+    #[default]
+    Auto,
+    /// Samples are evenly spaced, whatever the stamps' small print says.
+    Uniform,
+    /// Each step is as long as its stamps say.
+    AsStamped,
+}
+
+/// What to read from a table. What is `None` is guessed from the header, and the guess is noted; the reference is never
+/// guessed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selection {
+    /// The time column.
+    pub time: Option<ColumnRef>,
+    /// The first sensor.
+    pub t1: Option<ColumnRef>,
+    /// The second sensor.
+    pub t2: Option<ColumnRef>,
+    /// A trusted temperature, if wanted.
+    pub reference: Option<ColumnRef>,
+    /// Time from one row to the next; then no time column is used.
+    pub period_s: Option<f64>,
+    /// How the stamps are to be understood.
+    pub sampling: SamplingChoice,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_positive_number_is_a_column_number_and_all_else_a_name() {
+        for (text, want) in
+            [("3", ColumnRef::Number(3)), ("0", ColumnRef::Name("0".into())), ("T1", ColumnRef::Name("T1".into()))]
+        {
+            assert_eq!(text.parse(), Ok(want));
+        }
+    }
+}

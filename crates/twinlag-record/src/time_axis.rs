@@ -1,0 +1,170 @@
+//! From a column (or two) to seconds since the first sample.
+
+use crate::clock::{self, DAY_NS, Day, Stamp};
+use crate::note::Note;
+use crate::table::{Kind, Table};
+use crate::unit::Unit;
+use crate::{Place, RecordError};
+
+/// Seconds since the first row, and the time unit that the stamps were printed in.
+pub(crate) struct TimeAxis {
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) unit_s: f64,
+}
+
+/// Where time comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TimeColumns {
+    One(usize),
+    DateAndTime { date: usize, time: usize },
+}
+
+/// Reads the time of every row; not yet checked to increase.
+///
+/// # Errors
+/// [`RecordError::NotATimeUnit`], [`RecordError::NotATime`], [`RecordError::AmbiguousDate`],
+/// [`RecordError::MissingTime`], and those of [`Table::numbers`].
+pub(crate) fn read(table: &Table, columns: TimeColumns, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
+    match columns {
+        TimeColumns::One(index) if table.columns()[index].kind() != Kind::Stamp => numeric(table, index, notes),
+        TimeColumns::One(index) => {
+            let stamps = stamps(table, index)?;
+            Ok(TimeAxis { time_s: elapsed(table, index, &stamps, notes)?, unit_s: 1.0 })
+        }
+        TimeColumns::DateAndTime { date, time } => {
+            let (dates, mut stamps) = (stamps(table, date)?, stamps(table, time)?);
+            for (stamp, date) in stamps.iter_mut().zip(&dates) {
+                stamp.day = date.day;
+            }
+            notes.push(Note::DateAndTime { date: table.title(date), time: table.title(time) });
+            Ok(TimeAxis { time_s: elapsed(table, date, &stamps, notes)?, unit_s: 1.0 })
+        }
+    }
+}
+
+fn numeric(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
+    let values = table.numbers(index)?;
+    let column = &table.columns()[index];
+    let (unit_s, symbol, stated) = match column.unit() {
+        Unit::Time { symbol, seconds } => (*seconds, *symbol, true),
+        Unit::Unstated => (1.0, "s", false),
+        unit => {
+            let (file, column, unit) = (table.source().to_owned(), table.title(index), unit.to_string());
+            return Err(RecordError::NotATimeUnit { file, column, unit });
+        }
+    };
+    if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+        let (file, at) = (table.source().to_owned(), Place::Line(table.line_of(row)));
+        return Err(RecordError::MissingTime { file, at, column: table.title(index) });
+    }
+    let to = (symbol != "s").then_some("s");
+    if to.is_some() || !stated {
+        notes.push(Note::Unit { column: table.title(index), unit: symbol.to_owned(), stated, to });
+    }
+    let first = values.first().copied().unwrap_or(0.0);
+    // Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.
+    let scale = |value: f64| if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s };
+    Ok(TimeAxis { time_s: values.iter().map(|value| scale(value - first)).collect(), unit_s })
+}
+
+fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {
+    let column = &table.columns()[index];
+    (0..table.rows())
+        .map(|row| match column.text(row) {
+            Some(cell) => clock::parse(cell).ok_or_else(|| not_a_time(table, index, row, "a date-time or time of day")),
+            None if column.raw()[row].is_nan() => {
+                let (file, at) = (table.source().to_owned(), Place::Line(table.line_of(row)));
+                Err(RecordError::MissingTime { file, at, column: table.title(index) })
+            }
+            None => Err(not_a_time(table, index, row, "a date-time or time of day as in the other rows")),
+        })
+        .collect()
+}
+
+fn not_a_time(table: &Table, index: usize, row: usize, expected: &'static str) -> RecordError {
+    let column = &table.columns()[index];
+    let cell = column.text(row).map_or_else(|| column.raw()[row].to_string(), str::to_owned);
+    let (file, line) = (table.source().to_owned(), table.line_of(row));
+    RecordError::NotATime { file, line, column: table.title(index), cell, expected }
+}
+
+/// Which of two open numbers is the day.
+#[derive(Clone, Copy, PartialEq)]
+enum Order {
+    DayFirst,
+    MonthFirst,
+    /// All dates are the same one: whatever it is, it drops out of the differences.
+    OneDay,
+}
+
+fn elapsed(table: &Table, index: usize, stamps: &[Stamp], notes: &mut Vec<Note>) -> Result<Vec<f64>, RecordError> {
+    let order = order(table, index, stamps)?;
+    let Some(&first) = stamps.first() else { return Ok(Vec::new()) };
+    let mut nanos = Vec::with_capacity(stamps.len());
+    let (mut days_on, mut before_ns) = (0, i64::MIN);
+    for (row, stamp) in stamps.iter().enumerate() {
+        let alike = stamp.day.is_some() == first.day.is_some()
+            && stamp.time_ns.is_some() == first.time_ns.is_some()
+            && stamp.offset_s.is_some() == first.offset_s.is_some();
+        if !alike {
+            return Err(not_a_time(table, index, row, "date, time and zone written as in the first row"));
+        }
+        let mut time_ns = stamp.time_ns.unwrap_or(0);
+        let day = match stamp.day {
+            Some(Day::Sure(day)) => clock::day_number(day),
+            Some(Day::Open([a, b], year)) => {
+                let (day, month) = if order == Order::MonthFirst { (b, a) } else { (a, b) };
+                let open = jiff::civil::Date::new(year, month, day);
+                // One day that is no date in the order tried is one day all the same.
+                match open {
+                    Ok(date) => clock::day_number(date),
+                    Err(_) if order == Order::OneDay => 0,
+                    Err(_) => return Err(not_a_time(table, index, row, "a date in the order of the other rows")),
+                }
+            }
+            None => {
+                // Back by more than half a day: past midnight. By less: a mistake, found when the order is checked.
+                time_ns += days_on * DAY_NS;
+                if before_ns != i64::MIN && time_ns < before_ns - DAY_NS / 2 {
+                    days_on += 1;
+                    time_ns += DAY_NS;
+                }
+                before_ns = time_ns;
+                0
+            }
+        };
+        nanos.push(
+            i128::from(day) * i128::from(DAY_NS) + i128::from(time_ns)
+                - i128::from(stamp.offset_s.unwrap_or(0)) * 1_000_000_000,
+        );
+    }
+    if days_on > 0 {
+        notes.push(Note::Midnight { times: days_on as usize });
+    }
+    let first = nanos[0];
+    Ok(nanos.iter().map(|ns| (ns - first) as f64 / 1e9).collect())
+}
+
+fn order(table: &Table, index: usize, stamps: &[Stamp]) -> Result<Order, RecordError> {
+    let mut open = stamps.iter().enumerate().filter_map(|(row, stamp)| match stamp.day {
+        Some(Day::Open(numbers, year)) => Some((row, numbers, year)),
+        _ => None,
+    });
+    let Some((first_row, first, first_year)) = open.next() else { return Ok(Order::OneDay) };
+    let (mut day_first, mut month_first, mut one_day) = (first[0] > 12, first[1] > 12, true);
+    for (_, numbers, year) in open {
+        day_first |= numbers[0] > 12;
+        month_first |= numbers[1] > 12;
+        one_day &= numbers == first && year == first_year;
+    }
+    match (day_first, month_first) {
+        _ if one_day && stamps.iter().all(|stamp| matches!(stamp.day, Some(Day::Open(..)))) => Ok(Order::OneDay),
+        (true, false) => Ok(Order::DayFirst),
+        (false, true) => Ok(Order::MonthFirst),
+        _ => {
+            let cell = table.columns()[index].text(first_row).unwrap_or("").to_owned();
+            let (file, line) = (table.source().to_owned(), table.line_of(first_row));
+            Err(RecordError::AmbiguousDate { file, line, column: table.title(index), cell })
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! Columns of numbers as comma-separated text with decimal points: what this crate, and everything else, can read.
+
+use std::io::{self, BufWriter, Write};
+
+use crate::RecordError;
+
+/// How numbers are printed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Decimals {
+    /// The fewest digits that give the same double again.
+    #[default]
+    Shortest,
+    /// This many behind the point.
+    Fixed(usize),
+}
+
+/// Writes a header and one row per entry. Cells that are not finite stay empty: they read as missing.
+///
+/// - `columns`: name and values, `[n]` each
+///
+/// # Errors
+/// [`RecordError::LengthMismatch`], [`RecordError::CannotWrite`].
+pub fn write_csv(out: &mut impl Write, columns: &[(&str, &[f64])], decimals: Decimals) -> Result<(), RecordError> {
+    let rows = columns.first().map_or(0, |column| column.1.len());
+    for (name, values) in columns {
+        if values.len() != rows {
+            return Err(RecordError::LengthMismatch {
+                file: "table to write".to_owned(),
+                name: (*name).to_owned(),
+                found: values.len(),
+                like: columns[0].0.to_owned(),
+                expected: rows,
+            });
+        }
+    }
+    write_rows(out, columns, rows, decimals).map_err(|error| RecordError::CannotWrite { reason: error.to_string() })
+}
+
+fn write_rows(out: &mut impl Write, columns: &[(&str, &[f64])], rows: usize, decimals: Decimals) -> io::Result<()> {
+    let mut out = BufWriter::new(out);
+    for (at, (name, _)) in columns.iter().enumerate() {
+        let comma = if at == 0 { "" } else { "," };
+        if name.contains([',', '"', '\n', '\r']) {
+            write!(out, "{comma}\"{}\"", name.replace('"', "\"\""))?;
+        } else {
+            write!(out, "{comma}{name}")?;
+        }
+    }
+    writeln!(out)?;
+    for row in 0..rows {
+        for (at, (_, values)) in columns.iter().enumerate() {
+            if at > 0 {
+                out.write_all(b",")?;
+            }
+            match (values[row], decimals) {
+                (value, _) if !value.is_finite() => {}
+                (value, Decimals::Shortest) => write!(out, "{value}")?,
+                (value, Decimals::Fixed(digits)) => write!(out, "{value:.digits$}")?,
+            }
+        }
+        writeln!(out)?;
+    }
+    out.flush()
+}

@@ -1,0 +1,250 @@
+//! What loggers write is read, and what was made of it is said. The oracle is the numbers that the text was made from.
+
+mod common;
+
+use common::{assert_is_the_rig, notes, plain, record, record_with, rows};
+use twinlag_record::{Channels, ColumnRef, Kind, Record, SamplingChoice, SamplingKind, Selection, Table};
+
+fn comma(value: f64) -> String {
+    format!("{value:.3}").replace('.', ",")
+}
+
+#[test]
+fn every_delimiter_is_found() {
+    for (d, header) in [(",", "time_s,T1,T2"), (";", "time_s;T1;T2"), ("\t", "time_s\tT1\tT2"), ("|", "time_s|T1|T2")] {
+        assert_is_the_rig(&record(&rows(header, |_, t, a, b| format!("{t}{d}{a}{d}{b}"))), 0.0);
+    }
+    assert_is_the_rig(&record(&rows("  time_s   T1  T2", |_, t, a, b| format!("  {t}   {a}\t{b}"))), 0.0);
+    assert_is_the_rig(&record(&rows("time (s)  T1 (degC)  T2 (degC)", |_, t, a, b| format!("{t} {a}  {b}"))), 0.0);
+}
+
+#[test]
+fn decimal_commas_are_read_where_they_cannot_be_delimiters() {
+    for d in [";", "\t", " "] {
+        let header = format!("time_s{d}T1{d}T2");
+        let got = record(&rows(&header, |_, t, a, b| format!("{}{d}{}{d}{}", comma(t), comma(a), comma(b))));
+        assert_is_the_rig(&got, 0.0);
+        assert!(notes(&got).contains("decimal comma"), "{}", notes(&got));
+    }
+    let quoted = rows("time_s,T1,T2", |_, t, a, b| format!("\"{}\",\"{}\",\"{}\"", comma(t), comma(a), comma(b)));
+    assert_is_the_rig(&record(&quoted), 0.0);
+}
+
+#[test]
+fn a_file_without_header_is_read_by_the_place_of_its_columns() {
+    let text = plain();
+    let body = text.split_once('\n').unwrap().1;
+    let got = record(body);
+    assert_is_the_rig(&got, 0.0);
+    assert_eq!(got.channels, ["T1", "T2"]);
+    assert!(notes(&got).contains("without column names"), "{}", notes(&got));
+}
+
+#[test]
+fn preamble_unit_row_and_comments_are_not_taken_for_rows() {
+    let preamble = "sep=;\nLogger: Xy 3000\nSerial;12;34\nRange;0;100\n\n# a comment; with; cells\n";
+    let header = format!("{preamble}Zeit;T1;T2\n[s];[°C];[°C]\n// another");
+    let got = record(&rows(&header, |_, t, a, b| format!("{};{};{}", comma(t), comma(a), comma(b))));
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("column names on line 7"), "{}", notes(&got));
+}
+
+#[test]
+fn campbell_headers_are_read() {
+    let header = "\"TOA5\",\"rig\",\"CR1000\"\n\"TIMESTAMP\",\"RECORD\",\"T1_Avg\",\"T2_Avg\"\n\
+                  \"TS\",\"RN\",\"Deg C\",\"Deg C\"\n\"\",\"\",\"Avg\",\"Avg\"";
+    let row = |k, t, a, b| format!("\"2026-01-31 10:00:{t:04.1}\",{k},{a},{b}");
+    let got = record(&rows(header, row));
+    assert_is_the_rig(&got, 0.0);
+    assert_eq!(got.channels, ["T1_Avg", "T2_Avg"]);
+}
+
+#[test]
+fn a_commented_header_is_a_header() {
+    let got = record(&rows("# time_s,T1,T2", |_, t, a, b| format!("{t},{a},{b}")));
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("column names on line 1"), "{}", notes(&got));
+}
+
+#[test]
+fn units_in_headers_are_converted_and_said() {
+    let kelvin = rows("t_min,T1_K,T2 [K]", |_, t, a, b| format!("{},{},{}", t / 60.0, a + 273.15, b + 273.15));
+    let got = record(&kelvin);
+    // One rounding to and one from kelvin, half a unit in the last place of 300 each: 6e-14.
+    assert_is_the_rig(&got, 1e-13);
+    assert!(notes(&got).contains("is in K, converted to °C"), "{}", notes(&got));
+    let fahrenheit =
+        rows("time [ms],temp_F,temp2 (°F)", |_, t, a, b| format!("{},{},{}", t * 1e3, a * 1.8 + 32.0, b * 1.8 + 32.0));
+    assert_is_the_rig(&record(&fahrenheit), 1e-13);
+}
+
+#[test]
+fn every_encoding_and_line_end_is_read() {
+    let text = rows("time [s];T1 [°C];T2 [°C]", |_, t, a, b| format!("{t};{a};{b}"));
+    let utf16: Vec<u16> = text.encode_utf16().collect();
+    let little = [vec![0xFF, 0xFE], utf16.iter().flat_map(|unit| unit.to_le_bytes()).collect()].concat();
+    let big = [vec![0xFE, 0xFF], utf16.iter().flat_map(|unit| unit.to_be_bytes()).collect()].concat();
+    let western: Vec<u8> = text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect();
+    let marked = [b"\xEF\xBB\xBF", text.as_bytes()].concat();
+    let crlf = text.replace('\n', "\r\n").into_bytes();
+    let cr = text.replace('\n', "\r").into_bytes();
+    for bytes in [text.clone().into_bytes(), marked, little, big, western, crlf, cr] {
+        assert_is_the_rig(&record_with(&bytes, &Selection::default()).unwrap(), 0.0);
+    }
+}
+
+#[test]
+fn quotes_trailing_delimiters_and_blank_lines_do_no_harm() {
+    let trailing = |_, t, a, b| format!("\"{t}\";\"{a}\";{b};");
+    assert_is_the_rig(&record(&(rows("time_s;T1;T2;", trailing) + "\n \n\n")), 0.0);
+    assert_is_the_rig(&record(&rows("time_s;T1;T2", trailing)), 0.0);
+}
+
+#[test]
+fn a_header_that_comes_again_is_left_out_with_a_note() {
+    let text = plain();
+    let (header, body) = text.split_once('\n').unwrap();
+    let rolled = text.replace("\n2.5,", &format!("\n{header}\n2.5,"));
+    assert!(body.contains("\n2.5,"));
+    let got = record(&rolled);
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("first is line 7"), "{}", notes(&got));
+}
+
+#[test]
+fn a_cut_off_last_line_is_left_out_with_a_note() {
+    let got = record(&(plain() + "5,22"));
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("last line 12 is cut off (2 of 3 cells)"), "{}", notes(&got));
+}
+
+#[test]
+fn words_for_missing_are_nan_and_counted_and_cut_the_record() {
+    let words = ["", "NaN", "NA", "null", "---", "OL", "OPEN", "Over", "inf"];
+    for word in words {
+        let text = rows("time_s,T1,T2", |k, t, a, b| match k {
+            4 => format!("{t},{word},{b}"),
+            _ => format!("{t},{a},{b}"),
+        });
+        let got = record(&text);
+        assert!(got.t1_c[4].is_nan() && !got.t2_c[4].is_nan(), "{word}");
+        assert_eq!((got.missing, got.segments.clone()), (1, vec![0..4, 5..10]), "{word}");
+        assert_eq!(Table::read(text.as_bytes(), "x").unwrap().columns()[1].missing(), 1);
+        assert!(notes(&got).contains("1 rows masked"), "{}", notes(&got));
+    }
+}
+
+#[test]
+fn a_text_column_harms_only_who_selects_it() {
+    let text =
+        rows("time_s,T1,T2,status", |k, t, a, b| format!("{t},{a},{b},{}", if k == 3 { "door open" } else { "OK" }));
+    assert_is_the_rig(&record(&text), 0.0);
+    assert_eq!(Table::read(text.as_bytes(), "x").unwrap().columns()[3].kind(), Kind::Text);
+}
+
+#[test]
+fn every_way_to_write_the_time_gives_the_same_seconds() {
+    type Way = fn(f64) -> String;
+    let ways: [(&str, Way); 8] = [
+        ("time", |t| format!("2026-01-31T10:00:{t:04.1}Z")),
+        ("timestamp", |t| format!("2026-01-31 10:00:{t:04.1}")),
+        ("Zeit", |t| format!("31.01.2026 10:00:{t:06.3}")),
+        ("Date", |t| format!("01/31/2026 10:00:{t:04.1} AM")),
+        ("Uhrzeit", |t| format!("10:00:{t:04.1}")),
+        ("Date;Time", |t| format!("31.01.2026;10:00:{t:04.1}")),
+        ("elapsed [us]", |t| format!("{}", t * 1e6)),
+        ("time", |t| format!("{}", 1_700_000_000.0 + t)),
+    ];
+    for (header, way) in ways {
+        let got = record(&rows(&format!("{header};T1;T2"), |_, t, a, b| format!("{};{a};{b}", way(t))));
+        assert_is_the_rig(&got, 0.0);
+    }
+}
+
+#[test]
+fn time_of_day_goes_on_past_midnight() {
+    let text = rows("time,T1,T2", |k, t, a, b| {
+        let clock = if k < 4 { format!("23:59:{:04.1}", 58.0 + t) } else { format!("00:00:{:04.1}", t - 2.0) };
+        format!("{clock},{a},{b}")
+    });
+    let got = record(&text);
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("midnight"), "{}", notes(&got));
+}
+
+#[test]
+fn one_date_throughout_needs_no_order_of_day_and_month() {
+    assert_is_the_rig(&record(&rows("time,T1,T2", |_, t, a, b| format!("03/04/2026 10:00:{t:04.1},{a},{b}"))), 0.0);
+}
+
+#[test]
+fn a_period_stands_in_for_the_time_column() {
+    let selection = Selection { period_s: Some(0.5), ..Selection::default() };
+    for text in
+        [rows("T1,T2", |_, _, a, b| format!("{a},{b}")), rows("sample,T1,T2", |k, _, a, b| format!("{k},{a},{b}"))]
+    {
+        let got = record_with(text.as_bytes(), &selection).unwrap();
+        assert_is_the_rig(&got, 0.0);
+        assert_eq!((got.sampling.period_s, got.sampling.stamp_resolution_s), (0.5, None));
+    }
+}
+
+#[test]
+fn columns_are_chosen_by_name_number_and_name_without_unit() {
+    let text = rows("a [s],b [°C],3,c [°C]", |_, t, a, b| format!("{t},{a},{b},{}", a + b));
+    for (time, t1, t2) in [("a [s]", "b [°C]", "3"), ("1", "2", "3"), ("A", "b", "3")] {
+        let pick = |text: &str| Some(text.parse::<ColumnRef>().unwrap());
+        let selection =
+            Selection { time: pick(time), t1: pick(t1), t2: pick(t2), reference: pick("c"), ..Selection::default() };
+        let got = record_with(text.as_bytes(), &selection).unwrap();
+        assert_is_the_rig(&got, 0.0);
+        assert_eq!(got.reference_c.as_ref().unwrap()[0], 40.0);
+    }
+}
+
+#[test]
+fn t1_and_t2_go_before_other_temperatures_and_a_reference_is_never_one() {
+    let text = rows("time_s,Tref,T2_b_C,depth_m,T1_a_C,ambient_C", |_, t, a, b| format!("{t},9,{b},1,{a},8"));
+    let got = record(&text);
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("T1 guessed to be column 5 'T1_a_C'"), "{}", notes(&got));
+    assert_is_the_rig(
+        &record(&rows("time_s,setpoint_C,Tref,fine_C,coarse_C", |_, t, a, b| format!("{t},9,8,{a},{b}"))),
+        0.0,
+    );
+}
+
+#[test]
+fn a_gap_cuts_the_record_and_is_said_with_place_and_length() {
+    let text = rows("time_s,T1,T2", |k, t, a, b| format!("{},{a},{b}", if k < 6 { t } else { t + 7.0 }));
+    // Nine steps with one gap are more than one in twenty: the steps count as stamped, and 7.5 s is 15 of them.
+    let got = record(&text);
+    assert_eq!(got.segments, [0..6, 6..10]);
+    assert!(notes(&got).contains("gap of 7.500000 s before line 8, from 2.5"), "{}", notes(&got));
+}
+
+#[test]
+fn steps_are_the_period_if_even_and_as_stamped_if_not() {
+    let even = record(&plain());
+    assert_eq!(even.sampling.kind, SamplingKind::Uniform);
+    assert_eq!(even.steps_s(&even.segments[0]), vec![0.5; 9]);
+    let odd = record(&rows("time_s,T1,T2", |k, t, a, b| format!("{},{a},{b}", t + f64::from(k % 2) / 8.0)));
+    assert_eq!(odd.sampling.kind, SamplingKind::Irregular);
+    assert_eq!(odd.steps_s(&(0..4)), [0.625, 0.375, 0.625]);
+    assert!(notes(&odd).contains("nothing was resampled"), "{}", notes(&odd));
+}
+
+#[test]
+fn vectors_make_the_same_record_as_their_file() {
+    let want = record(&plain());
+    let channels = Channels {
+        source: "vectors".to_owned(),
+        names: ["T1", "T2"].map(str::to_owned),
+        time_s: want.time_s.clone(),
+        t1_c: want.t1_c.clone(),
+        t2_c: want.t2_c.clone(),
+        reference_c: None,
+    };
+    let got = Record::from_channels(channels, SamplingChoice::Auto).unwrap();
+    assert_eq!((got.sampling, got.segments), (want.sampling, want.segments));
+}

@@ -1,0 +1,201 @@
+//! What cannot be read in one way only is refused, with place and remedy.
+
+mod common;
+
+use common::{FILE, assert_says, plain, refusal, refusal_with, rows};
+use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table};
+
+#[expect(clippy::unnecessary_wraps, reason = "as the fields of a selection are")]
+fn pick(text: &str) -> Option<ColumnRef> {
+    Some(text.parse().unwrap())
+}
+
+#[test]
+fn decimal_commas_between_commas_are_refused() {
+    let text = rows("time_s,T1,T2", |k, _, _, _| format!("{k},0,20,{k},21,5"));
+    assert_says(&refusal(&text), &["line 2", "6 comma-separated", "3 column names", "semicolons"]);
+    let text = rows("time_s,T1,T2", |k, _, _, _| format!("{k},20,{k},21,5"));
+    assert_says(&refusal(&text), &["line 2", "5 comma-separated"]);
+    let headless = text.split_once('\n').unwrap().1.replace('\n', ",1\n");
+    assert_says(&refusal(&headless), &["line 1", "no header"]);
+}
+
+#[test]
+fn thousands_and_mixed_decimals_are_refused() {
+    let text = rows("time_s;T1;T2", |k, _, _, _| format!("{k};1,23{k};1,31{k}"));
+    assert_says(&refusal(&text), &["line 2", "'1,230'", "thousands", "decimal points"]);
+    let text = rows("time_s;T1;T2", |k, _, _, _| format!("{k}.5;20,{k};21,{k}"));
+    assert_says(&refusal(&text), &["'20,0'", "'0.5'", "line 2", "decimal points"]);
+}
+
+#[test]
+fn text_in_a_number_column_is_refused_with_line_column_and_cell() {
+    let text = plain().replace("1.5,20.75", "1.5,abc");
+    assert_says(&refusal(&text), &["line 5", "column 2 'T1'", "'abc'", "empty it"]);
+    // Also in the first row, which must not be taken for a header or preamble, with or without a header above.
+    let text = plain().replace("\n0,20,20", "\n0,abc,20");
+    assert_says(&refusal(&text), &["line 2", "'abc'"]);
+    assert_says(&refusal(text.split_once('\n').unwrap().1), &["line 1", "'abc'"]);
+    assert_says(&refusal(&format!("# {text}")), &["line 2", "'abc'"]);
+}
+
+#[test]
+fn a_text_column_cannot_be_a_temperature() {
+    let text = rows("time_s,T1,T2,status", |_, t, a, b| format!("{t},{a},{b},OK"));
+    let selection = Selection { t2: pick("status"), ..Selection::default() };
+    assert_says(&refusal_with(text.as_bytes(), &selection), &["4 'status'", "'OK'", "--t2"]);
+}
+
+#[test]
+fn a_line_with_a_wrong_number_of_cells_is_refused() {
+    let text = plain().replace("1.5,20.75,20.375", "1.5,20.75");
+    assert_says(&refusal(&text), &["line 5", "expected 3", "found 2", "remove"]);
+    let text = plain().replace("1.5,20.75,20.375", "1.5,20.75,20.375,7");
+    assert_says(&refusal(&text), &["line 5", "expected 3", "found 4"]);
+    let text = plain().replace("\n0,20,20\n", "\n0,20\n");
+    assert_says(&refusal(&text), &["line 2", "expected 3", "found 2"]);
+    assert_says(&refusal(&plain().replace("1.5,20.75", "1.5,\"20.75")), &["line 5", "quotation mark"]);
+    assert_says(
+        &refusal(&rows("time_s,T1", |_, t, a, b| format!("{t},{a},{b}"))),
+        &["line 2", "expected 2", "found 3"],
+    );
+}
+
+#[test]
+fn an_ambiguous_date_is_refused() {
+    let text = rows("time,T1,T2", |k, _, a, b| format!("03/{:02}/2026 10:00:00,{a},{b}", k + 1));
+    assert_says(&refusal(&text), &["line 2", "1 'time'", "'03/01/2026 10:00:00'", "YYYY-MM-DD"]);
+}
+
+#[test]
+fn a_broken_stamp_is_refused() {
+    let text = rows("time,T1,T2", |k, t, a, b| format!("10:00:{:04.1},{a},{b}", t + f64::from(k / 7) * 60.0));
+    assert_says(&refusal(&text), &["line 9", "1 'time'", "10:00:63.5", "remove"]);
+    let text =
+        rows("time,T1,T2", |k, t, a, b| format!("2026-01-31T10:00:{t:04.1}{},{a},{b}", if k == 3 { "Z" } else { "" }));
+    assert_says(&refusal(&text), &["line 5", "zone"]);
+}
+
+#[test]
+fn no_time_column_needs_a_period() {
+    let text = rows("T1,T2", |_, _, a, b| format!("{a},{b}"));
+    assert_says(&refusal(&text), &["--time", "--period", "1 'T1', 2 'T2'"]);
+    assert_says(&refusal(&rows("sample,T1,T2", |k, _, a, b| format!("{k},{a},{b}"))), &["--period"]);
+    let selection = Selection { period_s: Some(-1.0), ..Selection::default() };
+    assert_says(&refusal_with(text.as_bytes(), &selection), &["positive", "-1"]);
+    let selection = Selection { period_s: Some(1.0), time: pick("1"), ..Selection::default() };
+    assert_says(&refusal_with(plain().as_bytes(), &selection), &["1 'time_s'", "give one"]);
+}
+
+#[test]
+fn time_must_increase() {
+    for (stamp, text) in [("1", plain().replace("\n1.5,", "\n1,")), ("0.5", plain().replace("\n1.5,", "\n0.5,"))] {
+        assert_says(&refusal(&text), &["line 5", &format!("'{stamp}' follows '1'"), "sort", "remove"]);
+    }
+    assert_says(&refusal(&plain().replace("\n1.5,", "\nNaN,")), &["line 5", "1 'time_s'", "missing"]);
+    let text = rows("time,T1,T2", |k, _, a, b| format!("10:00:{:02},{a},{b}", k / 2));
+    assert_says(&refusal(&text), &["line 3", "'10:00:00' follows '10:00:00'", "--period"]);
+}
+
+#[test]
+fn which_columns_are_the_sensors_must_be_clear() {
+    for header in ["time_s,a_C,b_C,c_C", "time_s,chamber_C,dut_C,ref_C"] {
+        let text = rows(header, |_, t, a, b| format!("{t},{a},{b},{}", a + b));
+        assert_says(&refusal(&text), &["exactly two", "--t1 NAME --t2 NAME", "1 'time_s'", "_C'"]);
+    }
+    let text = rows("time_s,T1,x", |_, t, a, b| format!("{t},{a},{b}"));
+    assert_says(&refusal(&text), &["found 1", "2 'T1'", "3 'x'"]);
+    let with = |t1, t2| Selection { t1: pick(t1), t2: pick(t2), ..Selection::default() };
+    assert_says(&refusal_with(plain().as_bytes(), &with("T9", "T2")), &["'T9'", "2 'T1'", "--t1"]);
+    assert_says(&refusal_with(plain().as_bytes(), &with("7", "T2")), &["'7'"]);
+    assert_says(&refusal_with(plain().as_bytes(), &with("T2", "3")), &["3 'T2'", "twice"]);
+    let text = rows("time_s,T,T", |_, t, a, b| format!("{t},{a},{b}"));
+    assert_says(&refusal_with(text.as_bytes(), &with("T", "3")), &["[2, 3]", "by number"]);
+}
+
+#[test]
+fn what_is_no_temperature_or_time_by_its_unit_is_refused() {
+    let text = rows("time_s,T1 [mV],T2", |_, t, a, b| format!("{t},{a},{b}"));
+    let selection = Selection { t1: pick("T1"), t2: pick("T2"), ..Selection::default() };
+    assert_says(&refusal_with(text.as_bytes(), &selection), &["2 'T1 [mV]'", "'mV'", "°C", "convert"]);
+    let text = rows("x [m],T1,T2", |_, t, a, b| format!("{t},{a},{b}"));
+    let selection = Selection { time: pick("x"), ..Selection::default() };
+    assert_says(&refusal_with(text.as_bytes(), &selection), &["1 'x [m]'", "'m'", "time [s]"]);
+}
+
+#[test]
+fn impossible_temperatures_are_refused() {
+    for value in ["9999", "-9999", "1e37", "-273.2"] {
+        let text = plain().replace("1.5,20.75", &format!("1.5,{value}"));
+        let number = value.parse::<f64>().unwrap().to_string();
+        assert_says(&refusal(&text), &["line 5", "2 'T1'", &number, "open", "unit"]);
+    }
+    let text = rows("time_s,T1_K,T2_K", |_, t, a, b| format!("{t},{},{}", a + 253.0, b - 25.0));
+    assert_says(&refusal(&text), &["line 2", "3 'T2_K'", "-5 K", "absolute zero"]);
+}
+
+#[test]
+fn channels_that_tell_nothing_are_refused() {
+    assert_says(&refusal(&rows("time_s,T1,T2", |_, t, a, _| format!("{t},{a},{a}"))), &["2 'T1'", "3 'T2'", "same"]);
+    assert_says(
+        &refusal(&rows("time_s,T1,T2", |_, t, a, _| format!("{t},{a},21.5"))),
+        &["3 'T2'", "21.5 °C", "Choose"],
+    );
+}
+
+#[test]
+fn fewer_than_eight_usable_samples_are_refused() {
+    let text: String = plain().lines().take(8).map(|line| line.to_owned() + "\n").collect();
+    assert_says(&refusal(&text), &["7 usable", "of 7 rows", "at least 8"]);
+    let text =
+        rows("time_s,T1,T2", |k, t, a, b| if k % 4 == 0 { format!("{t},OL,{b}") } else { format!("{t},{a},{b}") });
+    assert_says(&refusal(&text), &["7 usable", "of 10 rows", "3 with a missing"]);
+}
+
+#[test]
+fn files_without_a_table_are_refused() {
+    for (bytes, says) in [
+        (&b""[..], "empty"),
+        (b"\n\n", "empty"),
+        (b"# only\n", "empty"),
+        (b"time_s,T1,T2\n", "no row"),
+        (b"T1\n1\n2\n3\n", "one column"),
+        (b"\x89HDF\r\n\x1a\n\0\0\0", "not text"),
+    ] {
+        assert_says(&refusal_with(bytes, &Selection::default()), &[says]);
+    }
+}
+
+#[test]
+fn files_that_cannot_be_opened_are_refused() {
+    let missing = Table::from_path("no/such/file.csv").unwrap_err().to_string();
+    assert!(missing.contains("no/such/file.csv") && missing.contains("check the path"), "{missing}");
+    let directory = Table::from_path(env!("CARGO_MANIFEST_DIR")).unwrap_err().to_string();
+    assert!(directory.contains("directory"), "{directory}");
+}
+
+#[test]
+fn vectors_are_checked_like_files() {
+    let good = || Channels {
+        source: FILE.to_owned(),
+        names: ["hot", "cold"].map(str::to_owned),
+        time_s: (0..10).map(f64::from).collect(),
+        t1_c: (0..10).map(f64::from).collect(),
+        t2_c: (0..10).map(|k| f64::from(k) / 2.0).collect(),
+        reference_c: None,
+    };
+    let refused = |channels| Record::from_channels(channels, SamplingChoice::Auto).expect_err("refused").to_string();
+    assert!(Record::from_channels(good(), SamplingChoice::Auto).is_ok());
+    let mut bad = good();
+    bad.t2_c.pop();
+    assert_says(&refused(bad), &["cold", "9 samples", "expected 10"]);
+    let mut bad = good();
+    bad.time_s[4] = 3.0;
+    assert_says(&refused(bad), &["sample 5", "'3 s' follows '3 s'"]);
+    let mut bad = good();
+    bad.t1_c[2] = f64::INFINITY;
+    assert_says(&refused(bad), &["sample 3", "hot"]);
+    let mut bad = good();
+    bad.time_s[2] = f64::NAN;
+    assert_says(&refused(bad), &["sample 3", "missing"]);
+}

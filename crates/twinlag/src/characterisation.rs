@@ -1,0 +1,173 @@
+//! The answer, as scripts read it: schema `twinlag.characterisation/1`.
+
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::ResidualTest;
+use twinlag_optimise::Fit;
+use twinlag_record::Sampling;
+
+use crate::options::Options;
+
+/// Whether there is an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Status {
+    /// Both time constants are determined, and the residual is what noise leaves.
+    Ok,
+    /// The best fit lies on a bound: no estimate.
+    AtBound,
+    /// The record does not determine the time constants apart; [`Characterisation::not_identifiable`] names what it does not.
+    NotIdentifiable,
+    /// The time constants are the best of a model that the record contradicts: the residual is not noise.
+    ModelRejected,
+}
+
+/// A number with its uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error; `None` where the interval has no one width to state.
+    pub standard_error: Option<f64>,
+    /// 95 % interval.
+    pub interval_95: [f64; 2],
+}
+
+/// What the record is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordSummary {
+    /// File or name.
+    pub source: String,
+    /// Rows.
+    pub samples: usize,
+    /// Time from sample to sample, s: the mean over unbroken stretches.
+    pub sample_period_s: f64,
+    /// Rows in which a channel is missing.
+    pub missing: usize,
+    /// Names of the channels.
+    pub channels: [String; 2],
+    /// Unbroken stretches.
+    pub segments: usize,
+    /// How the stamps lie.
+    pub sampling: Sampling,
+}
+
+/// What is found of one sensor; `None` where the record does not tell.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SensorEstimate {
+    /// Name of the channel.
+    pub channel: String,
+    /// Time constant, s.
+    pub time_constant_s: Option<f64>,
+    /// Its standard error, s.
+    pub standard_error_s: Option<f64>,
+    /// Its 95 % interval, s.
+    pub interval_95_s: Option<[f64; 2]>,
+    /// Noise standard deviation that was given or found, K.
+    #[serde(rename = "noise_std_K")]
+    pub noise_std_k: f64,
+    /// Whether the time constant was given, not found.
+    pub known: bool,
+}
+
+/// Relative calibration of channel 2 against channel 1: `y2 = gain · y1 + offset` at rest. `None` where not fitted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FreeParameters {
+    /// Gain of channel 2 relative to channel 1.
+    pub gain: Option<Estimate>,
+    /// Offset of channel 2 relative to channel 1 at 0 °C, K.
+    #[serde(rename = "offset_K")]
+    pub offset_k: Option<Estimate>,
+}
+
+/// `time_constant_difference_s` of the schema.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// `τ2 − τ1`, s.
+    pub value: Option<f64>,
+    /// Its 95 % interval, s.
+    pub interval_95_s: Option<[f64; 2]>,
+}
+
+/// What the fit leaves over.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Residual {
+    /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated level is left.
+    pub chi2_per_dof: f64,
+    /// Whether its autocorrelations are those of white noise.
+    pub white: bool,
+    /// The tests.
+    pub tests: Vec<ResidualTest>,
+}
+
+/// What the intervals rest on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalMethod {
+    /// White noise of the stated levels, the noise-noise term included.
+    Information,
+    /// The residual's own spectrum: model error is part of it.
+    ResidualSpectrum,
+    /// The range over every value of the undetermined time constant that the record allows.
+    Profile,
+    /// There are no intervals.
+    None,
+}
+
+/// What made this answer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MadeBy {
+    /// `twinlag`.
+    pub program: String,
+    /// Its version.
+    pub version: String,
+    /// What was asked.
+    pub options: Options,
+}
+
+/// Both time constants of a record, with everything needed to judge and repeat them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Characterisation {
+    /// `twinlag.characterisation/1`.
+    pub schema: String,
+    /// What the record is.
+    pub record: RecordSummary,
+    /// Name of the estimator.
+    pub estimator: String,
+    /// Name of the optimiser.
+    pub optimiser: String,
+    /// What the gas was taken to do between samples.
+    pub hold: String,
+    /// How much each time constant moves, relative, if the gas is taken to do the other thing between samples; `None` where
+    /// this was not tried.
+    pub hold_sensitivity: Option<[f64; 2]>,
+    /// Sensors 1 and 2.
+    pub sensors: [SensorEstimate; 2],
+    /// What the record tells best: the difference.
+    pub time_constant_difference_s: Difference,
+    /// Relative calibration, where fitted.
+    pub free: FreeParameters,
+    /// What is left over.
+    pub residual: Residual,
+    /// What the intervals rest on.
+    pub interval_method: IntervalMethod,
+    /// Whether there is an answer.
+    pub status: Status,
+    /// What this record cannot tell.
+    pub not_identifiable: Vec<String>,
+    /// What to know before using the numbers.
+    pub warnings: Vec<String>,
+    /// How the best fit ended. Its point is where it ended, not an estimate, unless the status says so.
+    pub fit: Fit,
+    /// Number of starts.
+    pub starts: usize,
+    /// How the file was understood.
+    pub notes: Vec<String>,
+    /// What made this answer.
+    pub made_by: MadeBy,
+}
+
+impl Characterisation {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.characterisation/1";
+}

@@ -1,0 +1,39 @@
+use thiserror::Error;
+use twinlag_bias::NoiseError;
+use twinlag_cross_relation::CostError;
+use twinlag_optimise::ProblemError;
+use twinlag_record::RecordError;
+use twinlag_signal::SignalError;
+
+/// Why a question could not be put to a record. A fit that ran is never an error: see [`crate::Status`].
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum Error {
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    #[error(transparent)]
+    Cost(#[from] CostError),
+    #[error(transparent)]
+    Noise(#[from] NoiseError),
+    #[error(transparent)]
+    Optimiser(#[from] ProblemError),
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    #[error("{option}: expected {expected}, got \"{got}\"")]
+    Option { option: &'static str, expected: String, got: String },
+    #[error("{what} needs the whitened estimator, not {estimator}: leave out --estimator")]
+    WhitenedOnly { what: &'static str, estimator: String },
+    #[error(
+        "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
+         use a longer record, a smaller --discard, or the whitened estimator, which discards none"
+    )]
+    DiscardsAll { discard: usize, longest: usize },
+}
+
+impl Error {
+    /// Whether the way the question was put is at fault, rather than the record.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, Self::Option { .. } | Self::WhitenedOnly { .. } | Self::Optimiser(_))
+    }
+}

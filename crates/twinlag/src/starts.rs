@@ -1,0 +1,82 @@
+//! Where to start: the costs have spurious minima, and either sensor may be the slow one.
+
+use twinlag_cross_relation::{Readings, difference_equation_least_squares};
+use twinlag_optimise::Variable;
+
+use crate::objective::Objective;
+
+/// Time constants per decade-spanning axis of the grid.
+const GRID: usize = 6;
+/// Starts kept for each order of the two time constants.
+const KEPT: usize = 2;
+
+/// Starts for `objective`, data-driven: the difference equation's least squares, and the lowest points of a logarithmic grid
+/// for either order of the time constants. Gain and offset take one Newton step of their own at each point.
+pub(crate) fn starts<const P: usize>(
+    objective: &Objective<'_, '_, P>,
+    readings: &Readings,
+    variables: &[Variable],
+) -> Vec<Vec<f64>> {
+    let step_s = readings.mean_step_s();
+    let (shortest, longest) = (0.5 * step_s, 0.25 * readings.longest_span_s());
+    let axis: Vec<f64> = (0..GRID)
+        .map(|i| shortest * (longest / shortest).powf((i as f64 + 0.5) / GRID as f64))
+        .collect();
+    let mut grid: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut add = |tau1: f64, tau2: f64| {
+        let mut x: Vec<f64> = [tau1, tau2, 1.0, mean_difference(readings)][..P].to_vec();
+        hold_known(&mut x, variables);
+        settle_calibration(objective, &mut x, variables);
+        let value = objective.at(&x).value;
+        if value.is_finite() {
+            grid.push((value, x));
+        }
+    };
+    if let Ok([tau1, tau2]) = difference_equation_least_squares(readings) {
+        add(tau1, tau2);
+        // Noise makes it too short: the slower guess is worth having too.
+        add(2.0 * tau1, 1.5 * tau2);
+    }
+    for (i, &tau1) in axis.iter().enumerate() {
+        for (j, &tau2) in axis.iter().enumerate() {
+            if i != j {
+                add(tau1, tau2);
+            }
+        }
+    }
+    grid.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut kept: Vec<Vec<f64>> = Vec::new();
+    for first_is_fast in [true, false] {
+        kept.extend(grid.iter().filter(|(_, x)| (x[0] < x[1]) == first_is_fast).take(KEPT).map(|(_, x)| x.clone()));
+    }
+    kept
+}
+
+fn hold_known(x: &mut [f64], variables: &[Variable]) {
+    for (x, v) in x.iter_mut().zip(variables) {
+        *x = x.clamp(v.lower, v.upper);
+    }
+}
+
+fn mean_difference(readings: &Readings) -> f64 {
+    let sum = |y: fn(&twinlag_cross_relation::Segment) -> &[f64]| -> f64 {
+        readings.segments().iter().flat_map(|s| y(s).iter()).sum()
+    };
+    (sum(twinlag_cross_relation::Segment::y2) - sum(twinlag_cross_relation::Segment::y1)) / readings.len() as f64
+}
+
+/// The residual is all but linear in gain and offset: one Newton step finds them for given time constants.
+fn settle_calibration<const P: usize>(objective: &Objective<'_, '_, P>, x: &mut [f64], variables: &[Variable]) {
+    let free: Vec<usize> = (2..P).filter(|&i| variables[i].lower < variables[i].upper).collect();
+    if free.is_empty() {
+        return;
+    }
+    let c = objective.at(x);
+    let h = nalgebra::DMatrix::from_fn(free.len(), free.len(), |p, q| c.hessian[free[p]][free[q]]);
+    let g = nalgebra::DVector::from_fn(free.len(), |p, _| c.gradient[free[p]]);
+    if let Some(step) = h.cholesky().map(|c| c.solve(&g)) {
+        for (p, &i) in free.iter().enumerate() {
+            x[i] = (x[i] - step[p]).clamp(variables[i].lower, variables[i].upper);
+        }
+    }
+}
