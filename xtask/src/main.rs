@@ -1,2 +1,51 @@
-//! Tasks of the repository.
-fn main() {}
+//! Tasks of the repository: `cargo xtask ci`, `cargo xtask measured DIR`, `cargo xtask bench`.
+
+
+mod ci;
+mod measured;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Parser, Subcommand};
+
+/// Tasks of the repository.
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Everything that must hold before a change lands: tests, format, lints, documentation, quick runs.
+    Ci,
+    /// Runs every record of a folder of measured data and holds what is found against what is known of them.
+    Measured {
+        /// The folder. It is no part of the repository.
+        dir: PathBuf,
+    },
+    /// Times the fits, beside what a user would otherwise write where Python with SciPy is at hand.
+    Bench,
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().task {
+        Task::Ci => ci::run(),
+        Task::Measured { dir } => measured::run(&dir),
+        Task::Bench => Ok(()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The top of the repository.
+fn root() -> Result<&'static Path> {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or_else(|| anyhow::anyhow!("xtask lies in the repository"))
+}

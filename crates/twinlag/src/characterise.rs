@@ -23,6 +23,9 @@ const REJECT: f64 = 1e-3 / 3.0;
 /// A time constant whose logarithm has a larger standard error than this is not determined: its interval spans a factor of
 /// seven.
 const UNDETERMINED: f64 = 0.5;
+/// A time constant longer than this share of the longest unbroken stretch is where fits run to when the record does not tell
+/// two lags from none: the gas would have to be known to move at periods longer than the record.
+const LONGEST_SHARE: f64 = 1.0 / 3.0;
 /// The other hold must lower the sum of squares by this many times the residual's energy per degree of freedom.
 const CLEARLY_BETTER: f64 = 10.0;
 /// Share of a standard error that the choice of hold may cost without a word.
@@ -190,18 +193,17 @@ impl<'a, const P: usize> Question<'a, P> {
         let hold_sensitivity = self.try_other_hold(&mut best)?;
         let theta: [f64; P] = std::array::from_fn(|i| best.fit.x[i]);
         energy = self.energy(&best);
-        if !self.levels.given && energy < 1.0 {
+        let expected_spread = (2.0 / best.whitened.terms() as f64 + self.levels.uncertainty.powi(2)).sqrt();
+        if !self.levels.given && energy < 1.0 - 4.0 * expected_spread {
             // Only the ratio matters to the fit; a signal that moves between samples makes third differences too large.
             let quieter = best.whitened.noise_std().map(|s| s * energy.sqrt());
             best.whitened = best.whitened.with_noise(quieter)?;
             self.levels.std_k = quieter;
-            if energy < 0.5 {
-                self.warnings.push(
-                    "the signal moves between samples as much as noise would: the noise levels are those of the residual, \
-                     their ratio is a guess; give --noise S1,S2 if you know them"
-                        .into(),
-                );
-            }
+            self.warnings.push(
+                "the signal moves between samples as noise would: the noise levels are scaled to the residual, and their \
+                 ratio is a guess; give --noise S1,S2 if you know them"
+                    .into(),
+            );
         }
         if self.options.estimator == Estimator::Whitened {
             let tests = self.tests(&best, &theta);
@@ -306,7 +308,7 @@ impl<'a, const P: usize> Question<'a, P> {
         let moved = [0, 1].map(|i| fitted.fit.x[i] / best.fit.x[i] - 1.0);
         let usable = fitted.fit.end.is_usable() && best.fit.end.is_usable();
         let needed = CLEARLY_BETTER * self.energy(best).max(1.0);
-        if self.options.hold == Hold::Auto && fitted.fit.value + needed < best.fit.value {
+        if self.options.hold == Hold::Auto && fitted.fit.end.is_usable() && fitted.fit.value + needed < best.fit.value {
             self.warnings.push(
                 "straight lines between samples explain the record clearly better than steps: the first-order hold was used"
                     .into(),
@@ -340,10 +342,12 @@ impl<'a, const P: usize> Question<'a, P> {
         let whitened_estimate = self.options.estimator == Estimator::Whitened;
         let log_error = |i: usize, c: &[[f64; P]; P]| c[i][i].sqrt() / theta[i];
         let is_free = |i: usize| self.variables[i].lower < self.variables[i].upper;
-        let vague: Vec<usize> = match &covariance {
-            Some(c) => (0..2).filter(|&i| is_free(i) && log_error(i, c) > UNDETERMINED).collect(),
-            None => (0..2).filter(|&i| is_free(i)).collect(),
+        let longest_s = LONGEST_SHARE * self.readings.longest_span_s();
+        let is_vague = |i: usize| match &covariance {
+            Some(c) => log_error(i, c) > UNDETERMINED || theta[i] > longest_s,
+            None => true,
         };
+        let vague: Vec<usize> = (0..2).filter(|&i| is_free(i) && is_vague(i)).collect();
         let on_bound = match &best.fit.end {
             End::OnBound(which) => which.clone(),
             _ => Vec::new(),
@@ -371,13 +375,7 @@ impl<'a, const P: usize> Question<'a, P> {
                 // Walk along the time constant that is on a bound, or the vaguer one.
                 let index = on_bound.iter().chain(&vague).copied().find(|&i| i < 2 && is_free(i));
                 let found = match index {
-                    Some(index) if whitened_estimate => {
-                        let cost = EstimatorCost::Whitened(best.whitened.clone());
-                        let objective = Objective::<P> { cost: &cost, priors: &self.priors };
-                        let x = &best.fit.x;
-                        ridge::<P>(&objective, &best.whitened, &self.variables, x, index, middle, self.options)?
-                            .map(|r| (index, r))
-                    }
+                    Some(index) if whitened_estimate => self.ridge(&best, index, middle)?.map(|r| (index, r)),
                     _ => None,
                 };
                 self.explain(&mut out, &best, found, is_rejected);
@@ -391,6 +389,29 @@ impl<'a, const P: usize> Question<'a, P> {
         }
         out.warnings.splice(0..0, self.warnings);
         Ok(out)
+    }
+
+    /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
+    /// more than noise, neither hold can be preferred.
+    fn ridge(&self, best: &Fitted<'a>, index: usize, middle: Middle) -> Result<Option<Ridge>, Error> {
+        let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, Error> {
+            let cost = EstimatorCost::Whitened(fitted.whitened.clone());
+            let objective = Objective::<P> { cost: &cost, priors: &self.priors };
+            ridge::<P>(&objective, &fitted.whitened, &self.variables, &fitted.fit.x, index, middle, self.options)
+        };
+        let found = along(best)?;
+        if self.options.hold != Hold::Auto || self.readings.even_period_s().is_none() {
+            return Ok(found);
+        }
+        let other = match best.whitened.hold() {
+            Discretisation::ZeroOrderHold => Discretisation::FirstOrderHold,
+            _ => Discretisation::ZeroOrderHold,
+        };
+        let other = self.fit_whitened_with(other, best.whitened.noise_std(), Some(&best.fit.x))?;
+        Ok(match (found, along(&other)?) {
+            (Some(a), Some(b)) => Some(a.with(&b)),
+            (a, _) => a,
+        })
     }
 
     /// Everything but the estimates.
@@ -532,7 +553,9 @@ impl<'a, const P: usize> Question<'a, P> {
             End::Stalled(why) => self.warnings.push(format!("the optimiser stopped at no minimum: {why}")),
             End::LimitReached => self.warnings.push("the optimiser ran out of evaluations before it converged".into()),
             _ => self.warnings.push(
-                "the record fits time constants that differ by large factors equally well: none is reported".into(),
+                "the record fits time constants that differ by large factors about equally well, or best such as are long \
+                 beside the record itself: none is reported"
+                    .into(),
             ),
         }
         let Some((index, ridge)) = found else {
@@ -540,8 +563,15 @@ impl<'a, const P: usize> Question<'a, P> {
             return;
         };
         out.interval_method = IntervalMethod::Profile;
-        let (value, interval) = ridge.difference;
-        out.time_constant_difference_s = Difference { value: Some(value), interval_95_s: Some(interval) };
+        let (value, [low, high]) = ridge.difference;
+        out.time_constant_difference_s = Difference { value: Some(value), interval_95_s: Some([low, high]) };
+        if low <= 0.0 && high >= 0.0 {
+            out.not_identifiable.push("time_constant_difference_s".into());
+            self.warnings.push(
+                "nothing about the time constants is determined, not even which sensor is the slower one".into(),
+            );
+            return;
+        }
         let other = 1 - index;
         let [low, high] = ridge.other;
         // With a residual that is noise, a time constant that stays put whatever the other does is determined all the same.
@@ -567,19 +597,12 @@ impl<'a, const P: usize> Question<'a, P> {
             "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that two first-order lags \
              lack is at work, or the noise is not what was assumed"
         };
-        self_push(
-            &mut out.warnings,
-            format!(
-                "the residual is not noise (energy {:.3} times what noise explains): two first-order lags do not explain \
-                 this record; {hint}",
-                out.residual.chi2_per_dof
-            ),
-        );
+        out.warnings.push(format!(
+            "the residual is not noise (energy {:.3} times what noise explains): two first-order lags do not explain this \
+             record, and a time constant found with them need not be that of a sensor; {hint}",
+            out.residual.chi2_per_dof
+        ));
     }
-}
-
-fn self_push(list: &mut Vec<String>, text: String) {
-    list.push(text);
 }
 
 /// Whether the tests reject the model. Where the levels are from the data, too little energy is no objection.

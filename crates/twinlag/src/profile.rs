@@ -28,6 +28,16 @@ pub(crate) struct Ridge {
     pub(crate) other: [f64; 2],
 }
 
+impl Ridge {
+    /// The union of two, where this one ended.
+    pub(crate) fn with(&self, other: &Self) -> Self {
+        Self {
+            difference: (self.difference.0, union(self.difference.1, other.difference.1)),
+            other: union(self.other, other.other),
+        }
+    }
+}
+
 /// Walks along time constant `index` (0 or 1) from `best`, the lowest point found for `cost` over `variables`.
 pub(crate) fn ridge<const P: usize>(
     cost: &dyn Cost,
@@ -77,7 +87,7 @@ pub(crate) fn ridge<const P: usize>(
             let there = [(fit.x[other] - width).max(0.0), fit.x[other] + width];
             found = Some(match found {
                 None => Ridge { difference: (difference(best), here), other: there },
-                Some(r) => Ridge { difference: (r.difference.0, union(r.difference.1, here)), other: union(r.other, there) },
+                Some(r) => r.with(&Ridge { difference: (difference(&fit.x), here), other: there }),
             });
         }
     }

@@ -1,0 +1,64 @@
+//! What must hold before a change lands.
+
+use std::fs;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail};
+
+use crate::root;
+
+pub(crate) fn run() -> Result<()> {
+    step("tests", "cargo", &["test", "--workspace"])?;
+    step("format", "cargo", &["fmt", "--all", "--check"])?;
+    step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
+    step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
+    step("the README's main job", "cargo", &["run", "--release", "--", "demo"])?;
+    step("an example of a layer", "cargo", &["run", "--release", "-p", "twinlag", "--example", "characterise"])?;
+    links()
+}
+
+fn step(name: &str, program: &str, arguments: &[&str]) -> Result<()> {
+    println!("== {name}: {program} {}", arguments.join(" "));
+    let start = Instant::now();
+    let status = Command::new(program)
+        .args(arguments)
+        .current_dir(root()?)
+        .env("RUSTDOCFLAGS", "--deny warnings")
+        .status()
+        .with_context(|| format!("{program} could not be started"))?;
+    if !status.success() {
+        bail!("{name}: {program} {} ended with {status}", arguments.join(" "));
+    }
+    println!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// Every relative link of the book and of the README leads to a file.
+fn links() -> Result<()> {
+    let root = root()?;
+    let mut pages = vec![root.join("README.md"), root.join("CONTRIBUTING.md"), root.join("CHANGELOG.md")];
+    for entry in fs::read_dir(root.join("docs/src"))? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|e| e == "md") {
+            pages.push(path);
+        }
+    }
+    let mut count = 0;
+    for page in &pages {
+        let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let target = link.split('#').next().unwrap_or("");
+            if target.is_empty() || target.contains("://") {
+                continue;
+            }
+            let path = page.parent().unwrap_or(root).join(target);
+            if !path.exists() {
+                bail!("{}: the link to {target} leads nowhere", page.display());
+            }
+            count += 1;
+        }
+    }
+    println!("== links: {count} in {} pages lead to files", pages.len());
+    Ok(())
+}
