@@ -1,6 +1,6 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask measured DIR`, `cargo xtask bench`.
 
-
+mod bench;
 mod ci;
 mod measured;
 
@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Ci => ci::run(),
         Task::Measured { dir } => measured::run(&dir),
-        Task::Bench => Ok(()),
+        Task::Bench => bench::run(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -124,7 +124,8 @@ impl<'a> Normalised<'a> {
     /// The normalised cost with gradient and Hessian at `theta` (`P` 2 or 4).
     ///
     /// # Source
-    /// Own reading of the published normalisation; docs, chapter "Theory", section 2.
+    /// Own derivation; docs, chapter "Theory", section 2. A normalisation is published (Gillespie, Hung, Kee, McLoone 2016), but
+    /// its abstract calls it biased where this one is not, so they are not the same.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let above = self.cost.evaluate(theta);
         let below = added_by_noise(&self.noise, theta, self.cost.period_s());

@@ -102,7 +102,8 @@ fn noise_in_common<const P: usize>(
         };
         let ((g1, dg1), (g2, dg2)) = (filter(0), filter(1));
         let lambda = variance[0] * g2.norm_sqr() + variance[1] * g1.norm_sqr();
-        let shared = [g1.conj() * dg1 * variance[1], g2.conj() * dg2 * variance[0], -g1.conj() * g1 * (variance[1] / gain)];
+        let shared =
+            [g1.conj() * dg1 * variance[1], g2.conj() * dg2 * variance[0], -g1.conj() * g1 * (variance[1] / gain)];
         let kappa: [Complex<f64>; P] =
             std::array::from_fn(|i| shared.get(i).copied().unwrap_or_default() - pull[i] * lambda);
         for i in 0..P {

@@ -13,13 +13,16 @@ use crate::failure::Failure;
 /// Two thermocouples of different thickness in the same gas lag differently. From how they disagree twinlag finds the time
 /// constant of each, without knowing the gas temperature, with intervals that account for the noise it finds.
 #[derive(Debug, Parser)]
-#[command(version, after_help = "\
+#[command(
+    version,
+    after_help = "\
 Try it without a file:   twinlag demo
 On a logger file:        twinlag characterise run.csv
 With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 For a script:            twinlag characterise run.csv --json
 
-Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 1 anything else.")]
+Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 1 anything else."
+)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,

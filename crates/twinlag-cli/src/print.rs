@@ -11,7 +11,8 @@ use crate::failure::Failure;
 
 /// Exactly one JSON object on standard output.
 pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| Failure::Other(format!("the answer has no JSON: {e}")))?;
+    let text =
+        serde_json::to_string_pretty(value).map_err(|e| Failure::Other(format!("the answer has no JSON: {e}")))?;
     writeln!(stdout(), "{text}").map_err(|e| Failure::Other(format!("standard output: {e}")))
 }
 
@@ -47,9 +48,7 @@ fn text(answer: &Characterisation) -> String {
         let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
         lines.push(format!("  {a} slower than {b} by {}", interval(value, low, high, " s")));
     }
-    for (name, estimate, unit) in
-        [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")]
-    {
+    for (name, estimate, unit) in [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")] {
         if let Some(e) = estimate {
             let channel = &answer.sensors[1].channel;
             lines.push(format!("  {channel}: {name} {}", interval(e.value, e.interval_95[0], e.interval_95[1], unit)));
@@ -57,7 +56,8 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.push(String::new());
     let white = if answer.residual.white { "white" } else { "not white" };
-    lines.push(format!("residual: {} times the energy of the noise, {white}", digits(answer.residual.chi2_per_dof, 4)));
+    let energy = answer.residual.chi2_per_dof.map_or("unknown".into(), |e| digits(e, 4));
+    lines.push(format!("residual: {energy} times the energy of the noise, {white}"));
     for test in &answer.residual.tests {
         lines.push(format!("  {:12} statistic {:>9}  p = {:.2e}", test.test, digits(test.statistic, 4), test.p_value));
     }

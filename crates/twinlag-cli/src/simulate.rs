@@ -50,7 +50,12 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
             "made_by": {"program": "twinlag", "version": env!("CARGO_PKG_VERSION")},
         }))?;
     } else if !to_stdout && !talk.quiet {
-        eprintln!("{}: {} samples, {} s apart", command.out.display(), record.time_s.len(), rig.record().sample_period_s);
+        eprintln!(
+            "{}: {} samples, {} s apart",
+            command.out.display(),
+            record.time_s.len(),
+            rig.record().sample_period_s
+        );
     }
     Ok(0)
 }
@@ -58,7 +63,8 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
 /// The rig in `spec`, relative paths in it taken from where it lies.
 fn read(spec: &Path) -> Result<Rig, Failure> {
     let name = spec.display();
-    let text = std::fs::read_to_string(spec).map_err(|error| Failure::File(format!("{name}: cannot be read: {error}")))?;
+    let text =
+        std::fs::read_to_string(spec).map_err(|error| Failure::File(format!("{name}: cannot be read: {error}")))?;
     let rig: Rig = toml::from_str(&text).map_err(|error| Failure::File(format!("{name}: {error}")))?;
     Ok(rig.with_base_dir(spec.parent().unwrap_or(Path::new(""))))
 }

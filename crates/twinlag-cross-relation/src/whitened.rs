@@ -110,6 +110,9 @@ impl<'a> Whitened<'a> {
     /// Sum of squares `Σ r²` with its exact gradient and its Gauss-Newton Hessian `2 Σ ∂r ∂r'` at `theta` (the first `P` of
     /// [`crate::Parameter::ALL`], `P` 2 or 4).
     ///
+    /// Value and gradient are the same in both forms. The Gauss-Newton matrices belong to different square roots of `V⁻¹` and
+    /// differ by terms of the size of the residual.
+    ///
     /// With known noise levels the sum is chi-square distributed with about [`Whitened::terms`] less `P` degrees of
     /// freedom at the minimum.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {

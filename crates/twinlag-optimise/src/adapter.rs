@@ -6,7 +6,10 @@
 
 use std::cell::{Cell, RefCell};
 
-use argmin::core::{CostFunction, Error, Executor, Gradient, Hessian, IterState, Solver, State, TerminationReason};
+use argmin::core::{
+    CostFunction, Error, Executor, Gradient, Hessian, IterState, KV, Solver, State, TerminationReason,
+    TerminationStatus,
+};
 
 use crate::problem::{Derivatives, Problem};
 use crate::report::{Budget, Evaluations};
@@ -22,10 +25,18 @@ pub(crate) enum Stop {
     Failed(String),
 }
 
+/// The lowest point that was evaluated.
+#[derive(Clone, Debug)]
+pub(crate) struct Best {
+    pub(crate) z: Vec<f64>,
+    pub(crate) value: f64,
+    /// If it was evaluated with derivatives.
+    pub(crate) derivatives: Option<Derivatives>,
+}
+
 /// What a run left behind.
 pub(crate) struct Run {
-    pub(crate) best: Vec<f64>,
-    pub(crate) value: f64,
+    pub(crate) best: Best,
     pub(crate) stop: Stop,
     pub(crate) iterations: u64,
     pub(crate) evaluations: Evaluations,
@@ -36,7 +47,8 @@ pub(crate) struct Run {
 pub(crate) enum Outside {
     /// Infinitely bad: for solvers that compare values only.
     Infinite,
-    /// The nearest point inside, plus a quadratic wall: continuous with its gradient, for solvers that follow it.
+    /// The nearest point inside, plus a quadratic wall: continuous, with a kink in the gradient at the bound itself, for
+    /// solvers that follow the gradient.
     Wall,
 }
 
@@ -51,7 +63,7 @@ pub(crate) struct Objective<'p, 'c> {
     counts: &'p Cell<Evaluations>,
     /// Whether an evaluation was asked for after the budget was spent: solvers may wrap the error in their own.
     refused: &'p Cell<bool>,
-    best: &'p RefCell<(Vec<f64>, f64)>,
+    best: &'p RefCell<Best>,
     last: RefCell<Option<(Vec<f64>, Derivatives)>>,
 }
 
@@ -78,11 +90,25 @@ impl Objective<'_, '_> {
         (inside, distance2)
     }
 
-    fn keep(&self, z: &[f64], value: f64) {
+    fn keep(&self, z: &[f64], value: f64, derivatives: Option<&Derivatives>) {
         let mut best = self.best.borrow_mut();
-        if value < best.1 {
-            *best = (z.to_vec(), value);
+        if value < best.value {
+            *best = Best { z: z.to_vec(), value, derivatives: derivatives.cloned() };
         }
+    }
+
+    /// `d`, taken at `inside`, as the solver is to see it at `z`: in the unit of the values, the wall added.
+    fn seen_from(&self, z: &[f64], inside: &[f64], mut d: Derivatives) -> Derivatives {
+        d.value /= self.unit;
+        d.gradient.iter_mut().chain(d.curvature.iter_mut().flatten()).for_each(|v| *v /= self.unit);
+        for i in 0..z.len() {
+            let beyond = z[i] - inside[i];
+            if beyond != 0.0 {
+                d.value += beyond * beyond;
+                d.gradient[i] = 2.0 * beyond;
+            }
+        }
+        d
     }
 
     fn derivatives(&self, z: &[f64]) -> Result<Derivatives, Error> {
@@ -92,20 +118,13 @@ impl Objective<'_, '_> {
             return Ok(known.clone());
         }
         self.count(|c| c.derivatives += 1)?;
-        let (inside, distance2) = self.inside(z);
-        let mut d = self
+        let (inside, _) = self.inside(z);
+        let d = self
             .problem
             .derivatives_at(&inside)
             .ok_or_else(|| Error::msg("the cost has no finite derivatives at this point"))?;
-        self.keep(&inside, d.value);
-        d.value = d.value / self.unit + distance2;
-        d.gradient.iter_mut().chain(d.curvature.iter_mut().flatten()).for_each(|v| *v /= self.unit);
-        for i in 0..z.len() {
-            let beyond = z[i] - inside[i];
-            if beyond != 0.0 {
-                d.gradient[i] = 2.0 * beyond;
-            }
-        }
+        self.keep(&inside, d.value, Some(&d));
+        let d = self.seen_from(z, &inside, d);
         *self.last.borrow_mut() = Some((z.to_vec(), d.clone()));
         Ok(d)
     }
@@ -134,7 +153,7 @@ impl CostFunction for Objective<'_, '_> {
             counted => counted?,
         }
         let value = self.problem.value_at(&inside);
-        self.keep(&inside, value);
+        self.keep(&inside, value, None);
         Ok(value / self.unit + distance2)
     }
 }
@@ -157,6 +176,31 @@ impl Hessian for Objective<'_, '_> {
     }
 }
 
+/// A solver whose iterations are counted even if it stops with an error, which takes argmin's own count with it.
+struct Counting<'q, S> {
+    solver: S,
+    iterations: &'q Cell<u64>,
+}
+
+impl<O, I: State, S: Solver<O, I>> Solver<O, I> for Counting<'_, S> {
+    fn name(&self) -> &str {
+        self.solver.name()
+    }
+
+    fn init(&mut self, problem: &mut argmin::core::Problem<O>, state: I) -> Result<(I, Option<KV>), Error> {
+        self.solver.init(problem, state)
+    }
+
+    fn next_iter(&mut self, problem: &mut argmin::core::Problem<O>, state: I) -> Result<(I, Option<KV>), Error> {
+        self.iterations.set(self.iterations.get() + 1);
+        self.solver.next_iter(problem, state)
+    }
+
+    fn terminate(&mut self, state: &I) -> TerminationStatus {
+        self.solver.terminate(state)
+    }
+}
+
 /// Runs `solver` from the state that `configure` makes of an empty one.
 pub(crate) fn run<'p, 'c, S, G, H>(
     problem: &'p Problem<'c>,
@@ -170,37 +214,38 @@ where
     S: for<'q> Solver<Objective<'q, 'c>, SolverState<G, H>>,
     SolverState<G, H>: State<Param = Vec<f64>, Float = f64>,
 {
-    let counts = Cell::new(Evaluations { values: 1, derivatives: 0 });
-    let at_start = problem.value_at(start);
-    let best = RefCell::new((start.to_vec(), at_start));
+    // The start is evaluated here, in the way that the solver will ask for it, and sets the unit of the values.
+    let derivatives = if outside == Outside::Wall { problem.derivatives_at(start) } else { None };
+    let value = derivatives.as_ref().map_or_else(|| problem.value_at(start), |d| d.value);
+    let with_derivatives = u64::from(derivatives.is_some());
+    let counts = Cell::new(Evaluations { values: 1 - with_derivatives, derivatives: with_derivatives });
     let refused = Cell::new(false);
-    let unit = if at_start.is_finite() && at_start != 0.0 { at_start.abs() } else { 1.0 };
+    let best = RefCell::new(Best { z: start.to_vec(), value, derivatives: derivatives.clone() });
     let objective = Objective {
         problem,
         bounds: problem.bounds(),
         outside,
-        unit,
+        unit: if value.is_finite() && value != 0.0 { value.abs() } else { 1.0 },
         limit: budget.evaluations,
         counts: &counts,
         refused: &refused,
         best: &best,
         last: RefCell::new(None),
     };
+    let known = derivatives.map(|d| (start.to_vec(), objective.seen_from(start, start, d)));
+    *objective.last.borrow_mut() = known;
     let iterations = Cell::new(0);
-    let result =
-        Executor::new(objective, solver).configure(|state| configure(state).max_iters(budget.iterations)).run();
+    let result = Executor::new(objective, Counting { solver, iterations: &iterations })
+        .configure(|state| configure(state).max_iters(budget.iterations))
+        .run();
     let stop = match result {
         _ if refused.get() => Stop::Exhausted,
-        Ok(result) => {
-            iterations.set(result.state().get_iter());
-            match result.state().get_termination_reason() {
-                Some(TerminationReason::SolverConverged | TerminationReason::TargetCostReached) => Stop::BySolver,
-                Some(TerminationReason::SolverExit(why)) => Stop::Failed(why.clone()),
-                _ => Stop::Exhausted,
-            }
-        }
+        Ok(result) => match result.state().get_termination_reason() {
+            Some(TerminationReason::SolverConverged | TerminationReason::TargetCostReached) => Stop::BySolver,
+            Some(TerminationReason::SolverExit(why)) => Stop::Failed(why.clone()),
+            _ => Stop::Exhausted,
+        },
         Err(error) => Stop::Failed(error.to_string()),
     };
-    let (best, value) = best.into_inner();
-    Run { best, value, stop, iterations: iterations.get(), evaluations: counts.get() }
+    Run { best: best.into_inner(), stop, iterations: iterations.get(), evaluations: counts.get() }
 }

@@ -37,6 +37,7 @@
 //! ```
 
 mod adapter;
+mod assess;
 mod levenberg_marquardt;
 mod minimiser;
 mod multi_start;

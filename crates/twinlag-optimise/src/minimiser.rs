@@ -11,6 +11,10 @@ use crate::problem::{Problem, ProblemError};
 use crate::report::{Budget, End, Fit};
 
 /// A local minimiser: from one start to one report. Implement it to bring a solver of your own.
+///
+/// A solver sees the problem in free coordinates of size one: [`Problem::coordinates`] of the start, [`Problem::bounds`],
+/// [`Problem::value_at`] and [`Problem::derivatives_at`]; [`Problem::point`] takes its answer back to the variables' own units, and
+/// [`Problem::assess`] says what kind of point it is.
 pub trait Minimiser {
     /// The name that reports carry.
     fn name(&self) -> String;
@@ -88,15 +92,15 @@ impl Optimiser {
                 };
                 // A simplex can shrink onto a point that is no minimum; a second one started there then moves on.
                 let first = once(start, budget);
-                if first.stop != Stop::BySolver {
+                let spent = first.evaluations.values;
+                if first.stop != Stop::BySolver || spent >= budget.evaluations {
                     return first;
                 }
-                let spent = first.evaluations.values;
                 let left = Budget {
                     iterations: budget.iterations.saturating_sub(first.iterations),
                     evaluations: budget.evaluations.saturating_sub(spent),
                 };
-                let mut second = once(&first.best, &left);
+                let mut second = once(&first.best.z, &left);
                 second.iterations += first.iterations;
                 second.evaluations.values += spent;
                 second
@@ -126,13 +130,25 @@ impl Minimiser for Optimiser {
 
     fn minimise(&self, problem: &Problem<'_>, start: &[f64], budget: &Budget) -> Result<Fit, ProblemError> {
         let from = problem.coordinates(start)?;
-        let run = self.run(problem, &from, budget);
-        let end = assess(problem, &run);
+        let mut run = self.run(problem, &from, budget);
+        let failure = match &run.stop {
+            Stop::Failed(why) => Some(why.as_str()),
+            _ => None,
+        };
+        let end = if run.stop == Stop::Exhausted {
+            End::LimitReached
+        } else {
+            if run.best.derivatives.is_none() {
+                run.best.derivatives = problem.derivatives_at(&run.best.z);
+                run.evaluations.derivatives += 1;
+            }
+            problem.judge(&run.best.z, run.best.derivatives.as_ref(), failure)
+        };
         Ok(Fit {
             optimiser: self.name(),
             start: start.to_vec(),
-            x: problem.point(&run.best),
-            value: run.value,
+            x: problem.point(&run.best.z),
+            value: run.best.value,
             end,
             iterations: run.iterations,
             evaluations: run.evaluations,
@@ -149,52 +165,4 @@ fn simplex(from: &[f64], bounds: &[(f64, f64)], edge: f64) -> Vec<Vec<f64>> {
         z
     };
     std::iter::once(from.to_vec()).chain((0..from.len()).map(corner)).collect()
-}
-
-/// Distance from a bound, in coordinates, within which a point counts as on it.
-const ON_BOUND: f64 = 1e-6;
-/// A Newton step longer than this, in coordinates, means that the minimum is elsewhere.
-const NOT_THERE: f64 = 1e-3;
-/// Curvature below this share of the largest one is none.
-const FLAT: f64 = 1e-12;
-
-/// What kind of point a run ended at, judged by the cost rather than by the solver's own word.
-fn assess(problem: &Problem<'_>, run: &Run) -> End {
-    let bounds = problem.bounds();
-    let near = |i: usize| {
-        let (lower, upper) = bounds[i];
-        run.best[i] - lower < ON_BOUND || upper - run.best[i] < ON_BOUND
-    };
-    let on_bound: Vec<usize> = (0..run.best.len()).filter(|&i| near(i)).collect();
-    if !run.value.is_finite() {
-        return End::Stalled("the cost is not finite anywhere that was tried".into());
-    }
-    if run.stop == Stop::Exhausted {
-        return End::LimitReached;
-    }
-    if !on_bound.is_empty() {
-        return End::OnBound(on_bound.into_iter().map(|i| problem.free()[i]).collect());
-    }
-    let Some(d) = problem.derivatives_at(&run.best) else {
-        return match &run.stop {
-            Stop::Failed(why) => End::Stalled(why.clone()),
-            _ => End::Unchecked,
-        };
-    };
-    let n = run.best.len();
-    let matrix = nalgebra::DMatrix::from_fn(n, n, |i, j| d.curvature[i][j]);
-    let eigenvalues = matrix.clone().symmetric_eigenvalues();
-    let smallest = eigenvalues.min();
-    if smallest <= FLAT * eigenvalues.max().max(0.0) || smallest <= 0.0 {
-        return End::Stalled("the cost is flat or falls away in some direction: this is no minimum".into());
-    }
-    let gradient = nalgebra::DVector::from_column_slice(&d.gradient);
-    let newton = matrix.cholesky().map(|c| c.solve(&gradient).amax());
-    match newton {
-        Some(step) if step <= NOT_THERE => End::Converged,
-        _ => End::Stalled(match &run.stop {
-            Stop::Failed(why) => why.clone(),
-            _ => "the solver stopped where the cost still falls".into(),
-        }),
-    }
 }

@@ -157,7 +157,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// [`ProblemError::Start`] unless `x` has one finite value for each variable.
-    pub(crate) fn coordinates(&self, x: &[f64]) -> Result<Vec<f64>, ProblemError> {
+    pub fn coordinates(&self, x: &[f64]) -> Result<Vec<f64>, ProblemError> {
         if x.len() != self.variables.len() || !x.iter().all(|v| v.is_finite()) {
             return Err(ProblemError::Start { expected: self.variables.len(), got: x.to_vec() });
         }
@@ -171,8 +171,8 @@ impl<'a> Problem<'a> {
             .collect())
     }
 
-    /// Bounds of the free coordinates.
-    pub(crate) fn bounds(&self) -> Vec<(f64, f64)> {
+    /// Bounds of the free coordinates, `(lower, upper)` each.
+    pub fn bounds(&self) -> Vec<(f64, f64)> {
         self.free
             .iter()
             .map(|&i| {
@@ -183,7 +183,7 @@ impl<'a> Problem<'a> {
     }
 
     /// All variables, in their own units, at coordinates `z` (inside the bounds).
-    pub(crate) fn point(&self, z: &[f64]) -> Vec<f64> {
+    pub fn point(&self, z: &[f64]) -> Vec<f64> {
         let mut x: Vec<f64> = self.variables.iter().map(|v| v.lower).collect();
         for (&i, &z) in self.free.iter().zip(z) {
             x[i] = self.variables[i].value(z);
@@ -191,13 +191,14 @@ impl<'a> Problem<'a> {
         x
     }
 
-    pub(crate) fn value_at(&self, z: &[f64]) -> f64 {
+    /// The cost at coordinates `z` inside the bounds; infinite where it is not finite.
+    pub fn value_at(&self, z: &[f64]) -> f64 {
         let value = self.cost.value(&self.point(z));
         if value.is_finite() { value } else { f64::INFINITY }
     }
 
     /// Derivatives with respect to the coordinates. `None` without derivatives, or where they are not finite.
-    pub(crate) fn derivatives_at(&self, z: &[f64]) -> Option<Derivatives> {
+    pub fn derivatives_at(&self, z: &[f64]) -> Option<Derivatives> {
         let x = self.point(z);
         let full = self.cost.derivatives(&x)?;
         // x = exp z has dx/dz = d²x/dz² = x; the second derivative enters through the gradient.

@@ -9,7 +9,8 @@ use crate::error::ModelError;
 /// What the gas temperature is taken to do between two samples.
 ///
 /// A real gas does none of these exactly. What the choice costs a blind estimate is [`crate::tone_floor`]; it falls with
-/// the square of the sample period.
+/// the square of the sample period for the zero-order hold and the bilinear rule, with its fourth power for the first-order
+/// hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]

@@ -92,8 +92,9 @@ pub struct Difference {
 /// What the fit leaves over.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Residual {
-    /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated level is left.
-    pub chi2_per_dof: f64,
+    /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated level is left. `None` if
+    /// there are no degrees of freedom.
+    pub chi2_per_dof: Option<f64>,
     /// Whether its autocorrelations are those of white noise.
     pub white: bool,
     /// The tests.
