@@ -14,7 +14,8 @@ pub(crate) fn run() -> Result<()> {
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
     step("the README's main job", "cargo", &["run", "--release", "--", "demo"])?;
-    step("an example of a layer", "cargo", &["run", "--release", "-p", "twinlag", "--example", "characterise"])?;
+    step("example: all estimators", "cargo", &["run", "--release", "-p", "twinlag", "--example", "characterise"])?;
+    step("example: a solver", "cargo", &["run", "--release", "-p", "twinlag-optimise", "--example", "compass"])?;
     links()
 }
 

@@ -59,7 +59,8 @@ fn text(answer: &Characterisation) -> String {
     let energy = answer.residual.chi2_per_dof.map_or("unknown".into(), |e| digits(e, 4));
     lines.push(format!("residual: {energy} times the energy of the noise, {white}"));
     for test in &answer.residual.tests {
-        lines.push(format!("  {:12} statistic {:>9}  p = {:.2e}", test.test, digits(test.statistic, 4), test.p_value));
+        let p = if test.p_value < 1e-99 { "p < 1e-99".into() } else { format!("p = {:.2e}", test.p_value) };
+        lines.push(format!("  {:12} statistic {:>9}  {p}", test.test, digits(test.statistic, 4)));
     }
     let method = match answer.interval_method {
         IntervalMethod::Information => "95 % intervals from the noise levels",

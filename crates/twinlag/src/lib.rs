@@ -1,4 +1,61 @@
 //! Two temperature sensors' time constants from their readings alone.
+//!
+//! Two sensors of different thickness in one gas lag differently. From how they disagree [`characterise`] finds the time
+//! constant of each *blind*, without knowing the gas temperature, with 95 % intervals that account for the noise it finds, and
+//! says so where the record does not tell. This crate is the one to take for whole records; each layer is re-exported as a
+//! module and can be taken alone: [`sensor`] (models), [`signal`] (simulated records), [`cross_relation`] (the costs),
+//! [`bias`] (noise in the published cost), [`optimise`] (solvers), [`record`] (logger files).
+//!
+//! ```
+//! use twinlag::record::{Channels, Record, SamplingChoice};
+//! use twinlag::signal::Rig;
+//! use twinlag::{Options, Status, characterise};
+//!
+//! // A record: here from a rig; from a file it would be `Record::read("run.csv", &Selection::default())`.
+//! let rig: Rig = toml::from_str(
+//!     r#"
+//!     seed = 1
+//!     [record]
+//!     samples = 2500
+//!     sample_period_s = 0.002
+//!     [gas]
+//!     kind = "turbulence"
+//!     mean_c = 450.0
+//!     std_k = 15.0
+//!     corner_hz = 3.0
+//!     cutoff_hz = 200.0
+//!     [[sensors]]
+//!     channel = "fine"
+//!     time_constant_s = 0.0238
+//!     noise = { std_k = 0.3 }
+//!     [[sensors]]
+//!     channel = "coarse"
+//!     time_constant_s = 0.1168
+//!     noise = { std_k = 0.3 }
+//!     "#,
+//! )?;
+//! let simulated = rig.simulate()?;
+//! let record = Record::from_channels(
+//!     Channels {
+//!         source: "a rig".into(),
+//!         names: simulated.channels,
+//!         time_s: simulated.time_s,
+//!         t1_c: simulated.t1_c,
+//!         t2_c: simulated.t2_c,
+//!         reference_c: None,
+//!     },
+//!     SamplingChoice::Auto,
+//! )?;
+//!
+//! let answer = characterise(&record, &Options::default())?;
+//! assert_eq!(answer.status, Status::Ok);
+//! for (sensor, truth) in answer.sensors.iter().zip([0.0238, 0.1168]) {
+//!     let tau_s = sensor.time_constant_s.expect("determined");
+//!     let error_s = sensor.standard_error_s.expect("determined");
+//!     assert!((tau_s - truth).abs() < 3.0 * error_s);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod characterisation;
 mod characterise;
