@@ -64,8 +64,8 @@ fn close(what: &str, got: f64, want: f64, relative: f64) {
 #[test]
 fn costs_at_the_truth_and_at_a_probe_point_are_those_of_the_reference() {
     for_each_record(|name, record, expected| {
-        let readings = readings(record).expect("usable");
-        close(name, readings.common_mean(), expected["common_mean_removed_C"].as_f64().expect("a number"), 1e-12);
+        let readings = readings(record, &Options::default()).expect("usable");
+        close(name, readings.level(), expected["common_mean_removed_C"].as_f64().expect("a number"), 1e-12);
         let noise_std = pair(&expected["noise_std_K"]);
         for (at, theta) in [("cost_at_truth", [0.0238, 0.1168]), ("cost_at_probe", [0.03, 0.1])] {
             let got = costs(&readings, noise_std, &theta);
@@ -108,8 +108,9 @@ fn minima_are_those_of_the_reference_for_every_optimiser() {
 #[test]
 fn gauss_newton_standard_errors_are_those_of_the_reference() {
     for_each_record(|name, record, expected| {
-        let readings = readings(record).expect("usable");
-        let whitened = Whitened::new(&readings, Discretisation::ZeroOrderHold, pair(&expected["noise_std_K"])).expect("valid");
+        let readings = readings(record, &Options::default()).expect("usable");
+        let whitened =
+            Whitened::new(&readings, Discretisation::ZeroOrderHold, pair(&expected["noise_std_K"])).expect("valid");
         let minimum = &expected["minimum"]["whitened_exact"];
         let theta = pair(&minimum["tau_s"]);
         let [[a, b], [_, d]] = whitened.evaluate(&theta).hessian;

@@ -28,7 +28,8 @@ fn minimum(evaluate: impl Fn(&[f64; 2]) -> CostValue<2>) -> [f64; 2] {
 #[test]
 fn stated_variances_are_those_of_many_estimates() {
     let (n, trials, std_k) = (1500, 400, [0.5, 0.3]);
-    let gas: Vec<f64> = (0..n).map(|k| 9.0 * (0.11 * k as f64).sin() + 5.0 * (0.031 * k as f64).cos()).collect();
+    let gas: Vec<f64> =
+        (0..n).map(|k| 9.0 * (0.11 * f64::from(k)).sin() + 5.0 * (0.031 * f64::from(k)).cos()).collect();
     let clean = TAU_S.map(|tau| FirstOrder::new(tau, PERIOD_S).expect("valid sensor").respond(&gas));
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let mut estimates: [Vec<[f64; 2]>; 2] = Default::default();

@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::fmt::Write as _;
+
 use common::{Bench, Gas, Trace, csv, estimates, interval, number, recovers};
 
 const GOOD_S: [f64; 2] = Trace::GOOD.tau_s;
@@ -95,7 +97,9 @@ fn standard_input_without_a_table_is_refused_by_that_name() {
 #[test]
 fn one_column_is_refused() {
     let bench = spoiled("one_column", |lines| {
-        lines.iter_mut().for_each(|l| *l = l.split(',').nth(1).expect("three cells").to_owned());
+        for line in lines.iter_mut() {
+            *line = line.split(',').nth(1).expect("three cells").to_owned();
+        }
     });
     bench.refuses(3, &FILE, &["run.csv", "line", "one column", "two temperatures", "side by side"]);
 }
@@ -159,7 +163,8 @@ fn a_unit_that_is_no_time_is_refused() {
 #[test]
 fn text_in_a_number_column_is_refused_with_file_line_column_cell_and_remedy() {
     let bench = spoiled("text", |lines| set(lines, 57, 2, "brown"));
-    let want = ["run.csv", "line 57", "column 2 'T1'", "expected a number", "found 'brown'", "mend the cell or empty it"];
+    let want =
+        ["run.csv", "line 57", "column 2 'T1'", "expected a number", "found 'brown'", "mend the cell or empty it"];
     bench.refuses(3, &FILE, &want);
 }
 
@@ -245,9 +250,8 @@ fn the_range_is_that_of_the_unit() {
 #[test]
 fn time_that_runs_backwards_is_refused() {
     let bench = spoiled("reversed", |lines| lines[1..].reverse());
-    let want = ["run.csv", "line 3", "time must increase", "'3.996000' follows '3.998000'", "sort the rows"];
-    // The numbers may be shown without their trailing zeros.
-    let want: Vec<&str> = want.iter().map(|w| if w.starts_with('\'') { "follows '3.998" } else { w }).collect();
+    // The numbers may be shown with their trailing zeros or without.
+    let want = ["run.csv", "line 3", "time must increase", "'3.996", "follows '3.998", "sort the rows"];
     bench.refuses(3, &FILE, &want);
 }
 
@@ -290,7 +294,8 @@ fn irregular_steps_are_noted_and_used_as_stamped() {
 fn a_date_that_can_be_read_in_two_ways_is_refused() {
     let mut text = "date,T1,T2\n".to_owned();
     for (i, row) in Trace::GOOD.rows().iter().take(27).enumerate() {
-        text += &format!("{:02}/{:02}/2026,{:.3},{:.3}\n", 3 + i % 9, 4 + i / 9, row[1], row[2]);
+        writeln!(text, "{:02}/{:02}/2026,{:.3},{:.3}", 3 + i % 9, 4 + i / 9, row[1], row[2])
+            .expect("a string takes it");
     }
     let want = ["run.csv", "line 2", "1 'date'", "'03/04/2026'", "day/month or month/day", "YYYY-MM-DD"];
     Bench::with("date", "run.csv", text).refuses(3, &FILE, &want);
@@ -586,7 +591,11 @@ fn a_gain_that_is_both_free_and_known_is_wrong_usage() {
 #[test]
 #[ignore = "defect: '--noise -1,1' is answered with \"unexpected argument '-1' found\" (arguments.rs, no hyphen values)"]
 fn negative_noise_without_the_equals_sign_says_what_is_expected() {
-    good("noise_hyphen").refuses(2, &["characterise", "run.csv", "--noise", "-1,1"], &["expected two positive numbers"]);
+    good("noise_hyphen").refuses(
+        2,
+        &["characterise", "run.csv", "--noise", "-1,1"],
+        &["expected two positive numbers"],
+    );
 }
 
 // Rigs.
@@ -681,7 +690,11 @@ fn an_existing_file_is_not_overwritten_unless_forced() {
 #[test]
 fn a_place_that_cannot_be_written_is_an_error_of_its_own_kind() {
     let bench = Bench::with("no_place", "rig.toml", RIG);
-    bench.refuses(1, &["simulate", "rig.toml", "--out", "no/such/place.csv"], &["no/such/place.csv", "cannot be written"]);
+    bench.refuses(
+        1,
+        &["simulate", "rig.toml", "--out", "no/such/place.csv"],
+        &["no/such/place.csv", "cannot be written"],
+    );
 }
 
 #[test]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// One parameter of the pair, in the order in which the costs take them.
 ///
 /// Sensor 1 reads `y1 = h1 ∗ x`, sensor 2 reads `y2 = g (h2 ∗ x) + o`, where `h` are first-order lags of unit gain, `g` is
-/// the *relative* gain and `o` the *relative* offset, at the record's common mean. What both channels share (a common gain,
+/// the *relative* gain and `o` the *relative* offset, at the level that was taken off the readings. What both channels share (a common gain,
 /// a common offset) cannot be seen without knowing the gas temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -17,7 +17,7 @@ pub enum Parameter {
     Tau2,
     /// Gain of channel 2 relative to channel 1.
     Gain,
-    /// Offset of channel 2 against channel 1 where both read the common mean, K.
+    /// Offset of channel 2 against channel 1 where channel 1 reads the level of [`crate::Readings`], K.
     Offset,
 }
 

@@ -1,4 +1,4 @@
-//! The two channels as the costs take them: cut where samples are missing, with the common mean taken off.
+//! The two channels as the costs take them: cut where samples are missing, with a common level taken off.
 
 use crate::error::CostError;
 
@@ -50,7 +50,7 @@ impl Segment {
         }
     }
 
-    /// Reading of sensor 1, the common mean taken off once the segment is part of [`Readings`].
+    /// Reading of sensor 1, the common level taken off once the segment is part of [`Readings`].
     pub fn y1(&self) -> &[f64] {
         &self.y1
     }
@@ -65,6 +65,11 @@ impl Segment {
         &self.steps
     }
 
+    /// Largest absolute reading of either channel.
+    pub fn highest(&self) -> f64 {
+        self.y1.iter().chain(&self.y2).fold(0.0, |m, y| m.max(y.abs()))
+    }
+
     /// Number of samples.
     #[expect(clippy::len_without_is_empty, reason = "a segment has two samples at least")]
     pub fn len(&self) -> usize {
@@ -72,34 +77,42 @@ impl Segment {
     }
 }
 
-/// Both channels of a record: one or more segments, the mean of all samples of both channels taken off.
+/// Both channels of a record: one or more segments, a common level taken off.
 ///
-/// The costs do not depend on a common constant; taking it off keeps it out of the rounding.
+/// At unity gain the costs do not depend on it, and taking it off keeps it out of the rounding. With a free gain it is the
+/// temperature at which the offset is stated: gain and offset are least entangled at the mean of the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     segments: Vec<Segment>,
-    common_mean: f64,
+    level: f64,
 }
 
 impl Readings {
-    /// Joins `segments` into one record.
+    /// Joins `segments` into one record, the mean of both channels' means taken off.
     ///
     /// # Errors
     /// [`CostError::TooShort`] if they hold fewer than 4 samples in all.
-    pub fn new(mut segments: Vec<Segment>) -> Result<Self, CostError> {
+    pub fn new(segments: Vec<Segment>) -> Result<Self, CostError> {
+        let samples = segments.iter().map(Segment::len).sum::<usize>() as f64;
+        let mean_of =
+            |channel: fn(&Segment) -> &[f64]| segments.iter().flat_map(|s| channel(s).iter()).sum::<f64>() / samples;
+        let mean = 0.5 * (mean_of(Segment::y1) + mean_of(Segment::y2));
+        Self::about(segments, mean)
+    }
+
+    /// Joins `segments` into one record, `level` taken off: the temperature at which the relative offset is stated.
+    ///
+    /// # Errors
+    /// As [`Readings::new`].
+    pub fn about(mut segments: Vec<Segment>, level: f64) -> Result<Self, CostError> {
         let samples: usize = segments.iter().map(Segment::len).sum();
         if samples < 4 {
             return Err(CostError::TooShort { samples, needed: 4 });
         }
-        // The mean of the two channel means, as the published method has it.
-        let mean_of = |channel: fn(&Segment) -> &[f64]| {
-            segments.iter().flat_map(|s| channel(s).iter()).sum::<f64>() / samples as f64
-        };
-        let common_mean = 0.5 * (mean_of(Segment::y1) + mean_of(Segment::y2));
         for segment in &mut segments {
-            segment.y1.iter_mut().chain(&mut segment.y2).for_each(|y| *y -= common_mean);
+            segment.y1.iter_mut().chain(&mut segment.y2).for_each(|y| *y -= level);
         }
-        Ok(Self { segments, common_mean })
+        Ok(Self { segments, level })
     }
 
     /// One unbroken, evenly sampled record: `y1`, `y2` `[n]`, `period_s` between samples.
@@ -110,14 +123,20 @@ impl Readings {
         Self::new(vec![Segment::new(y1.to_vec(), y2.to_vec(), Steps::Even(period_s))?])
     }
 
-    /// The unbroken stretches, common mean taken off.
+    /// The unbroken stretches, common level taken off.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// What was taken off: the mean of all samples of both channels.
-    pub fn common_mean(&self) -> f64 {
-        self.common_mean
+    /// What was taken off: the mean of all samples of both channels, unless something else was asked for.
+    pub fn level(&self) -> f64 {
+        self.level
+    }
+
+    /// Difference between the highest and the lowest reading of either channel.
+    pub fn swing(&self) -> f64 {
+        let all = || self.segments.iter().flat_map(|s| s.y1.iter().chain(&s.y2));
+        all().copied().fold(f64::NEG_INFINITY, f64::max) - all().copied().fold(f64::INFINITY, f64::min)
     }
 
     /// Samples of each channel.

@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut engine = Engine::new(60.0, 8.0);
     engine.amplitude_relative_std = 0.2;
     engine.period_relative_std = 0.03;
-    let simulated = Rig::new(7, Sampling::new(2500, 0.002), Gas::new(450.0, Signal::Engine(engine)), sensors)?.simulate()?;
+    let simulated =
+        Rig::new(7, Sampling::new(2500, 0.002), Gas::new(450.0, Signal::Engine(engine)), sensors)?.simulate()?;
 
     let record = Record::from_channels(
         Channels {

@@ -63,7 +63,9 @@ mod error;
 mod objective;
 mod options;
 mod profile;
+mod question;
 mod starts;
+mod verdict;
 
 pub use characterisation::{
     Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,

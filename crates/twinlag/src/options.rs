@@ -142,7 +142,7 @@ impl FromStr for Known {
 }
 
 /// Everything that a characterisation depends on besides the record.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
     /// How to estimate.
@@ -162,21 +162,6 @@ pub struct Options {
     /// Samples left out at the start of each unbroken stretch by the estimators that need it; by default five times the
     /// longest time constant of the whitened estimate.
     pub discard: Option<usize>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            estimator: Estimator::default(),
-            optimiser: Optimiser::default(),
-            hold: Hold::default(),
-            noise_std_k: None,
-            free_gain: false,
-            free_offset: false,
-            known: Vec::new(),
-            discard: None,
-        }
-    }
 }
 
 impl Options {

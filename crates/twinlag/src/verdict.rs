@@ -1,0 +1,309 @@
+//! What is reported of a fit: status, intervals, and in place of a number that the record does not tell, the reason.
+
+use twinlag_cross_relation::{Middle, ResidualTest};
+use twinlag_optimise::End;
+use twinlag_sensor::Discretisation;
+
+use crate::characterisation::{
+    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    SensorEstimate, Status,
+};
+use crate::error::Error;
+use crate::objective::{EstimatorCost, Objective};
+use crate::options::{Estimator, Hold, Known};
+use crate::profile::{Ridge, Z_975, ridge};
+use crate::question::{Fitted, Question, REJECT, rejected};
+
+/// A time constant whose logarithm has a larger standard error than this is not determined: its interval spans a factor of
+/// seven.
+const UNDETERMINED: f64 = 0.5;
+/// A time constant longer than this share of the longest unbroken stretch is where fits run to when the record does not tell
+/// two lags from none: the gas would have to be known to move at periods longer than the record.
+const LONGEST_SHARE: f64 = 1.0 / 3.0;
+/// Share of a standard error that the choice of hold may cost without a word.
+const NOTICEABLE: f64 = 0.5;
+
+impl<'a, const P: usize> Question<'a, P> {
+    pub(crate) fn conclude(
+        mut self,
+        best: &Fitted<'a>,
+        theta: [f64; P],
+        covariance: Option<[[f64; P]; P]>,
+        tests: Vec<ResidualTest>,
+        hold_sensitivity: Option<[f64; 2]>,
+    ) -> Result<Characterisation, Error> {
+        let is_rejected = rejected(&tests, self.levels.given);
+        let whitened_estimate = self.options.estimator == Estimator::Whitened;
+        let log_error = |i: usize, c: &[[f64; P]; P]| c[i][i].sqrt() / theta[i];
+        let is_free = |i: usize| !self.is_held(i);
+        let longest_s = LONGEST_SHARE * self.readings.longest_span_s();
+        let is_vague = |i: usize| match &covariance {
+            Some(c) => log_error(i, c) > UNDETERMINED || theta[i] > longest_s,
+            None => true,
+        };
+        let vague: Vec<usize> = (0..2).filter(|&i| is_free(i) && is_vague(i)).collect();
+        let on_bound = match &best.fit.end {
+            End::OnBound(which) => which.clone(),
+            _ => Vec::new(),
+        };
+        let status = match &best.fit.end {
+            End::OnBound(which) if which.iter().any(|&i| i >= 2) => Status::AtBound,
+            End::OnBound(_) | End::Stalled(_) | End::LimitReached => Status::NotIdentifiable,
+            _ if covariance.is_none() || !vague.is_empty() => Status::NotIdentifiable,
+            _ if is_rejected => Status::ModelRejected,
+            _ => Status::Ok,
+        };
+        let mut out = self.skeleton(best, tests, is_rejected, status, hold_sensitivity);
+        match status {
+            Status::Ok | Status::ModelRejected => {
+                let c = covariance.expect("without a covariance the status is another");
+                self.fill(&mut out, &theta, &c, hold_sensitivity);
+                out.interval_method = if whitened_estimate && is_rejected {
+                    IntervalMethod::ResidualSpectrum
+                } else {
+                    IntervalMethod::Information
+                };
+            }
+            _ => {
+                let middle = if is_rejected { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+                // Walk along the time constant that is on a bound, or the vaguer one.
+                let index = on_bound.iter().chain(&vague).copied().find(|&i| i < 2 && is_free(i));
+                let found = match index {
+                    Some(index) if whitened_estimate => self.ridge(best, index, middle)?.map(|r| (index, r)),
+                    _ => None,
+                };
+                self.explain(&mut out, best, found, is_rejected);
+                if found.is_none() && matches!(best.fit.end, End::OnBound(_)) {
+                    out.status = Status::AtBound;
+                }
+            }
+        }
+        if is_rejected {
+            self.advise(&mut out);
+        }
+        out.warnings.splice(0..0, self.warnings);
+        Ok(out)
+    }
+
+    /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
+    /// more than noise, neither hold can be preferred.
+    fn ridge(&self, best: &Fitted<'a>, index: usize, middle: Middle) -> Result<Option<Ridge>, Error> {
+        let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, Error> {
+            let cost = EstimatorCost::Whitened(fitted.whitened.clone());
+            let objective = Objective::<P> { cost: &cost, priors: &self.priors };
+            ridge::<P>(&objective, &fitted.whitened, &self.variables, &fitted.fit.x, index, middle, self.options)
+        };
+        let found = along(best)?;
+        if self.options.hold != Hold::Auto || self.readings.even_period_s().is_none() {
+            return Ok(found);
+        }
+        let other = match best.whitened.hold() {
+            Discretisation::ZeroOrderHold => Discretisation::FirstOrderHold,
+            _ => Discretisation::ZeroOrderHold,
+        };
+        let other = self.fit_whitened_with(other, best.whitened.noise_std(), Some(&best.fit.x))?;
+        Ok(match (found, along(&other)?) {
+            (Some(a), Some(b)) => Some(a.with(&b)),
+            (a, _) => a,
+        })
+    }
+
+    /// Everything but the estimates.
+    fn skeleton(
+        &self,
+        best: &Fitted<'_>,
+        tests: Vec<ResidualTest>,
+        is_rejected: bool,
+        status: Status,
+        hold_sensitivity: Option<[f64; 2]>,
+    ) -> Characterisation {
+        let sensor = |i: usize| SensorEstimate {
+            channel: self.record.channels[i].clone(),
+            time_constant_s: None,
+            standard_error_s: None,
+            interval_95_s: None,
+            noise_std_k: self.levels.std_k[i],
+            known: self.is_held(i),
+        };
+        let chi2_per_dof = tests.iter().find(|t| t.test == "total-energy").map(|t| t.statistic);
+        Characterisation {
+            schema: Characterisation::SCHEMA.into(),
+            record: RecordSummary {
+                source: self.record.source.clone(),
+                samples: self.record.len(),
+                sample_period_s: self.readings.mean_step_s(),
+                missing: self.record.missing,
+                channels: self.record.channels.clone(),
+                segments: self.record.segments.len(),
+                sampling: self.record.sampling,
+            },
+            estimator: self.options.estimator.name().into(),
+            optimiser: best.fit.optimiser.clone(),
+            hold: hold_name(best.whitened.hold()).into(),
+            hold_sensitivity,
+            sensors: [sensor(0), sensor(1)],
+            time_constant_difference_s: Difference { value: None, interval_95_s: None },
+            free: FreeParameters::default(),
+            residual: Residual {
+                chi2_per_dof,
+                white: tests.iter().all(|t| t.test != "whiteness" || t.p_value >= REJECT) && !is_rejected,
+                tests,
+            },
+            interval_method: IntervalMethod::None,
+            status,
+            not_identifiable: Vec::new(),
+            warnings: Vec::new(),
+            fit: best.fit.clone(),
+            starts: best.starts,
+            notes: self.record.notes.iter().map(ToString::to_string).collect(),
+            made_by: MadeBy {
+                program: "twinlag".into(),
+                version: env!("CARGO_PKG_VERSION").into(),
+                options: self.options.clone(),
+            },
+        }
+    }
+
+    /// Estimates and intervals of a fit that is one.
+    fn fill(
+        &mut self,
+        out: &mut Characterisation,
+        theta: &[f64; P],
+        covariance: &[[f64; P]; P],
+        hold_sensitivity: Option<[f64; 2]>,
+    ) {
+        // The two holds bracket what the gas does between samples: half their difference counts as a standard error.
+        let from_hold: [f64; 2] = hold_sensitivity.map_or([0.0; 2], |m| [0.5 * m[0] * theta[0], 0.5 * m[1] * theta[1]]);
+        for i in 0..2 {
+            let sensor = &mut out.sensors[i];
+            sensor.time_constant_s = Some(theta[i]);
+            if sensor.known {
+                continue;
+            }
+            let noise = covariance[i][i].sqrt();
+            let error = noise.hypot(from_hold[i]);
+            let factor = (Z_975 * error / theta[i]).exp();
+            sensor.standard_error_s = Some(error);
+            sensor.interval_95_s = Some([theta[i] / factor, theta[i] * factor]);
+            if from_hold[i].abs() > NOTICEABLE * noise {
+                self.warnings.push(format!(
+                    "{}: what the gas does between samples moves the time constant by {:.2} %, which is part of the \
+                     interval: sample faster",
+                    sensor.channel,
+                    100.0 * hold_sensitivity.map_or(0.0, |m| m[i]).abs()
+                ));
+            }
+        }
+        let difference = theta[1] - theta[0];
+        let variance = covariance[0][0] + covariance[1][1] - 2.0 * covariance[0][1];
+        let width = Z_975 * (variance + (from_hold[1] - from_hold[0]).powi(2)).sqrt();
+        out.time_constant_difference_s =
+            Difference { value: Some(difference), interval_95_s: Some([difference - width, difference + width]) };
+        if P == 4 {
+            let estimate = |value: f64, variance: f64| {
+                let error = variance.sqrt();
+                Estimate {
+                    value,
+                    standard_error: Some(error),
+                    interval_95: [value - Z_975 * error, value + Z_975 * error],
+                }
+            };
+            let (gain, offset, level) = (theta[2], theta[3], self.readings.level());
+            if !self.is_held(2) {
+                out.free.gain = Some(estimate(gain, covariance[2][2]));
+            }
+            if !self.is_held(3) {
+                // The costs have it at the level m of the readings: o(0 °C) = o − (g − 1) m.
+                let at_zero = covariance[3][3] - 2.0 * level * covariance[2][3] + level * level * covariance[2][2];
+                out.free.offset_k = Some(estimate(offset - (gain - 1.0) * level, at_zero));
+            }
+        }
+    }
+
+    /// What a record tells that does not tell both time constants.
+    fn explain(
+        &mut self,
+        out: &mut Characterisation,
+        best: &Fitted<'_>,
+        found: Option<(usize, Ridge)>,
+        is_rejected: bool,
+    ) {
+        let held: Vec<bool> = (0..P).map(|i| self.is_held(i)).collect();
+        let is_free = |i: usize| !held[i];
+        for i in 0..2 {
+            if out.sensors[i].known {
+                out.sensors[i].time_constant_s = Some(best.fit.x[i]);
+            }
+        }
+        out.not_identifiable = (0..2).filter(|&i| is_free(i)).map(|i| Known::NAMES[i].to_owned()).collect();
+        match &best.fit.end {
+            End::OnBound(which) => {
+                let names: Vec<_> = which.iter().map(|&i| self.variables[i].name.as_str()).collect();
+                self.warnings.push(format!(
+                    "the best fit lies on a bound of {}: its point is no estimate and is not reported as one",
+                    names.join(", ")
+                ));
+                out.not_identifiable.extend(which.iter().filter(|&&i| i >= 2).map(|&i| Known::NAMES[i].to_owned()));
+            }
+            End::Stalled(why) => self.warnings.push(format!("the optimiser stopped at no minimum: {why}")),
+            End::LimitReached => self.warnings.push("the optimiser ran out of evaluations before it converged".into()),
+            _ => self.warnings.push(
+                "the record fits time constants that differ by large factors about equally well, or best such as are long \
+                 beside the record itself: none is reported"
+                    .into(),
+            ),
+        }
+        let Some((index, ridge)) = found else {
+            self.warnings.push("not even the difference of the time constants is determined".into());
+            return;
+        };
+        out.interval_method = IntervalMethod::Profile;
+        let (value, [low, high]) = ridge.difference;
+        out.time_constant_difference_s = Difference { value: Some(value), interval_95_s: Some([low, high]) };
+        if low <= 0.0 && high >= 0.0 {
+            out.not_identifiable.push("time_constant_difference_s".into());
+            self.warnings
+                .push("nothing about the time constants is determined, not even which sensor is the slower one".into());
+            return;
+        }
+        let other = 1 - index;
+        let [low, high] = ridge.other;
+        // With a residual that is noise, a time constant that stays put whatever the other does is determined all the same.
+        if !is_rejected && is_free(other) && low > 0.0 && (high / low).ln() < 2.0 * Z_975 * UNDETERMINED {
+            let sensor = &mut out.sensors[other];
+            sensor.time_constant_s = Some(best.fit.x[other]);
+            sensor.interval_95_s = Some(ridge.other);
+            out.not_identifiable.retain(|name| name != Known::NAMES[other]);
+        } else {
+            self.warnings.push(
+                "the absolute time constants are not identifiable from this record; their difference is, over every \
+                 time constant that the record allows"
+                    .into(),
+            );
+        }
+    }
+
+    /// What to do about a rejected model.
+    fn advise(&self, out: &mut Characterisation) {
+        let hint = if self.options.calibrates() {
+            "an effect that two first-order lags lack is at work, or the noise is not what was assumed"
+        } else {
+            "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that two first-order lags \
+             lack is at work, or the noise is not what was assumed"
+        };
+        out.warnings.push(format!(
+            "the residual is not noise (energy {:.3} times what noise explains): two first-order lags do not explain this \
+             record, and a time constant found with them need not be that of a sensor; {hint}",
+            out.residual.chi2_per_dof.unwrap_or(0.0)
+        ));
+    }
+}
+
+fn hold_name(hold: Discretisation) -> &'static str {
+    match hold {
+        Discretisation::ZeroOrderHold => "zero-order-hold",
+        Discretisation::FirstOrderHold => "first-order-hold",
+        Discretisation::Bilinear => "bilinear",
+        _ => "band-limited",
+    }
+}
