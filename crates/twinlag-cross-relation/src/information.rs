@@ -167,3 +167,99 @@ fn smoothed(bins: &[f64]) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::readings::Readings;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+    use twinlag_sensor::{Discretisation, FirstOrder};
+
+    const PERIOD_S: f64 = 0.002;
+    const THETA: [f64; 4] = [0.0238, 0.1168, 1.1, 0.3];
+    const NOISE_STD: [f64; 2] = [0.6, 0.9];
+
+    fn record(swing_k: f64, noise: &mut impl FnMut() -> f64) -> Readings {
+        let gas: Vec<f64> =
+            (0..600).map(|k| swing_k * ((0.11 * f64::from(k)).sin() + 0.5 * (0.031 * f64::from(k)).cos())).collect();
+        let lag = |tau| FirstOrder::new(tau, PERIOD_S).expect("valid sensor").respond(&gas);
+        let y1: Vec<f64> = lag(THETA[0]).iter().map(|y| y + NOISE_STD[0] * noise()).collect();
+        let y2: Vec<f64> = lag(THETA[1]).iter().map(|y| THETA[2] * y + THETA[3] + NOISE_STD[1] * noise()).collect();
+        let segment = crate::Segment::new(y1, y2, crate::Steps::Even(PERIOD_S)).expect("valid channels");
+        Readings::about(vec![segment], 0.0).expect("valid record")
+    }
+
+    fn cost(readings: &Readings) -> Whitened<'_> {
+        Whitened::new(readings, Discretisation::ZeroOrderHold, NOISE_STD).expect("valid")
+    }
+
+    /// Half the gradient at the truth has variance `A + E`, with `A` of the record without noise. Over 2000 records a variance
+    /// has a relative standard error of `√(2/1999) = 3.2 %`, more where the score has heavier tails than a Gaussian; five of
+    /// these. Without a signal `A` vanishes, and the time constants and the gain see `E` alone.
+    #[test]
+    fn the_score_varies_as_the_signal_and_the_noise_noise_terms_say() {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        for swing_k in [0.0, 3.0] {
+            let clean = record(swing_k, &mut || 0.0);
+            let signal = cost(&clean).evaluate(&THETA).hessian;
+            let noise = cost(&clean).noise_noise(&THETA);
+            let mut squares = [0.0; 4];
+            let trials = 2000;
+            for _ in 0..trials {
+                let readings = record(swing_k, &mut || StandardNormal.sample(&mut rng));
+                let gradient = cost(&readings).evaluate(&THETA).gradient;
+                for i in 0..4 {
+                    squares[i] += 0.25 * gradient[i] * gradient[i] / f64::from(trials);
+                }
+            }
+            for i in 0..4 {
+                // At the truth of a clean record the residual is zero and the Gauss-Newton matrix is the Hessian.
+                let want = 0.5 * signal[i][i] + noise[i][i];
+                let tol = 5.0 * 0.032 * want;
+                assert!(
+                    (squares[i] - want).abs() < tol,
+                    "swing {swing_k} K, {i}: got {:e}, want {want:e} ± {tol:e}",
+                    squares[i]
+                );
+            }
+            // The term is no decoration: without a signal it is everything, with one a good part.
+            assert!(noise[0][0] > 0.05 * 0.5 * signal[0][0]);
+        }
+    }
+
+    /// A residual that is white has a flat spectrum of one, and both middles agree to the scatter of the smoothed spectrum:
+    /// some 100 bins carry the signal's information, so about `√(2/100) = 14 %` in the variance; four of these.
+    #[test]
+    fn both_middles_agree_where_the_residual_is_white() {
+        let mut rng = ChaCha8Rng::seed_from_u64(22);
+        let readings = record(60.0, &mut || StandardNormal.sample(&mut rng));
+        let cost = cost(&readings);
+        let variance = |middle| {
+            let free = [0, 1, 2, 3];
+            cost.covariance(&THETA, &free, &[f64::INFINITY; 4], middle).expect("determined")
+        };
+        let (a, b) = (variance(Middle::WhiteNoise), variance(Middle::ResidualSpectrum));
+        for i in 0..4 {
+            assert!((b[i][i] / a[i][i] - 1.0).abs() < 0.56, "{i}: {} and {}", a[i][i], b[i][i]);
+        }
+    }
+
+    /// What is held is not part of the covariance, and what is known beforehand to ten times the precision of the record
+    /// is known to that precision after it.
+    #[test]
+    fn held_and_known_parameters_are_what_they_were() {
+        let mut rng = ChaCha8Rng::seed_from_u64(23);
+        let readings = record(30.0, &mut || StandardNormal.sample(&mut rng));
+        let cost = cost(&readings);
+        let none = [f64::INFINITY; 4];
+        let free = cost.covariance(&THETA, &[0, 1], &none, Middle::WhiteNoise).expect("determined");
+        assert!(free[2][2] == 0.0 && free[0][2] == 0.0);
+        let known = 0.1 * free[0][0].sqrt();
+        let after = cost
+            .covariance(&THETA, &[0, 1], &[known, none[1], none[2], none[3]], Middle::WhiteNoise)
+            .expect("determined");
+        assert!((after[0][0].sqrt() / known - 1.0).abs() < 0.01);
+    }
+}
