@@ -70,7 +70,9 @@ What the status says:
   model-rejected     more than noise is left over: two first-order lags do not explain the record
 
 Thermometers rarely agree at rest: if the model is rejected, try --free gain,offset first. A data-sheet value of one sensor
-often decides: --known T1.time_constant_s=0.5+-0.05.")]
+often decides: --known T1.time_constant_s=0.5+-0.05.
+
+Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
 pub(crate) struct Characterise {
     /// The record; `-` reads standard input.
     pub(crate) file: PathBuf,
@@ -96,7 +98,7 @@ pub(crate) struct Columns {
     /// A trusted temperature, for scoring only: no estimate uses it.
     #[arg(long, value_name = "COL")]
     reference: Option<ColumnRef>,
-    /// Time from row to row, for files without a time column.
+    /// Time from row to row, for files without a time column; a guessed time column is then not used.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
     /// How time stamps are meant: auto, uniform (evenly spaced whatever they say), as-stamped.
@@ -130,8 +132,8 @@ impl Columns {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct Method {
-    /// Noise standard deviations of the two channels in K; found from the data if left out.
-    #[arg(long, value_name = "S1,S2", value_parser = pair)]
+    /// Noise standard deviations of the two channels in K, both positive; found from the data if left out.
+    #[arg(long, value_name = "S1,S2", value_parser = pair, allow_hyphen_values = true)]
     noise: Option<Pair>,
     /// whitened, cross-relation, bias-compensated or normalised.
     #[arg(long, value_name = "NAME", default_value = "whitened")]
@@ -142,10 +144,11 @@ pub(crate) struct Method {
     /// Relative calibration of channel 2 to fit as well: gain, offset or gain,offset.
     #[arg(long, value_name = "LIST")]
     free: Option<String>,
-    /// A parameter known beforehand, exactly or with a standard deviation; may be given several times.
-    #[arg(long, value_name = "NAME=VALUE[+-SD]")]
+    /// A parameter known beforehand, exactly or with a standard deviation; may be given once for each of
+    /// `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`.
+    #[arg(long, value_name = "NAME=VALUE[+-SD]", allow_hyphen_values = true)]
     known: Vec<Known>,
-    /// Samples that cross-relation estimators leave out at the start of each unbroken stretch.
+    /// Samples that the estimators other than whitened leave out at the start of each unbroken stretch.
     #[arg(long, value_name = "K0")]
     discard: Option<usize>,
     /// What the gas does between samples: auto, zero-order-hold, first-order-hold or bilinear.
@@ -204,7 +207,9 @@ A rig, in TOML:
   time_constant_s = 0.1168
   noise = { std_k = 0.5 }
 
-The record has the columns time_s,T1,T2,Tref; Tref is the true gas temperature, for scoring.")]
+The record has the columns time_s,T1,T2,Tref; Tref is the true gas temperature, for scoring.
+
+Exit codes: 0 written, 2 wrong usage, 3 the rig cannot be used, 1 anything else.")]
 pub(crate) struct Simulate {
     /// The rig.
     pub(crate) spec: PathBuf,
@@ -221,6 +226,7 @@ pub(crate) struct Simulate {
 
 /// The embedded rig.
 #[derive(Debug, Args)]
+#[command(after_help = "Exit codes: 0 status ok, 4 any other status, 1 anything else.")]
 pub(crate) struct Demo {
     /// Seed of all random numbers, in place of the rig's own.
     #[arg(long, value_name = "N")]

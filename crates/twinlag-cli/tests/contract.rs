@@ -395,7 +395,6 @@ fn the_rig_in_the_help_can_be_simulated_and_characterised() {
 }
 
 #[test]
-#[ignore = "defect: simulate --help and demo --help say nothing of exit codes or statuses (arguments.rs)"]
 fn the_help_of_every_command_tells_the_exit_codes_or_the_statuses() {
     let bench = Bench::new("help_codes");
     for command in ["characterise", "simulate", "demo"] {

@@ -11,7 +11,7 @@
 //!
 //! Derivation: docs, chapter "Theory", section 6.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 use rustdct::DctPlanner;
 
 use crate::inverse::{WIDEST, row};
@@ -94,6 +94,32 @@ impl Whitened<'_> {
             }
         }
         (0..free.len()).all(|p| covariance[(p, p)].is_finite() && covariance[(p, p)] > 0.0).then_some(out)
+    }
+
+    /// How much of what the residual seems to say about parameter `index`, the other `free` ones following it, is noise
+    /// multiplied by noise: `v'Ev / v'Gv` with the Gauss-Newton matrix `G`, along the direction `v` in which the cost's
+    /// profile runs.
+    ///
+    /// It falls towards zero as the signal determines the parameter, and is of the order of one where the signal says nothing:
+    /// the cost then still has some shape, but no interval can be read from it. Zero where the residual does not depend on the
+    /// parameter at all, as on the time constant of a sensor that is far faster than the sampling.
+    pub fn noise_share<const P: usize>(&self, theta: &[f64; P], free: &[usize], index: usize) -> f64 {
+        let (g, e) = (self.evaluate(theta).hessian, self.noise_noise(theta));
+        let rest: Vec<usize> = free.iter().copied().filter(|&i| i != index).collect();
+        let scale = |i: usize| g[i][i].sqrt();
+        let inner =
+            DMatrix::from_fn(rest.len(), rest.len(), |p, q| g[rest[p]][rest[q]] / (scale(rest[p]) * scale(rest[q])));
+        let coupling = DVector::from_fn(rest.len(), |p, _| -g[rest[p]][index] / scale(rest[p]));
+        let Some(follow) = inner.cholesky().map(|c| c.solve(&coupling)) else { return 1.0 };
+        let mut v = [0.0; P];
+        v[index] = 1.0;
+        for (p, &i) in rest.iter().enumerate() {
+            v[i] = follow[p] / scale(i);
+        }
+        let form =
+            |m: &[[f64; P]; P]| -> f64 { (0..P).map(|i| (0..P).map(|j| v[i] * m[i][j] * v[j]).sum::<f64>()).sum() };
+        let all = 0.5 * form(&g);
+        if all > 0.0 { form(&e) / all } else { 0.0 }
     }
 
     /// The noise-noise term `E`; uneven steps are taken at their mean.
@@ -244,6 +270,17 @@ mod tests {
         for i in 0..4 {
             assert!((b[i][i] / a[i][i] - 1.0).abs() < 0.56, "{i}: {} and {}", a[i][i], b[i][i]);
         }
+    }
+
+    /// Noise without a signal leaves a share of a third and more; with the signal the share falls as its square.
+    #[test]
+    fn the_noise_share_tells_signal_from_none() {
+        let mut rng = ChaCha8Rng::seed_from_u64(24);
+        let mut share =
+            |swing_k| cost(&record(swing_k, &mut || StandardNormal.sample(&mut rng))).noise_share(&THETA, &[0, 1], 0);
+        let [none, some, more] = [0.0, 30.0, 300.0].map(&mut share);
+        assert!(none > 0.3, "without a signal: {none}");
+        assert!(some < 0.02 && (some / more / 100.0 - 1.0).abs() < 0.2, "at 30 K: {some}, at 300 K: {more}");
     }
 
     /// What is held is not part of the covariance, and what is known beforehand to ten times the precision of the record

@@ -5,7 +5,7 @@ use twinlag_record::{Record, SamplingKind};
 
 use crate::characterisation::Characterisation;
 use crate::error::Error;
-use crate::options::{Estimator, Options};
+use crate::options::{Estimator, Known, Options};
 use crate::question::{Levels, Question};
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
@@ -53,6 +53,33 @@ fn check(options: &Options) -> Result<(), Error> {
         return Err(Error::WhitenedOnly {
             what: "a known value with an uncertainty (--known NAME=VALUE+-SD)",
             estimator: options.estimator.name().into(),
+        });
+    }
+    for (i, known) in options.known.iter().enumerate() {
+        let name = Known::NAMES[Parameter::ALL.iter().position(|p| *p == known.parameter).unwrap_or(0)];
+        let wrong = |expected: &str| Error::Option {
+            option: "--known",
+            expected: expected.into(),
+            got: format!("{name}={}", known.value),
+        };
+        if options.known[..i].iter().any(|k| k.parameter == known.parameter) {
+            return Err(wrong("each parameter once"));
+        }
+        let is_freed = match known.parameter {
+            Parameter::Gain => options.free_gain,
+            Parameter::Offset => options.free_offset,
+            _ => false,
+        };
+        if known.std.is_none() && is_freed {
+            return Err(wrong("a standard deviation (NAME=VALUE+-SD) for what --free lets float, or no --free"));
+        }
+    }
+    let is_held = |p| options.known(p).is_some_and(|k| k.std.is_none());
+    if is_held(Parameter::Tau1) && is_held(Parameter::Tau2) {
+        return Err(Error::Option {
+            option: "--known",
+            expected: "at least one time constant to find: leave one out, or give it a standard deviation".into(),
+            got: format!("{} and {}", Known::NAMES[0], Known::NAMES[1]),
         });
     }
     if let Some([a, b]) = options.noise_std_k

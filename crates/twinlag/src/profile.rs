@@ -2,7 +2,8 @@
 //!
 //! One time constant is held at one value after another, away from where the fit ended, and the rest is fitted. Every value
 //! for which the cost stays within the 95 % point of chi-square above its minimum is allowed; the intervals of the other
-//! time constant and of the difference are the unions over all that is allowed.
+//! time constant and of the difference are the unions over all that is allowed. Where the cost owes its shape to noise rather
+//! than to the signal it is not chi-square distributed, and nothing is claimed.
 
 use twinlag_cross_relation::{Middle, Whitened};
 use twinlag_optimise::{Budget, Cost, End, Minimiser, Problem, Variable};
@@ -18,6 +19,15 @@ pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
 const RATIO: f64 = 1.25;
 /// Held values tried each way.
 const MOST: i32 = 60;
+
+/// Beyond this share of noise in the cost's curvature anywhere along the walk, the walk means nothing: the truth may lie there,
+/// and noise alone may have made the cost lower elsewhere.
+const MOSTLY_NOISE: f64 = 0.25;
+/// How far above the minimum the walk looks for such places: lower than this the truth is where noise has its way with a
+/// parameter that the signal does not determine.
+const FAR_ABOVE: f64 = 50.0;
+/// A time constant this small beside its lower bound is none.
+const VANISHING: f64 = 1e-3;
 
 /// Intervals over all values of the undetermined time constant that the record allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,41 +64,60 @@ pub(crate) fn ridge<const P: usize>(
         return Ok(None);
     }
     let no_prior = [f64::INFINITY; P];
-    let spread = |x: &[f64], middle| {
-        let theta: [f64; P] = std::array::from_fn(|i| x[i]);
-        whitened.covariance(&theta, &rest, &no_prior, middle).map(|c| c[other][other].sqrt())
-    };
-    // How much wider than white noise alone the residual makes the spread; the threshold grows by its square.
+    let theta = |x: &[f64]| -> [f64; P] { std::array::from_fn(|i| x[i]) };
+    let spread =
+        |x: &[f64], middle| whitened.covariance(&theta(x), &rest, &no_prior, middle).map(|c| c[other][other].sqrt());
+    let all: Vec<usize> = (0..P).filter(|i| *i == index || rest.contains(i)).collect();
+    let noise_share = |x: &[f64]| whitened.noise_share(&theta(x), &all, index);
+    // How much wider than white noise alone the residual makes the spread; thresholds grow by its square.
     let inflation = match (spread(best, middle), spread(best, Middle::WhiteNoise)) {
         (Some(actual), Some(assumed)) => (actual / assumed).powi(2).max(1.0),
         _ => 1.0,
     };
     let lowest = cost.value(best);
-    let difference = |x: &[f64]| x[1] - x[0];
     let mut found: Option<Ridge> = None;
+    let mut include = |x: &[f64], width: f64| {
+        let difference = x[1] - x[0];
+        let here = Ridge {
+            difference: (difference, [difference - width, difference + width]),
+            other: [(x[other] - width).max(0.0), x[other] + width],
+        };
+        found = Some(found.map_or(here, |r| r.with(&here)));
+    };
     for direction in [1, -1] {
         let mut from = best.to_vec();
         for count in i32::from(direction < 0)..MOST {
-            let held = best[index] * RATIO.powi(direction * count);
-            if held < variables[index].lower || held > variables[index].upper {
+            let mut held = best[index] * RATIO.powi(direction * count);
+            if held > variables[index].upper {
                 break;
+            }
+            // What is faster than the sampling can show may be any time constant down to none at all.
+            let is_last = held < variables[index].lower;
+            if is_last {
+                held = VANISHING * variables[index].lower;
             }
             let mut variables = variables.to_vec();
             variables[index] = variables[index].clone().held_at(held);
             from[index] = held;
             let problem = Problem::new(cost, variables)?;
             let fit = options.optimiser.minimise(&problem, &from, &Budget::default())?;
-            if fit.value - lowest > CHI2_95 * inflation || matches!(fit.end, End::OnBound(_)) {
+            let above = (fit.value - lowest) / inflation;
+            if above > FAR_ABOVE || matches!(fit.end, End::OnBound(_)) {
                 break;
             }
+            let share = noise_share(&fit.x);
+            if share > MOSTLY_NOISE {
+                return Ok(None);
+            }
+            if above <= CHI2_95 * (1.0 + share / (1.0 - share))
+                && let Some(width) = spread(&fit.x, middle)
+            {
+                include(&fit.x, Z_975 * width);
+            }
             from.clone_from(&fit.x);
-            let Some(width) = spread(&fit.x, middle).map(|s| Z_975 * s) else { continue };
-            let here = [difference(&fit.x) - width, difference(&fit.x) + width];
-            let there = [(fit.x[other] - width).max(0.0), fit.x[other] + width];
-            found = Some(match found {
-                None => Ridge { difference: (difference(best), here), other: there },
-                Some(r) => r.with(&Ridge { difference: (difference(&fit.x), here), other: there }),
-            });
+            if is_last {
+                break;
+            }
         }
     }
     Ok(found)

@@ -121,6 +121,9 @@ impl<'a, const P: usize> Question<'a, P> {
     }
 
     pub(crate) fn answer(mut self) -> Result<Characterisation, Error> {
+        if self.options.discard.is_some() && self.options.estimator == Estimator::Whitened {
+            self.warnings.push("the whitened estimator discards no samples: --discard was not needed".into());
+        }
         let mut best = self.fit_whitened(self.options.hold.first(), None)?;
         let mut energy = self.energy(&best);
         if !self.priors.is_empty() && energy > 1.5 {

@@ -23,6 +23,9 @@ const LONGEST_SHARE: f64 = 1.0 / 3.0;
 /// Share of a standard error that the choice of hold may cost without a word.
 const NOTICEABLE: f64 = 0.5;
 
+/// Standard deviations from a known value beyond which the record contradicts it.
+const FAR: f64 = 3.0;
+
 impl<'a, const P: usize> Question<'a, P> {
     pub(crate) fn conclude(
         mut self,
@@ -58,6 +61,7 @@ impl<'a, const P: usize> Question<'a, P> {
             Status::Ok | Status::ModelRejected => {
                 let c = covariance.expect("without a covariance the status is another");
                 self.fill(&mut out, &theta, &c, hold_sensitivity);
+                self.hold_against_knowledge(&theta);
                 out.interval_method = if whitened_estimate && is_rejected {
                     IntervalMethod::ResidualSpectrum
                 } else {
@@ -220,6 +224,20 @@ impl<'a, const P: usize> Question<'a, P> {
         }
     }
 
+    /// A fit that leaves what was known beforehand far behind is worth a word.
+    fn hold_against_knowledge(&mut self, theta: &[f64; P]) {
+        for prior in &self.priors {
+            let away = (theta[prior.index] - prior.mean) / prior.std;
+            if away.abs() > FAR {
+                self.warnings.push(format!(
+                    "the record contradicts what was known of {}: it lies {:.1} standard deviations of that knowledge away",
+                    Known::NAMES[prior.index],
+                    away.abs()
+                ));
+            }
+        }
+    }
+
     /// What a record tells that does not tell both time constants.
     fn explain(
         &mut self,
@@ -238,11 +256,18 @@ impl<'a, const P: usize> Question<'a, P> {
         out.not_identifiable = (0..2).filter(|&i| is_free(i)).map(|i| Known::NAMES[i].to_owned()).collect();
         match &best.fit.end {
             End::OnBound(which) => {
-                let names: Vec<_> = which.iter().map(|&i| self.variables[i].name.as_str()).collect();
-                self.warnings.push(format!(
-                    "the best fit lies on a bound of {}: its point is no estimate and is not reported as one",
-                    names.join(", ")
-                ));
+                for &i in which {
+                    let (variable, x) = (&self.variables[i], best.fit.x[i]);
+                    let meaning = match (i < 2, x < (variable.lower * variable.upper).sqrt()) {
+                        (true, true) => "the sensor seems faster than the sampling can show: sample faster",
+                        (true, false) => "the record seems too short for so slow a sensor",
+                        (false, _) => "the two channels do not belong together",
+                    };
+                    self.warnings.push(format!(
+                        "the best fit lies on a bound of {}, {x:.3e}, and is no estimate: {meaning}",
+                        variable.name
+                    ));
+                }
                 out.not_identifiable.extend(which.iter().filter(|&&i| i >= 2).map(|&i| Known::NAMES[i].to_owned()));
             }
             End::Stalled(why) => self.warnings.push(format!("the optimiser stopped at no minimum: {why}")),
@@ -254,7 +279,12 @@ impl<'a, const P: usize> Question<'a, P> {
             ),
         }
         let Some((index, ridge)) = found else {
-            self.warnings.push("not even the difference of the time constants is determined".into());
+            out.not_identifiable.push("time_constant_difference_s".into());
+            self.warnings.push(
+                "nothing about the time constants is determined, not even their difference: the sensors may be alike, or \
+                 the gas may hardly have moved"
+                    .into(),
+            );
             return;
         };
         out.interval_method = IntervalMethod::Profile;
