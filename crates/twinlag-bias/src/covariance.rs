@@ -5,8 +5,8 @@
 //! behind the synthetic filters, so `M_ij = Σ_c s_c² (F_cᵀ v_i)·(F_cᵀ v_j) + n ⟨κ_i κ_j⟩`: the filters run backwards over
 //! `v` give the noise of `e` its colour, and `κ_i(w) = E[U* V_i]` is what noise in `e` and noise in `v_i` have in common.
 
-use nalgebra::{Complex, DMatrix};
-use twinlag_cross_relation::{CostValue, CrossRelation};
+use nalgebra::Complex;
+use twinlag_cross_relation::{CostValue, CrossRelation, sandwich};
 
 /// Covariance `[P][P]` of the minimum `theta` of a cost built on `cost`, zero for parameters not in `free`.
 ///
@@ -14,6 +14,8 @@ use twinlag_cross_relation::{CostValue, CrossRelation};
 /// - `noise_std`: white noise levels `[s1, s2]`, K
 /// - `pull`: for each parameter the multiple `c_i` of `e` in `v_i = ∂_i e − c_i e`: zero for the plain and the compensated
 ///   cost, half the logarithmic derivative of the denominator for the normalised one
+///
+/// - `unit`: what turns the cost's Hessian into that of the mean square of `e`
 ///
 /// `None` if the Hessian over the free parameters is not positive definite.
 pub(crate) fn covariance<const P: usize>(
@@ -46,22 +48,9 @@ pub(crate) fn covariance<const P: usize>(
             .sum();
         coloured + n * common[i][j]
     };
-    let a = DMatrix::from_fn(free.len(), free.len(), |p, q| 0.5 * n * unit * at_minimum.hessian[free[p]][free[q]]);
-    let m = DMatrix::from_fn(free.len(), free.len(), |p, q| middle(free[p], free[q]));
-    let scale: Vec<f64> = (0..free.len()).map(|p| a[(p, p)].sqrt()).collect();
-    if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
-        return None;
-    }
-    let scaled = |x: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |p, q| x[(p, q)] / (scale[p] * scale[q]));
-    let inverse = scaled(&a).cholesky()?.inverse();
-    let covariance = &inverse * scaled(&m) * &inverse;
-    let mut out = [[0.0; P]; P];
-    for (p, &i) in free.iter().enumerate() {
-        for (q, &j) in free.iter().enumerate() {
-            out[i][j] = covariance[(p, q)] / (scale[p] * scale[q]);
-        }
-    }
-    (0..free.len()).all(|p| covariance[(p, p)] > 0.0).then_some(out)
+    let curvature = at_minimum.hessian.map(|row| row.map(|h| 0.5 * n * unit * h));
+    let score = std::array::from_fn(|i| std::array::from_fn(|j| middle(i, j)));
+    sandwich(&curvature, &score, free)
 }
 
 /// The transpose of the filter `(1 − p) z⁻¹/(1 − p z⁻¹)` applied to `v`, with its decay before the first sample.

@@ -16,6 +16,7 @@ use rustdct::DctPlanner;
 
 use crate::inverse::{WIDEST, row};
 use crate::parameters::{Pair, parts};
+use crate::sandwich::sandwich;
 use crate::whitened::Whitened;
 
 /// What the variance of the gradient is taken from.
@@ -71,29 +72,11 @@ impl Whitened<'_> {
             }
             Middle::ResidualSpectrum => self.score_variance(theta),
         };
-        let reduced = |m: &[[f64; P]; P]| {
-            DMatrix::from_fn(free.len(), free.len(), |p, q| {
-                let own = if p == q { prior_std[free[p]].powi(-2) } else { 0.0 };
-                m[free[p]][free[q]] + own
-            })
+        // Independent knowledge adds its own information, and as much variance to the gradient.
+        let known = |m: &[[f64; P]; P]| -> [[f64; P]; P] {
+            std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] + if i == j { prior_std[i].powi(-2) } else { 0.0 }))
         };
-        // The parameters differ by orders of magnitude: scaled to unit diagonal before anything is judged singular.
-        let (a, m) = (reduced(&full), reduced(&score));
-        let scale: Vec<f64> = (0..free.len()).map(|i| a[(i, i)].sqrt()).collect();
-        if !scale.iter().all(|s| s.is_finite() && *s > 0.0) {
-            return None;
-        }
-        let scaled =
-            |x: &DMatrix<f64>| DMatrix::from_fn(free.len(), free.len(), |i, j| x[(i, j)] / (scale[i] * scale[j]));
-        let inverse = scaled(&a).cholesky()?.inverse();
-        let covariance = &inverse * scaled(&m) * &inverse;
-        let mut out = [[0.0; P]; P];
-        for (p, &i) in free.iter().enumerate() {
-            for (q, &j) in free.iter().enumerate() {
-                out[i][j] = covariance[(p, q)] / (scale[p] * scale[q]);
-            }
-        }
-        (0..free.len()).all(|p| covariance[(p, p)].is_finite() && covariance[(p, p)] > 0.0).then_some(out)
+        sandwich(&known(&full), &known(&score), free)
     }
 
     /// How much of what the residual seems to say about parameter `index`, the other `free` ones following it, is noise

@@ -36,6 +36,7 @@ mod parameters;
 mod published;
 mod readings;
 mod residual;
+mod sandwich;
 mod spectral;
 mod whitened;
 
@@ -47,4 +48,5 @@ pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
 pub use residual::{ResidualTest, residual_tests};
+pub use sandwich::sandwich;
 pub use whitened::{Form, Whitened};
