@@ -23,7 +23,7 @@ fn main() -> ExitCode {
 
 fn inspect(path: &str, selection: &Selection) -> Result<(), RecordError> {
     let table = Table::from_path(path)?;
-    println!("{path}: {} rows", table.rows());
+    println!("{path}: rows {}", table.rows());
     for (index, column) in table.columns().iter().enumerate() {
         let (name, unit, kind, missing) = (column.name(), column.unit(), column.kind(), column.missing());
         println!("  column {} '{name}': {kind:?}, {unit}, {missing} missing", index + 1);
@@ -33,6 +33,6 @@ fn inspect(path: &str, selection: &Selection) -> Result<(), RecordError> {
         println!("  {note}");
     }
     let [t1, t2] = &record.channels;
-    println!("  {t1} and {t2}: {} rows, {} segments", record.len(), record.segments.len());
+    println!("  {t1} and {t2}: rows {}, segments {}", record.len(), record.segments.len());
     Ok(())
 }

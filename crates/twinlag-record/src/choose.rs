@@ -118,21 +118,30 @@ fn is_time(column: &Column) -> bool {
     }
 }
 
+/// Whether name and unit, whatever the cells hold, are those of a temperature.
+fn is_called_temperature(column: &Column) -> bool {
+    column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE))
+}
+
 fn is_temperature(column: &Column) -> bool {
-    column.kind() == Kind::Number
-        && (column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE)))
+    column.kind() == Kind::Number && is_called_temperature(column)
+}
+
+fn first_word(column: &Column) -> String {
+    words(column.label()).next().unwrap_or_default()
 }
 
 /// Makes the choice, and notes what was guessed.
 ///
 /// # Errors
 /// Those of [`Table::find`]; [`RecordError::TimeAndPeriod`], [`RecordError::BadPeriod`], [`RecordError::NoTime`],
-/// [`RecordError::ChannelsUnclear`], [`RecordError::SameColumn`].
+/// [`RecordError::ChannelsUnclear`], [`RecordError::SameColumn`], [`RecordError::NoValues`],
+/// [`RecordError::NotATemperature`].
 pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>) -> Result<Chosen, RecordError> {
     let find = |wanted: &Option<_>| wanted.as_ref().map(|wanted| table.find(wanted)).transpose();
     let (named_time, named) = (find(&selection.time)?, [find(&selection.t1)?, find(&selection.t2)?]);
     let reference = find(&selection.reference)?;
-    let taken: Vec<usize> = [named_time, named[0], named[1]].into_iter().flatten().collect();
+    let taken: Vec<usize> = [named_time, named[0], named[1], reference].into_iter().flatten().collect();
     if let Some((_, &twice)) = taken.iter().enumerate().find(|(at, index)| taken[..*at].contains(index)) {
         return Err(RecordError::SameColumn { file: table.source().to_owned(), column: table.title(twice) });
     }
@@ -147,7 +156,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     }
     let guessed_time = match named_time {
         Some(_) => None,
-        None => guess_time(table, &taken, reference),
+        None => guess_time(table, &taken),
     };
     // Even where a period is given the time column is told, so that it is not taken for a temperature.
     let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
@@ -167,9 +176,9 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     Ok(Chosen { time: Some(time), channels, reference })
 }
 
-fn guess_time(table: &Table, taken: &[usize], reference: Option<usize>) -> Option<usize> {
+fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
-    let free = |index: &usize| !taken.contains(index) && reference != Some(*index);
+    let free = |index: &usize| !taken.contains(index);
     (0..columns.len()).filter(free).find(|&index| is_time(&columns[index])).or_else(|| {
         // Without a telling name: the first column, if it rises from row to row and is not a row number.
         let first = columns.first().filter(|_| free(&0))?;
@@ -218,21 +227,52 @@ fn guess_channels(
         !of_time && reference != Some(index) && !named.contains(&Some(index))
     };
     let has_names = columns.iter().any(|column| !column.name().is_empty());
-    let candidates: Vec<usize> = (0..columns.len())
-        .filter(|&index| is_free(index))
-        .filter(|&index| {
-            let column = &columns[index];
-            let named = is_temperature(column) && !has(column, &APART) && !is_index(column);
-            if has_names { named } else { column.kind() == Kind::Number }
-        })
-        .collect();
-    let first_word = |index: usize| words(columns[index].label()).next().unwrap_or_default();
-    let literal = |want: &str| match *candidates.iter().filter(|&&i| first_word(i) == want).collect::<Vec<_>>() {
-        [&index] => Some(index),
-        _ => None,
+    let free: Vec<usize> = (0..columns.len()).filter(|&index| is_free(index)).collect();
+    let of_kinds = |kinds: &[Kind]| -> Vec<usize> {
+        let may_be = |column: &Column| {
+            let named = is_called_temperature(column) && !has(column, &APART) && !is_index(column);
+            kinds.contains(&column.kind()) && (named || !has_names)
+        };
+        free.iter().copied().filter(|&index| may_be(&columns[index])).collect()
     };
+    let candidates = of_kinds(&[Kind::Number]);
+    let Some(channels) = clear_pair(columns, named, &candidates) else {
+        let file = table.source().to_owned();
+        // What would have been clear but for one fault is refused for that fault.
+        let with_empty = clear_pair(columns, named, &of_kinds(&[Kind::Number, Kind::Empty]));
+        let mut pair = with_empty.into_iter().flatten();
+        if let Some(empty) = pair.find(|&index| columns[index].kind() == Kind::Empty) {
+            return Err(RecordError::NoValues { file, column: table.title(empty) });
+        }
+        if let Some(index) = reference.filter(|&index| ["t1", "t2"].contains(&first_word(&columns[index]).as_str())) {
+            return Err(RecordError::SameColumn { file, column: table.title(index) });
+        }
+        if let Some(index) = foreign_unit(columns, named, &free).filter(|_| candidates.is_empty()) {
+            let unit = columns[index].unit().to_string();
+            return Err(RecordError::NotATemperature { file, column: table.title(index), unit });
+        }
+        let titles: Vec<_> = candidates.iter().map(|&index| table.title(index)).collect();
+        let candidates = if titles.is_empty() { "none".to_owned() } else { titles.join(", ") };
+        let found = titles.len() + named.iter().flatten().count();
+        return Err(RecordError::ChannelsUnclear { file, found, candidates, columns: table.listing() });
+    };
+    for (role, (was, index)) in ["T1", "T2"].into_iter().zip(named.into_iter().zip(channels)) {
+        if was.is_none() {
+            notes.push(Note::Guessed { role, column: table.title(index) });
+        }
+    }
+    Ok(channels)
+}
+
+/// T1 and T2, if there is one way only to take them from the candidates.
+fn clear_pair(columns: &[Column], named: [Option<usize>; 2], candidates: &[usize]) -> Option<[usize; 2]> {
+    let literal =
+        |want: &str| match *candidates.iter().filter(|&&i| first_word(&columns[i]) == want).collect::<Vec<_>>() {
+            [&index] => Some(index),
+            _ => None,
+        };
     let doubtful = candidates.iter().any(|&index| has(&columns[index], &SURROUNDINGS));
-    let found = match (named, &candidates[..]) {
+    match (named, candidates) {
         ([Some(t1), None], &[t2]) if !doubtful => Some([t1, t2]),
         ([None, Some(t2)], &[t1]) if !doubtful => Some([t1, t2]),
         ([Some(t1), None], _) => literal("t2").map(|t2| [t1, t2]),
@@ -243,18 +283,24 @@ fn guess_channels(
             _ => None,
         },
         _ => None,
-    };
-    let Some(channels) = found else {
-        let titles: Vec<_> = candidates.iter().map(|&index| table.title(index)).collect();
-        let candidates = if titles.is_empty() { "none".to_owned() } else { titles.join(", ") };
-        let found = titles.len() + named.iter().flatten().count();
-        let (file, columns) = (table.source().to_owned(), table.listing());
-        return Err(RecordError::ChannelsUnclear { file, found, candidates, columns });
-    };
-    for (role, (was, index)) in ["T1", "T2"].into_iter().zip(named.into_iter().zip(channels)) {
-        if was.is_none() {
-            notes.push(Note::Guessed { role, column: table.title(index) });
-        }
     }
-    Ok(channels)
+}
+
+/// The first column that is a sensor by its name and none by its unit, as `T1 [mV]`; without such a name the first with
+/// such a unit, unless a column without unit leaves it open which ones are meant.
+fn foreign_unit(columns: &[Column], named: [Option<usize>; 2], free: &[usize]) -> Option<usize> {
+    let is_foreign = |index: &usize| matches!(columns[*index].unit(), Unit::Other(_));
+    let numbers: Vec<usize> = free
+        .iter()
+        .copied()
+        .filter(|&index| {
+            let column = &columns[index];
+            column.kind() == Kind::Number && !has(column, &APART) && !is_index(column)
+        })
+        .collect();
+    let mut foreign = numbers.iter().copied().filter(is_foreign);
+    let is_open = numbers.iter().any(|&index| *columns[index].unit() == Unit::Unstated);
+    let called = foreign.clone().find(|&index| has(&columns[index], &TEMPERATURE));
+    let chosen = named.into_iter().flatten().find(is_foreign);
+    chosen.or(called).or_else(|| foreign.next().filter(|_| !is_open))
 }

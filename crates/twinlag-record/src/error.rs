@@ -4,6 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::wording::{Counted, plain};
+
 /// Where in the input something is: a line of a file, or a sample of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
@@ -39,7 +41,8 @@ pub enum RecordError {
     #[error("{file}: is empty, expected a header and rows of time and two temperatures")]
     Empty { file: String },
     #[error(
-        "{file}: has no row of numbers in its {lines} lines, expected rows under the header; was the logger started?"
+        "{file}: has no row of numbers in its {counted}, expected rows under the header; was the logger started?",
+        counted = Counted(*lines, "line")
     )]
     NoData { file: String, lines: usize },
     #[error(
@@ -88,7 +91,10 @@ pub enum RecordError {
     UnknownColumn { file: String, wanted: String, columns: String },
     #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example --t1 {first}", first = numbers[0])]
     AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
-    #[error("{file}: column {column} was chosen twice; --time, --t1 and --t2 must be three different columns")]
+    #[error(
+        "{file}: column {column} would be used twice; --time, --t1, --t2 and --reference must be different columns (a \
+         sensor cannot be its own reference)"
+    )]
     SameColumn { file: String, column: String },
     #[error(
         "{file}: expected exactly two columns that are clearly the sensors, found {found} that may be ({candidates}); \
@@ -129,23 +135,33 @@ pub enum RecordError {
     )]
     NotATimeUnit { file: String, column: String, unit: String },
     #[error(
-        "{file}: {at}, column {column}: {value} {unit} is not between absolute zero and 5000 °C; is the unit right, is \
-         the thermocouple open? Empty the cells that are not measurements"
+        "{file}: {at}, column {column}: {shown} {unit} is not between absolute zero and 5000 °C; is the unit right, is \
+         the thermocouple open? Empty the cells that are not measurements",
+        shown = cell.as_ref().map_or_else(|| plain(*value), |cell| format!("'{cell}'"))
     )]
-    OutOfRange { file: String, at: Place, column: String, value: f64, unit: &'static str },
+    OutOfRange { file: String, at: Place, column: String, value: f64, cell: Option<String>, unit: &'static str },
+    #[error(
+        "{file}: column {column} has no value in any row; is the sensor connected? Choose another column, or mend the \
+         connection and record again"
+    )]
+    NoValues { file: String, column: String },
     #[error("{file}: columns {first} and {second} are the same in every sample; choose two different sensors")]
     Identical { file: String, first: String, second: String },
     #[error(
-        "{file}: column {column} is {value_c} °C in every sample, so that it tells nothing about its sensor; \
-         is it connected, is it a setpoint? Choose another column"
+        "{file}: column {column} is {shown} °C in every sample, so that it tells nothing about its sensor; \
+         is it connected, is it a setpoint? Choose another column", shown = plain(*value_c)
     )]
     Constant { file: String, column: String, value_c: f64 },
     #[error(
-        "{file}: {usable} usable samples of {rows} rows ({missing} with a missing temperature), expected at least \
-         {least}; usable are rows with both temperatures, next to another such row without a gap: record for longer"
+        "{file}: {samples} of {counted} ({missing} with a missing temperature), expected at least {least}; usable are rows \
+         with both temperatures, next to another such row without a gap: record for longer",
+        samples = Counted(*usable, "usable sample"), counted = Counted(*rows, "row")
     )]
     TooShort { file: String, usable: usize, rows: usize, missing: usize, least: usize },
-    #[error("{file}: {name} has {found} samples, expected {expected} as in {like}; give vectors of one length")]
+    #[error(
+        "{file}: {name} has {samples}, expected {expected} as in {like}; give vectors of one length",
+        samples = Counted(*found, "sample")
+    )]
     LengthMismatch { file: String, name: String, found: usize, like: String, expected: usize },
     #[error("cannot write the table: {reason}; check the disk and the permissions")]
     CannotWrite { reason: String },

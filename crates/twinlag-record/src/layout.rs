@@ -46,7 +46,7 @@ impl Layout {
         let take = if all.len() > 400 { 400 } else { (all.len() / 2).max(8).min(all.len()) };
         let sample = if all.len() > 2 { &all[1..take.max(2)] } else { &all[..] };
         let Some(found) = sniff_delimiter(sample) else {
-            return Err(RecordError::OneColumn { file: file(), line: last_line(text) });
+            return Err(RecordError::OneColumn { file: file(), line: first_number(text) });
         };
         let (delimiter, cells) = (found.delimiter, found.cells);
         let columns = Columns::of(sample, delimiter, cells);
@@ -112,7 +112,7 @@ impl Layout {
                     return Err(wrong_count(file(), first_line, row.len(), cells, &columns));
                 }
             }
-            if columns.is_last_empty() {
+            if columns.last_empty {
                 width -= 1;
             }
             if delimiter == Delimiter::Comma && width >= 4 && width.is_multiple_of(2) && columns.whole {
@@ -141,6 +141,14 @@ impl Layout {
         let head = head.iter().map(|(_, line, _)| (*line).to_owned()).collect();
         Ok(Self { delimiter, names, header_line, units, width, first_line, head })
     }
+}
+
+/// Number of the first line that is a number or a time and nothing else; of the first that is not blank or a comment, if
+/// there is none.
+fn first_number(text: &str) -> usize {
+    let used = || lines(text).filter(|(_, line)| !is_idle(line));
+    let is_value = |line: &str| matches!(look(line.trim().trim_matches('"').trim()), Look::Number | Look::Stamp);
+    used().find(|(_, line)| is_value(line)).or_else(|| used().next()).map_or(0, |line| line.0)
 }
 
 /// Number of the last line that is not blank or a comment.
@@ -206,16 +214,19 @@ struct Columns {
     looks: Vec<Look>,
     /// Whether every cell is a whole number.
     whole: bool,
+    /// Whether nothing stands behind the last delimiter; a word for a missing value would be something.
+    last_empty: bool,
 }
 
 impl Columns {
     fn of(sample: &[&str], delimiter: Delimiter, cells: usize) -> Self {
         let mut counts = vec![[0_usize; 3]; cells];
-        let (mut row, mut whole) = (Vec::new(), true);
+        let (mut row, mut whole, mut last_empty) = (Vec::new(), true, true);
         for line in sample {
             if split(line, delimiter, &mut row).is_err() || row.len() != cells {
                 continue;
             }
+            last_empty &= row.last().is_some_and(|cell| cell.is_empty());
             for (cell, counts) in row.iter().zip(&mut counts) {
                 match look(cell) {
                     Look::Number => counts[0] += 1,
@@ -233,11 +244,7 @@ impl Columns {
             _ if stamps > numbers => Look::Stamp,
             _ => Look::Number,
         });
-        Self { delimiter, looks: looks.collect(), whole }
-    }
-
-    fn is_last_empty(&self) -> bool {
-        self.looks.last() == Some(&Look::Missing)
+        Self { delimiter, looks: looks.collect(), whole, last_empty }
     }
 
     /// Whether the cells are those of a row of measurements.
@@ -257,10 +264,10 @@ impl Columns {
         let width = self.looks.len();
         if names == width || cells.len() == width {
             // A trailing delimiter under the names and the rows alike.
-            let trailing = names + 1 == width && self.is_last_empty();
+            let trailing = names + 1 == width && self.last_empty;
             Some(if trailing { names } else { width })
         } else {
-            (names + 1 == width && self.is_last_empty()).then_some(names)
+            (names + 1 == width && self.last_empty).then_some(names)
         }
     }
 }

@@ -48,6 +48,7 @@ mod selection;
 mod table;
 mod time_axis;
 mod unit;
+mod wording;
 mod write;
 
 pub use dialect::{Decimal, Delimiter};

@@ -5,6 +5,10 @@ use std::fmt;
 use crate::Place;
 use crate::dialect::{Decimal, Delimiter};
 use crate::sampling::{Sampling, SamplingKind};
+use crate::wording::{Counted, brief};
+
+/// Stamps closer to even spacing than this part of the period are called uniform without further numbers.
+const EXACT: f64 = 1e-6;
 
 /// One remark on how a file was understood. Its `Display` is a sentence for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +69,11 @@ pub enum Note {
         /// How many it should have had.
         expected: usize,
     },
+    /// The very last line is a whole row, but no line break follows: what wrote it may have been stopped in mid-number.
+    NoFinalLineBreak {
+        /// The line.
+        line: usize,
+    },
     /// The header came again, as after a change of file.
     RepeatedHeader {
         /// How many lines were left out for it.
@@ -123,6 +132,7 @@ impl fmt::Display for Note {
             }
             Self::Guessed { role, column } => write!(f, "{role} guessed to be column {column}"),
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
+            Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
             Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
             Self::Unit { column, unit, stated, to } => {
                 let how = if *stated { "is in" } else { "names no unit and was taken to be in" };
@@ -135,11 +145,22 @@ impl fmt::Display for Note {
             Self::CutLine { line, found, expected } => {
                 write!(f, "last line {line} is cut off ({found} of {expected} cells) and was left out")
             }
+            Self::NoFinalLineBreak { line } => {
+                write!(
+                    f,
+                    "the file does not end with a line break, so the last number, on line {line}, may be cut off; "
+                )?;
+                write!(f, "it was read as it stands")
+            }
+            Self::RepeatedHeader { lines: 1, first_line } => {
+                write!(f, "the header comes again: 1 line left out, line {first_line}")
+            }
             Self::RepeatedHeader { lines, first_line } => {
                 write!(f, "the header comes again: {lines} lines left out, the first is line {first_line}")
             }
             Self::Masked { rows, t1, t2 } => {
-                write!(f, "{rows} rows masked for a missing temperature (T1 in {t1}, T2 in {t2}); none was filled")
+                let rows = Counted(*rows, "row");
+                write!(f, "{rows} masked for a missing temperature (T1 in {t1}, T2 in {t2}); none was filled")
             }
             Self::Gap { at, from_s, length_s } => {
                 write!(
@@ -147,9 +168,11 @@ impl fmt::Display for Note {
                     "gap of {length_s:.6} s before {at}, from {from_s:.6} s on; the record is cut there, not filled"
                 )
             }
+            Self::FurtherGaps { count: 1, length_s } => write!(f, "1 further gap, of {length_s:.6} s"),
             Self::FurtherGaps { count, length_s } => {
                 write!(f, "{count} further gaps, together {length_s:.6} s")
             }
+            Self::LoneRows { rows: 1 } => write!(f, "1 row stands alone between gaps or masked rows and is not used"),
             Self::LoneRows { rows } => {
                 write!(f, "{rows} rows stand alone between gaps or masked rows and are not used")
             }
@@ -161,10 +184,13 @@ impl fmt::Display for Note {
                     SamplingKind::Irregular => "irregular, steps used as stamped",
                 };
                 let who = if *chosen { " (as chosen)" } else { "" };
-                write!(f, "sampling {what}{who}: period {period_s:.9} s, stamps depart from even spacing by ")?;
-                write!(f, "{jitter_s:.3e} s rms and {largest_departure_s:.3e} s at most")?;
-                if let Some(resolution_s) = stamp_resolution_s {
-                    write!(f, ", stamp resolution {resolution_s} s")?;
+                write!(f, "sampling {what}{who}: period {} s", brief(*period_s))?;
+                if *largest_departure_s >= EXACT * period_s {
+                    write!(f, ", stamps depart from even spacing by {jitter_s:.3e} s rms and ")?;
+                    write!(f, "{largest_departure_s:.3e} s at most")?;
+                    if let Some(resolution_s) = stamp_resolution_s {
+                        write!(f, ", stamp resolution {} s", brief(*resolution_s))?;
+                    }
                 }
                 write!(f, "; nothing was resampled")
             }

@@ -11,9 +11,10 @@ use crate::choose::{Chosen, choose};
 use crate::note::Note;
 use crate::sampling::{self, Sampling, SamplingKind};
 use crate::selection::{SamplingChoice, Selection};
-use crate::table::{Column, Table};
+use crate::table::{Column, Table, shortened};
 use crate::time_axis::{self, TimeAxis};
 use crate::unit::Unit;
+use crate::wording::plain;
 use crate::write::{Decimals, write_csv};
 use crate::{Place, RecordError};
 
@@ -87,7 +88,7 @@ impl Origin<'_> {
         let cell = |index: usize| {
             let (table, _) = self.table?;
             let column = &table.columns()[index];
-            Some(column.text(row).map_or_else(|| column.raw()[row].to_string(), str::to_owned))
+            Some(column.text(row).map_or_else(|| plain(column.raw()[row]), str::to_owned))
         };
         let time = match self.table.and_then(|(_, chosen)| chosen.time) {
             Some(time_axis::TimeColumns::One(index)) => cell(index),
@@ -96,7 +97,7 @@ impl Origin<'_> {
             }
             None => None,
         };
-        time.unwrap_or_else(|| format!("{time_s} s"))
+        time.unwrap_or_else(|| format!("{} s", plain(time_s)))
     }
 }
 
@@ -113,7 +114,7 @@ impl Record {
     ///
     /// # Errors
     /// Every variant of [`RecordError`] on columns that cannot be told or used, times that do not increase, and
-    /// temperatures that cannot be: out of range, constant, identical, or fewer than 8 usable.
+    /// temperatures that cannot be: out of range, missing throughout, constant, identical, or fewer than 8 usable.
     pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(table, selection, &mut notes)?;
@@ -162,7 +163,8 @@ impl Record {
     ///
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`], [`RecordError::TimeNotIncreasing`],
-    /// [`RecordError::OutOfRange`], [`RecordError::TooShort`], [`RecordError::Constant`], [`RecordError::Identical`].
+    /// [`RecordError::OutOfRange`], [`RecordError::NoValues`], [`RecordError::TooShort`], [`RecordError::Constant`],
+    /// [`RecordError::Identical`].
     pub fn from_channels(channels: Channels, sampling: SamplingChoice) -> Result<Self, RecordError> {
         let file = channels.source.clone();
         let names = [&channels.names[0], &channels.names[1], "reference"].map(str::to_owned);
@@ -194,6 +196,11 @@ impl Record {
         check_range(&t2_c, 1, origin)?;
         if let Some(reference_c) = &reference_c {
             check_range(reference_c, 2, origin)?;
+        }
+        for (values, column) in [(&t1_c, &origin.columns[0]), (&t2_c, &origin.columns[1])] {
+            if rows > 0 && values.iter().all(|value| value.is_nan()) {
+                return Err(RecordError::NoValues { file: file(), column: column.clone() });
+            }
         }
         let count = |values: &[f64]| values.iter().filter(|value| value.is_nan()).count();
         let is_whole = |row: usize| !t1_c[row].is_nan() && !t2_c[row].is_nan();
@@ -311,15 +318,16 @@ fn check_time(time_s: &[f64], origin: &Origin<'_>) -> Result<(), RecordError> {
 fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(), RecordError> {
     let is_outside = |value: &f64| *value < ABSOLUTE_ZERO_C || *value > HOTTEST_C;
     let Some(row) = values_c.iter().position(is_outside) else { return Ok(()) };
-    let raw = origin.table.map(|(table, chosen)| {
+    let cells = origin.table.and_then(|(table, chosen)| {
         let indices = [Some(chosen.channels[0]), Some(chosen.channels[1]), chosen.reference];
-        indices[column].map_or(f64::NAN, |index| table.columns()[index].raw()[row])
+        indices[column].map(|index| &table.columns()[index])
     });
     Err(RecordError::OutOfRange {
         file: origin.file.to_owned(),
         at: origin.place(row),
         column: origin.columns[column].clone(),
-        value: raw.unwrap_or(values_c[row]),
+        value: cells.map_or(values_c[row], |cells| cells.raw()[row]),
+        cell: cells.and_then(|cells| cells.beyond(row)).map(shortened),
         unit: origin.units[column].symbol(),
     })
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
 
-use crate::cells::{is_idle, lines, split};
+use crate::cells::{is_idle, lines, lines_from_end, split};
 use crate::dialect::{Decimal, Delimiter, Evidence, Unclear};
 use crate::layout::Layout;
 use crate::note::Note;
@@ -37,6 +37,8 @@ pub struct Column {
     values: Vec<f64>,
     missing: usize,
     texts: Texts,
+    /// Numbers too large for a double: as infinities they do not say what stood there.
+    beyond: Texts,
 }
 
 impl Column {
@@ -75,10 +77,16 @@ impl Column {
         self.texts.get(row)
     }
 
+    /// The text of a cell that is a number too large for a double.
+    pub(crate) fn beyond(&self, row: usize) -> Option<&str> {
+        self.beyond.get(row)
+    }
+
     fn push(&mut self, row: usize, cell: &str, decimal: Decimal) {
         let value = number::read(cell, decimal);
         self.values.push(if let Value::Number(number) = value { number } else { f64::NAN });
         match value {
+            Value::Number(number) if number.is_infinite() => self.beyond.push(row, cell),
             Value::Number(_) => {}
             Value::Missing => self.missing += 1,
             Value::Other => self.texts.push(row, cell),
@@ -159,7 +167,8 @@ impl Table {
     /// - `source`: its name in messages
     ///
     /// Comment lines (`#`, `%`, `//`), blank lines, a header that comes again and a cut-off very last line are left out,
-    /// the latter two with a note. A cell that is not a number is no error here, only when its column is used.
+    /// the latter two with a note. A very last row that no line break follows is read, with a note. A cell that is not a
+    /// number is no error here, only when its column is used.
     ///
     /// # Errors
     /// The variants of [`RecordError`] on binary, empty and one-column input, on ambiguous decimal signs, on open
@@ -176,8 +185,8 @@ impl Table {
             let row_unit = layout.units[index].clone();
             // A suffix such as `_C` may be part of the name; the unit row is never.
             let unit = if row_unit == Unit::Unstated { unit } else { row_unit };
-            let (values, texts) = (Vec::new(), Texts::default());
-            Column { name, label, unit, kind: Kind::Empty, values, missing: 0, texts }
+            let (values, texts, beyond) = (Vec::new(), Texts::default(), Texts::default());
+            Column { name, label, unit, kind: Kind::Empty, values, missing: 0, texts, beyond }
         });
         let (columns, row_lines) = (columns.collect(), Vec::new());
         let mut table = Self { source: source.to_owned(), columns, row_lines, notes: vec![format] };
@@ -228,6 +237,9 @@ impl Table {
                 column.push(self.row_lines.len(), cell, decimal);
             }
             self.row_lines.push(line);
+            if is_last && lines_from_end(text).next() == Some(content) {
+                self.notes.push(Note::NoFinalLineBreak { line });
+            }
         }
         if repeated > 0 {
             self.notes.push(Note::RepeatedHeader { lines: repeated, first_line: first_repeated });
@@ -331,7 +343,7 @@ impl Table {
 }
 
 /// Enough of a cell to find it, however long it is.
-fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     const LONGEST: usize = 60;
     if text.chars().count() <= LONGEST {
         return text.to_owned();

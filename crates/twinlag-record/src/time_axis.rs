@@ -4,6 +4,7 @@ use crate::clock::{self, DAY_NS, Day, Stamp};
 use crate::note::Note;
 use crate::table::{Kind, Table};
 use crate::unit::Unit;
+use crate::wording::plain;
 use crate::{Place, RecordError};
 
 /// Seconds since the first row, and the time unit that the stamps were printed in.
@@ -83,7 +84,7 @@ fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {
 
 fn not_a_time(table: &Table, index: usize, row: usize, expected: &'static str) -> RecordError {
     let column = &table.columns()[index];
-    let cell = column.text(row).map_or_else(|| column.raw()[row].to_string(), str::to_owned);
+    let cell = column.text(row).map_or_else(|| plain(column.raw()[row]), str::to_owned);
     let (file, line) = (table.source().to_owned(), table.line_of(row));
     RecordError::NotATime { file, line, column: table.title(index), cell, expected }
 }

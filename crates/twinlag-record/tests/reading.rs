@@ -3,7 +3,7 @@
 mod common;
 
 use common::{assert_is_the_rig, notes, plain, record, record_with, rows};
-use twinlag_record::{Channels, ColumnRef, Kind, Record, SamplingChoice, SamplingKind, Selection, Table};
+use twinlag_record::{Channels, ColumnRef, Kind, Note, Record, SamplingChoice, SamplingKind, Selection, Table};
 
 fn comma(value: f64) -> String {
     format!("{value:.3}").replace('.', ",")
@@ -108,7 +108,7 @@ fn a_header_that_comes_again_is_left_out_with_a_note() {
     assert!(body.contains("\n2.5,"));
     let got = record(&rolled);
     assert_is_the_rig(&got, 0.0);
-    assert!(notes(&got).contains("first is line 7"), "{}", notes(&got));
+    assert!(notes(&got).contains("1 line left out, line 7"), "{}", notes(&got));
 }
 
 #[test]
@@ -116,6 +116,22 @@ fn a_cut_off_last_line_is_left_out_with_a_note() {
     let got = record(&(plain() + "5,22"));
     assert_is_the_rig(&got, 0.0);
     assert!(notes(&got).contains("last line 12 is cut off (2 of 3 cells)"), "{}", notes(&got));
+}
+
+#[test]
+fn a_last_row_without_a_line_break_is_read_with_a_note() {
+    for text in [plain(), plain().replace('\n', "\r\n"), plain().replace('\n', "\r")] {
+        assert!(!notes(&record(&text)).contains("line break"), "{text:?}");
+        let got = record(text.trim_end());
+        assert_is_the_rig(&got, 0.0);
+        let note = "does not end with a line break, so the last number, on line 11, may be cut off";
+        assert!(notes(&got).contains(note), "{}", notes(&got));
+    }
+    // Behind a comment the row is whole, also behind one that repeats it; a cut line is left out and has its own note.
+    let last = plain().lines().last().unwrap().to_owned();
+    for text in [plain() + "# end", plain() + "#" + &last, plain() + "5,22"] {
+        assert!(!notes(&record(&text)).contains("line break"), "{text:?}");
+    }
 }
 
 #[test]
@@ -130,7 +146,7 @@ fn words_for_missing_are_nan_and_counted_and_cut_the_record() {
         assert!(got.t1_c[4].is_nan() && !got.t2_c[4].is_nan(), "{word}");
         assert_eq!((got.missing, got.segments.clone()), (1, vec![0..4, 5..10]), "{word}");
         assert_eq!(Table::read(text.as_bytes(), "x").unwrap().columns()[1].missing(), 1);
-        assert!(notes(&got).contains("1 rows masked"), "{}", notes(&got));
+        assert!(notes(&got).contains("1 row masked"), "{}", notes(&got));
     }
 }
 
@@ -232,6 +248,52 @@ fn steps_are_the_period_if_even_and_as_stamped_if_not() {
     assert_eq!(odd.sampling.kind, SamplingKind::Irregular);
     assert_eq!(odd.steps_s(&(0..4)), [0.625, 0.375, 0.625]);
     assert!(notes(&odd).contains("nothing was resampled"), "{}", notes(&odd));
+}
+
+#[test]
+fn exactly_even_sampling_is_said_without_departures_and_with_few_digits() {
+    let said = |period_s: f64| {
+        let got = record(&rows("time_s,T1,T2", |k, _, a, b| format!("{:.6},{a},{b}", f64::from(k) * period_s)));
+        notes(&got).lines().find(|note| note.starts_with("sampling")).expect("said").to_owned()
+    };
+    assert_eq!(said(0.002), "sampling uniform: period 0.002 s; nothing was resampled");
+    assert_eq!(said(0.5), "sampling uniform: period 0.5 s; nothing was resampled");
+    // Printed to the microsecond, 1/24 s departs by up to half of one: 1e-5 periods.
+    let rounded = said(1.0 / 24.0);
+    for want in ["period 0.04166", "stamps depart from even spacing by", "s rms", "stamp resolution 0.000001 s"] {
+        assert!(rounded.contains(want), "no '{want}' in: {rounded}");
+    }
+    assert!(!rounded.contains("0.000e0"), "{rounded}");
+}
+
+#[test]
+fn one_is_singular_and_two_are_plural_in_every_note() {
+    let sentences = |n| {
+        [
+            Note::Masked { rows: n, t1: n, t2: 0 },
+            Note::LoneRows { rows: n },
+            Note::Midnight { times: n },
+            Note::FurtherGaps { count: n, length_s: 7.5 },
+            Note::RepeatedHeader { lines: n, first_line: 7 },
+        ]
+        .map(|note| note.to_string())
+    };
+    let one = [
+        "1 row masked for a missing temperature (T1 in 1, T2 in 0); none was filled",
+        "1 row stands alone between gaps or masked rows and is not used",
+        "time of day passed midnight once and was continued",
+        "1 further gap, of 7.500000 s",
+        "the header comes again: 1 line left out, line 7",
+    ];
+    let two = [
+        "2 rows masked for a missing temperature (T1 in 2, T2 in 0); none was filled",
+        "2 rows stand alone between gaps or masked rows and are not used",
+        "time of day passed midnight 2 times and was continued",
+        "2 further gaps, together 7.500000 s",
+        "the header comes again: 2 lines left out, the first is line 7",
+    ];
+    assert_eq!(sentences(1), one);
+    assert_eq!(sentences(2), two);
 }
 
 #[test]

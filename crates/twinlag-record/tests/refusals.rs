@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{FILE, assert_says, plain, refusal, refusal_with, rows};
+use common::{FILE, assert_says, plain, record, record_with, refusal, refusal_with, rows};
 use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table};
 
 #[expect(clippy::unnecessary_wraps, reason = "as the fields of a selection are")]
@@ -118,6 +118,17 @@ fn what_is_no_temperature_or_time_by_its_unit_is_refused() {
     let text = rows("time_s,T1 [mV],T2", |_, t, a, b| format!("{t},{a},{b}"));
     let selection = Selection { t1: pick("T1"), t2: pick("T2"), ..Selection::default() };
     assert_says(&refusal_with(text.as_bytes(), &selection), &["2 'T1 [mV]'", "'mV'", "°C", "convert"]);
+    // Left to be guessed, the same is said of the first column that is a sensor by its name.
+    let text = rows("time_s,depth [m],T1 [mV],T2 [mV]", |_, t, a, b| format!("{t},1,{a},{b}"));
+    let chosen = Selection { t1: pick("3"), ..Selection::default() };
+    for selection in [&Selection::default(), &chosen] {
+        assert_says(&refusal_with(text.as_bytes(), selection), &["column 3 'T1 [mV]' is in 'mV', expected a temp"]);
+    }
+    let text = rows("time_s,fast [V],slow [V]", |_, t, a, b| format!("{t},{a},{b}"));
+    assert_says(&refusal(&text), &["column 2 'fast [V]' is in 'V', expected a temperature"]);
+    // Columns without unit may be the sensors: the depth is not to blame.
+    let text = rows("time_s,depth [m],fast,slow", |_, t, a, b| format!("{t},1,{a},{b}"));
+    assert_says(&refusal(&text), &["exactly two", "found 0", "3 'fast'"]);
     let text = rows("x [m],T1,T2", |_, t, a, b| format!("{t},{a},{b}"));
     let selection = Selection { time: pick("x"), ..Selection::default() };
     assert_says(&refusal_with(text.as_bytes(), &selection), &["1 'x [m]'", "'m'", "time [s]"]);
@@ -127,11 +138,73 @@ fn what_is_no_temperature_or_time_by_its_unit_is_refused() {
 fn impossible_temperatures_are_refused() {
     for value in ["9999", "-9999", "1e37", "-273.2"] {
         let text = plain().replace("1.5,20.75", &format!("1.5,{value}"));
-        let number = value.parse::<f64>().unwrap().to_string();
-        assert_says(&refusal(&text), &["line 5", "2 'T1'", &number, "open", "unit"]);
+        assert_says(&refusal(&text), &["line 5", "2 'T1'", &format!(": {value} °C is not"), "open", "unit"]);
     }
     let text = rows("time_s,T1_K,T2_K", |_, t, a, b| format!("{t},{},{}", a + 253.0, b - 25.0));
     assert_says(&refusal(&text), &["line 2", "3 'T2_K'", "-5 K", "absolute zero"]);
+}
+
+/// A double ends at 1.8e308: as a number such a cell is infinite, which nobody wrote.
+#[test]
+fn a_cell_beyond_a_double_is_quoted_as_it_stands() {
+    for cell in ["1e999", "-2.50E+0400"] {
+        let text = plain().replace("1.5,20.75", &format!("1.5,{cell}"));
+        let want = format!("line 5, column 2 'T1': '{cell}' °C is not between");
+        assert_says(&refusal(&text), &[&want]);
+    }
+}
+
+#[test]
+fn a_channel_without_any_value_is_refused_by_name_whether_guessed_or_chosen() {
+    let chosen = Selection { t1: pick("T1"), t2: pick("T2"), ..Selection::default() };
+    let half = Selection { t2: pick("T2"), ..Selection::default() };
+    for word in ["NaN", "", "OL"] {
+        let text = rows("time_s,T1,T2", |_, t, a, _| format!("{t},{a},{word}"));
+        for selection in [&Selection::default(), &chosen, &half] {
+            let want = ["column 3 'T2' has no value in any row", "is the sensor connected?"];
+            assert_says(&refusal_with(text.as_bytes(), selection), &want);
+        }
+    }
+    // Beside a column that may be a sensor, without a header, in both channels, and in a vector.
+    let text = rows("time_s,T1,T2,room_C", |_, t, a, b| format!("{t},{a},NaN,{b}"));
+    assert_says(&refusal(&text), &["3 'T2' has no value"]);
+    let text = rows("time_s,T1,T2", |_, t, a, _| format!("{t},{a},NaN"));
+    assert_says(&refusal(text.split_once('\n').unwrap().1), &["column 3 has no value"]);
+    assert_says(&refusal(&rows("time_s,T1,T2", |_, t, _, _| format!("{t},NaN,NaN"))), &["2 'T1' has no value"]);
+    let channels = Channels {
+        source: FILE.to_owned(),
+        names: ["hot", "cold"].map(str::to_owned),
+        time_s: (0..10).map(f64::from).collect(),
+        t1_c: (0..10).map(f64::from).collect(),
+        t2_c: vec![f64::NAN; 10],
+        reference_c: None,
+    };
+    let error = Record::from_channels(channels, SamplingChoice::Auto).expect_err("refused").to_string();
+    assert_says(&error, &["column cold has no value"]);
+}
+
+/// Inputs of a logger that are not connected harm nobody who does not select them.
+#[test]
+fn empty_columns_beside_two_sensors_do_no_harm() {
+    let text = rows("time_s,ch1,ch2,ch3,ch4", |_, t, a, b| format!("{t},NaN,{a},{b},NaN"));
+    let got = record(&text);
+    assert_eq!((got.channels, got.t1_c[4]), (["ch2", "ch3"].map(str::to_owned), 21.0));
+}
+
+#[test]
+fn a_reference_that_is_also_a_sensor_or_the_time_is_refused() {
+    let with = |t1, reference| Selection { t1, reference: pick(reference), ..Selection::default() };
+    let text = rows("time_s,T1,T2,Tref", |_, t, a, b| format!("{t},{a},{b},{a}"));
+    for selection in [with(pick("T1"), "2"), with(None, "T1")] {
+        let want = ["2 'T1'", "twice", "cannot be its own reference"];
+        assert_says(&refusal_with(text.as_bytes(), &selection), &want);
+    }
+    let time = Selection { time: pick("1"), ..with(None, "time_s") };
+    assert_says(&refusal_with(text.as_bytes(), &time), &["1 'time_s'", "twice"]);
+    assert!(record_with(text.as_bytes(), &with(None, "Tref")).is_ok());
+    // A guess keeps off the reference: what it lacks then is a sensor.
+    let text = rows("time_s,T1,trusted_C", |_, t, a, b| format!("{t},{a},{b}"));
+    assert_says(&refusal_with(text.as_bytes(), &with(None, "trusted_C")), &["exactly two", "found 1"]);
 }
 
 #[test]
@@ -158,12 +231,35 @@ fn files_without_a_table_are_refused() {
         (&b""[..], "empty"),
         (b"\n\n", "empty"),
         (b"# only\n", "empty"),
-        (b"time_s,T1,T2\n", "no row"),
-        (b"T1\n1\n2\n3\n", "one column"),
+        (b"time_s,T1,T2\n", "no row of numbers in its 1 line,"),
+        (b"time_s,T1,T2\n[s],[K],[K]\n", "no row of numbers in its 2 lines,"),
         (b"\x89HDF\r\n\x1a\n\0\0\0", "not text"),
     ] {
         assert_says(&refusal_with(bytes, &Selection::default()), &[says]);
     }
+}
+
+#[test]
+fn one_column_is_refused_at_its_first_value() {
+    for (text, line) in [
+        ("T1\n1\n2\n3\n", "line 2:"),
+        ("# rig 3\n\nLogger\nT1\n\"20.5\"\n\"20.6\"\n", "line 5:"),
+        ("time\n10:00:00\n10:00:01\n", "line 2:"),
+        ("20.5\n20.6\n", "line 1:"),
+        ("\nneither\nnor\n", "line 2:"),
+    ] {
+        assert_says(&refusal(text), &[line, "one column"]);
+    }
+}
+
+#[test]
+fn counts_of_one_are_singular_in_refusals() {
+    let one: String = plain().lines().take(2).map(|line| line.to_owned() + "\n").collect();
+    assert_says(&refusal(&one), &[": 1 usable sample of 1 row (0 with"]);
+    assert_says(
+        &refusal(&plain().lines().take(3).collect::<Vec<_>>().join("\n")),
+        &[": 2 usable samples of 2 rows (0"],
+    );
 }
 
 #[test]
