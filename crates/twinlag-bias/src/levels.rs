@@ -18,6 +18,8 @@ pub struct NoiseLevel {
     pub standard_error_k: f64,
     /// Step of the converter, K, if the readings lie on a grid.
     pub quantisation_step_k: Option<f64>,
+    /// Third differences left out because noise does not make such: a dropout has up to four, a sharp step of the gas some.
+    pub outliers: usize,
 }
 
 /// Noise levels `[s1, s2]` of both channels.
@@ -28,20 +30,20 @@ pub struct NoiseLevel {
 /// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.
 pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError> {
     let level = |channel: fn(&Segment) -> &[f64]| -> Result<NoiseLevel, NoiseError> {
-        let (mut sum, mut count) = (0.0, 0_usize);
+        let mut differences = Vec::new();
         for segment in readings.segments() {
             let y = channel(segment);
             for (k, four) in y.windows(4).enumerate() {
                 let weights = third_difference(segment.steps(), k);
-                let difference: f64 = weights.iter().zip(four).map(|(w, y)| w * y).sum();
-                sum += difference * difference;
-                count += 1;
+                differences.push(weights.iter().zip(four).map(|(w, y)| w * y).sum::<f64>());
             }
         }
-        if count < 8 {
+        if differences.len() < 8 {
             return Err(NoiseError::TooShort { samples: readings.len(), needed: 11 });
         }
-        let from_differences = (sum / count as f64).sqrt();
+        let outliers = drop_outliers(&mut differences);
+        let count = differences.len();
+        let from_differences = (differences.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
         let step = quantisation_step(readings.segments().iter().map(channel));
         let floor = step.map_or(0.0, |q| q / 12.0_f64.sqrt());
         let std_k = from_differences.max(floor);
@@ -51,9 +53,24 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
             std_k,
             standard_error_k: 0.5 * std_k * (4.62 / count as f64).sqrt(),
             quantisation_step_k: step,
+            outliers,
         })
     };
     Ok([level(Segment::y1)?, level(Segment::y2)?])
+}
+
+/// Leaves out differences beyond six robust standard deviations (1.4826 times the median absolute value) and returns their
+/// number. White Gaussian noise has one such in five hundred million. Where more than half are zero, as with a coarse
+/// converter, there is no scale to judge by and all are kept.
+fn drop_outliers(differences: &mut Vec<f64>) -> usize {
+    let mut sizes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
+    let middle = sizes.len() / 2;
+    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let before = differences.len();
+    if median > 0.0 {
+        differences.retain(|d| d.abs() <= 6.0 * 1.4826 * median);
+    }
+    before - differences.len()
 }
 
 /// Weights of unit sum of squares that take any parabola through samples `k..k+4` to zero.
@@ -136,6 +153,17 @@ mod tests {
             let tol = 8.0 * level.standard_error_k;
             assert!((level.std_k - want).abs() < tol, "got {}, want {want} ± {tol}", level.std_k);
         }
+    }
+
+    /// One dropout in 3000 samples would multiply the level by ten; it is left out and counted: four differences see it.
+    #[test]
+    fn a_dropout_does_not_pass_for_noise() {
+        let [mut y1, y2] = noisy(3000, [0.3, 1.1], |k| k as f64);
+        y1[1500] = -200.0;
+        let levels = estimate_noise(&Readings::even(&y1, &y2, 0.01).expect("valid")).expect("long enough");
+        let tol = 4.0 * levels[0].standard_error_k;
+        assert!((levels[0].std_k - 0.3).abs() < tol, "got {}, want 0.3 ± {tol}", levels[0].std_k);
+        assert_eq!([levels[0].outliers, levels[1].outliers], [4, 0]);
     }
 
     #[test]

@@ -46,7 +46,12 @@ fn text(answer: &Characterisation) -> String {
     let difference = &answer.time_constant_difference_s;
     if let (Some(value), Some([low, high])) = (difference.value, difference.interval_95_s) {
         let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
-        lines.push(format!("  {a} slower than {b} by {}", interval(value, low, high, " s")));
+        let text = if value < 0.0 {
+            format!("  {a} faster than {b} by {}", interval(-value, -high, -low, " s"))
+        } else {
+            format!("  {a} slower than {b} by {}", interval(value, low, high, " s"))
+        };
+        lines.push(text);
     }
     for (name, estimate, unit) in [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")] {
         if let Some(e) = estimate {

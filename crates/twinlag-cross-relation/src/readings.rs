@@ -157,23 +157,15 @@ impl Readings {
 
     /// Mean time between neighbouring samples of a segment, s.
     pub fn mean_step_s(&self) -> f64 {
-        let (time, count) = self.segments.iter().fold((0.0, 0), |(time, count), s| {
-            let steps = s.len() - 1;
-            let span = match &s.steps {
-                Steps::Even(period) => period * steps as f64,
-                Steps::Uneven(each) => each.iter().sum(),
-            };
-            (time + span, count + steps)
-        });
-        time / count as f64
+        self.span_s() / (self.len() - self.segments.len()) as f64
     }
 
-    /// Longest unbroken stretch, s.
-    pub fn longest_span_s(&self) -> f64 {
+    /// Time covered by all segments together, s.
+    pub fn span_s(&self) -> f64 {
         let span = |s: &Segment| match &s.steps {
             Steps::Even(period) => period * (s.len() - 1) as f64,
             Steps::Uneven(each) => each.iter().sum(),
         };
-        self.segments.iter().map(span).fold(0.0, f64::max)
+        self.segments.iter().map(span).sum()
     }
 }

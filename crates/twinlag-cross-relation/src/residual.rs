@@ -7,7 +7,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 /// One test of the residual against white noise of unit variance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResidualTest {
-    /// What was tested: `total-energy`, `band-energy` or `whiteness`.
+    /// What was tested: `total-energy`, `band-energy`, `whiteness`; callers may add their own.
     pub test: String,
     /// The statistic.
     pub statistic: f64,

@@ -22,7 +22,8 @@ pub trait Minimiser {
     /// Minimises `problem` from `start` (all variables, their own units; moved inside the bounds first).
     ///
     /// # Errors
-    /// [`ProblemError::Start`] for a start of the wrong length or not finite. A fit that ran is never an error.
+    /// [`ProblemError::Start`] for a start of the wrong length or not finite, [`ProblemError::NeedsDerivatives`] where a solver
+    /// that follows gradients meets a cost without any. A fit that ran is never an error.
     fn minimise(&self, problem: &Problem<'_>, start: &[f64], budget: &Budget) -> Result<Fit, ProblemError>;
 }
 
@@ -131,6 +132,10 @@ impl Minimiser for Optimiser {
     fn minimise(&self, problem: &Problem<'_>, start: &[f64], budget: &Budget) -> Result<Fit, ProblemError> {
         let from = problem.coordinates(start)?;
         let mut run = self.run(problem, &from, budget);
+        let follows_gradients = !matches!(self, Self::NelderMead { .. });
+        if follows_gradients && run.best.derivatives.is_none() && !problem.has_derivatives_at(&from) {
+            return Err(ProblemError::NeedsDerivatives { optimiser: self.name() });
+        }
         let failure = match &run.stop {
             Stop::Failed(why) => Some(why.as_str()),
             _ => None,

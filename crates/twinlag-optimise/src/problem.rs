@@ -106,6 +106,8 @@ pub enum ProblemError {
     NothingFree,
     #[error("a start needs {expected} finite values, one for each variable, got {got:?}")]
     Start { expected: usize, got: Vec<f64> },
+    #[error("{optimiser} needs derivatives, and this cost has none: implement `Cost::derivatives`, or use nelder-mead")]
+    NeedsDerivatives { optimiser: String },
     #[error("at least one start is needed")]
     NoStart,
     #[error("there is no optimiser called \"{name}\"; there are {known}")]
@@ -189,6 +191,10 @@ impl<'a> Problem<'a> {
             x[i] = self.variables[i].value(z);
         }
         x
+    }
+
+    pub(crate) fn has_derivatives_at(&self, z: &[f64]) -> bool {
+        self.cost.derivatives(&self.point(z)).is_some()
     }
 
     /// The cost at coordinates `z` inside the bounds; infinite where it is not finite.

@@ -215,6 +215,20 @@ fn levenberg_marquardt_needs_few_evaluations() {
 }
 
 #[test]
+fn a_cost_without_derivatives_is_refused_by_those_that_need_them() {
+    let cost = Counted::new(rosenbrock_value, |_: &[f64]| None);
+    let problem = Problem::new(&cost, box_of(-5.0, 5.0)).expect("valid");
+    each(|name, optimiser| {
+        let got = optimiser.minimise(&problem, &[-1.2, 1.0], &Budget::default());
+        if name == "nelder-mead" {
+            assert_eq!(got.expect("values are enough").end, End::Unchecked);
+        } else {
+            assert_eq!(got, Err(ProblemError::NeedsDerivatives { optimiser: name.into() }));
+        }
+    });
+}
+
+#[test]
 fn a_held_variable_stays_and_the_rest_is_fitted() {
     each(|name, optimiser| {
         let variables = vec![Variable::linear("x", 1.0, -5.0, 5.0).held_at(0.7), Variable::linear("y", 1.0, -5.0, 5.0)];

@@ -12,7 +12,7 @@ use crate::question::{Levels, Question};
 ///
 /// # Errors
 /// [`Error`] if the question cannot be put: options that contradict each other, an estimator that cannot take the record's
-/// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its [`Status`] says what it is
+/// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its [`Status`](crate::Status) says what it is
 /// worth.
 pub fn characterise(record: &Record, options: &Options) -> Result<Characterisation, Error> {
     check(options)?;

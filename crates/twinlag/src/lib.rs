@@ -1,6 +1,6 @@
 //! Two temperature sensors' time constants from their readings alone.
 //!
-//! Two sensors of different thickness in one gas lag differently. From how they disagree [`characterise`] finds the time
+//! Two sensors of different thickness in one gas lag differently. From how they disagree [`characterise()`] finds the time
 //! constant of each *blind*, without knowing the gas temperature, with 95 % intervals that account for the noise it finds, and
 //! says so where the record does not tell. This crate is the one to take for whole records; each layer is re-exported as a
 //! module and can be taken alone: [`sensor`] (models), [`signal`] (simulated records), [`cross_relation`] (the costs),

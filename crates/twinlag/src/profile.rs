@@ -3,7 +3,7 @@
 //! One time constant is held at one value after another, away from where the fit ended, and the rest is fitted. Every value
 //! for which the cost stays within the 95 % point of chi-square above its minimum is allowed; the intervals of the other
 //! time constant and of the difference are the unions over all that is allowed. Where the cost owes its shape to noise rather
-//! than to the signal it is not chi-square distributed, and nothing is claimed.
+//! than to the signal it is not chi-square distributed, and far more is allowed.
 
 use twinlag_cross_relation::{Middle, Whitened};
 use twinlag_optimise::{Budget, Cost, End, Minimiser, Problem, Variable};
@@ -20,12 +20,14 @@ const RATIO: f64 = 1.25;
 /// Held values tried each way.
 const MOST: i32 = 60;
 
-/// Beyond this share of noise in the cost's curvature anywhere along the walk, the walk means nothing: the truth may lie there,
+/// Beyond this share of noise in the curvature along the walk, the cost is not chi-square distributed: the truth may lie there,
 /// and noise alone may have made the cost lower elsewhere.
 const MOSTLY_NOISE: f64 = 0.25;
-/// How far above the minimum the walk looks for such places: lower than this the truth is where noise has its way with a
-/// parameter that the signal does not determine.
+/// How far above the minimum such places are allowed: the truth lies lower than this where noise has its way with a parameter
+/// that the signal does not determine.
 const FAR_ABOVE: f64 = 50.0;
+/// Halvings, in logarithms, that place the edge of what is allowed.
+const HALVINGS: usize = 5;
 /// A time constant this small beside its lower bound is none.
 const VANISHING: f64 = 1e-3;
 
@@ -39,6 +41,15 @@ pub(crate) struct Ridge {
 }
 
 impl Ridge {
+    /// What one point says, `width` either way.
+    fn at(x: &[f64], other: usize, width: f64) -> Self {
+        let difference = x[1] - x[0];
+        Self {
+            difference: (difference, [difference - width, difference + width]),
+            other: [(x[other] - width).max(0.0), x[other] + width],
+        }
+    }
+
     /// The union of two, where this one ended.
     pub(crate) fn with(&self, other: &Self) -> Self {
         Self {
@@ -76,16 +87,31 @@ pub(crate) fn ridge<const P: usize>(
     };
     let lowest = cost.value(best);
     let mut found: Option<Ridge> = None;
+    if let Some(width) = spread(best, middle) {
+        found = Some(Ridge::at(best, other, Z_975 * width));
+    }
     let mut include = |x: &[f64], width: f64| {
-        let difference = x[1] - x[0];
-        let here = Ridge {
-            difference: (difference, [difference - width, difference + width]),
-            other: [(x[other] - width).max(0.0), x[other] + width],
-        };
+        let here = Ridge::at(x, other, width);
         found = Some(found.map_or(here, |r| r.with(&here)));
     };
+    // The rest fitted with the time constant held: where, how far above the minimum, and whether it is allowed.
+    let fit_at = |held: f64, from: &[f64]| -> Result<Option<(Vec<f64>, f64, bool)>, Error> {
+        let mut variables = variables.to_vec();
+        variables[index] = variables[index].clone().held_at(held);
+        let mut from = from.to_vec();
+        from[index] = held;
+        let problem = Problem::new(cost, variables)?;
+        let fit = options.optimiser.minimise(&problem, &from, &Budget::default())?;
+        if matches!(fit.end, End::OnBound(_)) {
+            return Ok(None);
+        }
+        let above = (fit.value - lowest) / inflation;
+        let share = noise_share(&fit.x);
+        let limit = if share > MOSTLY_NOISE { FAR_ABOVE } else { CHI2_95 * (1.0 + share / (1.0 - share)) };
+        Ok(Some((fit.x, above, above <= limit)))
+    };
     for direction in [1, -1] {
-        let mut from = best.to_vec();
+        let mut last = best.to_vec();
         for count in i32::from(direction < 0)..MOST {
             let mut held = best[index] * RATIO.powi(direction * count);
             if held > variables[index].upper {
@@ -96,28 +122,29 @@ pub(crate) fn ridge<const P: usize>(
             if is_last {
                 held = VANISHING * variables[index].lower;
             }
-            let mut variables = variables.to_vec();
-            variables[index] = variables[index].clone().held_at(held);
-            from[index] = held;
-            let problem = Problem::new(cost, variables)?;
-            let fit = options.optimiser.minimise(&problem, &from, &Budget::default())?;
-            let above = (fit.value - lowest) / inflation;
-            if above > FAR_ABOVE || matches!(fit.end, End::OnBound(_)) {
+            let Some((x, above, is_allowed)) = fit_at(held, &last)? else { break };
+            if is_allowed {
+                if let Some(width) = spread(&x, middle) {
+                    include(&x, Z_975 * width);
+                }
+            } else {
+                // The edge of what is allowed lies between the last two held values.
+                let (mut inside, mut outside) = (last.clone(), held);
+                for _ in 0..HALVINGS {
+                    let between = (inside[index] * outside).sqrt();
+                    match fit_at(between, &inside)? {
+                        Some((x, _, true)) => inside = x,
+                        _ => outside = between,
+                    }
+                }
+                if let Some(width) = spread(&inside, middle) {
+                    include(&inside, Z_975 * width);
+                }
+            }
+            if above > FAR_ABOVE || is_last || !is_allowed {
                 break;
             }
-            let share = noise_share(&fit.x);
-            if share > MOSTLY_NOISE {
-                return Ok(None);
-            }
-            if above <= CHI2_95 * (1.0 + share / (1.0 - share))
-                && let Some(width) = spread(&fit.x, middle)
-            {
-                include(&fit.x, Z_975 * width);
-            }
-            from.clone_from(&fit.x);
-            if is_last {
-                break;
-            }
+            last = x;
         }
     }
     Ok(found)

@@ -1,6 +1,6 @@
 //! One record with one set of options: noise levels, starts, fits.
 
-use twinlag_bias::{Compensated, Noise, Normalised, estimate_noise, plain_covariance};
+use twinlag_bias::{Compensated, Noise, NoiseLevel, Normalised, estimate_noise, plain_covariance};
 use twinlag_cross_relation::{
     CrossRelation, Middle, Parameter, Readings, ResidualTest, Segment, Whitened, residual_tests,
 };
@@ -14,10 +14,13 @@ use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::options::{Estimator, Hold, Known, Options};
 use crate::starts::starts;
 
-/// A residual test below this p-value rejects the model: three tests, so one false alarm in a thousand records.
-pub(crate) const REJECT: f64 = 1e-3 / 3.0;
+/// A residual test below this p-value rejects the model: four tests, so one false alarm in a thousand records.
+pub(crate) const REJECT: f64 = 1e-3 / 4.0;
 /// The other hold must lower the sum of squares by this many times the residual's energy per degree of freedom.
 const CLEARLY_BETTER: f64 = 10.0;
+
+/// A converter whose own noise `q/√12` is this share of the level is coarse: its errors are not white.
+const COARSE: f64 = 0.7;
 
 /// Noise levels and how well they are known.
 #[derive(Clone, Copy, Debug)]
@@ -26,18 +29,33 @@ pub(crate) struct Levels {
     pub(crate) given: bool,
     /// Relative standard deviation of the variances: 0 if given.
     uncertainty: f64,
+    /// Step of each converter where it is coarser than the noise, K.
+    pub(crate) coarse_step_k: [Option<f64>; 2],
+    /// Third differences that are too large for noise, in each channel.
+    pub(crate) outliers: [usize; 2],
+    /// Energy of the residual in units of the levels as found, where these had to be scaled to it.
+    pub(crate) energy_as_found: Option<f64>,
 }
 
 impl Levels {
     pub(crate) fn of(readings: &Readings, options: &Options) -> Result<Self, Error> {
         if let Some(std_k) = options.noise_std_k {
-            return Ok(Self { std_k, given: true, uncertainty: 0.0 });
+            let (coarse_step_k, outliers) = ([None; 2], [0; 2]);
+            return Ok(Self { std_k, given: true, uncertainty: 0.0, coarse_step_k, outliers, energy_as_found: None });
         }
         let found = estimate_noise(readings)?;
+        let coarse = |l: &NoiseLevel| l.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE * l.std_k);
         let uncertainty = found.iter().map(|l| 2.0 * l.standard_error_k / l.std_k).fold(0.0, f64::max);
         // A channel without any noise at all: a hundred-thousandth of its swing stands in, far below any converter's step.
         let least = 1e-5 * readings.swing();
-        Ok(Self { std_k: found.map(|l| l.std_k.max(least)), given: false, uncertainty })
+        Ok(Self {
+            std_k: found.map(|l| l.std_k.max(least)),
+            given: false,
+            uncertainty,
+            coarse_step_k: [coarse(&found[0]), coarse(&found[1])],
+            outliers: found.map(|l| l.outliers),
+            energy_as_found: None,
+        })
     }
 }
 
@@ -46,7 +64,7 @@ fn variable(i: usize, readings: &Readings, levels: &Levels) -> Variable {
     let name = Known::NAMES[i];
     match Parameter::ALL[i] {
         Parameter::Tau1 | Parameter::Tau2 => {
-            Variable::logarithmic(name, 0.2 * readings.mean_step_s(), 10.0 * readings.longest_span_s())
+            Variable::logarithmic(name, 0.2 * readings.mean_step_s(), 10.0 * readings.span_s())
         }
         Parameter::Gain => Variable::linear(name, 0.01, 0.2, 5.0),
         Parameter::Offset => {
@@ -74,6 +92,8 @@ pub(crate) struct Question<'a, const P: usize> {
     pub(crate) variables: Vec<Variable>,
     pub(crate) priors: Vec<Prior>,
     pub(crate) warnings: Vec<String>,
+    /// Whether the whitened estimate determines both time constants, for the estimators that cannot judge it themselves.
+    pub(crate) is_determined: bool,
 }
 
 impl<'a, const P: usize> Question<'a, P> {
@@ -103,7 +123,7 @@ impl<'a, const P: usize> Question<'a, P> {
             }
         });
         let variables = variables.collect();
-        Self { record, readings, options, levels, variables, priors, warnings: Vec::new() }
+        Self { record, readings, options, levels, variables, priors, warnings: Vec::new(), is_determined: true }
     }
 
     pub(crate) fn free(&self) -> Vec<usize> {
@@ -144,19 +164,21 @@ impl<'a, const P: usize> Question<'a, P> {
             let quieter = best.whitened.noise_std().map(|s| s * energy.sqrt());
             best.whitened = best.whitened.with_noise(quieter)?;
             self.levels.std_k = quieter;
+            self.levels.energy_as_found = Some(energy);
             self.warnings.push(
                 "the signal moves between samples as noise would: the noise levels are scaled to the residual, and their \
                  ratio is a guess; give --noise S1,S2 if you know them"
                     .into(),
             );
         }
+        let tests = self.tests(&best);
+        let middle = if self.rejected(&tests) { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+        let covariance = best.whitened.covariance(&theta, &self.free(), &self.prior_std(), middle);
         if self.options.estimator == Estimator::Whitened {
-            let tests = self.tests(&best, &theta);
-            let middle =
-                if rejected(&tests, self.levels.given) { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
-            let covariance = best.whitened.covariance(&theta, &self.free(), &self.prior_std(), middle);
             return self.conclude(&best, theta, covariance, tests, hold_sensitivity);
         }
+        // What the whitened estimate cannot tell, the others only seem to tell.
+        self.is_determined = best.fit.end.is_usable() && self.vague(&theta, covariance.as_ref()).is_empty();
         self.answer_published(best)
     }
 
@@ -199,7 +221,7 @@ impl<'a, const P: usize> Question<'a, P> {
             EstimatorCost::CrossRelation(c) => plain_covariance(c, &theta, &free, std_k),
             EstimatorCost::Whitened(_) => None,
         };
-        let tests = self.tests(&whitened, &theta);
+        let tests = self.tests(&whitened);
         self.warnings.push(format!("the first {discard} samples of each unbroken stretch were discarded"));
         self.conclude(&whitened, theta, covariance, tests, None)
     }
@@ -256,31 +278,52 @@ impl<'a, const P: usize> Question<'a, P> {
         let fitted = self.fit_whitened_with(other, best.whitened.noise_std(), Some(&best.fit.x))?;
         let moved = [0, 1].map(|i| fitted.fit.x[i] / best.fit.x[i] - 1.0);
         let usable = fitted.fit.end.is_usable() && best.fit.end.is_usable();
-        let needed = CLEARLY_BETTER * self.energy(best).max(1.0);
-        if self.options.hold == Hold::Auto && fitted.fit.end.is_usable() && fitted.fit.value + needed < best.fit.value {
-            self.warnings.push(
-                "straight lines between samples explain the record clearly better than steps: the first-order hold was used"
-                    .into(),
-            );
-            *best = Fitted { starts: best.starts, ..fitted };
+        if self.options.hold == Hold::Auto && fitted.fit.end.is_usable() {
+            let needed = CLEARLY_BETTER * self.energy(best).max(1.0);
+            let is_better = fitted.fit.value + needed < best.fit.value;
+            if is_better || (self.rejected(&self.tests(best)) && !self.rejected(&self.tests(&fitted))) {
+                *best = Fitted { starts: best.starts, ..fitted };
+            }
         }
         Ok(usable.then_some(moved))
     }
 
-    fn tests(&self, fitted: &Fitted<'_>, theta: &[f64; P]) -> Vec<ResidualTest> {
+    /// The tests of the residual, and of the calibration where it was not fitted.
+    fn tests(&self, fitted: &Fitted<'_>) -> Vec<ResidualTest> {
+        let theta: [f64; P] = std::array::from_fn(|i| fitted.fit.x[i]);
         // Levels that were rescaled for the priors' sake are not what the record is tested against.
         let scale = fitted.whitened.noise_std()[0] / self.levels.std_k[0];
         let residual: Vec<Vec<f64>> = fitted
             .whitened
-            .residual(theta)
+            .residual(&theta)
             .into_iter()
             .map(|segment| segment.into_iter().map(|r| r * scale).collect())
             .collect();
-        residual_tests(&residual, self.free().len(), self.levels.uncertainty)
+        let mut tests = residual_tests(&residual, self.free().len(), self.levels.uncertainty);
+        if self.levels.energy_as_found.is_some() {
+            // Levels taken from the residual say nothing about its energy.
+            tests.retain(|t| t.test != "total-energy");
+        }
+        if P == 2 && self.options.estimator == Estimator::Whitened && fitted.fit.end.is_usable() {
+            let at_rest_alike = [theta[0], theta[1], 1.0, 0.0];
+            let statistic = fitted.whitened.score_test(&at_rest_alike, &self.free(), &[2, 3]);
+            tests.extend(statistic.map(|s| {
+                let statistic = s * scale * scale;
+                // Chi-square with two degrees of freedom.
+                ResidualTest {
+                    test: "calibration".into(),
+                    statistic,
+                    degrees_of_freedom: Some(2.0),
+                    p_value: (-0.5 * statistic).exp(),
+                }
+            }));
+        }
+        tests
     }
-}
 
-/// Whether the tests reject the model. Where the levels are from the data, too little energy is no objection.
-pub(crate) fn rejected(tests: &[ResidualTest], given: bool) -> bool {
-    tests.iter().any(|t| t.p_value < REJECT && (given || t.test != "total-energy" || t.statistic > 1.0))
+    /// Whether the tests reject the model. Where the levels are from the data, too little energy is no objection.
+    pub(crate) fn rejected(&self, tests: &[ResidualTest]) -> bool {
+        let counts = |t: &&ResidualTest| self.levels.given || t.test != "total-energy" || t.statistic > 1.0;
+        tests.iter().filter(counts).any(|t| t.p_value < REJECT)
+    }
 }

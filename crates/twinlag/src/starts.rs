@@ -18,7 +18,7 @@ pub(crate) fn starts<const P: usize>(
     variables: &[Variable],
 ) -> Vec<Vec<f64>> {
     let step_s = readings.mean_step_s();
-    let (shortest, longest) = (0.5 * step_s, 0.25 * readings.longest_span_s());
+    let (shortest, longest) = (0.5 * step_s, 0.25 * readings.span_s());
     let axis: Vec<f64> =
         (0..GRID).map(|i| shortest * (longest / shortest).powf((i as f64 + 0.5) / GRID as f64)).collect();
     let mut grid: Vec<(f64, Vec<f64>)> = Vec::new();

@@ -12,14 +12,16 @@ use crate::error::Error;
 use crate::objective::{EstimatorCost, Objective};
 use crate::options::{Estimator, Hold, Known};
 use crate::profile::{Ridge, Z_975, ridge};
-use crate::question::{Fitted, Question, REJECT, rejected};
+use crate::question::{Fitted, Question, REJECT};
 
 /// A time constant whose logarithm has a larger standard error than this is not determined: its interval spans a factor of
 /// seven.
 const UNDETERMINED: f64 = 0.5;
-/// A time constant longer than this share of the longest unbroken stretch is where fits run to when the record does not tell
-/// two lags from none: the gas would have to be known to move at periods longer than the record.
+/// A time constant longer than this share of the record, and only known to [`LOOSE`], is where fits run to when the record does
+/// not tell two lags from none.
 const LONGEST_SHARE: f64 = 1.0 / 3.0;
+/// Standard error of the logarithm of a time constant that is long beside the record, above which it is not believed.
+const LOOSE: f64 = 0.1;
 /// Share of a standard error that the choice of hold may cost without a word.
 const NOTICEABLE: f64 = 0.5;
 
@@ -35,16 +37,10 @@ impl<'a, const P: usize> Question<'a, P> {
         tests: Vec<ResidualTest>,
         hold_sensitivity: Option<[f64; 2]>,
     ) -> Result<Characterisation, Error> {
-        let is_rejected = rejected(&tests, self.levels.given);
+        let is_rejected = self.rejected(&tests);
         let whitened_estimate = self.options.estimator == Estimator::Whitened;
-        let log_error = |i: usize, c: &[[f64; P]; P]| c[i][i].sqrt() / theta[i];
         let is_free = |i: usize| !self.is_held(i);
-        let longest_s = LONGEST_SHARE * self.readings.longest_span_s();
-        let is_vague = |i: usize| match &covariance {
-            Some(c) => log_error(i, c) > UNDETERMINED || theta[i] > longest_s,
-            None => true,
-        };
-        let vague: Vec<usize> = (0..2).filter(|&i| is_free(i) && is_vague(i)).collect();
+        let vague = self.vague(&theta, covariance.as_ref());
         let on_bound = match &best.fit.end {
             End::OnBound(which) => which.clone(),
             _ => Vec::new(),
@@ -52,11 +48,11 @@ impl<'a, const P: usize> Question<'a, P> {
         let status = match &best.fit.end {
             End::OnBound(which) if which.iter().any(|&i| i >= 2) => Status::AtBound,
             End::OnBound(_) | End::Stalled(_) | End::LimitReached => Status::NotIdentifiable,
-            _ if covariance.is_none() || !vague.is_empty() => Status::NotIdentifiable,
+            _ if !self.is_determined || covariance.is_none() || !vague.is_empty() => Status::NotIdentifiable,
             _ if is_rejected => Status::ModelRejected,
             _ => Status::Ok,
         };
-        let mut out = self.skeleton(best, tests, is_rejected, status, hold_sensitivity);
+        let mut out = self.skeleton(best, tests, status, hold_sensitivity);
         match status {
             Status::Ok | Status::ModelRejected => {
                 let c = covariance.expect("without a covariance the status is another");
@@ -85,8 +81,29 @@ impl<'a, const P: usize> Question<'a, P> {
         if is_rejected {
             self.advise(&mut out);
         }
+        for (channel, outliers) in self.record.channels.iter().zip(self.levels.outliers) {
+            if outliers > 0 {
+                out.warnings.push(format!(
+                    "{channel}: {outliers} third differences are too large for noise and were left out of its level: spikes, \
+                     dropouts or sharp steps of the gas"
+                ));
+            }
+        }
         out.warnings.splice(0..0, self.warnings);
         Ok(out)
+    }
+
+    /// The free time constants that the record does not determine, given their covariance if there is one.
+    pub(crate) fn vague(&self, theta: &[f64; P], covariance: Option<&[[f64; P]; P]>) -> Vec<usize> {
+        let longest_s = LONGEST_SHARE * self.readings.span_s();
+        let is_vague = |i: usize| match covariance {
+            Some(c) => {
+                let log_error = c[i][i].sqrt() / theta[i];
+                log_error > UNDETERMINED || (log_error > LOOSE && theta[i] > longest_s)
+            }
+            None => true,
+        };
+        (0..2).filter(|&i| !self.is_held(i) && is_vague(i)).collect()
     }
 
     /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
@@ -117,7 +134,6 @@ impl<'a, const P: usize> Question<'a, P> {
         &self,
         best: &Fitted<'_>,
         tests: Vec<ResidualTest>,
-        is_rejected: bool,
         status: Status,
         hold_sensitivity: Option<[f64; 2]>,
     ) -> Characterisation {
@@ -129,7 +145,8 @@ impl<'a, const P: usize> Question<'a, P> {
             noise_std_k: self.levels.std_k[i],
             known: self.is_held(i),
         };
-        let chi2_per_dof = tests.iter().find(|t| t.test == "total-energy").map(|t| t.statistic);
+        let total = tests.iter().find(|t| t.test == "total-energy").map(|t| t.statistic);
+        let chi2_per_dof = self.levels.energy_as_found.or(total);
         Characterisation {
             schema: Characterisation::SCHEMA.into(),
             record: RecordSummary {
@@ -150,7 +167,7 @@ impl<'a, const P: usize> Question<'a, P> {
             free: FreeParameters::default(),
             residual: Residual {
                 chi2_per_dof,
-                white: tests.iter().all(|t| t.test != "whiteness" || t.p_value >= REJECT) && !is_rejected,
+                white: tests.iter().all(|t| t.test != "whiteness" || t.p_value >= REJECT),
                 tests,
             },
             interval_method: IntervalMethod::None,
@@ -254,6 +271,14 @@ impl<'a, const P: usize> Question<'a, P> {
             }
         }
         out.not_identifiable = (0..2).filter(|&i| is_free(i)).map(|i| Known::NAMES[i].to_owned()).collect();
+        if !self.is_determined {
+            self.warnings.push(
+                "the whitened estimate finds nothing determined here; a number from this estimator would be chance"
+                    .into(),
+            );
+            out.not_identifiable.push("time_constant_difference_s".into());
+            return;
+        }
         match &best.fit.end {
             End::OnBound(which) => {
                 for &i in which {
@@ -315,16 +340,40 @@ impl<'a, const P: usize> Question<'a, P> {
 
     /// What to do about a rejected model.
     fn advise(&self, out: &mut Characterisation) {
-        let hint = if self.options.calibrates() {
-            "an effect that two first-order lags lack is at work, or the noise is not what was assumed"
+        let failed: Vec<&str> =
+            out.residual.tests.iter().filter(|t| t.p_value < REJECT).map(|t| t.test.as_str()).collect();
+        if self.levels.given && failed == ["total-energy"] {
+            let energy = out.residual.chi2_per_dof.unwrap_or(1.0);
+            out.warnings.push(format!(
+                "the residual is white, but its energy is {energy:.3} of what the given noise explains: the noise levels \
+                 given are about {:.2} times what the record shows",
+                energy.sqrt().recip()
+            ));
+            return;
+        }
+        let coarse: Vec<String> = (0..2)
+            .filter_map(|i| Some((i, self.levels.coarse_step_k[i]?)))
+            .map(|(i, step)| format!("{} is quantised in steps of {step:.3} K", self.record.channels[i]))
+            .collect();
+        let hint = if !coarse.is_empty() {
+            format!("{}, coarser than its noise: that alone may be what is left", coarse.join(", "))
+        } else if self.levels.energy_as_found.is_some() {
+            "the samples are far apart for these sensors: sample faster".into()
+        } else if self.levels.outliers != [0, 0] && failed.contains(&"total-energy") {
+            "samples that no noise explains are among them (see below): mend or empty these cells first".into()
+        } else if failed.contains(&"calibration") {
+            "gain and offset of the second channel would explain it better: try --free gain,offset".into()
+        } else if self.options.calibrates() {
+            "an effect that two first-order lags lack is at work, or the noise is not white".into()
         } else {
             "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that two first-order lags \
-             lack is at work, or the noise is not what was assumed"
+             lack is at work, or the noise is not white"
+                .into()
         };
         out.warnings.push(format!(
-            "the residual is not noise (energy {:.3} times what noise explains): two first-order lags do not explain this \
-             record, and a time constant found with them need not be that of a sensor; {hint}",
-            out.residual.chi2_per_dof.unwrap_or(0.0)
+            "two first-order lags do not explain this record (tests that fail: {}), and a time constant found with them \
+             need not be that of a sensor; {hint}",
+            failed.join(", ")
         ));
     }
 }
