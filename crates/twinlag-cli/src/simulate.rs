@@ -24,7 +24,7 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
     }
     let record = {
         let _progress = Progress::start(talk, format!("simulating {} samples", rig.record().samples));
-        rig.simulate().map_err(twinlag::Error::from)?
+        rig.simulate().map_err(|error| Failure::File(format!("{}: {error}", command.spec.display())))?
     };
     if to_stdout {
         write(&mut stdout().lock(), &record)?;

@@ -299,16 +299,18 @@ mod tests {
     }
 
     /// 400 records with gain 1.1 and offset 0.3 K as stated: the statistic of both is chi-square with two degrees of freedom,
-    /// mean 2 and standard deviation 2, so that the mean of 400 lies within 2 ± 0.4 (four standard errors). A gain stated one per
-    /// cent wrong is seen in every record of this signal.
+    /// mean 2 and standard deviation 2, so that the mean of 400 lies within 2 ± 0.4 (four standard errors). At a gain stated
+    /// five per cent wrong it is larger by the square of that error in standard errors of the gain, as Wald's test has it, to
+    /// leading order in the error: within a third.
     #[test]
     fn the_score_test_is_chi_square_at_the_truth_and_sees_a_gain_off_it() {
         let mut rng = ChaCha8Rng::seed_from_u64(25);
-        let mut mean = [0.0; 2];
+        let (mut mean, mut wald) = ([0.0; 2], 0.0);
+        let off = 0.05 * THETA[2];
         for _ in 0..400 {
             let readings = record(60.0, &mut || StandardNormal.sample(&mut rng));
             let cost = cost(&readings);
-            for (mean, gain) in mean.iter_mut().zip([THETA[2], 1.01 * THETA[2]]) {
+            for (mean, gain) in mean.iter_mut().zip([THETA[2], THETA[2] + off]) {
                 // Fit the time constants at the stated gain.
                 let mut theta = [THETA[0], THETA[1], gain, THETA[3]];
                 for _ in 0..20 {
@@ -320,9 +322,13 @@ mod tests {
                 }
                 *mean += cost.score_test(&theta, &[0, 1], &[2, 3]).expect("determined") / 400.0;
             }
+            let all =
+                cost.covariance(&THETA, &[0, 1, 2, 3], &[f64::INFINITY; 4], Middle::WhiteNoise).expect("determined");
+            wald += off * off / all[2][2] / 400.0;
         }
         assert!((mean[0] - 2.0).abs() < 0.4, "at the truth: mean {}", mean[0]);
-        assert!(mean[1] > 20.0, "at a gain 1 % off: mean {}", mean[1]);
+        assert!((mean[1] / (2.0 + wald) - 1.0).abs() < 0.33, "at a gain off: mean {}, Wald {}", mean[1], 2.0 + wald);
+        assert!(wald > 20.0, "the signal must show the error at all: {wald}");
     }
 
     /// What is held is not part of the covariance, and what is known beforehand to ten times the precision of the record

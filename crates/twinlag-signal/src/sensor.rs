@@ -15,7 +15,7 @@ use crate::{Adc, Noise, Record, SignalError};
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Sensor {
-    /// Name of the channel, the record's column.
+    /// Name of the channel.
     pub channel: String,
     /// Time constant τ of the first pole, s.
     pub time_constant_s: f64,
