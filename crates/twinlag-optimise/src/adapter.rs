@@ -37,6 +37,8 @@ pub(crate) struct Best {
 /// What a run left behind.
 pub(crate) struct Run {
     pub(crate) best: Best,
+    /// Whether derivatives were asked for at the start and finite there.
+    pub(crate) started_with_derivatives: bool,
     pub(crate) stop: Stop,
     pub(crate) iterations: u64,
     pub(crate) evaluations: Evaluations,
@@ -247,5 +249,11 @@ where
         },
         Err(error) => Stop::Failed(error.to_string()),
     };
-    Run { best: best.into_inner(), stop, iterations: iterations.get(), evaluations: counts.get() }
+    Run {
+        best: best.into_inner(),
+        started_with_derivatives: with_derivatives > 0,
+        stop,
+        iterations: iterations.get(),
+        evaluations: counts.get(),
+    }
 }

@@ -133,7 +133,7 @@ impl Minimiser for Optimiser {
         let from = problem.coordinates(start)?;
         let mut run = self.run(problem, &from, budget);
         let follows_gradients = !matches!(self, Self::NelderMead { .. });
-        if follows_gradients && run.evaluations.derivatives == 0 && !problem.has_derivatives_at(&from) {
+        if follows_gradients && !run.started_with_derivatives && !problem.has_derivatives_at(&from) {
             return Err(ProblemError::NeedsDerivatives { optimiser: self.name() });
         }
         let failure = match &run.stop {
