@@ -715,3 +715,35 @@ fn a_record_and_json_cannot_both_go_to_standard_output() {
     let bench = Bench::with("both", "rig.toml", RIG);
     bench.run(&["simulate", "rig.toml", "--out", "-", "--json"]).says(&["--out -", "--json", "name a file"]);
 }
+
+/// A logger that drops a value now and then leaves short stretches; together they tell as much as one long one.
+#[test]
+fn scattered_missing_values_do_not_spoil_a_record() {
+    let mut lines = Trace::GOOD.lines();
+    for line in lines.iter_mut().skip(1).step_by(25) {
+        let cells: Vec<&str> = line.split(',').collect();
+        *line = format!("{},,{}", cells[0], cells[2]);
+    }
+    let bench = Bench::with("dropouts", "run.csv", lines.join("\n") + "\n");
+    recovers(&bench.characterise("run.csv", &[]).status(&["ok"]), GOOD_S);
+}
+
+/// Noise stated ten times too large leaves a white residual of a hundredth of the energy: the statement is at fault.
+#[test]
+fn a_false_noise_level_is_told_from_a_false_model() {
+    let value = good("false_noise").characterise("run.csv", &["--noise", "3,3"]).status(&["model-rejected"]);
+    assert_eq!(value["residual"]["white"], true, "{value:#}");
+    assert!(value["warnings"].to_string().contains("noise levels given"), "{value:#}");
+}
+
+/// What the whitened estimate cannot tell, the others only seem to tell.
+#[test]
+fn no_estimator_makes_an_answer_of_white_noise() {
+    let bench = Bench::new("white_published");
+    for seed in 0..4 {
+        bench.write("run.csv", Trace { gas: Gas::Still, noise_k: [1.0, 1.0], seed, ..Trace::GOOD }.csv());
+        for estimator in ["cross-relation", "bias-compensated", "normalised"] {
+            bench.characterise("run.csv", &["--estimator", estimator]).status(&UNKNOWN);
+        }
+    }
+}
