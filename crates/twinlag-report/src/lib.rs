@@ -1,0 +1,49 @@
+//! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped bars.
+//!
+//! For anyone who has numbers and wants a figure for a report, without a plotting environment: error bars and intervals,
+//! logarithmic axes, reference lines, contour lines, one colour-blind-safe palette, and a legend that hides no data. The
+//! same data give the same bytes, so figures can be kept under version control and compared. What it does not do:
+//! interaction, three dimensions, filled contours. Whoever wants those, or a kind of chart that is not here, is better
+//! served by [kuva](https://docs.rs/kuva), which writes the SVG here too but does not show in the signatures.
+//!
+//! ```
+//! use twinlag_report::{Axis, Chart, Figure, Mark, Reference, Series, Surface};
+//!
+//! let noise_k = [0.01, 0.03, 0.1, 0.3];
+//! let bias = Chart::new("Bias", Axis::logarithmic("noise (K)"), Axis::linear("bias of τ₁ (%)"))
+//!     .series(Series::line("plain", noise_k, [-0.02, -0.2, -1.9, -11.0]).errors([0.01, 0.04, 0.1, 0.4]))
+//!     .series(Series::line("whitened", noise_k, [0.0, 0.01, -0.1, f64::NAN]).errors([0.01, 0.04, 0.1, 0.4]))
+//!     .reference(Reference::horizontal(0.0).label("no bias"));
+//!
+//! let tau_s: Vec<f64> = (0..40).map(|i| 0.01 * 1.06_f64.powi(i)).collect();
+//! let cost: Vec<f64> = tau_s
+//!     .iter()
+//!     .flat_map(|t2| tau_s.iter().map(move |t1| 0.1 + (t1 / 0.023).ln().powi(2) + (t2 / 0.05).ln().powi(2)))
+//!     .collect();
+//! let axes = [Axis::logarithmic("τ₁ (s)"), Axis::logarithmic("τ₂ (s)"), Axis::logarithmic("cost (K²)")];
+//! let cost = Surface::new("Cost", axes, tau_s.clone(), tau_s, cost).mark(Mark::cross("truth", 0.023, 0.05));
+//!
+//! let svg = Figure::new("Two thermocouples").panel(bias).panel(cost).to_svg()?;
+//! assert!(svg.starts_with("<svg") && svg.len() < 60_000);
+//! # Ok::<(), twinlag_report::ReportError>(())
+//! ```
+
+mod axis;
+mod canvas;
+mod chart;
+mod chart_drawing;
+mod contour;
+mod decimate;
+mod error;
+mod figure;
+mod palette;
+mod surface;
+mod surface_drawing;
+
+pub use axis::Axis;
+pub use chart::{Chart, Reference, Series};
+pub use decimate::decimate;
+pub use error::ReportError;
+pub use figure::{Figure, Panel};
+pub use palette::Colour;
+pub use surface::{Mark, Surface};

@@ -1,0 +1,481 @@
+//! What there is of a study so far, in memory and on disk.
+
+use std::fmt;
+use std::fs;
+use std::io::{BufWriter, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Gap, StudyError};
+use crate::forest::{Forest, ForestError};
+use crate::study::{Quantity, Study};
+use crate::tally::Tally;
+
+/// Version of the layout of parts and results on disk.
+const FORMAT: u32 = 1;
+
+/// What a study is: parts belong together if this is equal.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    format: u32,
+    version: String,
+    plan: String,
+    trials: u64,
+    block: u64,
+    cells: Vec<Vec<Quantity>>,
+}
+
+impl Header {
+    pub(crate) fn of<S: Study>(study: &S) -> Result<Self, StudyError> {
+        let (cells, trials, block) = (study.cells(), study.trials(), study.block());
+        if cells == 0 || trials == 0 || block == 0 {
+            return Err(StudyError::Empty { cells, trials, block });
+        }
+        let blocks = trials.div_ceil(block).checked_mul(cells as u64);
+        // A block's end is computed as well.
+        if blocks.is_none_or(|n| n > Forest::<Tally>::LARGEST) || trials.checked_add(block).is_none() {
+            return Err(StudyError::TooLarge { cells, trials, block });
+        }
+        let cells: Vec<_> = (0..cells).map(|cell| study.quantities(cell)).collect();
+        for (cell, quantities) in cells.iter().enumerate() {
+            let mut names: Vec<_> = quantities.iter().map(|q| &q.name).collect();
+            names.sort_unstable();
+            if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+                return Err(StudyError::SameName { cell, name: pair[0].clone() });
+            }
+        }
+        let version = env!("CARGO_PKG_VERSION").into();
+        Ok(Self { format: FORMAT, version, plan: study.plan(), trials, block, cells })
+    }
+
+    /// The study's own digest of its plan.
+    pub fn plan(&self) -> &str {
+        &self.plan
+    }
+
+    /// The version of this crate that wrote it.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+
+    /// Trials of each cell.
+    pub fn trials(&self) -> u64 {
+        self.trials
+    }
+
+    /// Trials of a block.
+    pub fn block(&self) -> u64 {
+        self.block
+    }
+
+    /// The quantities of each cell.
+    pub fn cells(&self) -> &[Vec<Quantity>] {
+        &self.cells
+    }
+
+    /// Blocks of each cell.
+    pub(crate) fn blocks(&self) -> u64 {
+        self.trials.div_ceil(self.block)
+    }
+
+    /// Blocks of all cells. Job `j` is block `j mod blocks` of cell `j / blocks`.
+    pub(crate) fn jobs(&self) -> u64 {
+        self.blocks() * self.cells.len() as u64
+    }
+
+    /// Trials in these blocks of a cell.
+    pub(crate) fn trials_in(&self, blocks: &Range<u64>) -> Range<u64> {
+        blocks.start * self.block..(blocks.end * self.block).min(self.trials)
+    }
+
+    fn expect_same(&self, got: &Self, path: &Path) -> Result<(), StudyError> {
+        let differ = |what, expected: &dyn fmt::Display, got: &dyn fmt::Display| {
+            Err(StudyError::OtherStudy {
+                path: path.into(),
+                what,
+                expected: expected.to_string(),
+                got: got.to_string(),
+            })
+        };
+        if got.format != self.format {
+            return differ("format", &self.format, &got.format);
+        }
+        if got.version != self.version {
+            return differ("version of twinlag-study", &self.version, &got.version);
+        }
+        if got.plan != self.plan {
+            return differ("plan", &self.plan, &got.plan);
+        }
+        if got.trials != self.trials {
+            return differ("number of trials", &self.trials, &got.trials);
+        }
+        if got.block != self.block {
+            return differ("block size", &self.block, &got.block);
+        }
+        if got.cells.len() != self.cells.len() {
+            return differ("number of cells", &self.cells.len(), &got.cells.len());
+        }
+        let names = |quantities: &[Quantity]| {
+            quantities.iter().map(|q| format!("{} ({:?})", q.name, q.kind)).collect::<Vec<_>>().join(", ")
+        };
+        match self.cells.iter().zip(&got.cells).find(|(a, b)| a != b) {
+            Some((a, b)) => differ("list of quantities", &names(a), &names(b)),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The `k`-th of `n` contiguous ranges of the blocks of all cells, cell after cell. Written `k/n`, counted from 0.
+///
+/// Contiguous, because blocks that are neighbours merge: a shard of `b` blocks of a cell is at most
+/// `2 log2 b + 1` nodes, where every `n`-th block would be `b` nodes. If cells differ much in cost, divide into more shards
+/// than there are machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Shard {
+    index: u64,
+    of: u64,
+}
+
+impl Shard {
+    /// The only shard there is: all of the study.
+    pub const WHOLE: Self = Self { index: 0, of: 1 };
+
+    /// Shard `index` of `of`.
+    ///
+    /// # Errors
+    /// [`StudyError::NoSuchShard`] unless `index < of`.
+    pub fn new(index: u64, of: u64) -> Result<Self, StudyError> {
+        if index < of { Ok(Self { index, of }) } else { Err(StudyError::NoSuchShard { got: format!("{index}/{of}") }) }
+    }
+
+    /// Which one, from 0.
+    pub fn index(&self) -> u64 {
+        self.index
+    }
+
+    /// Of how many.
+    pub fn of(&self) -> u64 {
+        self.of
+    }
+
+    pub(crate) fn range(self, jobs: u64) -> Range<u64> {
+        let edge = |k: u64| (u128::from(jobs) * u128::from(k) / u128::from(self.of)) as u64;
+        edge(self.index)..edge(self.index + 1)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = StudyError;
+
+    fn from_str(text: &str) -> Result<Self, StudyError> {
+        let parsed = text.split_once('/').and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
+        let (index, of) = parsed.ok_or_else(|| StudyError::NoSuchShard { got: format!("\"{text}\"") })?;
+        Self::new(index, of)
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = StudyError;
+
+    fn try_from(text: String) -> Result<Self, StudyError> {
+        text.parse()
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
+    }
+}
+
+/// What one shard has computed so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "UncheckedPart")]
+pub struct Part {
+    header: Header,
+    shard: Shard,
+    cells: Vec<Forest<Tally>>,
+}
+
+impl Part {
+    pub(crate) fn empty(header: Header, shard: Shard) -> Self {
+        let cells = vec![Forest::new(header.blocks()); header.cells.len()];
+        Self { header, shard, cells }
+    }
+
+    /// Reads a part.
+    ///
+    /// # Errors
+    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is none; [`StudyError::OtherStudy`] if it is in another format.
+    pub fn read(path: &Path) -> Result<Self, StudyError> {
+        #[derive(Deserialize)]
+        struct Probe {
+            header: ProbeHeader,
+        }
+        #[derive(Deserialize)]
+        struct ProbeHeader {
+            format: u32,
+        }
+        let bytes = fs::read(path).map_err(|cause| StudyError::Read { path: path.into(), cause })?;
+        serde_json::from_slice(&bytes).map_err(|cause| match serde_json::from_slice::<Probe>(&bytes) {
+            Ok(Probe { header }) if header.format != FORMAT => StudyError::OtherStudy {
+                path: path.into(),
+                what: "format",
+                expected: FORMAT.to_string(),
+                got: header.format.to_string(),
+            },
+            _ => StudyError::Damaged { path: path.into(), cause },
+        })
+    }
+
+    /// Writes the part, in place of an older one if there is one. At every moment there is the old file or the new one.
+    ///
+    /// A process that is killed here leaves a file `<path>.tmp-<process>` behind, which can be deleted.
+    ///
+    /// # Errors
+    /// [`StudyError::Write`].
+    pub fn write(&self, path: &Path) -> Result<(), StudyError> {
+        let mut temporary = path.as_os_str().to_owned();
+        temporary.push(format!(".tmp-{}", std::process::id()));
+        let temporary = PathBuf::from(temporary);
+        let write = || {
+            let mut file = BufWriter::new(fs::File::create(&temporary)?);
+            serde_json::to_writer(&mut file, self)?;
+            file.write_all(b"\n")?;
+            // Else a power failure could leave the new name with no content.
+            file.into_inner()?.sync_all()?;
+            fs::rename(&temporary, path)
+        };
+        write().map_err(|cause| StudyError::Write { path: path.into(), cause })
+    }
+
+    /// What study this is a part of.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Which part it is.
+    pub fn shard(&self) -> Shard {
+        self.shard
+    }
+
+    /// What each cell has so far.
+    pub fn cells(&self) -> &[Forest<Tally>] {
+        &self.cells
+    }
+
+    /// Blocks of this shard that are still to be computed.
+    pub fn missing(&self) -> Vec<Gap> {
+        self.gaps_in(&self.shard.range(self.header.jobs()))
+    }
+
+    /// Whether this shard is done.
+    pub fn is_complete(&self) -> bool {
+        self.missing().is_empty()
+    }
+
+    /// The result, if this part is all of the study.
+    ///
+    /// # Errors
+    /// [`StudyError::Incomplete`].
+    pub fn into_results(self) -> Result<Results, StudyError> {
+        let shards = self.shard.of;
+        finish(self, Some(shards))
+    }
+
+    pub(crate) fn expect_same(&self, header: &Header, shard: Shard, path: &Path) -> Result<(), StudyError> {
+        header.expect_same(&self.header, path)?;
+        if self.shard == shard {
+            return Ok(());
+        }
+        let (expected, got) = (shard.to_string(), self.shard.to_string());
+        Err(StudyError::OtherStudy { path: path.into(), what: "shard", expected, got })
+    }
+
+    pub(crate) fn insert(&mut self, job: u64, tally: Tally) {
+        let blocks = self.header.blocks();
+        self.cells[(job / blocks) as usize].insert(job % blocks, tally).expect("each job is taken once, and exists");
+    }
+
+    /// Jobs in `range` that are not there.
+    fn gaps_in(&self, range: &Range<u64>) -> Vec<Gap> {
+        let blocks = self.header.blocks();
+        let mut gaps = Vec::new();
+        for (cell, forest) in self.cells.iter().enumerate() {
+            let first = cell as u64 * blocks;
+            let own = range.start.max(first)..range.end.min(first + blocks);
+            if own.is_empty() {
+                continue;
+            }
+            let own = own.start - first..own.end - first;
+            let clipped = forest.missing().into_iter().map(|gap| gap.start.max(own.start)..gap.end.min(own.end));
+            gaps.extend(clipped.filter(|gap| !gap.is_empty()).map(|blocks| Gap { cell, blocks }));
+        }
+        gaps
+    }
+}
+
+#[derive(Deserialize)]
+struct UncheckedPart {
+    header: Header,
+    shard: Shard,
+    cells: Vec<Forest<Tally>>,
+}
+
+impl TryFrom<UncheckedPart> for Part {
+    type Error = String;
+
+    fn try_from(UncheckedPart { header, shard, cells }: UncheckedPart) -> Result<Self, String> {
+        header.check()?;
+        if cells.len() != header.cells.len() {
+            return Err(format!("the header has {} cells, the body {}", header.cells.len(), cells.len()));
+        }
+        for (cell, forest) in cells.iter().enumerate() {
+            if forest.blocks() != header.blocks() {
+                return Err(format!("cell {cell} has {} blocks, expected {}", forest.blocks(), header.blocks()));
+            }
+            for (blocks, tally) in forest.nodes() {
+                header.check_tally(cell, &blocks, tally)?;
+            }
+        }
+        Ok(Self { header, shard, cells })
+    }
+}
+
+impl Header {
+    fn check(&self) -> Result<(), String> {
+        let jobs = self.trials.checked_add(self.block).filter(|_| self.block > 0 && self.trials > 0);
+        let jobs = jobs.and_then(|_| self.blocks().checked_mul(self.cells.len() as u64));
+        match jobs {
+            Some(1..=Forest::<Tally>::LARGEST) => Ok(()),
+            _ => Err(format!(
+                "there is no study of {} cells and {} trials in blocks of {}",
+                self.cells.len(),
+                self.trials,
+                self.block
+            )),
+        }
+    }
+
+    fn check_tally(&self, cell: usize, blocks: &Range<u64>, tally: &Tally) -> Result<(), String> {
+        if !tally.is_over(&self.cells[cell]) {
+            return Err(format!("a tally of cell {cell} is over other quantities than the header says"));
+        }
+        let trials = self.trials_in(blocks);
+        if tally.trials() != trials.end - trials.start {
+            return Err(format!(
+                "cell {cell}, blocks {} to {}, has {} trials, expected {}",
+                blocks.start,
+                blocks.end - 1,
+                tally.trials(),
+                trials.end - trials.start
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// What a study found: a tally for each cell. Of equal studies it has equal bytes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "UncheckedResults")]
+pub struct Results {
+    header: Header,
+    cells: Vec<Tally>,
+}
+
+impl Results {
+    /// What study this is.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// What each cell found.
+    pub fn cells(&self) -> &[Tally] {
+        &self.cells
+    }
+
+    /// The results as JSON, which reads back to the same bits.
+    ///
+    /// # Panics
+    /// Never: all that is kept is finite.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).expect("maps have string keys and writing to memory does not fail")
+    }
+}
+
+#[derive(Deserialize)]
+struct UncheckedResults {
+    header: Header,
+    cells: Vec<Tally>,
+}
+
+impl TryFrom<UncheckedResults> for Results {
+    type Error = String;
+
+    fn try_from(UncheckedResults { header, cells }: UncheckedResults) -> Result<Self, String> {
+        header.check()?;
+        if cells.len() != header.cells.len() {
+            return Err(format!("the header has {} cells, the body {}", header.cells.len(), cells.len()));
+        }
+        for (cell, tally) in cells.iter().enumerate() {
+            header.check_tally(cell, &(0..header.blocks()), tally)?;
+        }
+        Ok(Self { header, cells })
+    }
+}
+
+/// Joins the parts of a study, in any order.
+///
+/// What counts is that every block is there once; how the study was divided does not. So a missing shard can be made up for
+/// by smaller ones.
+///
+/// # Errors
+/// [`StudyError::Incomplete`], with the shards to run again; [`StudyError::Twice`]; [`StudyError::OtherStudy`]; and those of
+/// [`Part::read`].
+pub fn merge<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Results, StudyError> {
+    let mut whole: Option<Part> = None;
+    let mut divided_by = None;
+    for path in paths {
+        let path = path.as_ref();
+        let part = Part::read(path)?;
+        let Some(whole) = &mut whole else {
+            divided_by = Some(part.shard.of);
+            whole = Some(part);
+            continue;
+        };
+        whole.header.expect_same(&part.header, path)?;
+        divided_by = divided_by.filter(|&of| of == part.shard.of);
+        for (cell, (mine, other)) in whole.cells.iter_mut().zip(part.cells).enumerate() {
+            mine.join(other).map_err(|e| match e {
+                ForestError::Twice { range: blocks, .. } => {
+                    StudyError::Twice { path: path.into(), gap: Gap { cell, blocks } }
+                }
+                other => unreachable!("the headers are equal, so the trees are: {other}"),
+            })?;
+        }
+    }
+    finish(whole.ok_or(StudyError::NoParts)?, divided_by)
+}
+
+/// All cells' roots, or what is missing; with the shards that had it, if the study was divided by one number.
+fn finish(part: Part, divided_by: Option<u64>) -> Result<Results, StudyError> {
+    let jobs = part.header.jobs();
+    let gaps = part.gaps_in(&(0..jobs));
+    if !gaps.is_empty() {
+        let shards = divided_by.into_iter().flat_map(|of| (0..of).map(move |index| Shard { index, of }));
+        let shards = shards.filter(|shard| !part.gaps_in(&shard.range(jobs)).is_empty()).collect();
+        return Err(StudyError::Incomplete { shards, gaps });
+    }
+    let cells = part.cells.into_iter().map(|forest| forest.into_root().ok()).collect::<Option<_>>();
+    Ok(Results { header: part.header, cells: cells.expect("a forest without gaps is a tree") })
+}
