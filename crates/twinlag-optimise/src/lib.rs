@@ -1,9 +1,13 @@
 //! The minimum of any smooth cost within bounds, with a report of how it was found.
 //!
 //! For anyone with a cost of a few variables who wants to swap solvers by name, keep bounds, and be told when an answer is
-//! none: on a bound, on a plateau, out of budget. The solvers are [argmin](https://argmin-rs.org)'s, and a bounded
-//! Levenberg-Marquardt of our own; argmin itself does not show in this crate's signatures. The crate knows nothing of
-//! thermocouples: the costs are in `twinlag-cross-relation`, their use on records in `twinlag`.
+//! none: on a bound, on a plateau, out of budget. The crate knows nothing of thermocouples: the costs are in
+//! `twinlag-cross-relation`, their use on records in `twinlag`.
+//!
+//! The solvers are [argmin](https://argmin-rs.org)'s, and a bounded Levenberg-Marquardt of our own; argmin itself does not show
+//! in this crate's signatures. [`Optimiser`] lists them: local ones by derivatives or by values, global ones that search the
+//! whole of the bounds, one for a single variable. One that is not there is brought by implementing [`Minimiser`]; a fit is
+//! watched by [`Minimiser::minimise_observed`].
 //!
 //! ```
 //! use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Variable};
@@ -38,13 +42,17 @@
 
 mod adapter;
 mod assess;
-mod levenberg_marquardt;
+mod cholesky;
+mod ledger;
 mod minimiser;
 mod multi_start;
+mod optimiser;
 mod problem;
 mod report;
+mod solvers;
 
-pub use minimiser::{Minimiser, Optimiser};
+pub use minimiser::Minimiser;
 pub use multi_start::MultiStart;
+pub use optimiser::Optimiser;
 pub use problem::{Cost, Derivatives, Problem, ProblemError, Scale, Variable};
-pub use report::{Budget, End, Evaluations, Fit};
+pub use report::{Budget, End, Evaluations, Fit, Progress};

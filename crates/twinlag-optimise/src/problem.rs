@@ -108,6 +108,12 @@ pub enum ProblemError {
     Start { expected: usize, got: Vec<f64> },
     #[error("{optimiser} needs derivatives, and this cost has none: implement `Cost::derivatives`, or use nelder-mead")]
     NeedsDerivatives { optimiser: String },
+    #[error(
+        "{optimiser} minimises over one variable, and {} are free here ({}): hold the others, or take another optimiser",
+        free.len(),
+        free.join(", ")
+    )]
+    OneVariable { optimiser: String, free: Vec<String> },
     #[error("at least one start is needed")]
     NoStart,
     #[error("there is no optimiser called \"{name}\"; there are {known}")]
@@ -119,6 +125,16 @@ pub struct Problem<'a> {
     cost: &'a dyn Cost,
     variables: Vec<Variable>,
     free: Vec<usize>,
+    bounds: Vec<(f64, f64)>,
+}
+
+/// Why there are no derivatives at a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub(crate) enum NoDerivatives {
+    #[error("the cost has no derivatives")]
+    Anywhere,
+    #[error("the cost has no finite derivatives at this point")]
+    NotFinite,
 }
 
 impl<'a> Problem<'a> {
@@ -142,7 +158,17 @@ impl<'a> Problem<'a> {
             }
         }
         let free: Vec<usize> = (0..variables.len()).filter(|&i| !variables[i].is_held()).collect();
-        if free.is_empty() { Err(ProblemError::NothingFree) } else { Ok(Self { cost, variables, free }) }
+        if free.is_empty() {
+            return Err(ProblemError::NothingFree);
+        }
+        let bounds = free
+            .iter()
+            .map(|&i| {
+                let v = &variables[i];
+                (v.coordinate(v.lower), v.coordinate(v.upper))
+            })
+            .collect();
+        Ok(Self { cost, variables, free, bounds })
     }
 
     /// The variables.
@@ -174,14 +200,8 @@ impl<'a> Problem<'a> {
     }
 
     /// Bounds of the free coordinates, `(lower, upper)` each.
-    pub fn bounds(&self) -> Vec<(f64, f64)> {
-        self.free
-            .iter()
-            .map(|&i| {
-                let v = &self.variables[i];
-                (v.coordinate(v.lower), v.coordinate(v.upper))
-            })
-            .collect()
+    pub fn bounds(&self) -> &[(f64, f64)] {
+        &self.bounds
     }
 
     /// All variables, in their own units, at coordinates `z` (inside the bounds).
@@ -193,10 +213,6 @@ impl<'a> Problem<'a> {
         x
     }
 
-    pub(crate) fn has_derivatives_at(&self, z: &[f64]) -> bool {
-        self.cost.derivatives(&self.point(z)).is_some()
-    }
-
     /// The cost at coordinates `z` inside the bounds; infinite where it is not finite.
     pub fn value_at(&self, z: &[f64]) -> f64 {
         let value = self.cost.value(&self.point(z));
@@ -205,31 +221,34 @@ impl<'a> Problem<'a> {
 
     /// Derivatives with respect to the coordinates. `None` without derivatives, or where they are not finite.
     pub fn derivatives_at(&self, z: &[f64]) -> Option<Derivatives> {
+        self.look_at(z).ok()
+    }
+
+    /// [`Problem::derivatives_at`], with the reason where there are none.
+    pub(crate) fn look_at(&self, z: &[f64]) -> Result<Derivatives, NoDerivatives> {
         let x = self.point(z);
-        let full = self.cost.derivatives(&x)?;
-        // x = exp z has dx/dz = d²x/dz² = x; the second derivative enters through the gradient.
-        let (slope, bend): (Vec<f64>, Vec<f64>) = self
-            .free
-            .iter()
-            .map(|&i| match self.variables[i].scale {
-                Scale::Logarithmic => (x[i], x[i]),
-                Scale::Linear { typical } => (typical, 0.0),
-            })
-            .unzip();
-        let gradient: Vec<f64> = self.free.iter().zip(&slope).map(|(&i, s)| full.gradient[i] * s).collect();
-        let curvature = (0..self.free.len())
-            .map(|p| {
-                (0..self.free.len())
-                    .map(|q| {
-                        let own = if p == q { full.gradient[self.free[p]] * bend[p] } else { 0.0 };
-                        full.curvature[self.free[p]][self.free[q]] * slope[p] * slope[q] + own
-                    })
-                    .collect()
-            })
-            .collect();
-        let out = Derivatives { value: full.value, gradient, curvature };
-        let finite = out.value.is_finite()
-            && out.gradient.iter().chain(out.curvature.iter().flatten()).all(|v: &f64| v.is_finite());
-        finite.then_some(out)
+        let mut d = self.cost.derivatives(&x).ok_or(NoDerivatives::Anywhere)?;
+        let slope = |i: usize| match self.variables[i].scale {
+            Scale::Logarithmic => x[i],
+            Scale::Linear { typical } => typical,
+        };
+        // In place: free indices rise, so what belongs at `p` is still where the cost put it, at `i ≥ p`.
+        for (p, &i) in self.free.iter().enumerate() {
+            d.curvature.swap(p, i);
+            for (q, &j) in self.free.iter().enumerate() {
+                d.curvature[p][q] = d.curvature[p][j] * slope(i) * slope(j);
+            }
+            d.curvature[p].truncate(self.free.len());
+            // x = exp z has dx/dz = d²x/dz² = x; the second derivative enters through the gradient.
+            if self.variables[i].scale == Scale::Logarithmic {
+                d.curvature[p][p] += d.gradient[i] * x[i];
+            }
+            d.gradient[p] = d.gradient[i] * slope(i);
+        }
+        d.gradient.truncate(self.free.len());
+        d.curvature.truncate(self.free.len());
+        let finite =
+            d.value.is_finite() && d.gradient.iter().chain(d.curvature.iter().flatten()).all(|v| v.is_finite());
+        if finite { Ok(d) } else { Err(NoDerivatives::NotFinite) }
     }
 }

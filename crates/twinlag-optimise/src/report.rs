@@ -40,7 +40,7 @@ pub struct Evaluations {
 pub struct Budget {
     /// Solver iterations.
     pub iterations: u64,
-    /// Evaluations of the cost, of either kind.
+    /// Evaluations of the cost, of either kind; at least the one at the start is made.
     pub evaluations: u64,
 }
 
@@ -48,6 +48,19 @@ impl Default for Budget {
     fn default() -> Self {
         Self { iterations: 500, evaluations: 5_000 }
     }
+}
+
+/// How far a fit has come: what a watcher is told after every iteration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Progress {
+    /// Iterations of the solver so far, 0 for the start.
+    pub iteration: u64,
+    /// Evaluations of the cost so far.
+    pub evaluations: Evaluations,
+    /// The best point seen so far, all variables, in their own units.
+    pub x: Vec<f64>,
+    /// The cost there.
+    pub value: f64,
 }
 
 /// One fit from one start.
