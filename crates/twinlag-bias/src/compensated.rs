@@ -15,12 +15,43 @@ use crate::noise_gain::Noise;
 pub struct Compensated<'a> {
     cost: CrossRelation<'a>,
     noise: [Noise; 2],
+    level: f64,
 }
 
 impl<'a> Compensated<'a> {
     /// `cost` compensated for the noise of channels 1 and 2.
     pub fn new(cost: CrossRelation<'a>, noise: [Noise; 2]) -> Self {
-        Self { cost, noise }
+        Self { cost, noise, level: 1.0 }
+    }
+
+    /// The same cost for noise of `level` times the variance that [`Compensated::new`] was given, in both channels.
+    ///
+    /// # Errors
+    /// [`NoiseError::Negative`] unless `level` is finite and not negative.
+    pub fn with_level(&self, level: f64) -> Result<Self, NoiseError> {
+        if level.is_finite() && level >= 0.0 {
+            Ok(Self { level, ..self.clone() })
+        } else {
+            Err(NoiseError::Negative { name: "noise level", value: level })
+        }
+    }
+
+    /// What the variances given to [`Compensated::new`] are multiplied by: 1 unless [`Compensated::with_level`] says otherwise.
+    pub fn level(&self) -> f64 {
+        self.level
+    }
+
+    /// The level at which the compensated cost at `theta` would be zero: `ℓ = J_CR/N` with `N` the noise's share at level 1.
+    ///
+    /// Where only the ratio of the two levels is known, give [`Compensated::new`] any pair of that ratio and repeat: minimise,
+    /// take `profiled_level` at the minimum, go on [`Compensated::with_level`] of it. This is Dinkelbach's iteration. It converges
+    /// faster than linearly to the minimum of [`Normalised`], which is the shorter way to the same point and has its
+    /// covariance; `ℓ` then is the level of the noise. NaN if neither channel has noise.
+    ///
+    /// # Source
+    /// Dinkelbach 1967 for the minimum of a ratio (recalled, not consulted); docs, chapter "Theory", section 2.
+    pub fn profiled_level<const P: usize>(&self, theta: &[f64; P]) -> f64 {
+        self.cost.evaluate(theta).value / added_by_noise(&self.noise, theta, self.cost.period_s()).value
     }
 
     /// The cost without compensation.
@@ -28,19 +59,19 @@ impl<'a> Compensated<'a> {
         &self.cost
     }
 
-    /// `J_BC = J_CR − s1² h(c) − s2² h(a)/g²` for white noise, with gradient and Hessian, at `theta` (`P` 2 or 4). Can be
-    /// negative: it is a difference.
+    /// `J_BC = J_CR − s1² h(c) − s2² h(a)/g²` for white noise, with gradient and Hessian, at `theta` (`P` 2, 4 or 6; for sensors
+    /// of second order `h` is the gain of [`Noise::passed_second_order`]). Can be negative: it is a difference.
     ///
     /// # Source
     /// Gillespie, Hung, Kee, McLoone 2016 (abstract seen). Formula: own derivation, docs, chapter "Theory", section 2.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let mut out = self.cost.evaluate(theta);
         let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
-        out.value -= noise.value;
+        out.value -= self.level * noise.value;
         for i in 0..P {
-            out.gradient[i] -= noise.gradient[i];
+            out.gradient[i] -= self.level * noise.gradient[i];
             for j in 0..P {
-                out.hessian[i][j] -= noise.hessian[i][j];
+                out.hessian[i][j] -= self.level * noise.hessian[i][j];
             }
         }
         out
@@ -121,7 +152,7 @@ impl<'a> Normalised<'a> {
         &self.cost
     }
 
-    /// The normalised cost with gradient and Hessian at `theta` (`P` 2 or 4).
+    /// The normalised cost with gradient and Hessian at `theta` (`P` 2, 4 or 6).
     ///
     /// # Source
     /// Own derivation; docs, chapter "Theory", section 2. A normalisation is published (Gillespie, Hung, Kee, McLoone 2016), but
@@ -145,20 +176,32 @@ impl<'a> Normalised<'a> {
 }
 
 /// What noise adds to the expected cost, with derivatives.
-fn added_by_noise<const P: usize>(noise: &[Noise; 2], theta: &[f64; P], period_s: f64) -> CostValue<P> {
-    let [through2, d2, dd2] = noise[0].passed(theta[1], period_s);
-    let [through1, d1, dd1] = noise[1].passed(theta[0], period_s);
+pub(crate) fn added_by_noise<const P: usize>(noise: &[Noise; 2], theta: &[f64; P], period_s: f64) -> CostValue<P> {
+    // Channel 1 passes the model of sensor 2, and the other way round.
+    let through = |noise: &Noise, sensor: usize| match theta.get(4 + sensor) {
+        Some(&second) if second > 0.0 => noise.passed_second_order(theta[sensor], second, period_s),
+        _ => {
+            let [value, slope, bend] = noise.passed(theta[sensor], period_s);
+            CostValue { value, gradient: [slope, 0.0], hessian: [[bend, 0.0], [0.0, 0.0]] }
+        }
+    };
+    let (through2, through1) = (through(&noise[0], 1), through(&noise[1], 0));
     let gain = theta.get(2).copied().unwrap_or(1.0);
     let share = 1.0 / (gain * gain);
     let by_gain = -2.0 * share / gain;
-    let mut all = [[0.0; 4]; 4];
-    all[0][0] = dd1 * share;
-    all[1][1] = dd2;
+    let ([d1, e1], [d2, e2]) = (through1.gradient, through2.gradient);
+    let mut all = [[0.0; 6]; 6];
+    for (sensor, of, scale) in [(0, &through1, share), (1, &through2, 1.0)] {
+        all[sensor][sensor] = of.hessian[0][0] * scale;
+        all[sensor][4 + sensor] = of.hessian[0][1] * scale;
+        all[4 + sensor][4 + sensor] = of.hessian[1][1] * scale;
+    }
     all[0][2] = d1 * by_gain;
-    all[2][2] = -3.0 * through1 * by_gain / gain;
-    let gradient = [d1 * share, d2, through1 * by_gain, 0.0];
+    all[2][4] = e1 * by_gain;
+    all[2][2] = -3.0 * through1.value * by_gain / gain;
+    let gradient = [d1 * share, d2, through1.value * by_gain, 0.0, e1 * share, e2];
     CostValue {
-        value: through2 + through1 * share,
+        value: through2.value + through1.value * share,
         gradient: std::array::from_fn(|i| gradient[i]),
         hessian: std::array::from_fn(|i| std::array::from_fn(|j| all[i.min(j)][i.max(j)])),
     }

@@ -9,6 +9,10 @@ pub enum NoiseError {
     Negative { name: &'static str, value: f64 },
     #[error("a noise ratio must be finite and positive, got {value}")]
     Ratio { value: f64 },
+    #[error("a weight must lie between 0 (normalised) and 1 (compensated), got {value}")]
+    Weight { value: f64 },
+    #[error("without noise in either channel there is nothing to measure the cost by")]
+    NoNoise,
     #[error(
         "an autocovariance starts with the variance, which no lag exceeds: lag {lag} is {value}, the variance {variance}"
     )]

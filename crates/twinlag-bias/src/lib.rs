@@ -1,8 +1,9 @@
 //! What measurement noise adds to a two-sensor cost, and how to take it off.
 //!
 //! For anyone who uses the published cross-relation cost on noisy data: the noise gain of the synthetic filters for white
-//! and coloured noise, the compensated cost for known levels, the normalised cost for a known ratio, and the levels
-//! themselves from the data. Where you are free to choose, prefer the exactly whitened cost of `twinlag-cross-relation`,
+//! and coloured noise, of first and second order, the compensated cost for known levels, the normalised cost for a known
+//! ratio (or the compensated one with its level profiled), the hybrid between the two, and the levels themselves from the
+//! data. All of them take two, four or six parameters, in the order of [`twinlag_cross_relation::Parameter::ALL`]. Where you are free to choose, prefer the exactly whitened cost of `twinlag-cross-relation`,
 //! which needs no compensation and is up to several times more precise; for whole records take `twinlag`. This crate knows
 //! no optimiser.
 //!
@@ -24,10 +25,14 @@
 mod compensated;
 mod covariance;
 mod error;
+mod hybrid;
 mod levels;
+mod moments;
 mod noise_gain;
 
 pub use compensated::{Compensated, Normalised, plain_covariance};
 pub use error::NoiseError;
+pub use hybrid::Hybrid;
 pub use levels::{NoiseLevel, estimate_noise};
+pub use moments::{JointLevels, NoiseMoments};
 pub use noise_gain::Noise;

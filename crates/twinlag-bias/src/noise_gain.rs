@@ -1,5 +1,8 @@
 //! What a synthetic filter lets through of the noise at its input.
 
+use num_dual::Dual2SVec64;
+use twinlag_cross_relation::{CostValue, synthetic_filter};
+
 use crate::error::NoiseError;
 
 /// Measurement noise of one channel, as far as the cost's expectation needs it.
@@ -37,6 +40,11 @@ impl Noise {
         }
     }
 
+    /// Its variance, K².
+    pub(crate) fn variance(&self) -> f64 {
+        self.autocovariance[0]
+    }
+
     /// Variance that this noise leaves behind the filter `(1 − p) z⁻¹/(1 − p z⁻¹)`, `p = exp(−Ts/τ)`, with its first two
     /// derivatives with respect to `τ`.
     ///
@@ -63,6 +71,38 @@ impl Noise {
         let ddp = dp * (period_s / tau_s - 2.0) / tau_s;
         [value, by_pole * dp, by_pole2 * dp * dp + by_pole * ddp]
     }
+
+    /// Variance that this noise leaves behind the filter of second order
+    /// `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)` ([`synthetic_filter`]), with gradient and Hessian with respect to `[τ, τ₂]` (s).
+    ///
+    /// `σ² = r[0] ρ[0] + 2 Σ_l r[l] ρ[l]` with the autocorrelation `ρ` of the impulse response:
+    /// `ρ[0] = ((n1 + n2)(1 + d2) − 2 n1 n2)/((1 − d2)(1 − d1 + d2))`, the noise gain, then
+    /// `ρ[1] = (n1 n2 − d1 ρ[0])/(1 + d2)` and `ρ[l] = −d1 ρ[l−1] − d2 ρ[l−2]`. `second_tau_s = 0` is the filter of first order.
+    ///
+    /// # Source
+    /// Own derivation (Yule-Walker equations), docs, chapter "Theory", section 2.
+    pub fn passed_second_order(&self, tau_s: f64, second_tau_s: f64, period_s: f64) -> CostValue<2> {
+        let filter = synthetic_filter(tau_s, second_tau_s, period_s);
+        let ([_, n1, n2], [_, d1, d2]) = (filter.numerator, filter.denominator);
+        // With unit static gain 1 + d1 + d2 = n1 + n2, so that this needs no difference of nearly equal numbers.
+        let gain = ((n1 + n2) * (d2 + 1.0) - n1 * n2 * 2.0) / ((-d2 + 1.0) * (d2 - d1 + 1.0));
+        let mut next = (n1 * n2 - d1 * gain) / (d2 + 1.0);
+        let mut now = gain;
+        let mut sum = gain * self.autocovariance[0];
+        for r in &self.autocovariance[1..] {
+            sum += next * (2.0 * r);
+            (now, next) = (next, -d1 * next - d2 * now);
+        }
+        let (gradient, hessian) = derivatives(&sum);
+        CostValue { value: sum.re, gradient, hessian }
+    }
+}
+
+/// Gradient and Hessian of a dual number.
+pub(crate) fn derivatives(x: &Dual2SVec64<2>) -> ([f64; 2], [[f64; 2]; 2]) {
+    let first = x.v1.unwrap_generic(nalgebra::U1, nalgebra::Const::<2>);
+    let second = x.v2.unwrap_generic(nalgebra::Const::<2>, nalgebra::Const::<2>);
+    ([0, 1].map(|i| first[i]), [0, 1].map(|i| [0, 1].map(|j| second[(i, j)])))
 }
 
 #[cfg(test)]
@@ -101,6 +141,58 @@ mod tests {
             assert!((mid[1] / first - 1.0).abs() < 1e-7, "τ = {tau}: got {}, want {first}", mid[1]);
             assert!((mid[2] / second - 1.0).abs() < 1e-6, "τ = {tau}: got {}, want {second}", mid[2]);
         }
+    }
+
+    /// `w = A aᵏ + C cᵏ` with distinct poles has the sum of squares `A² a²/(1 − a²) + 2 A C a c/(1 − a c) + C² c²/(1 − c²)`, and the
+    /// same at lag `l` with `aˡ`, `cˡ` in place of one factor. The residues follow from the partial fractions of the sensor,
+    /// `A = τ/(τ − τ₂) (1 − a)/a`, `C = −τ₂/(τ − τ₂) (1 − c)/c`. Rounding is amplified by `1/(1 − a²)`, some 100.
+    #[test]
+    fn second_order_noise_gain_is_the_closed_form_of_distinct_poles() {
+        for (tau, second) in [(0.0238_f64, 0.009_f64), (0.0238, 0.0005), (0.005, 0.12)] {
+            let period = 0.002;
+            let [a, c] = [tau, second].map(|t| (-period / t).exp());
+            let residues =
+                [(tau / (tau - second), a), (-second / (tau - second), c)].map(|(part, p)| part * (1.0 - p) / p);
+            let autocorrelation = |lag: i32| -> f64 {
+                let pair = |i: usize, j: usize| {
+                    let (p, q) = ([a, c][i], [a, c][j]);
+                    residues[i] * residues[j] * p * q / (1.0 - p * q) * q.powi(lag)
+                };
+                pair(0, 0) + pair(0, 1) + pair(1, 0) + pair(1, 1)
+            };
+            let r = [0.25, 0.1, -0.05, 0.02];
+            let want: f64 = (0..4).map(|l| r[l] * autocorrelation(l as i32) * if l == 0 { 1.0 } else { 2.0 }).sum();
+            let noise = Noise::coloured(r.to_vec()).expect("valid");
+            let got = noise.passed_second_order(tau, second, period).value;
+            assert!((got / want - 1.0).abs() < 1e-11, "τ = {tau}, {second}: got {got:e}, want {want:e}");
+        }
+    }
+
+    /// Equal poles have no such form: here 100 000 samples of white noise behind the simulated sensor. The output is
+    /// correlated over some `2τ/Ts` = 10 samples to either side, so its mean square has a relative standard error of about
+    /// `√(2 · 15/n)` = 1.7 %; four of these. The first-order noise gain, 0.1, is twice as large.
+    #[test]
+    fn critically_damped_noise_gain_is_that_of_a_simulation() {
+        use rand::SeedableRng;
+        use rand_distr::{Distribution, StandardNormal};
+        use twinlag_sensor::{Discretisation, Lag, SecondOrder};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+        let noise: Vec<f64> = (0..100_000).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let sensor = SecondOrder::new(0.01, 0.01, 0.002).expect("valid");
+        let passed = sensor.difference_equation(Discretisation::ZeroOrderHold).expect("exists").respond(&noise);
+        let want = passed[100..].iter().map(|y| y * y).sum::<f64>() / (passed.len() - 100) as f64;
+        let got = Noise::white(1.0).expect("valid").passed_second_order(0.01, 0.01, 0.002).value;
+        assert!((got / want - 1.0).abs() < 0.07, "got {got}, simulated {want}");
+    }
+
+    #[test]
+    fn without_a_second_lag_the_noise_gain_is_that_of_first_order() {
+        let noise = Noise::coloured(vec![0.25, 0.1, -0.05, 0.02]).expect("valid");
+        let (got, want) = (noise.passed_second_order(0.0238, 0.0, 0.002), noise.passed(0.0238, 0.002));
+        for (got, want) in [got.value, got.gradient[0], got.hessian[0][0]].into_iter().zip(want) {
+            assert!((got / want - 1.0).abs() < 1e-12, "got {got}, want {want}");
+        }
+        assert_eq!(got.gradient[1], 0.0);
     }
 
     #[test]

@@ -5,65 +5,67 @@
 //! derivatives ride along as dual numbers: `O(N q²)`.
 
 use num_dual::{DualNum, DualSVec64};
-use twinlag_sensor::Discretisation;
 
-use crate::inverse::{Row, WIDEST, row, width};
+use crate::inverse::{Row, row};
 use crate::parameters::Pair;
+use crate::polynomial::LONGEST;
 use crate::readings::{Segment, Steps};
+use crate::whitened::Model;
 
 /// Calls `visit` with each whitened residual of `segment`, in order of time.
 pub(crate) fn sweep<const P: usize>(
     segment: &Segment,
-    hold: Discretisation,
-    noise_std: [f64; 2],
+    model: &Model,
     pair: &Pair<DualSVec64<P>>,
     mut visit: impl FnMut(DualSVec64<P>),
 ) {
     type Dual<const P: usize> = DualSVec64<P>;
-    let width = width(hold).expect("checked when the cost was built");
-    let band = width - 1;
-    let variance = noise_std.map(|s| s * s);
+    let variance = model.white_variance();
     let (y1, y2) = (segment.y1(), segment.y2());
     let zero = Dual::<P>::from_re(0.0);
+    let first_step_s = match segment.steps() {
+        Steps::Even(step_s) => *step_s,
+        Steps::Uneven(steps) => steps[0],
+    };
+    let first = row(model, pair, first_step_s);
+    let width = first.data[0].as_slice().len();
+    let band = first.noise.iter().map(|c| c.as_slice().len()).max().expect("two channels") - 1;
 
     // Covariance of u[k] with u[k − lag].
     let covariance = |now: &Row<Dual<P>>, then: &Row<Dual<P>>, lag: usize| -> Dual<P> {
         let mut sum = zero;
-        for j in 0..width - lag {
-            sum += now.c1[j] * then.c1[j + lag] * variance[0] + now.c2[j] * then.c2[j + lag] * variance[1];
+        for i in 0..2 {
+            let (now, then) = (now.noise[i].as_slice(), then.noise[i].as_slice());
+            for (a, b) in now.iter().zip(then.iter().skip(lag)) {
+                sum += *a * *b * variance[i];
+            }
         }
         sum
     };
-    let fixed = match segment.steps() {
-        Steps::Even(step_s) => Some(row(hold, pair, *step_s)),
-        Steps::Uneven(_) => None,
-    };
-    let fixed_covariance = fixed
-        .map(|r| std::array::from_fn::<_, WIDEST, _>(|lag| if lag < width { covariance(&r, &r, lag) } else { zero }));
+    let is_even = matches!(segment.steps(), Steps::Even(_));
+    let fixed = std::array::from_fn::<_, LONGEST, _>(|lag| covariance(&first, &first, lag));
 
     // The last `band` rows, newest first: filter, factor (lags 0..=band) and residual.
-    let mut rows: [Option<Row<Dual<P>>>; WIDEST] = [None; WIDEST];
-    let mut factors = [[zero; WIDEST]; WIDEST];
-    let mut residuals = [zero; WIDEST];
+    let mut rows = [first; 2];
+    let mut factors = [[zero; LONGEST]; LONGEST];
+    let mut residuals = [zero; LONGEST];
     for k in 0..(y1.len() + 1).saturating_sub(width) {
-        let now = match segment.steps() {
-            Steps::Even(_) => fixed.expect("even steps share one row"),
-            Steps::Uneven(steps) => row(hold, pair, steps[k]),
-        };
+        if let Steps::Uneven(steps) = segment.steps() {
+            // One-step inverses alone take uneven steps, and these look one row back.
+            rows.swap(0, 1);
+            rows[0] = row(model, pair, steps[k]);
+        }
+        let [d1, d2] = [0, 1].map(|i| rows[0].data[i].as_slice());
         let mut u = zero;
         for j in 0..width {
-            u += now.c1[j] * y1[k + j] - now.c2[j] * (-pair.offset + y2[k + j]);
+            u += d1[j] * y1[k + j] - d2[j] * (-pair.offset + y2[k + j]);
         }
 
         // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the older ones.
-        let mut factor = [zero; WIDEST];
+        let mut factor = [zero; LONGEST];
         let reach = band.min(k);
         for lag in (0..=reach).rev() {
-            let mut entry = match (&fixed_covariance, lag) {
-                (Some(c), _) => c[lag],
-                (None, 0) => covariance(&now, &now, 0),
-                (None, _) => covariance(&now, &rows[lag - 1].expect("lag reaches no further back than k"), lag),
-            };
+            let mut entry = if is_even { fixed[lag] } else { covariance(&rows[0], &rows[lag], lag) };
             for older in lag + 1..=reach {
                 let other = if lag == 0 { factor[older] } else { factors[lag - 1][older - lag] };
                 entry -= factor[older] * other;
@@ -77,10 +79,8 @@ pub(crate) fn sweep<const P: usize>(
         residual /= factor[0];
         visit(residual);
 
-        rows.rotate_right(1);
-        factors.rotate_right(1);
-        residuals.rotate_right(1);
-        rows[0] = Some(now);
+        factors[..=band].rotate_right(1);
+        residuals[..=band].rotate_right(1);
         factors[0] = factor;
         residuals[0] = residual;
     }

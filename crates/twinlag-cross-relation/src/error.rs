@@ -23,6 +23,8 @@ pub enum CostError {
     HoldNeedsEvenSampling,
     #[error("a band-limited gas has no difference equation to whiten: choose a hold")]
     NoDifferenceEquation,
+    #[error("noise is modelled as stationary autoregression of order 1 or 2, got coefficients {coefficients:?}")]
+    Autoregression { coefficients: Vec<f64> },
     #[error("the spectral form needs evenly spaced samples and a one-step inverse (zero-order hold or bilinear rule)")]
     NoSpectralForm,
     #[error("the least-squares system is singular: the channels do not determine two time constants")]

@@ -14,9 +14,11 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use rustdct::DctPlanner;
 
-use crate::inverse::{WIDEST, row};
+use crate::compressed::Bands;
+use crate::inverse::row;
 use crate::parameters::{Pair, parts};
-use crate::sandwich::sandwich;
+use crate::sandwich::{inverse, sandwich};
+use crate::transform::Plan;
 use crate::whitened::Whitened;
 
 /// What the variance of the gradient is taken from.
@@ -37,8 +39,12 @@ impl Whitened<'_> {
         let normal = self.evaluate(theta).hessian;
         let mut half = [[0.0; P]; P];
         for i in 0..P {
-            let scale = if i < 2 { 0.05 * theta[i] } else { f64::INFINITY };
+            // Gain and offset are linear; a time constant must stay positive, and a second lag that there is none of has no slope.
+            let scale = if matches!(i, 2 | 3) { f64::INFINITY } else { 0.05 * theta[i] };
             let step = (0.1 / (0.5 * normal[i][i]).sqrt()).min(scale);
+            if !(step.is_finite() && step > 0.0) {
+                continue;
+            }
             let slope = |sign: f64| {
                 let mut moved = *theta;
                 moved[i] += sign * step;
@@ -48,6 +54,17 @@ impl Whitened<'_> {
             half[i] = std::array::from_fn(|j| 0.25 * (up[j] - down[j]) / step);
         }
         std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (half[i][j] + half[j][i])))
+    }
+
+    /// Cramér-Rao bound: the covariance that no unbiased estimate goes below, `[P][P]`, zero for parameters not in `free`, for noise
+    /// of the stated levels and a gas that is unknown and not random.
+    ///
+    /// To be asked of the cost on readings *without* noise, at the `theta` that made them: `(Σ_w d_w d_w')⁻¹` with `d` the derivative
+    /// of the whitened residual, which is the exact finite-record form of
+    /// `d = (∂H2 H1 − ∂H1 H2) X/√(s1² |H2|² + s2² |H1|²)` summed over all frequencies. On noisy readings noise would count as signal.
+    /// `None` where the record determines no such bound.
+    pub fn cramer_rao<const P: usize>(&self, theta: &[f64; P], free: &[usize]) -> Option<[[f64; P]; P]> {
+        inverse(&self.evaluate(theta).hessian.map(|row| row.map(|h| 0.5 * h)), free)
     }
 
     /// Covariance of the parameters at the minimum `theta`, `[P][P]`, zero for those not in `free`.
@@ -137,27 +154,56 @@ impl Whitened<'_> {
         if all > 0.0 { form(&e) / all } else { 0.0 }
     }
 
+    /// Share of each channel's noise in the variance of the difference of the inferred inputs at `theta`, mean over frequency: how
+    /// much the energy of the whitened residual falls, relative, when that channel's variance is taken to be larger.
+    pub fn noise_shares<const P: usize>(&self, theta: &[f64; P]) -> [f64; 2] {
+        let pair = Pair::<num_dual::DualSVec64<P>>::variables(theta);
+        let row = row(self.model(), &pair, self.readings().mean_step_s());
+        let variance = self.model().white_variance();
+        let (mut first, mut all) = (0.0, 0.0);
+        for segment in self.readings().segments() {
+            for (cosine, bins) in Bands::of(&Plan::of(segment.len())).points() {
+                let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
+                let power = |i: usize| {
+                    let taps = row.noise[i].as_slice().iter().rev();
+                    variance[i] * taps.fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c.re).norm_sqr()
+                };
+                let (p, q) = (power(0), power(1));
+                first += bins * p / (p + q);
+                all += bins;
+            }
+        }
+        [first / all, 1.0 - first / all]
+    }
+
     /// The noise-noise term `E`; uneven steps are taken at their mean.
     fn noise_noise<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
-        let row = row(self.hold(), &Pair::<num_dual::DualSVec64<P>>::variables(theta), self.readings().mean_step_s());
-        let [c1, c2] = [row.c1, row.c2].map(|c| c.map(parts));
-        let [v1, v2] = self.noise_std().map(|s| s * s);
+        let pair = Pair::<num_dual::DualSVec64<P>>::variables(theta);
+        let row = row(self.model(), &pair, self.readings().mean_step_s());
+        let [c1, c2]: [Vec<(f64, [f64; P])>; 2] = row.noise.map(|c| c.as_slice().iter().copied().map(parts).collect());
+        let [v1, v2] = self.model().white_variance();
         let mut out = [[0.0; P]; P];
         for segment in self.readings().segments() {
-            let n = segment.len() - 1;
-            for bin in 1..=n {
-                let w = std::f64::consts::PI * bin as f64 / (n + 1) as f64;
-                let turn: [Complex<f64>; WIDEST] = std::array::from_fn(|k| Complex::from_polar(1.0, w * k as f64));
-                let at = |c: &[(f64, [f64; P]); WIDEST]| {
-                    let value: Complex<f64> = (0..WIDEST).map(|k| turn[k] * c[k].0).sum();
-                    let slopes: [Complex<f64>; P] =
-                        std::array::from_fn(|i| (0..WIDEST).map(|k| turn[k] * c[k].1[i]).sum());
+            let plan = Plan::of(segment.len());
+            for (cosine, bins) in Bands::of(&plan).points() {
+                let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
+                let at = |c: &[(f64, [f64; P])]| {
+                    let mut power = Complex::new(1.0, 0.0);
+                    let mut value = Complex::new(0.0, 0.0);
+                    let mut slopes = [value; P];
+                    for (coefficient, by) in c {
+                        value += power * coefficient;
+                        for i in 0..P {
+                            slopes[i] += power * by[i];
+                        }
+                        power *= turn;
+                    }
                     (value, slopes)
                 };
                 let ((p, dp), (q, dq)) = (at(&c1), at(&c2));
                 let lambda = v1 * p.norm_sqr() + v2 * q.norm_sqr();
                 let d: [Complex<f64>; P] = std::array::from_fn(|i| dp[i] * q - dq[i] * p);
-                let weight = v1 * v2 / (lambda * lambda);
+                let weight = bins * v1 * v2 / (lambda * lambda);
                 for i in 0..P {
                     for j in 0..P {
                         out[i][j] += weight * (d[i] * d[j].conj()).re;

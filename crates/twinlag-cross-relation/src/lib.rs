@@ -27,26 +27,33 @@
 //! ```
 
 mod banded;
+mod compressed;
 mod difference_equation;
 mod error;
 mod free_gains;
+mod inferred;
 mod information;
 mod inverse;
 mod parameters;
+mod polynomial;
 mod published;
 mod readings;
 mod residual;
 mod sandwich;
 mod spectral;
+mod synthetic;
+mod transform;
 mod whitened;
 
-pub use difference_equation::difference_equation_least_squares;
+pub use difference_equation::{DifferenceEquationEstimator, difference_equation_least_squares};
 pub use error::CostError;
 pub use free_gains::FreeGains;
+pub use inferred::{InferredInputs, inferred_inputs};
 pub use information::Middle;
 pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
 pub use residual::{ResidualTest, residual_tests};
 pub use sandwich::sandwich;
+pub use synthetic::synthetic_filter;
 pub use whitened::{Form, Whitened};

@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 /// One parameter of the pair, in the order in which the costs take them.
 ///
-/// Sensor 1 reads `y1 = h1 ∗ x`, sensor 2 reads `y2 = g (h2 ∗ x) + o`, where `h` are first-order lags of unit gain, `g` is
-/// the *relative* gain and `o` the *relative* offset, at the level that was taken off the readings. What both channels share (a common gain,
-/// a common offset) cannot be seen without knowing the gas temperature.
+/// Sensor 1 reads `y1 = h1 ∗ x`, sensor 2 reads `y2 = g (h2 ∗ x) + o`, where `h` are lags of unit gain, of first order or of
+/// second, `g` is the *relative* gain and `o` the *relative* offset, at the level that was taken off the readings. What both
+/// channels share (a common gain, a common offset) cannot be seen without knowing the gas temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
@@ -19,11 +19,15 @@ pub enum Parameter {
     Gain,
     /// Offset of channel 2 against channel 1 where channel 1 reads the level of [`crate::Readings`], K.
     Offset,
+    /// Time constant of a second lag in series with that of sensor 1, s; 0 for a sensor of first order.
+    SecondTau1,
+    /// The same of sensor 2, s.
+    SecondTau2,
 }
 
 impl Parameter {
-    /// All four, in order. Costs take the first two (gain 1, offset 0) or all.
-    pub const ALL: [Self; 4] = [Self::Tau1, Self::Tau2, Self::Gain, Self::Offset];
+    /// All six, in order. Costs take the first two (gain 1, offset 0, first order), the first four (first order), or all.
+    pub const ALL: [Self; 6] = [Self::Tau1, Self::Tau2, Self::Gain, Self::Offset, Self::SecondTau1, Self::SecondTau2];
 }
 
 /// The parameters as numbers or as dual numbers.
@@ -32,17 +36,26 @@ pub(crate) struct Pair<D> {
     pub(crate) tau_s: [D; 2],
     pub(crate) gain: D,
     pub(crate) offset: D,
+    /// Second lags, where there are any.
+    pub(crate) second_tau_s: [Option<D>; 2],
 }
 
 impl<const P: usize> Pair<DualSVec64<P>> {
-    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1 and offset 0.
+    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1, offset 0 and first order. A second time constant of
+    /// zero is none, and has no derivatives.
     pub(crate) fn variables(theta: &[f64; P]) -> Self {
-        const { assert!(P == 2 || P == 4, "two time constants, or these with gain and offset") };
+        const { assert!(P == 2 || P == 4 || P == 6, "two time constants, with gain and offset, with second lags") };
         let variable = |i: usize, otherwise: f64| match theta.get(i) {
             Some(&value) => DualSVec64::from_re(value).derivative(i),
             None => DualSVec64::from_re(otherwise),
         };
-        Self { tau_s: [variable(0, f64::NAN), variable(1, f64::NAN)], gain: variable(2, 1.0), offset: variable(3, 0.0) }
+        let second = |i: usize| theta.get(i).filter(|t| **t > 0.0).map(|_| variable(i, f64::NAN));
+        Self {
+            tau_s: [variable(0, f64::NAN), variable(1, f64::NAN)],
+            gain: variable(2, 1.0),
+            offset: variable(3, 0.0),
+            second_tau_s: [second(4), second(5)],
+        }
     }
 }
 

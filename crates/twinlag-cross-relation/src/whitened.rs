@@ -9,41 +9,87 @@ use num_dual::DualSVec64;
 use twinlag_sensor::Discretisation;
 
 use crate::banded;
+use crate::compressed::Compressed;
 use crate::error::CostError;
-use crate::inverse::width;
+use crate::inverse::{has_inverse, is_one_step, row};
 use crate::parameters::{CostValue, Pair, parts};
 use crate::readings::{Readings, Steps};
-use crate::spectral::{Sums, Transformed};
+use crate::sandwich::inverse;
+use crate::spectral::{self, Sums};
+use crate::transform::Transformed;
 
-/// How the whitening is computed. Both give the same numbers to rounding.
+/// How the whitening is computed. The first two give the same numbers to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Sine transform, once; then a sum over bins. Even sampling, zero-order hold or bilinear rule.
+    /// Sine transform, once; then a sum over bins. Even sampling, zero-order hold or bilinear rule, first-order sensors, white
+    /// noise.
     Spectral,
-    /// Banded Cholesky factorisation at every evaluation. Any sampling and hold.
+    /// Banded Cholesky factorisation at every evaluation. Any sampling, hold, order and noise.
     Banded,
+    /// The spectral form with its bins gathered into bands: about a hundred terms for records of any length, at a known error
+    /// ([`Whitened::shift_bound`]). For what the spectral form takes.
+    Compressed,
+}
+
+/// What is taken for granted: hold and noise.
+#[derive(Clone, Debug)]
+pub(crate) struct Model {
+    pub(crate) hold: Discretisation,
+    noise_std: [f64; 2],
+    /// `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]`, for each channel; empty for white noise.
+    autoregression: [Vec<f64>; 2],
+}
+
+impl Model {
+    pub(crate) fn white(hold: Discretisation, noise_std: [f64; 2]) -> Self {
+        Self { hold, noise_std, autoregression: [Vec::new(), Vec::new()] }
+    }
+
+    pub(crate) fn is_white(&self) -> bool {
+        self.autoregression.iter().all(Vec::is_empty)
+    }
+
+    /// Variance of `e`.
+    pub(crate) fn white_variance(&self) -> [f64; 2] {
+        [0, 1].map(|i| {
+            let variance = self.noise_std[i] * self.noise_std[i];
+            match self.autoregression[i][..] {
+                [] => variance,
+                [phi] => variance * (1.0 - phi * phi),
+                [first, second, ..] => {
+                    let rest = 1.0 - second;
+                    variance * (1.0 + second) * (rest * rest - first * first) / rest
+                }
+            }
+        })
+    }
+
+    /// Coefficients of `e = Φ n`: `1, −φ1, −φ2`.
+    pub(crate) fn whitener(&self, channel: usize) -> impl Iterator<Item = f64> {
+        std::iter::once(1.0).chain(self.autoregression[channel].iter().map(|phi| -phi))
+    }
 }
 
 /// Sum of squares of the exactly whitened disagreement of two sensors.
 #[derive(Clone, Debug)]
 pub struct Whitened<'a> {
     readings: &'a Readings,
-    hold: Discretisation,
-    noise_std: [f64; 2],
-    /// Present in the spectral form: one entry for each segment.
+    model: Model,
+    /// Present in the spectral and compressed forms: one entry for each segment.
     transformed: Option<Vec<Transformed>>,
-    terms: usize,
+    /// Present in the compressed form.
+    compressed: Option<Vec<Compressed>>,
 }
 
 impl<'a> Whitened<'a> {
-    /// The cost on `readings` for white noise of `noise_std` `[s1, s2]` (K), in the fastest form there is for them.
+    /// The cost on `readings` for white noise of `noise_std` `[s1, s2]` (K), in the fastest exact form there is for them.
     ///
     /// # Errors
     /// [`CostError::NotPositive`] for a noise level, [`CostError::NoDifferenceEquation`],
     /// [`CostError::HoldNeedsEvenSampling`], or [`CostError::TooShort`] if no segment is as long as the inverse is wide.
     pub fn new(readings: &'a Readings, hold: Discretisation, noise_std: [f64; 2]) -> Result<Self, CostError> {
         let even = readings.segments().iter().all(|s| matches!(s.steps(), Steps::Even(_)));
-        let form = if even && width(hold) == Some(2) { Form::Spectral } else { Form::Banded };
+        let form = if even && hold != Discretisation::FirstOrderHold { Form::Spectral } else { Form::Banded };
         Self::with_form(readings, hold, noise_std, form)
     }
 
@@ -58,23 +104,55 @@ impl<'a> Whitened<'a> {
         form: Form,
     ) -> Result<Self, CostError> {
         check_noise(noise_std)?;
-        let width = width(hold).ok_or(CostError::NoDifferenceEquation)?;
-        if width > 2 && readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_))) {
+        if !has_inverse(hold) {
+            return Err(CostError::NoDifferenceEquation);
+        }
+        let needed = if hold == Discretisation::FirstOrderHold { 3 } else { 2 };
+        if needed > 2 && readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_))) {
             return Err(CostError::HoldNeedsEvenSampling);
         }
-        let terms = readings.segments().iter().map(|s| (s.len() + 1).saturating_sub(width)).sum();
-        if terms == 0 {
-            return Err(CostError::TooShort { samples: readings.len(), needed: width });
+        if readings.segments().iter().all(|s| s.len() < needed) {
+            return Err(CostError::TooShort { samples: readings.len(), needed });
         }
-        let transformed = match form {
+        let transformed: Option<Vec<Transformed>> = match form {
             Form::Banded => None,
-            Form::Spectral if width > 2 => return Err(CostError::NoSpectralForm),
-            Form::Spectral => {
+            Form::Spectral | Form::Compressed if needed > 2 => return Err(CostError::NoSpectralForm),
+            Form::Spectral | Form::Compressed => {
                 let each = readings.segments().iter().map(Transformed::new).collect::<Option<_>>();
                 Some(each.ok_or(CostError::NoSpectralForm)?)
             }
         };
-        Ok(Self { readings, hold, noise_std, transformed, terms })
+        let model = Model::white(hold, noise_std);
+        let out = Self { readings, model, transformed, compressed: None };
+        Ok(if form == Form::Compressed { out.compressed(false) } else { out })
+    }
+
+    /// The same cost with its bins gathered into bands, where it is in the spectral form; unchanged otherwise.
+    ///
+    /// - `calibration`: whether gain and offset will be asked for (`P` 4), which takes more than twice as many sums; without it
+    ///   such questions are answered by the full sum
+    #[must_use]
+    pub fn compressed(mut self, calibration: bool) -> Self {
+        let series = if calibration { 5 } else { 3 };
+        let segments = self.transformed.as_ref().filter(|_| self.model.is_white());
+        self.compressed = segments.map(|all| all.iter().map(|s| Compressed::new(s, series)).collect());
+        self
+    }
+
+    /// The same cost without compression.
+    #[must_use]
+    pub fn exact(mut self) -> Self {
+        self.compressed = None;
+        self
+    }
+
+    /// How evaluations at first order are computed.
+    pub fn form(&self) -> Form {
+        match (&self.transformed, &self.compressed) {
+            (None, _) => Form::Banded,
+            (Some(_), None) => Form::Spectral,
+            (Some(_), Some(_)) => Form::Compressed,
+        }
     }
 
     /// The same cost for other noise levels, without transforming again.
@@ -83,18 +161,50 @@ impl<'a> Whitened<'a> {
     /// [`CostError::NotPositive`].
     pub fn with_noise(mut self, noise_std: [f64; 2]) -> Result<Self, CostError> {
         check_noise(noise_std)?;
-        self.noise_std = noise_std;
+        self.model.noise_std = noise_std;
         Ok(self)
+    }
+
+    /// The same cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]` with `e` white, of order 0
+    /// (empty: white), 1 or 2. The noise levels stay standard deviations of `n`.
+    ///
+    /// Exact, in the banded form: the equation is multiplied by both channels' whitening filters, which costs as many samples
+    /// as they are long and supposes nothing about the noise before the record.
+    ///
+    /// # Errors
+    /// [`CostError::Autoregression`] for an order above 2 or noise that is not stationary,
+    /// [`CostError::HoldNeedsEvenSampling`] for uneven steps.
+    pub fn with_autoregression(mut self, autoregression: [Vec<f64>; 2]) -> Result<Self, CostError> {
+        let is_stationary = |phi: &[f64]| match *phi {
+            [] => true,
+            [phi] => phi.abs() < 1.0,
+            [first, second] => second.abs() < 1.0 && first.abs() < 1.0 - second,
+            _ => false,
+        };
+        if let Some(bad) = autoregression.iter().find(|phi| !is_stationary(phi)) {
+            return Err(CostError::Autoregression { coefficients: bad.clone() });
+        }
+        if self.readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_))) {
+            return Err(CostError::HoldNeedsEvenSampling);
+        }
+        self.model.autoregression = autoregression;
+        self.compressed = None;
+        Ok(self)
+    }
+
+    /// Coefficients of the noise's autoregression for each channel, empty where it is white.
+    pub fn autoregression(&self) -> &[Vec<f64>; 2] {
+        &self.model.autoregression
     }
 
     /// Noise standard deviations `[s1, s2]`, K.
     pub fn noise_std(&self) -> [f64; 2] {
-        self.noise_std
+        self.model.noise_std
     }
 
     /// What the gas is taken to do between samples.
     pub fn hold(&self) -> Discretisation {
-        self.hold
+        self.model.hold
     }
 
     /// The channels.
@@ -102,9 +212,12 @@ impl<'a> Whitened<'a> {
         self.readings
     }
 
-    /// Number of whitened residuals: for each segment of `n` samples `n − 1` (zero-order hold, bilinear) or `n − 2`.
-    pub fn terms(&self) -> usize {
-        self.terms
+    /// Number of whitened residuals at `theta`: for each segment of `n` samples `n − 1` for first-order sensors (zero-order hold,
+    /// bilinear rule), `n − 2` with the first-order hold, fewer by one or two with second lags or autoregressive noise.
+    pub fn terms<const P: usize>(&self, theta: &[f64; P]) -> usize {
+        let row = row(&self.model, &Pair::<DualSVec64<P>>::variables(theta), self.readings.mean_step_s());
+        let width = row.data[0].as_slice().len();
+        self.readings.segments().iter().map(|s| (s.len() + 1).saturating_sub(width)).sum()
     }
 
     /// Sum of squares `Σ r²` with its exact gradient and its Gauss-Newton Hessian `2 Σ ∂r ∂r'` at `theta` (the first `P` of
@@ -118,16 +231,24 @@ impl<'a> Whitened<'a> {
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let pair = Pair::variables(theta);
         let mut sums = Sums::ZERO;
-        if let Some(segments) = &self.transformed {
-            for segment in segments {
-                segment.accumulate(self.hold, self.noise_std, &pair, &mut sums);
+        match (&self.transformed, &self.compressed) {
+            (Some(segments), Some(all)) if self.is_compressed_at(&pair) => {
+                for (segment, compressed) in segments.iter().zip(all) {
+                    compressed.accumulate(segment, &self.model, &pair, &mut sums);
+                }
             }
-        } else {
-            for segment in self.readings.segments() {
-                banded::sweep(segment, self.hold, self.noise_std, &pair, |residual| {
-                    let (r, dr) = parts(residual);
-                    sums.add(r, &dr);
-                });
+            (Some(segments), _) if is_one_step(&self.model, &pair) => {
+                for segment in segments {
+                    spectral::accumulate(segment, &self.model, &pair, &mut sums);
+                }
+            }
+            _ => {
+                for segment in self.readings.segments() {
+                    banded::sweep(segment, &self.model, &pair, |residual| {
+                        let (r, dr) = parts(residual);
+                        sums.add(r, &dr);
+                    });
+                }
             }
         }
         CostValue {
@@ -148,7 +269,7 @@ impl<'a> Whitened<'a> {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         let of = |segment| {
             let mut out = Vec::new();
-            banded::sweep(segment, self.hold, self.noise_std, &pair, |residual| out.push(parts(residual)));
+            banded::sweep(segment, &self.model, &pair, |residual| out.push(parts(residual)));
             out
         };
         self.readings.segments().iter().map(of).collect()
@@ -159,8 +280,43 @@ impl<'a> Whitened<'a> {
     /// Bin `j` (from 0) of a segment with `n` bins lies at `(j + 1)/(2 (n + 1) Ts)` Hz.
     pub fn spectrum<const P: usize>(&self, theta: &[f64; P]) -> Option<Vec<Vec<f64>>> {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
-        let segments = self.transformed.as_ref()?;
-        Some(segments.iter().map(|s| s.residuals(self.hold, self.noise_std, &pair)).collect())
+        let segments = self.transformed.as_ref().filter(|_| is_one_step(&self.model, &pair))?;
+        Some(segments.iter().map(|s| spectral::residuals(s, &self.model, &pair)).collect())
+    }
+
+    fn is_compressed_at<const P: usize>(&self, pair: &Pair<DualSVec64<P>>) -> bool {
+        let serves = |c: &Compressed| P == 2 || c.has_calibration();
+        is_one_step(&self.model, pair) && self.compressed.as_ref().is_some_and(|all| all.iter().all(serves))
+    }
+
+    /// How far compression can have moved each of the `free` parameters from the minimum of the full sum, at most, in standard
+    /// errors (those of the information at `theta`); zeros where nothing is compressed.
+    ///
+    /// `|A⁻¹ δ| / √A⁻¹_ii`, worst signs, with `A` half the Hessian and `δ` the bound on what interpolation changes of half the
+    /// gradient. Where the information is singular it is infinite.
+    pub fn shift_bound<const P: usize>(&self, theta: &[f64; P], free: &[usize]) -> [f64; P] {
+        let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
+        let mut out = [0.0; P];
+        let (Some(segments), Some(all), true) = (&self.transformed, &self.compressed, self.is_compressed_at(&pair))
+        else {
+            return out;
+        };
+        let mut gradient = [0.0; P];
+        for (segment, compressed) in segments.iter().zip(all) {
+            compressed.gradient_error(segment, &self.model, &pair, &mut gradient);
+        }
+        let half = self.evaluate(theta).hessian.map(|row| row.map(|h| 0.5 * h));
+        let covariance = inverse(&half, free);
+        for &i in free {
+            out[i] = covariance.map_or(f64::INFINITY, |c| {
+                free.iter().map(|&j| (c[i][j] * gradient[j]).abs()).sum::<f64>() / c[i][i].sqrt()
+            });
+        }
+        out
+    }
+
+    pub(crate) fn model(&self) -> &Model {
+        &self.model
     }
 }
 

@@ -118,6 +118,43 @@ fn whitened_value_and_gradient_agree_in_both_forms() {
     check("whitened, first-order hold", false, |t: &[f64; 4]| cost.evaluate(t));
 }
 
+/// The compressed sum's gradient is that of the compressed sum.
+#[test]
+fn compressed_value_and_gradient_agree() {
+    let readings = even();
+    let cost = Whitened::new(&readings, Discretisation::ZeroOrderHold, [0.3, 0.2]).expect("valid").compressed(true);
+    check("compressed", false, |t: &[f64; 2]| cost.evaluate(t));
+    check("compressed, free gain and offset", false, |t: &[f64; 4]| cost.evaluate(t));
+}
+
+#[test]
+fn whitened_value_and_gradient_agree_with_autoregressive_noise_and_second_lags() {
+    let readings = even();
+    for hold in [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold, Discretisation::Bilinear] {
+        let cost = Whitened::new(&readings, hold, [0.3, 0.2]).expect("valid");
+        let cost = cost.with_autoregression([vec![0.5], vec![0.2, -0.3]]).expect("stationary");
+        check("autoregressive noise", false, |t: &[f64; 4]| cost.evaluate(t));
+        // Two lags in each sensor multiply the condition of V, to some (2τ/Ts)² (2τ₂/Ts)² = 3e6, and with it the rounding of the
+        // value: a wider step, `h = 1e-4` in the logarithms, whose truncation is `h²`.
+        for at in [[0.0238_f64, 0.1168, 1.03, 0.4, 0.004, 0.03], [0.03, 0.09, 0.9, -1.0, 0.01, 0.01]] {
+            let got = cost.evaluate(&at);
+            let scale: [f64; 6] = std::array::from_fn(|i| if i == 2 || i == 3 { 1.0 } else { at[i] });
+            let want: Vec<f64> = (0..6)
+                .map(|i| {
+                    let value = |sign: f64| {
+                        let mut moved = at;
+                        moved[i] += sign * 1e-4 * scale[i];
+                        cost.evaluate(&moved).value
+                    };
+                    (value(1.0) - value(-1.0)) / 2e-4
+                })
+                .collect();
+            let got: Vec<f64> = (0..6).map(|i| got.gradient[i] * scale[i]).collect();
+            close(&format!("second lags, {hold:?}, {at:?}"), &got, &want);
+        }
+    }
+}
+
 #[test]
 fn whitened_value_and_gradient_agree_on_uneven_samples_with_a_gap() {
     let readings = uneven_with_a_gap();

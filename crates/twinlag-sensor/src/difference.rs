@@ -122,6 +122,79 @@ impl Discretisation {
     }
 }
 
+impl Discretisation {
+    /// Coefficients of the second-order sensor `1/((1 + s τ)(1 + s τ₂))`, `None` for [`Discretisation::BandLimited`].
+    ///
+    /// Generic over dual numbers as [`Discretisation::first_order`] is. Exact for any two positive time constants, equal ones
+    /// included: the partial fractions are combined into the divided difference of the exponential before their poles can
+    /// cancel.
+    pub fn second_order<D: DualNum<Primitive = f64> + Copy>(
+        self,
+        tau_s: D,
+        second_tau_s: D,
+        period_s: f64,
+    ) -> Option<SecondOrderCoefficients<D>> {
+        let zero = D::from(0.0);
+        let one = D::from(1.0);
+        if self == Self::Bilinear {
+            let [p, q] = [tau_s, second_tau_s].map(|tau| self.first_order(tau, period_s));
+            let (p, q) = (p?, q?);
+            let [(b0, b1), (d0, d1)] = [p, q].map(|c| (c.numerator[0], c.numerator[1]));
+            let [a, c] = [p, q].map(|c| c.denominator[1]);
+            return Some(SecondOrderCoefficients {
+                numerator: [b0 * d0, b0 * d1 + b1 * d0, b1 * d1],
+                denominator: [one, a + c, a * c],
+            });
+        }
+        // In units of the period: rates p, q, poles a, c.
+        let [p, q] = [tau_s, second_tau_s].map(|tau| tau.recip() * period_s);
+        let pole = |t: f64| [(-p * t).exp(), (-q * t).exp()];
+        let [a, c] = pole(1.0);
+        let [fall_a, fall_c] = [p, q].map(|rate| -(-rate).exp_m1());
+        let all = fall_a * fall_c;
+        let numerator = match self {
+            Self::ZeroOrderHold => {
+                // The step response after one period, and unit static gain.
+                let first = fall_a - p * divided_difference(p, q, 1.0);
+                [zero, first, all - first]
+            }
+            Self::FirstOrderHold => {
+                // The response to a triangle of unit height is the second difference of the ramp response.
+                let ramp = |t: f64| {
+                    let fall = -(-p * t).exp_m1();
+                    -(p + q) / (p * q) * fall + p / q * divided_difference(p, q, t) + t
+                };
+                let (now, then) = (ramp(1.0), ramp(2.0) - ramp(1.0) * 2.0);
+                let middle = then - (a + c) * now;
+                [now, middle, all - now - middle]
+            }
+            Self::Bilinear | Self::BandLimited => return None,
+        };
+        Some(SecondOrderCoefficients { numerator, denominator: [one, -(a + c), a * c] })
+    }
+}
+
+/// `(e^(−p t) − e^(−q t))/(q − p)`, also where `p` and `q` meet.
+fn divided_difference<D: DualNum<Primitive = f64> + Copy>(p: D, q: D, t: f64) -> D {
+    let half = (q - p) * (0.5 * t);
+    if half.re().abs() > 0.05 {
+        return ((-p * t).exp() - (-q * t).exp()) / (q - p);
+    }
+    // t e^(−(p + q) t/2) sinh(half)/half; the next term of the series is below 1e-16.
+    let square = half * half;
+    let sinhc = ((square / 42.0 + 1.0) * square / 20.0 + 1.0) * square / 6.0 + 1.0;
+    (-(p + q) * (0.5 * t)).exp() * sinhc * t
+}
+
+/// `y[k] + den[1] y[k−1] + den[2] y[k−2] = num[0] x[k] + num[1] x[k−1] + num[2] x[k−2]`, `den[0] = 1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SecondOrderCoefficients<D> {
+    /// Coefficients of `x[k]`, `x[k−1]`, `x[k−2]`.
+    pub numerator: [D; 3],
+    /// Coefficients of `y[k]`, `y[k−1]`, `y[k−2]`.
+    pub denominator: [D; 3],
+}
+
 /// `y[k] + den[1] y[k−1] = num[0] x[k] + num[1] x[k−1]`, `den[0] = 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FirstOrderCoefficients<D> {
@@ -201,6 +274,44 @@ mod tests {
                     tol += w * period / fastest / 3.0;
                 }
                 assert!((got / want - 1.0).norm() < tol, "{kind:?}: got {got}, want {want} within {tol:e}");
+            }
+        }
+    }
+
+    /// The partial fractions of [`SecondOrder`], which lose digits to the cancellation of their poles, here 1/0.78: rounding of the
+    /// fractions, and of `1 − r(T)/T`, which loses a factor `(τ/Ts)²` = 150 in the first-order hold; 1e-12.
+    #[test]
+    fn second_order_coefficients_are_those_of_the_partial_fractions() {
+        let (tau, second, period) = (0.05, 0.011, 0.004);
+        for kind in [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold, Discretisation::Bilinear] {
+            let want = SecondOrder::new(tau, second, period).expect("valid").difference_equation(kind).expect("exists");
+            let got = kind.second_order(tau, second, period).expect("exists");
+            for j in 0..3 {
+                for (got, want) in
+                    [(got.numerator[j], want.numerator()[j]), (got.denominator[j], want.denominator()[j])]
+                {
+                    assert!((got - want).abs() < 1e-12, "{kind:?}, {j}: got {got}, want {want}");
+                }
+            }
+        }
+    }
+
+    /// On both sides of the switch from series to quotient, and with equal poles, the coefficients are smooth in the time
+    /// constants: the mean of two neighbours 1e-6 apart differs from the middle by the second derivative, 1e-12 of the size.
+    #[test]
+    fn equal_and_nearly_equal_poles_are_no_special_case() {
+        let period = 0.004;
+        for kind in [Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold] {
+            let tau: f64 = 0.01;
+            // (q − p)/2 = 0.05 in units of the period, where the formula changes, and equality.
+            let switch = 1.0 / (1.0 / tau + 0.1 / period);
+            for second in [switch, tau] {
+                let at = |t: f64| kind.second_order(tau, t, period).expect("exists").numerator;
+                let (low, middle, high) = (at(second * (1.0 - 1e-6)), at(second), at(second * (1.0 + 1e-6)));
+                for j in 0..3 {
+                    let mean = 0.5 * (low[j] + high[j]);
+                    assert!((mean - middle[j]).abs() < 1e-11, "{kind:?} {second} {j}: {mean} and {}", middle[j]);
+                }
             }
         }
     }

@@ -34,7 +34,7 @@ mod floor;
 mod second_order;
 mod slow_mode;
 
-pub use difference::{DifferenceEquation, Discretisation, FirstOrderCoefficients};
+pub use difference::{DifferenceEquation, Discretisation, FirstOrderCoefficients, SecondOrderCoefficients};
 pub use error::ModelError;
 pub use first_order::FirstOrder;
 pub use floor::tone_floor;

@@ -1,0 +1,109 @@
+//! Between compensation and normalisation: the compensated cost in units of a power of what noise adds to it.
+//!
+//! `F_w = (J_CR − N)/N^(1−w)` with `N(θ) = s1² h(c) + s2² h(a)/g²`. `w = 1` is the compensated cost, `w = 0` the normalised one
+//! less 1, `w = 1/2` the hybrid, `(J_CR − N)/√N`: the excess of the mean square of `e` over its noise, in units of the standard
+//! deviation of that noise. `F_w` is linear in `J_CR`, so at the given levels `E[F_w] = J_clean/N^(1−w)` at *every* `θ`: nowhere
+//! negative and zero at the truth, for every `w`.
+
+use twinlag_cross_relation::{CostValue, CrossRelation};
+
+use crate::compensated::added_by_noise;
+use crate::covariance::covariance;
+use crate::error::NoiseError;
+use crate::noise_gain::Noise;
+
+/// Compensated cross-relation cost over a power of what noise adds to it.
+///
+/// It assumes what [`crate::Compensated`] does, stationary noise of known autocovariance that is independent of the gas, but
+/// leans on the level less: if the true variances are `1 + ε` times the given ones, `E[F_w] = J_clean/N^(1−w) + ε N^w`, and
+/// the minimum is off by `w` times what it would be off with the compensated cost (to first order in `ε`). The ratio of the
+/// levels has to be right for any `w`.
+#[derive(Clone, Debug)]
+pub struct Hybrid<'a> {
+    cost: CrossRelation<'a>,
+    noise: [Noise; 2],
+    weight: f64,
+}
+
+impl<'a> Hybrid<'a> {
+    /// The hybrid, `w = 1/2`, of `cost` for the noise of channels 1 and 2.
+    ///
+    /// # Errors
+    /// [`NoiseError::NoNoise`] if neither channel has any.
+    pub fn new(cost: CrossRelation<'a>, noise: [Noise; 2]) -> Result<Self, NoiseError> {
+        Self::with_weight(cost, noise, 0.5)
+    }
+
+    /// As [`Hybrid::new`], with `weight` `w` from 0 (normalised, less 1) to 1 (compensated).
+    ///
+    /// # Errors
+    /// [`NoiseError::Weight`], [`NoiseError::NoNoise`].
+    pub fn with_weight(cost: CrossRelation<'a>, noise: [Noise; 2], weight: f64) -> Result<Self, NoiseError> {
+        if !(0.0..=1.0).contains(&weight) {
+            return Err(NoiseError::Weight { value: weight });
+        }
+        if noise.iter().all(|n| n.variance() == 0.0) {
+            return Err(NoiseError::NoNoise);
+        }
+        Ok(Self { cost, noise, weight })
+    }
+
+    /// The cost that this one is made of.
+    pub fn cost(&self) -> &CrossRelation<'a> {
+        &self.cost
+    }
+
+    /// `w`.
+    pub fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// `F_w = (J_CR − N) N^(w−1)` with gradient and exact Hessian at `theta` (`P` 2, 4 or 6), in the square of the channels'
+    /// unit to the power of `w`. Can be negative: it is a difference.
+    ///
+    /// # Source
+    /// Own reading. A hybrid of normalisation and compensation is published (Gillespie, Hung, Kee, McLoone, *Noise resilient
+    /// discrete-time cross-relation sensor characterisation*), but its abstract, which is all that was seen, gives no formula;
+    /// whether it is this one is not known. Derivation: docs, chapter "Theory", section 2.
+    pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
+        let above = self.cost.evaluate(theta);
+        let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
+        let excess = above.value - noise.value;
+        // m = N^p, m' = p m/N N', m'' = p m/N (N'' + (p − 1) N' N'/N).
+        let power = self.weight - 1.0;
+        let unit = noise.value.powf(power);
+        let slope = power * unit / noise.value;
+        let rise: [f64; P] = std::array::from_fn(|i| above.gradient[i] - noise.gradient[i]);
+        let fall = noise.gradient.map(|g| slope * g);
+        CostValue {
+            value: excess * unit,
+            gradient: std::array::from_fn(|i| rise[i] * unit + excess * fall[i]),
+            hessian: std::array::from_fn(|i| {
+                std::array::from_fn(|j| {
+                    let bend = noise.gradient[i] * noise.gradient[j] / noise.value;
+                    (above.hessian[i][j] - noise.hessian[i][j]) * unit
+                        + rise[i] * fall[j]
+                        + rise[j] * fall[i]
+                        + excess * slope * (noise.hessian[i][j] + (power - 1.0) * bend)
+                })
+            }),
+        }
+    }
+
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
+    /// in `free`; `None` where `theta` is no minimum.
+    ///
+    /// In units of `N^(w−1)` the gradient is `∂J − (w + (1 − w) J/N) ∂N`: of the sum over samples, half of it is
+    /// `Σ e (∂e − (1 − w) ∂N/(2N) e)` less a number that does not scatter.
+    pub fn covariance<const P: usize>(
+        &self,
+        theta: &[f64; P],
+        free: &[usize],
+        noise_std: [f64; 2],
+    ) -> Option<[[f64; P]; P]> {
+        let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
+        let rest = 1.0 - self.weight;
+        let pull = noise.gradient.map(|g| 0.5 * rest * g / noise.value);
+        covariance(&self.cost, &self.evaluate(theta), noise.value.powf(rest), theta, free, noise_std, &pull)
+    }
+}

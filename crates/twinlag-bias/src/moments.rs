@@ -1,0 +1,228 @@
+//! Noise levels from how the two inferred gas temperatures disagree, whatever the gas does.
+//!
+//! `f1 = x + n1`, `f2 = x + n2` with independent noises of known *shape*: so `f1 (f1 − f2)` has expectation `|n1|²` at each
+//! frequency and `f2 (f2 − f1)` has `|n2|²`, the gas having dropped out, exactly and without any assumption about it. In bands
+//! these are two sets of moments, linear in the two variances; weighted least squares with the moments' own covariance (for a
+//! gas that is Gaussian in the band) finds both, and their standard errors. Where the gas has power a moment scatters widely
+//! and has little weight; the bands that it leaves alone decide, wherever they are.
+//!
+//! Where third differences ([`crate::estimate_noise`]) take a signal that moves from sample to sample for noise, this does not.
+//! It needs the time constants, which need the levels: iterate.
+//!
+//! # Source
+//! Own derivation; docs, chapter "Theory", section 3.
+
+use nalgebra::{Matrix2, Vector2};
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+use twinlag_cross_relation::InferredInputs;
+
+/// Width of a band: this factor in frequency, and at least [`LEAST`] bins.
+const RATIO: f64 = 1.25;
+const LEAST: usize = 12;
+/// Fewest samples of a stretch that is used.
+const SHORTEST: usize = 64;
+/// Neighbouring bins of a Hann window share power: a mean over them has the variance of this many times fewer bins,
+/// `1 + 2 (2/3)² + 2 (1/6)²`.
+const SHARED: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+/// A level is taken to be no less than this share of the other: below it hardly matters, and weights stay finite.
+const LEAST_SHARE: f64 = 0.1;
+/// Steps towards weights that agree with the levels they give.
+const STEPS: usize = 6;
+
+/// Moments of the inferred inputs per band.
+#[derive(Clone, Debug)]
+pub struct NoiseMoments {
+    bands: Vec<Band>,
+}
+
+#[derive(Clone, Debug)]
+struct Band {
+    /// Means of `Re f1 (f1 − f2)*`, `Re f2 (f2 − f1)*`.
+    moments: Vector2<f64>,
+    /// What the gas has here: mean of `Re f1 f2*`, if positive.
+    gas: f64,
+    /// Independent bins.
+    weight: f64,
+    /// For each bin, `cos w` and both filters' power gain.
+    bins: Vec<(f64, [f64; 2])>,
+}
+
+/// What [`NoiseMoments::levels`] finds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointLevels {
+    /// Standard deviations of both channels' noise, K.
+    pub std_k: [f64; 2],
+    /// Covariance of the two *variances*, K⁴.
+    pub covariance_k4: [[f64; 2]; 2],
+    /// Which of them was held at a tenth of the other because the moments put it lower, or below zero: it is at most that,
+    /// within its standard error.
+    pub is_held: [bool; 2],
+    /// Weighted sum of squares that the levels leave of the moments: about twice the number of bands, less the parameters, if
+    /// noise has the assumed shape and both sensors their models.
+    pub misfit: f64,
+}
+
+impl JointLevels {
+    /// Standard errors of the standard deviations, K.
+    pub fn standard_error_k(&self) -> [f64; 2] {
+        [0, 1].map(|i| 0.5 * self.covariance_k4[i][i].sqrt() / self.std_k[i])
+    }
+}
+
+impl NoiseMoments {
+    /// Moments of `inputs`; `None` if no stretch has 64 samples.
+    pub fn new(inputs: &InferredInputs) -> Option<Self> {
+        let mut planner = RealFftPlanner::new();
+        let mut bins: Vec<(f64, Vector2<f64>, f64, f64)> = Vec::new();
+        for [f1, f2] in inputs.segments.iter().filter(|s| s[0].len() >= SHORTEST) {
+            let n = f1.len();
+            let mean = 0.5 * (f1.iter().sum::<f64>() + f2.iter().sum::<f64>()) / n as f64;
+            let angle = |k: usize| std::f64::consts::TAU * (k + 1) as f64 / (n + 1) as f64;
+            let window: Vec<f64> = (0..n).map(|k| 0.5 * (1.0 - angle(k).cos())).collect();
+            let energy: f64 = window.iter().map(|w| w * w).sum();
+            let plan = planner.plan_fft_forward(n);
+            let transform = |value: &dyn Fn(usize) -> f64| -> Vec<Complex<f64>> {
+                let mut input: Vec<f64> = (0..n).map(|k| window[k] * value(k)).collect();
+                let mut output = plan.make_output_vec();
+                plan.process(&mut input, &mut output).expect("buffers are those of the plan");
+                output
+            };
+            let (first, difference) = (transform(&|k| f1[k] - mean), transform(&|k| f1[k] - f2[k]));
+            // Neither the mean nor the bin at half the sampling rate has an independent imaginary part.
+            for k in 1..n.div_ceil(2) {
+                let (p, u) = (first[k], difference[k]);
+                let q = p - u;
+                let moments = Vector2::new((p * u.conj()).re, -(q * u.conj()).re) / energy;
+                bins.push((k as f64 / n as f64, moments, (p * q.conj()).re / energy, 1.0));
+            }
+        }
+        if bins.is_empty() {
+            return None;
+        }
+        bins.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut bands = Vec::new();
+        let mut from = 0;
+        while from < bins.len() {
+            let edge = bins[from].0 * RATIO;
+            let mut to = bins.partition_point(|b| b.0 <= edge).max(from + LEAST).min(bins.len());
+            if bins.len() - to < LEAST {
+                to = bins.len();
+            }
+            bands.push(Band::of(&bins[from..to], &inputs.filters));
+            from = to;
+        }
+        Some(Self { bands })
+    }
+
+    /// Levels for noise that is white, or autoregressive of first order with coefficients `ar1` (0 is white).
+    ///
+    /// - `start_std_k`: levels to begin the weights with; the fixed point does not depend on them
+    ///
+    /// `None` where the moments have no solution with a positive variance.
+    pub fn levels(&self, start_std_k: [f64; 2], ar1: [f64; 2]) -> Option<JointLevels> {
+        let shapes = self.shapes(ar1);
+        let mut std_k = start_std_k;
+        let mut out = None;
+        for _ in 0..STEPS {
+            let found = self.step(&shapes, &self.weights(&shapes, std_k)?)?;
+            std_k = found.std_k;
+            out = Some(found);
+        }
+        out
+    }
+
+    /// Levels for coefficients `ar1` with the weights that noise of `std_k` and `weighing_ar1` gives: its misfit, minimised over
+    /// `ar1`, tells the colour of the noise. (Weights that followed `ar1` would favour whatever makes them small.)
+    pub fn levels_weighed(&self, std_k: [f64; 2], weighing_ar1: [f64; 2], ar1: [f64; 2]) -> Option<JointLevels> {
+        self.step(&self.shapes(ar1), &self.weights(&self.shapes(weighing_ar1), std_k)?)
+    }
+
+    fn shapes(&self, ar1: [f64; 2]) -> Vec<Vector2<f64>> {
+        self.bands.iter().map(|b| b.shape(ar1)).collect()
+    }
+
+    fn weights(&self, shapes: &[Vector2<f64>], std_k: [f64; 2]) -> Option<Vec<Matrix2<f64>>> {
+        let variance = Vector2::from(std_k.map(|s| s * s));
+        self.bands.iter().zip(shapes).map(|(b, s)| b.information(&s.component_mul(&variance))).collect()
+    }
+
+    /// The weighted least-squares solution.
+    fn step(&self, shapes: &[Vector2<f64>], weights: &[Matrix2<f64>]) -> Option<JointLevels> {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for ((band, shape), weight) in self.bands.iter().zip(shapes).zip(weights) {
+            let design = Matrix2::from_diagonal(shape);
+            normal += design * weight * design;
+            right += design * weight * band.moments;
+        }
+        let covariance = normal.try_inverse()?;
+        let mut found = covariance * right;
+        let mut is_held = [false; 2];
+        for i in 0..2 {
+            let other = 1 - i;
+            if found[i] < LEAST_SHARE * LEAST_SHARE * found[other] {
+                // The other one alone explains the moments.
+                found[other] = right[other] / normal[(other, other)];
+                found[i] = LEAST_SHARE * LEAST_SHARE * found[other];
+                is_held[i] = true;
+                break;
+            }
+        }
+        if !(found.min() > 0.0 && found.max().is_finite()) {
+            return None;
+        }
+        let misfit = self.bands.iter().zip(shapes).zip(weights).map(|((band, shape), weight)| {
+            let left = band.moments - shape.component_mul(&found);
+            left.dot(&(weight * left))
+        });
+        Some(JointLevels {
+            std_k: [found[0].sqrt(), found[1].sqrt()],
+            covariance_k4: [[covariance[(0, 0)], covariance[(0, 1)]], [covariance[(1, 0)], covariance[(1, 1)]]],
+            is_held,
+            misfit: misfit.sum(),
+        })
+    }
+}
+
+impl Band {
+    fn of(bins: &[(f64, Vector2<f64>, f64, f64)], filters: &[Vec<f64>; 2]) -> Self {
+        let count = bins.len() as f64;
+        let gain = |filter: &[f64], turn: Complex<f64>| {
+            filter.iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr()
+        };
+        Self {
+            moments: bins.iter().map(|b| b.1).sum::<Vector2<f64>>() / count,
+            gas: (bins.iter().map(|b| b.2).sum::<f64>() / count).max(0.0),
+            weight: count / SHARED,
+            bins: bins
+                .iter()
+                .map(|b| {
+                    let turn = Complex::from_polar(1.0, std::f64::consts::TAU * b.0);
+                    (turn.re, [gain(&filters[0], turn), gain(&filters[1], turn)])
+                })
+                .collect(),
+        }
+    }
+
+    /// Noise of unit variance in each inferred input, mean over the band.
+    fn shape(&self, ar1: [f64; 2]) -> Vector2<f64> {
+        let colour = |phi: f64, cosine: f64| (1.0 - phi * phi) / (1.0 + phi * phi - 2.0 * phi * cosine);
+        let mean = |i: usize| -> f64 {
+            self.bins.iter().map(|(cosine, gain)| gain[i] * colour(ar1[i], *cosine)).sum::<f64>()
+                / self.bins.len() as f64
+        };
+        Vector2::new(mean(0), mean(1))
+    }
+
+    /// Inverse covariance of the two moments where the noises have powers `noise`, all Gaussian.
+    ///
+    /// With `p = x + n1`, `u = n1 − n2`: `Var Re(p u*) = ½ (⟨|p|²⟩⟨|u|²⟩ + ⟨n1²⟩²)`, likewise for the other, and covariance
+    /// `−½ (⟨x²⟩⟨|u|²⟩ − ⟨n1²⟩⟨n2²⟩)`, over the number of bins.
+    fn information(&self, noise: &Vector2<f64>) -> Option<Matrix2<f64>> {
+        let (n1, n2, gas) = (noise[0], noise[1], self.gas);
+        let both = n1 + n2;
+        let shared = -(gas * both - n1 * n2);
+        let covariance = Matrix2::new((gas + n1) * both + n1 * n1, shared, shared, (gas + n2) * both + n2 * n2);
+        (covariance * (0.5 / self.weight)).try_inverse()
+    }
+}

@@ -1,0 +1,302 @@
+//! The whitened cost in a hundred terms instead of thousands: bins gathered into bands once, before any evaluation.
+//!
+//! All that depends on data in the spectral cost is quadratic in a few series per bin, `D_i,j D_k,j`, and all that depends on
+//! the parameters is smooth in `x = cos w`. So in each band the function `1/λ(x)`, `λ = α + β x`, is interpolated at
+//! [`NODES`] Chebyshev points `x_q`: with `L_q` Lagrange's polynomials, `Σ_j (D_i D_k)_j/λ_j ≈ Σ_q G_ik,q/λ(x_q)`,
+//! `G_ik,q = Σ_j L_q(x_j) (D_i D_k)_j`. The same sum over points, of which there are about a hundred whatever the length of
+//! the record. Bands with no more bins than points keep their bins.
+//!
+//! The error is known exactly: interpolating `1/λ` leaves the relative error `Π_q β (x − x_q)/λ(x_q)`, at most
+//! `ε = 2 (|β| h/2)^Q / Π_q λ(x_q)` in a band of half width `h`. Bands are a factor of two wide in `1 − x`, so `ε ≤ 5.1e-5`
+//! (`1/T₆(3)`) whatever the parameters, and far less where noise is white in the band. [`shift_bound`] turns it into a bound on
+//! what the minimum can move.
+
+use num_dual::DualSVec64;
+
+use crate::parameters::Pair;
+use crate::spectral::{Sloped, Sums, Weights};
+use crate::transform::{Plan, Transformed};
+use crate::whitened::Model;
+
+/// Points in each band.
+const NODES: usize = 6;
+/// Width of a band in `1 − cos w`.
+const RATIO: f64 = 2.0;
+
+/// How the bins of a segment are gathered. Depends on its length alone.
+pub(crate) struct Bands {
+    bands: Vec<Band>,
+    /// `cos w` at the points of all bands.
+    nodes: Vec<f64>,
+    /// Lagrange's polynomials at the bins of the bands that are interpolated, in order.
+    lagrange: Vec<[f64; NODES]>,
+    /// How many bins each point stands for: Lagrange's polynomials summed.
+    counts: Vec<f64>,
+}
+
+#[derive(Clone, Copy)]
+struct Band {
+    first_bin: usize,
+    bins: usize,
+    first_node: usize,
+    /// Half width in `cos w`; 0 for a band that is a single bin, kept as it is.
+    half_width: f64,
+}
+
+impl Bands {
+    fn new(cosines: &[f64]) -> Self {
+        let mut out = Self { bands: Vec::new(), nodes: Vec::new(), lagrange: Vec::new(), counts: Vec::new() };
+        let mut first_bin = 0;
+        while first_bin < cosines.len() {
+            let edge = RATIO * (1.0 - cosines[first_bin]);
+            let bins = cosines[first_bin..].partition_point(|x| 1.0 - x <= edge).max(1);
+            let first_node = out.nodes.len();
+            if bins <= NODES {
+                out.bands.push(Band { first_bin, bins: 1, first_node, half_width: 0.0 });
+                out.nodes.push(cosines[first_bin]);
+                out.counts.push(1.0);
+                first_bin += 1;
+                continue;
+            }
+            let (high, low) = (cosines[first_bin], cosines[first_bin + bins - 1]);
+            let (middle, half_width) = (0.5 * (high + low), 0.5 * (high - low));
+            let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES as f64;
+            let unit: [f64; NODES] = std::array::from_fn(|q| angle(q).cos());
+            out.nodes.extend(unit.iter().map(|c| middle + half_width * c));
+            out.bands.push(Band { first_bin, bins, first_node, half_width });
+            let mut counts = [0.0; NODES];
+            for x in &cosines[first_bin..first_bin + bins] {
+                let at = (x - middle) / half_width;
+                let lagrange: [f64; NODES] = std::array::from_fn(|q| {
+                    (0..NODES).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
+                });
+                (0..NODES).for_each(|q| counts[q] += lagrange[q]);
+                out.lagrange.push(lagrange);
+            }
+            out.counts.extend(counts);
+            first_bin += bins;
+        }
+        out
+    }
+
+    pub(crate) fn of(plan: &Plan) -> &Self {
+        plan.bands.get_or_init(|| Self::new(&plan.cosines))
+    }
+
+    /// Points `x = cos w` and how many bins each stands for: `Σ_j f(x_j)` over all bins, for an `f` that is smooth in `x`.
+    pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64)> {
+        self.nodes.iter().copied().zip(self.counts.iter().copied())
+    }
+}
+
+/// Products of the first `T` series, upper triangle.
+const fn pairs(series: usize) -> usize {
+    series * (series + 1) / 2
+}
+
+/// One segment, compressed: for each product of two series, its sums at the points.
+#[derive(Clone, Debug)]
+pub(crate) struct Compressed {
+    /// `[pair][node]`, pairs in the order `(0,0), (0,1), (1,1), (0,2), …`.
+    gram: Vec<Vec<f64>>,
+}
+
+impl Compressed {
+    /// The products of the first three series, or of all five.
+    pub(crate) fn new(segment: &Transformed, series: usize) -> Self {
+        match series {
+            3 => Self { gram: gather::<3, { pairs(3) }>(segment) },
+            _ => Self { gram: gather::<5, { pairs(5) }>(segment) },
+        }
+    }
+
+    /// Whether gain and offset are served as well.
+    pub(crate) fn has_calibration(&self) -> bool {
+        self.gram.len() > pairs(3)
+    }
+
+    /// Adds this segment to `sums`.
+    pub(crate) fn accumulate<const P: usize>(
+        &self,
+        segment: &Transformed,
+        model: &Model,
+        pair: &Pair<DualSVec64<P>>,
+        sums: &mut Sums<P>,
+    ) {
+        let weights = Weights::new(model, pair, segment.period_s);
+        match P {
+            2 => self.accumulate_pairs::<P, { pairs(3) }>(segment, &weights, sums),
+            _ => self.accumulate_pairs::<P, { pairs(5) }>(segment, &weights, sums),
+        }
+    }
+
+    fn accumulate_pairs<const P: usize, const G: usize>(
+        &self,
+        segment: &Transformed,
+        weights: &Weights<P>,
+        sums: &mut Sums<P>,
+    ) {
+        let nodes = &Bands::of(&segment.plan).nodes[..];
+        let gram: [&[f64]; G] = std::array::from_fn(|g| &self.gram[g][..nodes.len()]);
+        let forms = Forms::<P, G>::new(&weights.parts);
+        for (j, &x) in nodes.iter().enumerate() {
+            let at: [f64; G] = std::array::from_fn(|g| gram[g][j]);
+            let terms = forms.at(&at, weights, x);
+            sums.squares += terms.squares;
+            for p in 0..P {
+                sums.gradient[p] += terms.gradient[p];
+                for q in p..P {
+                    sums.normal[p][q] += terms.normal[p][q];
+                }
+            }
+        }
+    }
+
+    /// Bounds on what compression changes of half the gradient, added up over this segment.
+    pub(crate) fn gradient_error<const P: usize>(
+        &self,
+        segment: &Transformed,
+        model: &Model,
+        pair: &Pair<DualSVec64<P>>,
+        out: &mut [f64; P],
+    ) {
+        let weights = Weights::new(model, pair, segment.period_s);
+        match P {
+            2 => self.gradient_error_of_pairs::<P, { pairs(3) }>(segment, &weights, out),
+            _ => self.gradient_error_of_pairs::<P, { pairs(5) }>(segment, &weights, out),
+        }
+    }
+
+    /// With `J_j (1 + ε_j)` in place of `J_j = r_j²`: `½ ∂(J ε) = r ∂r ε + ½ J ε ∂ ln ε`, Cauchy's inequality for the first
+    /// over a band, and `∂ ln ε = Σ_q ∂ ln(β/λ_q)`, the same for all its bins.
+    fn gradient_error_of_pairs<const P: usize, const G: usize>(
+        &self,
+        segment: &Transformed,
+        weights: &Weights<P>,
+        out: &mut [f64; P],
+    ) {
+        let bands = Bands::of(&segment.plan);
+        let forms = Forms::<P, G>::new(&weights.parts);
+        let beta = &weights.beta;
+        for band in bands.bands.iter().filter(|b| b.half_width > 0.0) {
+            let mut sums = Sums::<P>::ZERO;
+            let mut epsilon = 2.0;
+            let mut slope = [0.0; P];
+            for j in band.first_node..band.first_node + NODES {
+                let x = bands.nodes[j];
+                let at: [f64; G] = std::array::from_fn(|g| self.gram[g][j]);
+                let terms = forms.at(&at, weights, x);
+                let lambda = weights.alpha.0 + beta.0 * x;
+                sums.squares += terms.squares;
+                epsilon *= 0.5 * (beta.0 * band.half_width / lambda).abs();
+                for p in 0..P {
+                    sums.normal[p][p] += terms.normal[p][p];
+                    slope[p] += beta.1[p] / beta.0 - (weights.alpha.1[p] + beta.1[p] * x) / lambda;
+                }
+            }
+            for p in 0..P {
+                let along = (sums.squares.abs() * sums.normal[p][p].abs()).sqrt();
+                out[p] += epsilon * (along + 0.5 * sums.squares.abs() * slope[p].abs());
+            }
+        }
+    }
+}
+
+/// `G` sums over the bins at each point, for the products of `T` series.
+fn gather<const T: usize, const G: usize>(segment: &Transformed) -> Vec<Vec<f64>> {
+    let bands = Bands::of(&segment.plan);
+    let all = segment.parts();
+    let n = segment.len();
+    let series: [&[f64]; T] = std::array::from_fn(|i| &all[i][..n]);
+    let products = |j: usize| -> [f64; G] {
+        let d: [f64; T] = std::array::from_fn(|i| series[i][j]);
+        let mut out = [0.0; G];
+        let mut g = 0;
+        for i in 0..T {
+            for k in 0..=i {
+                out[g] = d[i] * d[k];
+                g += 1;
+            }
+        }
+        out
+    };
+    let mut gram = vec![vec![0.0; bands.nodes.len()]; G];
+    let mut lagrange = bands.lagrange.iter();
+    for band in &bands.bands {
+        if band.half_width == 0.0 {
+            for (row, product) in gram.iter_mut().zip(products(band.first_bin)) {
+                row[band.first_node] = product;
+            }
+            continue;
+        }
+        let mut sums = [[0.0; NODES]; G];
+        for (j, weights) in (band.first_bin..band.first_bin + band.bins).zip(&mut lagrange) {
+            let products = products(j);
+            for g in 0..G {
+                for q in 0..NODES {
+                    sums[g][q] += products[g] * weights[q];
+                }
+            }
+        }
+        for (row, sums) in gram.iter_mut().zip(&sums) {
+            row[band.first_node..band.first_node + NODES].copy_from_slice(sums);
+        }
+    }
+    gram
+}
+
+/// `U²`, `U ∂_p U` and `∂_p U ∂_q U` as linear forms in the products of the series.
+struct Forms<const P: usize, const G: usize> {
+    value: [f64; G],
+    first: [[f64; G]; P],
+    second: [[[f64; G]; P]; P],
+}
+
+impl<const P: usize, const G: usize> Forms<P, G> {
+    fn new(weights: &[Sloped<P>; 5]) -> Self {
+        let mut out = Self { value: [0.0; G], first: [[0.0; G]; P], second: [[[0.0; G]; P]; P] };
+        let mut g = 0;
+        for i in 0..5 {
+            for k in 0..=i {
+                if g == G {
+                    return out;
+                }
+                // A product of two different series stands for both of its orders.
+                let product = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| {
+                    if i == k { a(i) * b(i) } else { a(i) * b(k) + a(k) * b(i) }
+                };
+                let value = |i: usize| weights[i].0;
+                out.value[g] = product(&value, &value);
+                for p in 0..P {
+                    let slope = |i: usize| weights[i].1[p];
+                    out.first[p][g] = product(&value, &slope);
+                    for q in p..P {
+                        out.second[p][q][g] = product(&slope, &|i| weights[i].1[q]);
+                    }
+                }
+                g += 1;
+            }
+        }
+        out
+    }
+
+    /// The terms of `Σ r²/2`'s value, gradient and Gauss-Newton matrix at a point `x` with products `gram`.
+    #[inline]
+    fn at(&self, gram: &[f64; G], weights: &Weights<P>, x: f64) -> Sums<P> {
+        let dot = |form: &[f64; G]| -> f64 { (0..G).map(|g| form[g] * gram[g]).sum() };
+        let inverse = 1.0 / (weights.alpha.0 + weights.beta.0 * x);
+        let value = dot(&self.value) * inverse;
+        // ∂ ln √λ
+        let pull: [f64; P] = std::array::from_fn(|p| 0.5 * (weights.alpha.1[p] + weights.beta.1[p] * x) * inverse);
+        let first: [f64; P] = std::array::from_fn(|p| dot(&self.first[p]) * inverse);
+        let mut out = Sums { squares: value, gradient: [0.0; P], normal: [[0.0; P]; P] };
+        for p in 0..P {
+            out.gradient[p] = first[p] - value * pull[p];
+            for q in p..P {
+                let second = dot(&self.second[p][q]) * inverse;
+                out.normal[p][q] = second - first[p] * pull[q] - first[q] * pull[p] + value * pull[p] * pull[q];
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,134 @@
+//! Sine transforms of a segment, and what depends on its length alone.
+//!
+//! The sine transform of type I of a channel and of the channel one sample later both follow from *one* Fourier transform of
+//! the channel padded with as many zeros: with `N` samples, `w_j = π j/N` and `Y_j = Σ_m y[m] e^(−i w_j m)`,
+//!
+//! ```text
+//! Σ_k y[k+1] sin(w_j (k+1)) = −Im Y_j            k = 0 … N−2
+//! Σ_k y[k]   sin(w_j (k+1)) = −cos w_j Im Y_j + sin w_j Re Y_j
+//! ```
+//!
+//! the last since `sin(w_j N) = 0`. Two real transforms serve both channels.
+
+use std::cell::RefCell;
+use std::sync::{Arc, OnceLock};
+
+use realfft::num_complex::Complex;
+use realfft::{RealFftPlanner, RealToComplex};
+
+use crate::compressed::Bands;
+use crate::readings::{Segment, Steps};
+
+/// Lengths whose plans are kept by each thread.
+const KEPT: usize = 4;
+
+/// What the transforms of all segments of one length share.
+pub(crate) struct Plan {
+    samples: usize,
+    fourier: Arc<dyn RealToComplex<f64>>,
+    /// `cos w_j`, `j = 1 … N−1`.
+    pub(crate) cosines: Vec<f64>,
+    sines: Vec<f64>,
+    /// The transform of ones.
+    ones: OnceLock<Vec<f64>>,
+    /// How bins are gathered into bands.
+    pub(crate) bands: OnceLock<Bands>,
+}
+
+impl std::fmt::Debug for Plan {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Plan({} samples)", self.samples)
+    }
+}
+
+impl Plan {
+    /// The plan for `samples`, from this thread's store where it is kept.
+    pub(crate) fn of(samples: usize) -> Arc<Self> {
+        thread_local! {
+            static STORE: RefCell<(RealFftPlanner<f64>, Vec<Arc<Plan>>)> = RefCell::new((RealFftPlanner::new(), Vec::new()));
+        }
+        STORE.with_borrow_mut(|(planner, kept)| {
+            if let Some(place) = kept.iter().position(|p| p.samples == samples) {
+                kept[..=place].rotate_right(1);
+            } else {
+                kept.truncate(KEPT - 1);
+                kept.insert(0, Arc::new(Self::new(samples, planner.plan_fft_forward(2 * samples))));
+            }
+            kept[0].clone()
+        })
+    }
+
+    fn new(samples: usize, fourier: Arc<dyn RealToComplex<f64>>) -> Self {
+        let angles = (1..samples).map(|j| std::f64::consts::PI * j as f64 / samples as f64);
+        let (sines, cosines) = angles.map(f64::sin_cos).unzip();
+        Self { samples, fourier, cosines, sines, ones: OnceLock::new(), bands: OnceLock::new() }
+    }
+
+    fn scale(&self) -> f64 {
+        (2.0 / self.samples as f64).sqrt()
+    }
+
+    /// `√(2/N) Σ_k sin(w_j (k + 1))`: `cot(w_j/2)` for odd `j`, nothing for even.
+    pub(crate) fn ones(&self) -> &[f64] {
+        self.ones.get_or_init(|| {
+            let bin = |j: usize| {
+                if j % 2 == 0 {
+                    0.0
+                } else {
+                    (0.5 * std::f64::consts::PI * j as f64 / self.samples as f64).tan().recip()
+                }
+            };
+            (1..self.samples).map(|j| self.scale() * bin(j)).collect()
+        })
+    }
+}
+
+/// One evenly sampled segment, transformed: `T_i` channel `i` without its last sample, `S_i` without its first.
+#[derive(Clone, Debug)]
+pub(crate) struct Transformed {
+    pub(crate) period_s: f64,
+    pub(crate) plan: Arc<Plan>,
+    /// `T1 − T2`.
+    pub(crate) difference: Vec<f64>,
+    /// `S1 − T1` and `S2 − T2`: what changes from sample to sample.
+    pub(crate) change: [Vec<f64>; 2],
+    /// `T2`.
+    pub(crate) second: Vec<f64>,
+}
+
+impl Transformed {
+    /// `None` if the segment is unevenly sampled.
+    pub(crate) fn new(segment: &Segment) -> Option<Self> {
+        let Steps::Even(period_s) = *segment.steps() else { return None };
+        let plan = Plan::of(segment.len());
+        let (mut padded, mut spectrum) = (plan.fourier.make_input_vec(), plan.fourier.make_output_vec());
+        let mut scratch = plan.fourier.make_scratch_vec();
+        let mut transform = |y: &[f64]| {
+            padded[..y.len()].copy_from_slice(y);
+            padded[y.len()..].fill(0.0);
+            plan.fourier
+                .process_with_scratch(&mut padded, &mut spectrum, &mut scratch)
+                .expect("buffers are those of the plan");
+            let scale = plan.scale();
+            let both = |(y, (cosine, sine)): (&Complex<f64>, (&f64, &f64))| {
+                let without_last = scale * (sine * y.re - cosine * y.im);
+                (without_last, -scale * y.im - without_last)
+            };
+            spectrum[1..].iter().zip(plan.cosines.iter().zip(&plan.sines)).map(both).unzip()
+        };
+        let (first, change1): (Vec<f64>, Vec<f64>) = transform(segment.y1());
+        let (second, change2): (Vec<f64>, Vec<f64>) = transform(segment.y2());
+        let difference = first.iter().zip(&second).map(|(a, b)| a - b).collect();
+        Some(Self { period_s, plan, difference, change: [change1, change2], second })
+    }
+
+    /// Bins of this segment.
+    pub(crate) fn len(&self) -> usize {
+        self.difference.len()
+    }
+
+    /// What `u` is made of in each bin: three series at unity gain, five with gain and offset.
+    pub(crate) fn parts(&self) -> [&[f64]; 5] {
+        [&self.difference, &self.change[0], &self.change[1], &self.second, self.plan.ones()]
+    }
+}
