@@ -45,7 +45,7 @@ fn costs(readings: &Readings, noise_std: [f64; 2], theta: &[f64; 2]) -> [f64; 4]
     let whitened = |form| Whitened::with_form(readings, Discretisation::ZeroOrderHold, noise_std, form).expect("valid");
     let [spectral, banded] = [Form::Spectral, Form::Banded].map(|form| {
         let cost = whitened(form);
-        cost.evaluate(theta).value / cost.terms() as f64
+        cost.evaluate(theta).value / cost.terms(theta) as f64
     });
     // 2499 terms whose covariance has a condition of (2τ/Ts)² = 1.4e4.
     assert!((spectral / banded - 1.0).abs() < 1e-10, "spectral form {spectral}, banded form {banded}");

@@ -1,105 +1,67 @@
-//! How long a fit takes, beside the SciPy script that a user would otherwise write: same record, same cost, same start, same
-//! minimum, in one run.
+//! How long a fit and a trial take (Criterion, `benches/fits.rs`), the fits beside the SciPy script that a user would otherwise
+//! write: same record, same cost, same start, same minimum, in one run.
 
-use std::hint::black_box;
+use std::fs;
+use std::ops::ControlFlow;
 use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
-use twinlag::bias::{Compensated, Noise};
-use twinlag::cross_relation::{CostValue, CrossRelation, Readings, Whitened};
-use twinlag::optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Variable};
-use twinlag::record::{Record, Selection};
-use twinlag::sensor::Discretisation;
-use twinlag::{Hold, Options, characterise};
+use clap::Args;
+use twinlag_experiment::{Experiment, Plan};
+use twinlag_study::Options;
 
 use crate::root;
 
-/// What the SciPy script starts from, discards, and is told.
-const START_S: [f64; 2] = [0.01, 0.05];
-const DISCARD: usize = 300;
 const NOISE_STD_K: f64 = 0.583_363_094_478_901_8;
 /// Fits that the script averages over.
 const SCIPY_FITS: usize = 20;
-/// Agreement of the minima, relative.
-const SAME: f64 = 1e-6;
+/// What the compensated and the plain fit reach on this record, s; the reference tests hold them to 1e-6.
+const MINIMA: &str = "the reference tests hold both minima to 1e-6";
 
-/// A cost of two time constants, as the optimiser takes it.
-struct OfTwo<F>(F);
-
-impl<F: Fn(&[f64; 2]) -> CostValue<2>> Cost for OfTwo<F> {
-    fn value(&self, x: &[f64]) -> f64 {
-        self.0(&[x[0], x[1]]).value
-    }
-
-    fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
-        let c = self.0(&[x[0], x[1]]);
-        Some(Derivatives {
-            value: c.value,
-            gradient: c.gradient.to_vec(),
-            curvature: c.hessian.iter().map(|row| row.to_vec()).collect(),
-        })
-    }
+#[derive(Args)]
+pub(crate) struct Bench {
+    /// Also runs the study of a million trials, and says how long it takes and how much memory.
+    #[arg(long)]
+    million: bool,
+    /// Trials of that study, in place of a million.
+    #[arg(long, requires = "million")]
+    trials: Option<u64>,
 }
 
-fn fit(cost: impl Fn(&[f64; 2]) -> CostValue<2>, period_s: f64, span_s: f64) -> Result<[f64; 2]> {
-    let cost = OfTwo(cost);
-    let variable = |name: &str| Variable::logarithmic(name, 0.2 * period_s, 10.0 * span_s);
-    let problem = Problem::new(&cost, vec![variable("T1"), variable("T2")])?;
-    let fit = Optimiser::default().minimise(&problem, &START_S, &Budget::default())?;
-    ensure!(fit.end == End::Converged, "the fit ended {:?}", fit.end);
-    Ok([fit.x[0], fit.x[1]])
-}
-
-/// Mean seconds per call over at least a second of calls, after a tenth of one.
-fn time<T>(mut call: impl FnMut() -> Result<T>) -> Result<(f64, T)> {
-    let mut last = call()?;
-    for least_s in [0.1, 1.0] {
-        let (start, mut calls) = (Instant::now(), 0);
-        while start.elapsed().as_secs_f64() < least_s {
-            last = black_box(call()?);
-            calls += 1;
-        }
-        if least_s == 1.0 {
-            return Ok((start.elapsed().as_secs_f64() / f64::from(calls), last));
-        }
+pub(crate) fn run(arguments: &Bench) -> Result<()> {
+    if arguments.million {
+        return million(arguments.trials);
     }
-    bail!("no call was timed")
-}
+    let status = Command::new("cargo")
+        .args(["bench", "--package", "xtask", "--bench", "fits", "--", "--noplot", "--quiet"])
+        .current_dir(root()?)
+        .status()
+        .context("cargo could not be started")?;
+    ensure!(status.success(), "the benchmarks failed");
+    let shown = [
+        ("fit-plain", "plain cross-relation, one fit"),
+        ("fit-compensated", "compensated, one fit"),
+        ("fit-whitened", "whitened, one fit"),
+        ("fit-whitened-all-bins", "whitened without compression, one fit"),
+        ("evaluate-all-bins", "whitened, one evaluation, all bins"),
+        ("evaluate-compressed", "whitened, one evaluation, compressed"),
+        ("estimate-everything-found", "whitened, noise and starts found, intervals"),
+        ("characterise", "characterise, all of it"),
+        ("noise-and-transforms", "noise of both channels and its transforms"),
+        ("trial", "one trial: simulate, fit, accumulate"),
+    ];
+    for (id, what) in shown {
+        println!("{what:45} {:>9.1} µs", 1e6 * mean_s(id)?);
+    }
+    println!(
+        "one trial takes {:.2} times its noise and transforms",
+        mean_s("trial")? / mean_s("noise-and-transforms")?
+    );
 
-pub(crate) fn run() -> Result<()> {
     let file = root()?.join("tests/data/sine_5pct.csv");
-    let record = Record::read(&file, &Selection::default())?;
-    let (y1, y2) = (&record.t1_c, &record.t2_c);
-    let (period_s, span_s) = (record.sampling.period_s, record.time_s[record.len() - 1]);
-
-    // Each fit starts from the raw channels, as the script's does from its arrays.
-    let (plain_s, plain) = time(|| {
-        let readings = Readings::even(y1, y2, period_s)?;
-        let cost = CrossRelation::new(&readings, DISCARD)?;
-        fit(|t| cost.evaluate(t), period_s, span_s)
-    })?;
-    let (compensated_s, compensated) = time(|| {
-        let readings = Readings::even(y1, y2, period_s)?;
-        let noise = [Noise::white(NOISE_STD_K)?, Noise::white(NOISE_STD_K)?];
-        let cost = Compensated::new(CrossRelation::new(&readings, DISCARD)?, noise);
-        fit(|t| cost.evaluate(t), period_s, span_s)
-    })?;
-    let (whitened_s, _) = time(|| {
-        let readings = Readings::even(y1, y2, period_s)?;
-        let cost = Whitened::new(&readings, Discretisation::ZeroOrderHold, [NOISE_STD_K; 2])?;
-        fit(|t| cost.evaluate(t), period_s, span_s)
-    })?;
-    let options = Options { hold: Hold::ZeroOrderHold, ..Options::default() };
-    let (whole_s, _) = time(|| Ok(characterise(&record, &options)?))?;
-    println!("{:34} {:>10.3} ms", "plain cross-relation, one fit", 1e3 * plain_s);
-    println!("{:34} {:>10.3} ms", "compensated, one fit", 1e3 * compensated_s);
-    println!("{:34} {:>10.3} ms", "whitened, one fit", 1e3 * whitened_s);
-    println!("{:34} {:>10.3} ms", "characterise, all of it", 1e3 * whole_s);
-
-    let script = root()?.join("xtask/bench/scipy_baseline.py");
     let output = Command::new("python3")
-        .arg(&script)
+        .arg(root()?.join("xtask/bench/scipy_baseline.py"))
         .arg(&file)
         .args([NOISE_STD_K.to_string(), SCIPY_FITS.to_string()])
         .output()
@@ -109,18 +71,58 @@ pub(crate) fn run() -> Result<()> {
         bail!("the SciPy script failed (pip install numpy scipy?): {}", why.lines().last().unwrap_or(""));
     }
     let text = String::from_utf8_lossy(&output.stdout);
-    for (name, ours_s, ours) in [("plain", plain_s, plain), ("compensated", compensated_s, compensated)] {
+    let theirs_s = |name: &str| -> Result<f64> {
         let line =
             text.lines().find(|l| l.starts_with(name)).with_context(|| format!("no line '{name}' in: {text}"))?;
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let number = |i: usize| -> Result<f64> { Ok(words.get(i).context("a shorter line")?.parse()?) };
-        let theirs_ms = number(1)?;
-        // The script prints six decimals of a second: the last of them, and what it stands for, may differ.
-        for (i, got) in ours.iter().enumerate() {
-            let want = number(4 + i)?;
-            ensure!((got - want).abs() < 0.5e-6 + SAME * want, "{name}: minimum at {got}, SciPy's at {want}");
-        }
-        println!("{name}: SciPy {theirs_ms:.3} ms, {:.0} times as long, same minimum", theirs_ms / (1e3 * ours_s));
+        Ok(1e-3 * line.split_whitespace().nth(1).context("a shorter line")?.parse::<f64>()?)
+    };
+    for (ours, theirs) in [("fit-plain", "plain"), ("fit-compensated", "compensated"), ("fit-whitened", "compensated")]
+    {
+        let (ours_s, theirs_s) = (mean_s(ours)?, theirs_s(theirs)?);
+        println!("{ours}: SciPy's {theirs} fit takes {:.2} ms, {:.0} times as long", 1e3 * theirs_s, theirs_s / ours_s);
     }
+    println!("{MINIMA}");
+    Ok(())
+}
+
+/// The mean time of a benchmark, s, as Criterion wrote it.
+fn mean_s(id: &str) -> Result<f64> {
+    let target = std::env::var("CARGO_TARGET_DIR").map_or(root()?.join("target"), Into::into);
+    let path = target.join("criterion").join(id).join("new/estimates.json");
+    let text = fs::read_to_string(&path).with_context(|| format!("{}", path.display()))?;
+    let estimates: serde_json::Value = serde_json::from_str(&text)?;
+    Ok(1e-9 * estimates["mean"]["point_estimate"].as_f64().context("a mean")?)
+}
+
+/// The study of a million trials.
+fn million(trials: Option<u64>) -> Result<()> {
+    let mut plan = Plan::from_toml(&fs::read_to_string(root()?.join("xtask/bench/million.toml"))?)?;
+    plan.trials = trials.unwrap_or(plan.trials);
+    let memory = || -> Option<f64> {
+        let text = fs::read_to_string("/proc/self/status").ok()?;
+        let line = text.lines().find(|l| l.starts_with("VmHWM"))?;
+        Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+    };
+    let experiment = Experiment::new(&plan)?;
+    let start = Instant::now();
+    let mut tenth = 0;
+    let part = twinlag_study::run(&experiment, &Options::default(), |p| {
+        if p.done * 10 / p.total > tenth {
+            tenth = p.done * 10 / p.total;
+            let peak = memory().map_or("unknown".into(), |m| format!("{m:.1} MB"));
+            eprintln!("{} trials, {:.1} s, peak memory {peak}", p.done, start.elapsed().as_secs_f64());
+        }
+        ControlFlow::Continue(())
+    })?;
+    let results = part.into_results()?;
+    let seconds = start.elapsed().as_secs_f64();
+    let threads = Options::default().threads;
+    let trials = results.cells()[0].trials();
+    println!(
+        "{trials} trials of {} samples in {seconds:.1} s on {threads} threads, {:.1} µs each on one; peak memory {}",
+        plan.samples[0],
+        1e6 * seconds * threads.get() as f64 / trials as f64,
+        memory().map_or("unknown".into(), |m| format!("{m:.1} MB"))
+    );
     Ok(())
 }

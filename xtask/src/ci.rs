@@ -15,7 +15,16 @@ pub(crate) fn run() -> Result<()> {
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
     step("the README's main job", "cargo", &["run", "--release", "--", "demo"])?;
     step("example: all estimators", "cargo", &["run", "--release", "-p", "twinlag", "--example", "characterise"])?;
-    step("example: a solver", "cargo", &["run", "--release", "-p", "twinlag-optimise", "--example", "compass"])?;
+    step("example: a solver of one's own", "cargo", &["run", "--release", "-p", "own-solver"])?;
+    step("example: a cost of one's own", "cargo", &["run", "--release", "-p", "own-cost"])?;
+    step("example: an estimator of one's own", "cargo", &["run", "--release", "-p", "own-estimator"])?;
+    let quick = root()?.join("target/quick-experiments");
+    if quick.exists() {
+        fs::remove_dir_all(&quick)?;
+    }
+    let start = Instant::now();
+    crate::experiment::quick(&quick)?;
+    println!("== experiments, two trials a cell: {:.0} s", start.elapsed().as_secs_f64());
     links()
 }
 

@@ -1,7 +1,8 @@
-//! Tasks of the repository: `cargo xtask ci`, `cargo xtask measured DIR`, `cargo xtask bench`.
+//! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask bench`.
 
 mod bench;
 mod ci;
+mod experiment;
 mod measured;
 
 use std::path::{Path, PathBuf};
@@ -26,15 +27,19 @@ enum Task {
         /// The folder. It is no part of the repository.
         dir: PathBuf,
     },
+    /// The Monte-Carlo experiments: list, run, check, merge.
+    #[command(subcommand)]
+    Experiment(experiment::Task),
     /// Times the fits, beside what a user would otherwise write where Python with SciPy is at hand.
-    Bench,
+    Bench(bench::Bench),
 }
 
 fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Ci => ci::run(),
         Task::Measured { dir } => measured::run(&dir),
-        Task::Bench => bench::run(),
+        Task::Bench(arguments) => bench::run(&arguments),
+        Task::Experiment(task) => experiment::run(task),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

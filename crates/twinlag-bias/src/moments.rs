@@ -10,11 +10,11 @@
 //! It needs the time constants, which need the levels: iterate.
 //!
 //! # Source
-//! Own derivation; docs, chapter "Theory", section 3.
+//! Own derivation; docs, chapter "Theory", section 5.
 
 use nalgebra::{Matrix2, Vector2};
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
+use realfft::{RealFftPlanner, RealToComplex};
 use twinlag_cross_relation::InferredInputs;
 
 /// Width of a band: this factor in frequency, and at least [`LEAST`] bins.
@@ -82,12 +82,8 @@ impl NoiseMoments {
             let window: Vec<f64> = (0..n).map(|k| 0.5 * (1.0 - angle(k).cos())).collect();
             let energy: f64 = window.iter().map(|w| w * w).sum();
             let plan = planner.plan_fft_forward(n);
-            let transform = |value: &dyn Fn(usize) -> f64| -> Vec<Complex<f64>> {
-                let mut input: Vec<f64> = (0..n).map(|k| window[k] * value(k)).collect();
-                let mut output = plan.make_output_vec();
-                plan.process(&mut input, &mut output).expect("buffers are those of the plan");
-                output
-            };
+            let transform =
+                |value: &dyn Fn(usize) -> f64| spectrum(&*plan, (0..n).map(|k| window[k] * value(k)).collect());
             let (first, difference) = (transform(&|k| f1[k] - mean), transform(&|k| f1[k] - f2[k]));
             // Neither the mean nor the bin at half the sampling rate has an independent imaginary part.
             for k in 1..n.div_ceil(2) {
@@ -182,6 +178,13 @@ impl NoiseMoments {
             misfit: misfit.sum(),
         })
     }
+}
+
+/// The Fourier transform of `input`, whose length is the plan's.
+fn spectrum(plan: &dyn RealToComplex<f64>, mut input: Vec<f64>) -> Vec<Complex<f64>> {
+    let mut output = plan.make_output_vec();
+    plan.process(&mut input, &mut output).expect("buffers are those of the plan");
+    output
 }
 
 impl Band {

@@ -3,10 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use twinlag::estimate::Bootstrap;
 use twinlag::record::{ColumnRef, SamplingChoice, Selection};
-use twinlag::{Estimator, Hold, Known, Options, optimise::Optimiser};
+use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise::Optimiser};
 
 use crate::failure::Failure;
+use crate::study::Study;
 
 /// Tells two temperature sensors' dynamics from their readings alone.
 ///
@@ -21,7 +23,8 @@ On a logger file:        twinlag characterise run.csv
 With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 For a script:            twinlag characterise run.csv --json
 
-Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 1 anything else."
+Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 75 try again (a shard of a
+study is missing), 1 anything else."
 )]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -50,9 +53,12 @@ impl Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Both time constants of a record, with intervals, noise levels and residual tests.
-    Characterise(Characterise),
+    Characterise(Box<Characterise>),
     /// A record from a described rig: gas, sensors, noise, converter.
     Simulate(Simulate),
+    /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
+    #[command(subcommand)]
+    Study(Study),
     /// Simulates an embedded rig and characterises it: no file needed.
     Demo(Demo),
 }
@@ -69,8 +75,9 @@ What the status says:
   at-bound           the best fit lies on a bound: no estimate
   model-rejected     more than noise is left over: two first-order lags do not explain the record
 
-Thermometers rarely agree at rest: if the model is rejected, try --free gain,offset first. A data-sheet value of one sensor
-often decides: --known T1.time_constant_s=0.5+-0.05.
+Thermometers rarely agree at rest: if the model is rejected, try --free gain,offset first, then --second-order T1,T2. A
+data-sheet value of one sensor often decides: --known T1.time_constant_s=0.5+-0.05. If the gas rests for a while, say when:
+--quiet-segment 0..2.5.
 
 Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
 pub(crate) struct Characterise {
@@ -133,27 +140,69 @@ impl Columns {
 #[command(next_help_heading = "Method")]
 pub(crate) struct Method {
     /// Noise standard deviations of the two channels in K, both positive; found from the data if left out.
-    #[arg(long, value_name = "S1,S2", value_parser = pair, allow_hyphen_values = true)]
+    #[arg(long, value_name = "S1,S2", value_parser = pair, allow_hyphen_values = true, help_heading = "Noise")]
     noise: Option<Pair>,
-    /// whitened, cross-relation, bias-compensated or normalised.
+    /// Ratio S2/S1 of the noise levels, where only that is known.
+    #[arg(long, value_name = "R", allow_hyphen_values = true, help_heading = "Noise")]
+    noise_ratio: Option<f64>,
+    /// A stretch in which the gas is at rest, in seconds from the start: noise is taken from its scatter. May be given several
+    /// times.
+    #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, help_heading = "Noise")]
+    quiet_segment: Vec<Stretch>,
+    /// What noise is like where it is found: white, or autoregressive (each sample carries a share of the last one's).
+    #[arg(long, value_name = "KIND", default_value = "white", help_heading = "Noise")]
+    noise_colour: NoiseColour,
+    /// whitened, cross-relation, bias-compensated, normalised, hybrid, difference-equation-ls, difference-equation-tls or
+    /// difference-equation-gtls.
     #[arg(long, value_name = "NAME", default_value = "whitened")]
     estimator: Estimator,
-    /// levenberg-marquardt, nelder-mead or l-bfgs.
-    #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt")]
+    #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt", help = optimisers())]
     optimiser: String,
     /// Relative calibration of channel 2 to fit as well: gain, offset or gain,offset.
     #[arg(long, value_name = "LIST")]
     free: Option<String>,
+    /// Sensors with a second lag in series, to fit as well: T1, T2 or T1,T2.
+    #[arg(long, value_name = "LIST")]
+    second_order: Option<String>,
     /// A parameter known beforehand, exactly or with a standard deviation; may be given once for each of
-    /// `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`.
+    /// `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`, `T1.second_time_constant_s`,
+    /// `T2.second_time_constant_s`.
     #[arg(long, value_name = "NAME=VALUE[+-SD]", allow_hyphen_values = true)]
     known: Vec<Known>,
-    /// Samples that the estimators other than whitened leave out at the start of each unbroken stretch.
+    /// Samples that the cross-relation, bias-compensated, normalised and hybrid estimators leave out at the start of each
+    /// unbroken stretch.
     #[arg(long, value_name = "K0")]
     discard: Option<usize>,
     /// What the gas does between samples: auto, zero-order-hold, first-order-hold or bilinear.
     #[arg(long, value_name = "HOW", default_value = "auto")]
     hold: Hold,
+    /// What 95 % intervals are made of: auto (standard errors, or the profile of the cost where these do not describe it),
+    /// profile, or bootstrap (the same estimator on simulated records).
+    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = ["auto", "profile", "bootstrap"])]
+    intervals: String,
+    /// Simulated records of the bootstrap, at least 39 [default: 199].
+    #[arg(long, value_name = "N")]
+    replicates: Option<usize>,
+    /// Seed of the bootstrap [default: 1].
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+fn optimisers() -> String {
+    let names: Vec<&str> = Optimiser::names().collect();
+    format!("One of {}", names.join(", "))
+}
+
+/// A stretch of time, in a type of its own for the same reason as [`Pair`].
+#[derive(Clone, Copy, Debug)]
+struct Stretch([f64; 2]);
+
+fn stretch(text: &str) -> Result<Stretch, String> {
+    let wrong = || format!("expected FROM..TO in seconds from the start, FROM the smaller, got '{text}'");
+    let (from, to) = text.split_once("..").ok_or_else(wrong)?;
+    let number = |text: &str| text.trim().parse::<f64>().ok().filter(|s| s.is_finite()).ok_or_else(wrong);
+    let (from_s, to_s) = (number(from)?, number(to)?);
+    if from_s < to_s { Ok(Stretch([from_s, to_s])) } else { Err(wrong()) }
 }
 
 /// Two numbers, in a type of their own: a list would mean an option given twice.
@@ -176,11 +225,37 @@ impl Method {
             optimiser: Optimiser::by_name(&self.optimiser).map_err(twinlag::Error::from)?,
             hold: self.hold,
             noise_std_k: self.noise.map(|pair| pair.0),
+            noise_ratio: self.noise_ratio,
+            quiet_segments_s: self.quiet_segment.iter().map(|s| s.0).collect(),
+            noise_colour: self.noise_colour,
             known: self.known.clone(),
             discard: self.discard,
+            intervals: self.intervals()?,
             ..Options::default()
         };
-        Ok(options.free(self.free.as_deref().unwrap_or(""))?)
+        let options = options.free(self.free.as_deref().unwrap_or(""))?;
+        Ok(options.second_order(self.second_order.as_deref().unwrap_or(""))?)
+    }
+
+    fn intervals(&self) -> Result<Intervals, Failure> {
+        let needs_bootstrap = |option: &str| {
+            Err(Failure::Usage(format!(
+                "{option} belongs to the bootstrap: add --intervals bootstrap, or leave it out"
+            )))
+        };
+        match (self.intervals.as_str(), self.replicates, self.seed) {
+            ("bootstrap", replicates, seed) => {
+                let usual = Bootstrap::default();
+                Ok(Intervals::Bootstrap(Bootstrap {
+                    replicates: replicates.unwrap_or(usual.replicates),
+                    seed: seed.unwrap_or(usual.seed),
+                }))
+            }
+            (_, Some(_), _) => needs_bootstrap("--replicates"),
+            (_, _, Some(_)) => needs_bootstrap("--seed"),
+            ("profile", ..) => Ok(Intervals::Profile),
+            _ => Ok(Intervals::Auto),
+        }
     }
 }
 

@@ -21,8 +21,9 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
 }
 
 pub(crate) fn characterise(record: &Record, options: &Options, talk: Talk) -> Result<Characterisation, Failure> {
-    let _progress = Progress::start(talk, format!("characterising {} samples", record.len()));
-    Ok(twinlag::characterise(record, options)?)
+    let progress = Progress::start(talk, format!("characterising {} samples", record.len()));
+    let watch = |done: usize, of: usize| progress.say(|| format!("bootstrap: {done} of {of} simulated records"));
+    Ok(twinlag::characterise_watched(record, options, &watch)?)
 }
 
 /// 0 for an answer; 4 where the data were read but do not give one.

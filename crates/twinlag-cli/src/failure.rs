@@ -10,6 +10,8 @@ pub(crate) enum Failure {
     Usage(String),
     File(String),
     Other(String),
+    /// It will work once something else has: a shard is missing.
+    NotYet(String),
 }
 
 impl Failure {
@@ -18,6 +20,7 @@ impl Failure {
             Self::Usage(_) => 2,
             Self::File(_) => 3,
             Self::Other(_) => 1,
+            Self::NotYet(_) => 75,
         }
     }
 }
@@ -25,7 +28,7 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(text) | Self::File(text) | Self::Other(text) => f.write_str(text),
+            Self::Usage(text) | Self::File(text) | Self::Other(text) | Self::NotYet(text) => f.write_str(text),
         }
     }
 }

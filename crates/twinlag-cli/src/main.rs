@@ -2,7 +2,8 @@
 //!
 //! The program is a thin face of the crate `twinlag`: it reads arguments, shows progress, prints answers. Data go to standard
 //! output, talk to standard error. Exit codes: 0 answered; 2 wrong usage; 3 the file cannot be used; 4 the data were read
-//! but the question cannot be answered (the answer, printed all the same, has a `status` that says why); 1 anything else.
+//! but the question cannot be answered (the answer, printed all the same, has a `status` that says why); 75 a shard of a study
+//! is missing; 1 anything else.
 
 mod arguments;
 mod characterise;
@@ -11,6 +12,7 @@ mod failure;
 mod print;
 mod progress;
 mod simulate;
+mod study;
 
 use std::process::ExitCode;
 
@@ -24,6 +26,7 @@ fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Characterise(command) => characterise::run(&command, talk),
         Command::Simulate(command) => simulate::run(&command, talk),
+        Command::Study(command) => study::run(&command, talk),
         Command::Demo(command) => demo::run(&command, talk),
     };
     match result {

@@ -3,8 +3,9 @@
 use std::io::{Write, stdout};
 
 use serde::Serialize;
+use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
-use twinlag::{Characterisation, IntervalMethod, SensorEstimate, Status};
+use twinlag::{Characterisation, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status};
 
 use crate::arguments::Talk;
 use crate::failure::Failure;
@@ -41,17 +42,21 @@ fn text(answer: &Characterisation) -> String {
     let width = answer.sensors.iter().map(|s| s.channel.chars().count()).max().unwrap_or(0);
     for sensor in &answer.sensors {
         lines.push(format!("  {:width$}  time constant {}", sensor.channel, time_constant(sensor)));
-        lines.push(format!("  {:width$}  noise {} K", "", digits(sensor.noise_std_k, 3)));
+        if let Some(lag) = &sensor.second_time_constant_s {
+            lines.push(format!("  {:width$}  second time constant {}", "", second_lag(lag)));
+        }
+        lines.push(format!("  {:width$}  noise {}", "", noise(sensor)));
     }
     let difference = &answer.time_constant_difference_s;
-    if let (Some(value), Some([low, high])) = (difference.value, difference.interval_95_s) {
+    if let Some(value) = difference.value {
         let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
-        let text = if value < 0.0 {
-            format!("  {a} faster than {b} by {}", interval(-value, -high, -low, " s"))
-        } else {
-            format!("  {a} slower than {b} by {}", interval(value, low, high, " s"))
+        let (how, size) = if value < 0.0 { ("faster", -value) } else { ("slower", value) };
+        let by = match difference.interval_95_s {
+            Some([low, high]) if value < 0.0 => interval(size, -high, -low, " s"),
+            Some([low, high]) => interval(size, low, high, " s"),
+            None => format!("{} s", digits(size, 4)),
         };
-        lines.push(text);
+        lines.push(format!("  {a} {how} than {b} by {by}"));
     }
     for (name, estimate, unit) in [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")] {
         if let Some(e) = estimate {
@@ -61,8 +66,10 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.push(String::new());
     let white = if answer.residual.white { "white" } else { "not white" };
-    let energy = answer.residual.chi2_per_dof.map_or("unknown".into(), |e| digits(e, 4));
-    lines.push(format!("residual: {energy} times the energy of the noise, {white}"));
+    lines.push(match answer.residual.chi2_per_dof {
+        Some(energy) => format!("residual: {} times the energy of the noise, {white}", digits(energy, 4)),
+        None => format!("residual: {white}"),
+    });
     for test in &answer.residual.tests {
         let p = if test.p_value < 1e-99 { "p < 1e-99".into() } else { format!("p = {:.2e}", test.p_value) };
         lines.push(format!("  {:12} statistic {:>9}  {p}", test.test, digits(test.statistic, 4)));
@@ -71,9 +78,13 @@ fn text(answer: &Characterisation) -> String {
         IntervalMethod::Information => "95 % intervals from the noise levels",
         IntervalMethod::ResidualSpectrum => "95 % intervals from the spectrum of the residual",
         IntervalMethod::Profile => "95 % intervals over all that the record allows",
+        IntervalMethod::Bootstrap => "95 % intervals from simulated records",
         IntervalMethod::None => "no intervals",
     };
-    lines.push(method.into());
+    let by_profile = answer.sensors.iter().filter(|s| s.interval_basis == Some(IntervalBasis::Profile));
+    let by_profile: Vec<&str> = by_profile.map(|s| s.channel.as_str()).collect();
+    let shape = if by_profile.is_empty() { String::new() } else { format!("; {} by profile", by_profile.join(", ")) };
+    lines.push(format!("{method}{shape}"));
     lines.push(format!("status: {}", status(answer.status)));
     if !answer.not_identifiable.is_empty() {
         lines.push(format!("this record cannot tell: {}", answer.not_identifiable.join(", ")));
@@ -99,6 +110,30 @@ fn time_constant(sensor: &SensorEstimate) -> String {
         (Some(value), None) if sensor.known => format!("{} s (given)", digits(value, 5)),
         _ => "not determined by this record".into(),
     }
+}
+
+fn second_lag(lag: &SecondLag) -> String {
+    match (lag.value, lag.interval_95) {
+        (Some(value), Some([low, high])) => interval(value, low, high, " s"),
+        (Some(value), None) => format!("{} s (given)", digits(value, 5)),
+        (None, Some([0.0, high])) => format!("not seen, at most {} s", digits(high, 3)),
+        (None, Some([low, high])) => format!("not determined, from {} to {} s", digits(low, 3), digits(high, 3)),
+        (None, None) => "not determined by this record".into(),
+    }
+}
+
+fn noise(sensor: &SensorEstimate) -> String {
+    let error = sensor.noise_standard_error_k.map_or(String::new(), |e| format!(" ± {}", digits(e, 2)));
+    let colour = sensor.noise_ar1.map_or(String::new(), |phi| format!(", autoregressive {phi:.2}"));
+    let source = match sensor.noise_from {
+        NoiseSource::Given => "given",
+        NoiseSource::QuietSegment => "quiet segment",
+        NoiseSource::ThirdDifferences => "third differences",
+        NoiseSource::InferredInputs => "inferred inputs",
+        NoiseSource::Residual => "residual",
+        _ => "unknown source",
+    };
+    format!("{}{error} K{colour} ({source})", digits(sensor.noise_std_k, 3))
 }
 
 fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {

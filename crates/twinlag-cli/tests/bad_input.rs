@@ -413,6 +413,97 @@ fn what_needs_the_whitened_estimator_says_so() {
 }
 
 #[test]
+fn nonsense_for_a_second_lag_is_wrong_usage() {
+    let bench = good("second_order");
+    for bad in ["T3", "T1,T3", "1", "T1;T2"] {
+        let want = ["--second-order", "expected T1, T2 or T1,T2", bad.rsplit(',').next().expect("one at least")];
+        bench.refuses(2, &["characterise", "run.csv", "--second-order", bad], &want);
+    }
+    let known = ["--known", "T1.second_time_constant_s=0.01"];
+    let both = [&FILE[..], &["--second-order", "T1"], &known].concat();
+    bench.refuses(2, &both, &["--known", "T1.second_time_constant_s=0.01", "--second-order", "+-SD"]);
+    let larger = [&FILE[..], &known, &["--known", "T1.time_constant_s=0.005"]].concat();
+    bench.refuses(2, &larger, &["--known", "smaller one", "0.005", "0.01"]);
+}
+
+#[test]
+fn nonsense_about_the_noise_is_wrong_usage() {
+    let bench = good("noise_options");
+    for bad in ["0", "-1", "nan", "inf", "two"] {
+        bench.refuses(2, &["characterise", "run.csv", &format!("--noise-ratio={bad}")], &["--noise-ratio", bad]);
+    }
+    bench.refuses(
+        2,
+        &["characterise", "run.csv", "--noise-colour", "pink"],
+        &["--noise-colour", "autoregressive", "pink"],
+    );
+    for bad in ["", "1", "2..1", "1..1", "a..b", "0..inf", "0-1"] {
+        let want = ["--quiet-segment", "expected FROM..TO in seconds", bad];
+        bench.refuses(2, &["characterise", "run.csv", &format!("--quiet-segment={bad}")], &want);
+    }
+    let want = ["--quiet-segment 5..6", "ends at 3.998 s", "10 samples"];
+    bench.refuses(2, &["characterise", "run.csv", "--quiet-segment", "5..6"], &want);
+    bench.refuses(
+        2,
+        &["characterise", "run.csv", "--quiet-segment", "1..1.01"],
+        &["--quiet-segment 1..1.01", "10 samples"],
+    );
+    for (further, word) in [
+        (["--noise-ratio", "1", "--noise", "1,1"], "--noise-ratio"),
+        (["--noise-ratio", "1", "--quiet-segment", "0..1"], "--noise-ratio"),
+        (["--noise-colour", "autoregressive", "--noise", "1,1"], "--noise-colour"),
+        (["--noise-colour", "autoregressive", "--noise-ratio", "1"], "--noise-colour"),
+    ] {
+        bench.refuses(2, &[&FILE[..], &further].concat(), &[word, "expected"]);
+    }
+}
+
+#[test]
+fn nonsense_about_intervals_is_wrong_usage() {
+    let bench = good("interval_options");
+    let bootstrap = ["--intervals", "bootstrap"];
+    bench.refuses(
+        2,
+        &[&FILE[..], &["--intervals", "magic"]].concat(),
+        &["--intervals", "magic", "bootstrap", "profile"],
+    );
+    bench.refuses(2, &[&FILE[..], &["--replicates", "99"]].concat(), &["--replicates", "add --intervals bootstrap"]);
+    bench.refuses(2, &[&FILE[..], &["--seed", "9"]].concat(), &["--seed", "add --intervals bootstrap"]);
+    bench.refuses(
+        2,
+        &[&FILE[..], &bootstrap, &["--replicates", "9"]].concat(),
+        &["--replicates", "at least 39", "\"9\""],
+    );
+    bench.refuses(
+        2,
+        &[&FILE[..], &bootstrap, &["--free", "gain"]].concat(),
+        &["--intervals", "--free", "auto or profile"],
+    );
+    let known = ["--known", "T2.gain=1"];
+    bench.refuses(2, &[&FILE[..], &bootstrap, &known].concat(), &["--intervals", "--known", "auto or profile"]);
+    let profile = ["--intervals", "profile", "--estimator", "hybrid"];
+    bench.refuses(2, &[&FILE[..], &profile].concat(), &["--intervals profile", "whitened", "hybrid"]);
+}
+
+#[test]
+fn what_has_no_part_in_a_closed_form_is_wrong_usage() {
+    let bench = good("closed_form");
+    for (option, value) in [("--free", "gain"), ("--second-order", "T1"), ("--known", "T1.time_constant_s=0.02")] {
+        for estimator in ["difference-equation-ls", "difference-equation-tls", "difference-equation-gtls"] {
+            let arguments = ["characterise", "run.csv", "--estimator", estimator, option, value];
+            bench.refuses(2, &arguments, &[option, estimator, "closed form", "leave it out"]);
+        }
+    }
+}
+
+#[test]
+fn what_needs_even_sampling_says_so() {
+    let bench = Bench::with("uneven", "run.csv", Trace { jitter: 0.3, ..Trace::GOOD }.csv());
+    bench.refuses(3, &[&FILE[..], &["--estimator", "difference-equation-gtls"]].concat(), &["even"]);
+    bench.refuses(3, &[&FILE[..], &["--intervals", "bootstrap"]].concat(), &["even"]);
+}
+
+#[test]
 fn no_command_no_file_and_unknown_options_are_wrong_usage() {
     let bench = good("usage");
     for (arguments, word) in [
@@ -742,7 +833,7 @@ fn no_estimator_makes_an_answer_of_white_noise() {
     let bench = Bench::new("white_published");
     for seed in 0..4 {
         bench.write("run.csv", Trace { gas: Gas::Still, noise_k: [1.0, 1.0], seed, ..Trace::GOOD }.csv());
-        for estimator in ["cross-relation", "bias-compensated", "normalised"] {
+        for estimator in ["cross-relation", "bias-compensated", "normalised", "hybrid", "difference-equation-gtls"] {
             bench.characterise("run.csv", &["--estimator", estimator]).status(&UNKNOWN);
         }
     }

@@ -2,15 +2,21 @@
 //!
 //! Noise of `u` is a moving average, `V[k,m] = Σ_i s_i² Σ_j c_i,k[j] c_i,m[j + k − m]`. With `V = L Lᵀ` the residual
 //! `r = L⁻¹ u` is white at the true parameters. Factor and residual are built in one sweep that keeps `q` rows, and exact
-//! derivatives ride along as dual numbers: `O(N q²)`.
+//! derivatives ride along as dual numbers: `O(N q²)`. With even steps the factor settles, geometrically and to the last digit,
+//! as the start of the record is forgotten; from there on a row costs what its residual does.
 
 use num_dual::{DualNum, DualSVec64};
 
 use crate::inverse::{Row, row};
-use crate::parameters::Pair;
+use crate::parameters::{Pair, parts};
 use crate::polynomial::LONGEST;
 use crate::readings::{Segment, Steps};
 use crate::whitened::Model;
+
+/// Relative difference that rounding makes.
+const SAME: f64 = 4.0 * f64::EPSILON;
+/// Rows that must agree with the one before before the factor counts as settled.
+const AGREEING: usize = LONGEST;
 
 /// Calls `visit` with each whitened residual of `segment`, in order of time.
 pub(crate) fn sweep<const P: usize>(
@@ -49,6 +55,7 @@ pub(crate) fn sweep<const P: usize>(
     let mut rows = [first; 2];
     let mut factors = [[zero; LONGEST]; LONGEST];
     let mut residuals = [zero; LONGEST];
+    let mut agreeing = 0;
     for k in 0..(y1.len() + 1).saturating_sub(width) {
         if let Steps::Uneven(steps) = segment.steps() {
             // One-step inverses alone take uneven steps, and these look one row back.
@@ -59,6 +66,18 @@ pub(crate) fn sweep<const P: usize>(
         let mut u = zero;
         for j in 0..width {
             u += d1[j] * y1[k + j] - d2[j] * (-pair.offset + y2[k + j]);
+        }
+
+        if agreeing >= AGREEING {
+            let mut residual = u;
+            for lag in 1..=band {
+                residual -= factors[0][lag] * residuals[lag - 1];
+            }
+            residual /= factors[0][0];
+            visit(residual);
+            residuals[..=band].rotate_right(1);
+            residuals[0] = residual;
+            continue;
         }
 
         // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the older ones.
@@ -79,9 +98,21 @@ pub(crate) fn sweep<const P: usize>(
         residual /= factor[0];
         visit(residual);
 
+        agreeing = if is_even && k > band && agree(&factor, &factors[0]) { agreeing + 1 } else { 0 };
         factors[..=band].rotate_right(1);
         residuals[..=band].rotate_right(1);
         factors[0] = factor;
         residuals[0] = residual;
     }
+}
+
+/// Whether two rows of the factor are the same to rounding, derivatives included.
+fn agree<const P: usize>(now: &[DualSVec64<P>; LONGEST], before: &[DualSVec64<P>; LONGEST]) -> bool {
+    let parts = |row: &[DualSVec64<P>; LONGEST]| row.map(parts);
+    let (now, before) = (parts(now), parts(before));
+    let size = now[0].0;
+    let slope = |p: usize| now.iter().map(|x| x.1[p].abs()).fold(0.0, f64::max);
+    now.iter()
+        .zip(&before)
+        .all(|(a, b)| (a.0 - b.0).abs() <= SAME * size && (0..P).all(|p| (a.1[p] - b.1[p]).abs() <= SAME * slope(p)))
 }

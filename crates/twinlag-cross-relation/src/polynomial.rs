@@ -34,7 +34,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Polynomial<D> {
     }
 
     pub(crate) fn scaled(mut self, by: D) -> Self {
-        self.coefficients[..self.len].iter_mut().for_each(|c| *c = *c * by);
+        self.coefficients[..self.len].iter_mut().for_each(|c| *c *= by);
         self
     }
 
@@ -42,7 +42,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Polynomial<D> {
         let mut out = Self { coefficients: [D::from(0.0); LONGEST], len: self.len + other.len - 1 };
         for (i, &a) in self.as_slice().iter().enumerate() {
             for (j, &b) in other.as_slice().iter().enumerate() {
-                out.coefficients[i + j] = out.coefficients[i + j] + a * b;
+                out.coefficients[i + j] += a * b;
             }
         }
         out

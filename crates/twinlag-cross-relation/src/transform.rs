@@ -72,7 +72,7 @@ impl Plan {
     pub(crate) fn ones(&self) -> &[f64] {
         self.ones.get_or_init(|| {
             let bin = |j: usize| {
-                if j % 2 == 0 {
+                if j.is_multiple_of(2) {
                     0.0
                 } else {
                     (0.5 * std::f64::consts::PI * j as f64 / self.samples as f64).tan().recip()

@@ -5,6 +5,8 @@ use twinlag_cross_relation::ResidualTest;
 use twinlag_optimise::Fit;
 use twinlag_record::Sampling;
 
+use crate::estimate::IntervalBasis;
+use crate::levels::NoiseSource;
 use crate::options::Options;
 
 /// Whether there is an answer.
@@ -63,10 +65,35 @@ pub struct SensorEstimate {
     pub standard_error_s: Option<f64>,
     /// Its 95 % interval, s.
     pub interval_95_s: Option<[f64; 2]>,
+    /// What that interval rests on.
+    pub interval_basis: Option<IntervalBasis>,
+    /// Time constant of its second lag, s, the smaller of the two; `None` where it was not asked. Without a value where none is
+    /// seen or it is not determined: the interval then says how large it may be.
+    pub second_time_constant_s: Option<SecondLag>,
     /// Noise standard deviation that was given or found, K.
     #[serde(rename = "noise_std_K")]
     pub noise_std_k: f64,
+    /// Its standard error, K; `None` where it was given, or is not known.
+    #[serde(rename = "noise_standard_error_K")]
+    pub noise_standard_error_k: Option<f64>,
+    /// First-order autoregressive coefficient of the noise; `None` where it was taken to be white.
+    pub noise_ar1: Option<f64>,
+    /// Where the noise level comes from.
+    pub noise_from: NoiseSource,
     /// Whether the time constant was given, not found.
+    pub known: bool,
+}
+
+/// What is found of a sensor's second lag.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SecondLag {
+    /// The estimate, s; `None` where none is seen, or it is not determined.
+    pub value: Option<f64>,
+    /// Its standard error, s.
+    pub standard_error: Option<f64>,
+    /// 95 % interval, s; from 0 where none is seen.
+    pub interval_95: Option<[f64; 2]>,
+    /// Whether it was given, not found.
     pub known: bool,
 }
 
@@ -93,7 +120,7 @@ pub struct Difference {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Residual {
     /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated level is left. `None` if
-    /// there are no degrees of freedom.
+    /// there are no degrees of freedom, or if the levels were made to fit since only their ratio was given.
     pub chi2_per_dof: Option<f64>,
     /// Whether its autocorrelations are those of white noise.
     pub white: bool,
@@ -105,12 +132,14 @@ pub struct Residual {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalMethod {
-    /// White noise of the stated levels, the noise-noise term included.
+    /// Noise of the stated levels, the noise-noise term and what found levels are uncertain by included.
     Information,
     /// The residual's own spectrum: model error is part of it.
     ResidualSpectrum,
     /// The range over every value of the undetermined time constant that the record allows.
     Profile,
+    /// The same estimator on simulated records.
+    Bootstrap,
     /// There are no intervals.
     None,
 }
@@ -150,7 +179,7 @@ pub struct Characterisation {
     pub free: FreeParameters,
     /// What is left over.
     pub residual: Residual,
-    /// What the intervals rest on.
+    /// What the intervals rest on; the shape of each is in [`SensorEstimate::interval_basis`].
     pub interval_method: IntervalMethod,
     /// Whether there is an answer.
     pub status: Status,

@@ -5,8 +5,9 @@ use twinlag_record::{Record, SamplingKind};
 
 use crate::characterisation::Characterisation;
 use crate::error::Error;
-use crate::options::{Estimator, Known, Options};
-use crate::question::{Levels, Question};
+use crate::levels::{Levels, NoiseColour};
+use crate::options::{Estimator, Intervals, Known, Options};
+use crate::question::{Question, Watch};
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
@@ -15,13 +16,23 @@ use crate::question::{Levels, Question};
 /// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its [`Status`](crate::Status) says what it is
 /// worth.
 pub fn characterise(record: &Record, options: &Options) -> Result<Characterisation, Error> {
+    characterise_watched(record, options, &|_, _| ())
+}
+
+/// The same, with `watch` told of every replicate of a bootstrap: how many are done, of how many.
+///
+/// # Errors
+/// As [`characterise`].
+pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>) -> Result<Characterisation, Error> {
     check(options)?;
     let readings = readings(record, options)?;
-    let levels = Levels::of(&readings, options)?;
-    if options.calibrates() {
-        Question::<4>::new(record, &readings, options, levels).answer()
+    let levels = Levels::of(record, &readings, options)?;
+    if options.has_second_lag() != [false; 2] {
+        Question::<6>::new(record, &readings, options, levels, watch).answer()
+    } else if options.calibrates() {
+        Question::<4>::new(record, &readings, options, levels, watch).answer()
     } else {
-        Question::<2>::new(record, &readings, options, levels).answer()
+        Question::<2>::new(record, &readings, options, levels, watch).answer()
     }
 }
 
@@ -49,6 +60,8 @@ pub fn readings(record: &Record, options: &Options) -> Result<Readings, Error> {
 }
 
 fn check(options: &Options) -> Result<(), Error> {
+    check_noise(options)?;
+    check_estimator(options)?;
     if options.estimator != Estimator::Whitened && options.known.iter().any(|k| k.std.is_some()) {
         return Err(Error::WhitenedOnly {
             what: "a known value with an uncertainty (--known NAME=VALUE+-SD)",
@@ -68,10 +81,14 @@ fn check(options: &Options) -> Result<(), Error> {
         let is_freed = match known.parameter {
             Parameter::Gain => options.free_gain,
             Parameter::Offset => options.free_offset,
-            _ => false,
+            Parameter::SecondTau1 => options.second_order[0],
+            Parameter::SecondTau2 => options.second_order[1],
+            Parameter::Tau1 | Parameter::Tau2 => false,
         };
         if known.std.is_none() && is_freed {
-            return Err(wrong("a standard deviation (NAME=VALUE+-SD) for what --free lets float, or no --free"));
+            let expected =
+                "a standard deviation (NAME=VALUE+-SD) for what --free or --second-order lets float, or not both";
+            return Err(wrong(expected));
         }
     }
     let is_held = |p| options.known(p).is_some_and(|k| k.std.is_none());
@@ -82,14 +99,81 @@ fn check(options: &Options) -> Result<(), Error> {
             got: format!("{} and {}", Known::NAMES[0], Known::NAMES[1]),
         });
     }
-    if let Some([a, b]) = options.noise_std_k
-        && !(a.is_finite() && b.is_finite() && a > 0.0 && b > 0.0)
-    {
-        return Err(Error::Option {
-            option: "--noise",
-            expected: "two positive numbers, S1,S2 in K".into(),
-            got: format!("{a},{b}"),
-        });
+    for (first, second) in [(Parameter::Tau1, Parameter::SecondTau1), (Parameter::Tau2, Parameter::SecondTau2)] {
+        if let (Some(first), Some(second)) = (options.known(first), options.known(second))
+            && second.value > first.value
+        {
+            return Err(Error::Option {
+                option: "--known",
+                expected: format!("a second time constant that is the smaller one, at most {}", first.value),
+                got: second.value.to_string(),
+            });
+        }
     }
     Ok(())
+}
+
+/// Whether what is said of the noise goes together.
+fn check_noise(options: &Options) -> Result<(), Error> {
+    let wrong = |option, expected: &str, got: String| Err(Error::Option { option, expected: expected.into(), got });
+    let is_sound = |s: f64| s.is_finite() && s > 0.0;
+    if let Some([a, b]) = options.noise_std_k
+        && !(is_sound(a) && is_sound(b))
+    {
+        return wrong("--noise", "two positive numbers, S1,S2 in K", format!("{a},{b}"));
+    }
+    if let Some(ratio) = options.noise_ratio {
+        if !is_sound(ratio) {
+            return wrong("--noise-ratio", "a positive number, S2/S1", ratio.to_string());
+        }
+        if options.noise_std_k.is_some() || !options.quiet_segments_s.is_empty() {
+            let expected = "no --noise and no --quiet-segment beside it: levels have a ratio already";
+            return wrong("--noise-ratio", expected, ratio.to_string());
+        }
+    }
+    if options.noise_colour == NoiseColour::Autoregressive
+        && (options.noise_std_k.is_some() || options.noise_ratio.is_some())
+    {
+        let expected =
+            "white where --noise or --noise-ratio says what the noise is: colour and levels are found together";
+        return wrong("--noise-colour", expected, "autoregressive".into());
+    }
+    for &[from_s, to_s] in &options.quiet_segments_s {
+        if !(from_s.is_finite() && to_s.is_finite() && from_s < to_s) {
+            return wrong("--quiet-segment", "FROM..TO in seconds, FROM the smaller", format!("{from_s}..{to_s}"));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the estimator can be asked this.
+fn check_estimator(options: &Options) -> Result<(), Error> {
+    let name = options.estimator.name();
+    if options.estimator.is_closed_form() {
+        let asked = [
+            (options.free_gain || options.free_offset, "--free"),
+            (options.second_order != [false; 2], "--second-order"),
+            (!options.known.is_empty(), "--known"),
+        ];
+        if let Some((_, what)) = asked.into_iter().find(|(is_asked, _)| *is_asked) {
+            return Err(Error::NotInClosedForm { what, estimator: name.into() });
+        }
+    }
+    match options.intervals {
+        Intervals::Profile if options.estimator != Estimator::Whitened => {
+            Err(Error::WhitenedOnly { what: "--intervals profile", estimator: name.into() })
+        }
+        Intervals::Bootstrap(bootstrap) => {
+            bootstrap.check()?;
+            if options.calibrates() || !options.known.is_empty() {
+                return Err(Error::Option {
+                    option: "--intervals",
+                    expected: "auto or profile with --free or --known, which the bootstrap does not simulate".into(),
+                    got: "bootstrap".into(),
+                });
+            }
+            Ok(())
+        }
+        _ => Ok(()),
+    }
 }

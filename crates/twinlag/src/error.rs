@@ -24,6 +24,13 @@ pub enum Error {
     Option { option: &'static str, expected: String, got: String },
     #[error("{what} needs the whitened estimator, not {estimator}: leave out --estimator")]
     WhitenedOnly { what: &'static str, estimator: String },
+    #[error("{what} has no part in {estimator}, which is in closed form: leave it out, or take another estimator")]
+    NotInClosedForm { what: &'static str, estimator: String },
+    #[error(
+        "--quiet-segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
+         {needed} samples or more in unbroken stretches there"
+    )]
+    QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
     #[error(
         "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
          use a longer record, a smaller --discard, or the whitened estimator, which discards none"
@@ -34,6 +41,13 @@ pub enum Error {
 impl Error {
     /// Whether the way the question was put is at fault, rather than the record.
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Option { .. } | Self::WhitenedOnly { .. } | Self::Optimiser(_))
+        matches!(
+            self,
+            Self::Option { .. }
+                | Self::WhitenedOnly { .. }
+                | Self::NotInClosedForm { .. }
+                | Self::QuietSegment { .. }
+                | Self::Optimiser(_)
+        )
     }
 }

@@ -60,20 +60,26 @@
 mod characterisation;
 mod characterise;
 mod error;
+pub mod estimate;
+mod fitting;
+mod levels;
 mod objective;
 mod options;
 mod profile;
 mod question;
+mod second_lag;
 mod starts;
 mod verdict;
 
 pub use characterisation::{
-    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
     SensorEstimate, Status,
 };
-pub use characterise::{characterise, readings};
+pub use characterise::{characterise, characterise_watched, readings};
 pub use error::Error;
-pub use options::{Estimator, Hold, Known, Options};
+pub use levels::{NoiseColour, NoiseSource};
+pub use options::{Estimator, Hold, Intervals, Known, Options};
+pub use question::Watch;
 
 pub use twinlag_bias as bias;
 pub use twinlag_cross_relation as cross_relation;

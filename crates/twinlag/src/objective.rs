@@ -1,6 +1,6 @@
 //! The costs as the optimiser takes them: the one place where the two meet.
 
-use twinlag_bias::{Compensated, Normalised};
+use twinlag_bias::{Compensated, Hybrid, Normalised};
 use twinlag_cross_relation::{CostValue, CrossRelation, Whitened};
 use twinlag_optimise::{Cost, Derivatives};
 
@@ -10,6 +10,7 @@ pub(crate) enum EstimatorCost<'a> {
     CrossRelation(CrossRelation<'a>),
     Compensated(Compensated<'a>),
     Normalised(Normalised<'a>),
+    Hybrid(Hybrid<'a>),
 }
 
 impl EstimatorCost<'_> {
@@ -19,6 +20,7 @@ impl EstimatorCost<'_> {
             Self::CrossRelation(cost) => cost.evaluate(theta),
             Self::Compensated(cost) => cost.evaluate(theta),
             Self::Normalised(cost) => cost.evaluate(theta),
+            Self::Hybrid(cost) => cost.evaluate(theta),
         }
     }
 }

@@ -9,6 +9,8 @@ use twinlag_optimise::Optimiser;
 use twinlag_sensor::Discretisation;
 
 use crate::error::Error;
+use crate::estimate::Bootstrap;
+use crate::levels::NoiseColour;
 
 /// The estimators, by the names that scripts use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -24,11 +26,34 @@ pub enum Estimator {
     BiasCompensated,
     /// The published cost over what noise adds to it; needs only the ratio of the noise levels.
     Normalised,
+    /// The compensated cost in units of the noise's own standard deviation; needs the noise levels.
+    Hybrid,
+    /// Least squares on the difference equation. Noise biases it to short time constants.
+    DifferenceEquationLs,
+    /// Total least squares on it. Biased too, since its columns share their noise.
+    DifferenceEquationTls,
+    /// Generalised total least squares on it; needs only the ratio of the noise levels.
+    DifferenceEquationGtls,
 }
 
 impl Estimator {
     /// All of them, the default first.
-    pub const ALL: [Self; 4] = [Self::Whitened, Self::CrossRelation, Self::BiasCompensated, Self::Normalised];
+    pub const ALL: [Self; 8] = [
+        Self::Whitened,
+        Self::CrossRelation,
+        Self::BiasCompensated,
+        Self::Normalised,
+        Self::Hybrid,
+        Self::DifferenceEquationLs,
+        Self::DifferenceEquationTls,
+        Self::DifferenceEquationGtls,
+    ];
+
+    /// Whether it is one of those on the difference equation: solved in closed form, for sensors of first order, and with nothing
+    /// else to find.
+    pub fn is_closed_form(self) -> bool {
+        matches!(self, Self::DifferenceEquationLs | Self::DifferenceEquationTls | Self::DifferenceEquationGtls)
+    }
 
     /// The name that scripts use.
     pub fn name(self) -> &'static str {
@@ -37,6 +62,10 @@ impl Estimator {
             Self::CrossRelation => "cross-relation",
             Self::BiasCompensated => "bias-compensated",
             Self::Normalised => "normalised",
+            Self::Hybrid => "hybrid",
+            Self::DifferenceEquationLs => "difference-equation-ls",
+            Self::DifferenceEquationTls => "difference-equation-tls",
+            Self::DifferenceEquationGtls => "difference-equation-gtls",
         }
     }
 }
@@ -103,6 +132,20 @@ impl FromStr for Hold {
     }
 }
 
+/// What 95 % intervals are made of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Intervals {
+    /// Standard errors, with noise multiplied by noise and the uncertainty of found levels in them; the profile of the cost
+    /// where that has another shape.
+    #[default]
+    Auto,
+    /// The profile of the whitened cost.
+    Profile,
+    /// The same estimator on simulated records.
+    Bootstrap(Bootstrap),
+}
+
 /// Something known of a parameter beforehand: `T1.time_constant_s=0.5`, or `T1.time_constant_s=0.5+-0.05`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
@@ -116,7 +159,14 @@ pub struct Known {
 
 impl Known {
     /// Names that [`Known::from_str`] takes, in the order of [`Parameter::ALL`].
-    pub const NAMES: [&'static str; 4] = ["T1.time_constant_s", "T2.time_constant_s", "T2.gain", "T2.offset_K"];
+    pub const NAMES: [&'static str; 6] = [
+        "T1.time_constant_s",
+        "T2.time_constant_s",
+        "T2.gain",
+        "T2.offset_K",
+        "T1.second_time_constant_s",
+        "T2.second_time_constant_s",
+    ];
 }
 
 impl FromStr for Known {
@@ -153,15 +203,25 @@ pub struct Options {
     pub hold: Hold,
     /// Noise standard deviations of the two channels, K; found from the data if left out.
     pub noise_std_k: Option<[f64; 2]>,
+    /// Ratio `s2/s1` of the noise levels where only that is known.
+    pub noise_ratio: Option<f64>,
+    /// Stretches `[from, to]` in which the gas is at rest, s from the start of the record: noise levels are taken from there.
+    pub quiet_segments_s: Vec<[f64; 2]>,
+    /// What noise is taken to be like where its levels are found.
+    pub noise_colour: NoiseColour,
     /// Whether the relative gain of channel 2 is fitted.
     pub free_gain: bool,
     /// Whether the relative offset of channel 2 is fitted.
     pub free_offset: bool,
+    /// Which sensors have a second lag that is fitted.
+    pub second_order: [bool; 2],
     /// What is known beforehand.
     pub known: Vec<Known>,
-    /// Samples left out at the start of each unbroken stretch by the estimators that need it; by default five times the
+    /// Samples left out at the start of each unbroken stretch by the published family; by default ten times the
     /// longest time constant of the whitened estimate.
     pub discard: Option<usize>,
+    /// What intervals are made of.
+    pub intervals: Intervals,
 }
 
 impl Options {
@@ -181,6 +241,30 @@ impl Options {
             }
         }
         Ok(self)
+    }
+
+    /// Parses `T1`, `T2` or `T1,T2` into [`Options::second_order`].
+    ///
+    /// # Errors
+    /// [`Error::Option`] for any other name.
+    pub fn second_order(mut self, list: &str) -> Result<Self, Error> {
+        for name in list.split(',').map(str::trim).filter(|n| !n.is_empty()) {
+            match name {
+                "T1" => self.second_order[0] = true,
+                "T2" => self.second_order[1] = true,
+                _ => {
+                    let expected = "T1, T2 or T1,T2".into();
+                    return Err(Error::Option { option: "--second-order", expected, got: name.into() });
+                }
+            }
+        }
+        Ok(self)
+    }
+
+    /// Which sensors have a second lag: one that is fitted, or known.
+    pub(crate) fn has_second_lag(&self) -> [bool; 2] {
+        let known = |p| self.known(p).is_some();
+        [self.second_order[0] || known(Parameter::SecondTau1), self.second_order[1] || known(Parameter::SecondTau2)]
     }
 
     pub(crate) fn known(&self, parameter: Parameter) -> Option<&Known> {
@@ -216,5 +300,6 @@ mod tests {
         let message = "least-squares".parse::<Estimator>().expect_err("unknown").to_string();
         assert!(message.contains("whitened") && message.contains("normalised"), "{message}");
         assert!(Options::default().free("gain,slope").is_err());
+        assert!(Options::default().second_order("T1,T3").is_err());
     }
 }

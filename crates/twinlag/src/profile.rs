@@ -25,7 +25,7 @@ const MOST: i32 = 60;
 const MOSTLY_NOISE: f64 = 0.25;
 /// How far above the minimum such places are allowed: the truth lies lower than this where noise has its way with a parameter
 /// that the signal does not determine.
-const FAR_ABOVE: f64 = 50.0;
+pub(crate) const FAR_ABOVE: f64 = 50.0;
 /// Halvings, in logarithms, that place the edge of what is allowed.
 const HALVINGS: usize = 5;
 /// A time constant this small beside its lower bound is none.

@@ -51,7 +51,25 @@ pub(crate) fn starts<const P: usize>(
     kept
 }
 
-fn hold_known(x: &mut [f64], variables: &[Variable]) {
+/// Starts for `P = 6` beside a fit at first order: second lags of several sizes, since from a single one they may be missed.
+///
+/// - `first`: time constants, gain and offset of that fit
+/// - `second_order`: which sensors have a second lag
+pub(crate) fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
+    let shares: &[[f64; 2]] = match second_order {
+        [true, true] => &[[0.05, 0.05], [0.3, 0.3], [0.8, 0.8], [0.05, 0.8], [0.8, 0.05]],
+        [_, false] => &[[0.05, 0.0], [0.3, 0.0], [0.8, 0.0]],
+        [false, true] => &[[0.0, 0.05], [0.0, 0.3], [0.0, 0.8]],
+    };
+    let start = |[s1, s2]: &[f64; 2]| {
+        // Both lags together delay as much as the one that was found.
+        let (t1, t2) = (first[0] / (1.0 + s1), first[1] / (1.0 + s2));
+        [t1, t2, first[2], first[3], s1 * t1, s2 * t2][..P].to_vec()
+    };
+    shares.iter().map(start).collect()
+}
+
+pub(crate) fn hold_known(x: &mut [f64], variables: &[Variable]) {
     for (x, v) in x.iter_mut().zip(variables) {
         *x = x.clamp(v.lower, v.upper);
     }

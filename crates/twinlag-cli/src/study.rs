@@ -1,0 +1,166 @@
+//! `twinlag study run PLAN.toml --out DIR` and `twinlag study merge DIR`.
+//!
+//! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. Without shards a run merges its
+//! only part itself.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use twinlag_experiment::{Experiment, ExperimentError, Plan, Table, write};
+use twinlag_study::{Options, Shard, Study as _, StudyError};
+
+use crate::arguments::Talk;
+use crate::failure::Failure;
+use crate::print;
+
+/// What to do with a study.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Study {
+    /// Runs a study, or a shard of it; the result has the same bytes on any threads, shards and restarts.
+    Run(Run),
+    /// Joins the parts of all shards in a folder into the table and the pictures.
+    Merge {
+        /// The folder of the parts.
+        dir: PathBuf,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Run {
+    /// The plan: a TOML file; see the book's chapter Experiments.
+    plan: PathBuf,
+    /// The folder of the results, made if need be.
+    #[arg(long)]
+    out: PathBuf,
+    /// Runs part `k/n` alone, `k` from 0.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// Goes on where an interrupted run stopped.
+    #[arg(long)]
+    resume: bool,
+    /// Threads; one for each processor if left out. The result does not depend on them.
+    #[arg(long)]
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+pub(crate) fn run(command: &Study, talk: Talk) -> Result<u8, Failure> {
+    match command {
+        Study::Run(run) => start(run, talk),
+        Study::Merge { dir } => merge(dir, talk),
+    }
+}
+
+fn read(path: &Path) -> Result<(Plan, String), Failure> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
+    let plan = Plan::from_toml(&text).map_err(|e| Failure::File(format!("{name}: {e}")))?;
+    Ok((plan, text))
+}
+
+fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
+    let (plan, text) = read(&run.plan)?;
+    let experiment = Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", run.plan.display())))?;
+    let out = run.out.display();
+    fs::create_dir_all(&run.out).map_err(|e| Failure::Other(format!("{out}: cannot be made: {e}")))?;
+    if !run.resume && run.shard.is_none() && run.out.join("results.json").exists() {
+        return Err(Failure::Usage(format!("{out}: holds results already; name another folder, or remove them")));
+    }
+    let copy = run.out.join("plan.toml");
+    match fs::read_to_string(&copy) {
+        Ok(other) if other != text => {
+            return Err(Failure::Usage(format!("{}: another plan lies there; name another folder", copy.display())));
+        }
+        Ok(_) => {}
+        Err(_) => {
+            fs::write(&copy, &text)
+                .map_err(|e| Failure::Other(format!("{}: cannot be written: {e}", copy.display())))?;
+        }
+    }
+    let shard = run.shard.unwrap_or(Shard::WHOLE);
+    let part = run.out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()));
+    let options = Options {
+        threads: run.threads.unwrap_or(Options::default().threads),
+        shard,
+        checkpoint: Some(part.clone()),
+        resume: run.resume,
+        ..Options::default()
+    };
+    let bar = if talk.quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(1) };
+    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
+    bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
+    let done = twinlag_study::run(&experiment, &options, |p| {
+        bar.set_length(p.total);
+        bar.set_position(p.done);
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    done.map_err(failure)?;
+    if run.shard.is_some() {
+        say(talk, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
+            format!("{}: done; when all parts are, twinlag study merge {out}", part.display())
+        })?;
+        return Ok(0);
+    }
+    merge(&run.out, talk)
+}
+
+fn merge(dir: &Path, talk: Talk) -> Result<u8, Failure> {
+    let (plan, _) = read(&dir.join("plan.toml"))?;
+    let name = dir.display();
+    let entries = fs::read_dir(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
+    let mut parts: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_part(p)).collect();
+    parts.sort();
+    if parts.is_empty() {
+        return Err(Failure::File(format!("{name}: holds no part of a study: run `twinlag study run` first")));
+    }
+    let results = twinlag_study::merge(&parts).map_err(failure)?;
+    let experiment = Experiment::new(&plan).map_err(other)?;
+    if results.header().plan() != experiment.plan() {
+        return Err(Failure::File(format!(
+            "{name}: the parts are of another plan than plan.toml, or of another version"
+        )));
+    }
+    let table = Table::of(&experiment, &results).map_err(other)?;
+    write(&plan, &table, dir).map_err(other)?;
+    let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
+    say(talk, &json!({"schema": "twinlag.study/1", "out": dir, "trials": trials, "rows": table.rows}), || {
+        format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len())
+    })?;
+    Ok(0)
+}
+
+fn is_part(path: &Path) -> bool {
+    let name = path.file_name().and_then(OsStr::to_str).unwrap_or("");
+    name.starts_with("part-") && path.extension() == Some(OsStr::new("json"))
+}
+
+fn say(talk: Talk, object: &serde_json::Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
+    if talk.json {
+        print::json(object)
+    } else {
+        if !talk.quiet {
+            eprintln!("{}", text());
+        }
+        Ok(())
+    }
+}
+
+fn other(error: ExperimentError) -> Failure {
+    Failure::Other(error.to_string())
+}
+
+/// A part that is there already, or is not there yet, is a matter of how the program was called.
+fn failure(error: StudyError) -> Failure {
+    match error {
+        StudyError::Exists { .. } => Failure::Usage(error.to_string()),
+        StudyError::Incomplete { .. } => Failure::NotYet(error.to_string()),
+        StudyError::Damaged { .. } | StudyError::OtherStudy { .. } => Failure::File(error.to_string()),
+        _ => Failure::Other(error.to_string()),
+    }
+}

@@ -1,0 +1,352 @@
+//! The plan of an experiment: which records, which methods, how many trials.
+//!
+//! Cells are the product of all lists, in the order in which they stand here; every method answers the same records.
+
+use serde::{Deserialize, Serialize};
+use twinlag::NoiseColour;
+use twinlag::estimate::NoiseKnowledge;
+use twinlag::optimise::Optimiser;
+use twinlag::sensor::Discretisation;
+use twinlag::signal::{Gas, Noise, Record, Rig, Sensor};
+
+use crate::error::ExperimentError;
+use crate::picture::PictureSpec;
+use crate::summary::SummarySpec;
+
+/// An experiment, as its TOML file has it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Name of the experiment and of its folder.
+    pub name: String,
+    /// What it shows, one line.
+    pub title: String,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Trials in each cell.
+    pub trials: u64,
+    /// Trials added up at a time. Part of the plan, because it decides the last digits.
+    #[serde(default = "default_block")]
+    pub block: u64,
+    /// Gas signals.
+    pub gases: Vec<NamedGas>,
+    /// Lengths of the record, samples.
+    #[serde(default = "default_samples")]
+    pub samples: Vec<usize>,
+    /// Sample periods, s.
+    #[serde(default = "default_periods")]
+    pub sample_period_s: Vec<f64>,
+    /// Pairs of time constants, s.
+    #[serde(default = "default_time_constants")]
+    pub time_constants_s: Vec<[f64; 2]>,
+    /// Noise standard deviations, per cent; the louder channel's where the levels differ.
+    pub noise_percent: Vec<f64>,
+    /// Per cent of what.
+    #[serde(default = "default_noise_of")]
+    pub noise_of: Vec<NoiseOf>,
+    /// Noise of channel 2 over that of channel 1.
+    #[serde(default = "default_ratio")]
+    pub noise_ratio: Vec<f64>,
+    /// First-order autoregressive coefficient of both noises.
+    #[serde(default = "default_white")]
+    pub noise_ar1: Vec<f64>,
+    /// What answers each record.
+    pub methods: Vec<Method>,
+    /// Time constants of a grid of starts (every pair of two of them), s, for methods that start there.
+    #[serde(default)]
+    pub grid_s: Vec<f64>,
+    /// Pictures of the table.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pictures: Vec<PictureSpec>,
+    /// Tables for people.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub summaries: Vec<SummarySpec>,
+}
+
+fn default_block() -> u64 {
+    100
+}
+fn default_samples() -> Vec<usize> {
+    vec![2500]
+}
+fn default_periods() -> Vec<f64> {
+    vec![0.002]
+}
+fn default_time_constants() -> Vec<[f64; 2]> {
+    vec![[0.0238, 0.1168]]
+}
+fn default_noise_of() -> Vec<NoiseOf> {
+    vec![NoiseOf::Gas]
+}
+fn default_ratio() -> Vec<f64> {
+    vec![1.0]
+}
+fn default_white() -> Vec<f64> {
+    vec![0.0]
+}
+
+/// A gas signal with the name that tables have for it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NamedGas {
+    /// Name.
+    pub name: String,
+    /// The signal, as in a rig file.
+    pub gas: Gas,
+}
+
+/// What noise is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseOf {
+    /// The standard deviation of the gas temperature: both channels have the same noise.
+    Gas,
+    /// The standard deviation of each channel's own reading before noise.
+    Reading,
+}
+
+impl NoiseOf {
+    /// The name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gas => "gas",
+            Self::Reading => "reading",
+        }
+    }
+}
+
+/// What a method is told of the noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Told {
+    /// Both levels and the colour.
+    #[default]
+    Known,
+    /// Nothing; white noise is supposed.
+    Found,
+    /// Nothing; autoregressive noise is supposed.
+    FoundAutoregressive,
+    /// The ratio of the levels.
+    Ratio,
+}
+
+/// Where a method starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// Where it thinks best.
+    #[default]
+    Own,
+    /// At these time constants, s.
+    At([f64; 2]),
+    /// Trial `i` at point `i` of the plan's grid, round and round.
+    Grid,
+}
+
+/// An estimator with all that it is given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
+    /// Name in tables and pictures.
+    pub name: String,
+    /// The estimator, by name: one of the family, or one that the experiment is given.
+    pub estimator: String,
+    /// The optimiser: its name, or its name with options; or the name of one that the experiment is given.
+    #[serde(default)]
+    pub optimiser: OptimiserChoice,
+    /// What it is told of the noise.
+    #[serde(default)]
+    pub noise: Told,
+    /// The levels that it is told are the true ones with their *variances* times these.
+    #[serde(default = "default_factor")]
+    pub variance_factor: [f64; 2],
+    /// Where it starts.
+    #[serde(default)]
+    pub start: Start,
+    /// What it takes the gas to do between samples.
+    #[serde(default)]
+    pub hold: Discretisation,
+    /// Samples that it discards, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub discard: Option<usize>,
+    /// Whether its intervals are wanted.
+    #[serde(default)]
+    pub intervals: bool,
+}
+
+fn default_factor() -> [f64; 2] {
+    [1.0; 2]
+}
+
+/// An optimiser by name, or with options of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum OptimiserChoice {
+    /// By name; one of the registry has its default options.
+    Named(String),
+    /// With options.
+    WithOptions(Optimiser),
+}
+
+impl Default for OptimiserChoice {
+    fn default() -> Self {
+        Self::WithOptions(Optimiser::default())
+    }
+}
+
+/// One cell: a kind of record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// Which gas, by position.
+    pub gas: usize,
+    /// Samples.
+    pub samples: usize,
+    /// Sample period, s.
+    pub sample_period_s: f64,
+    /// True time constants, s.
+    pub tau_s: [f64; 2],
+    /// Noise, per cent.
+    pub noise_percent: f64,
+    /// Per cent of what.
+    pub noise_of: NoiseOf,
+    /// Noise of channel 2 over that of channel 1.
+    pub noise_ratio: f64,
+    /// Autoregressive coefficient of both noises.
+    pub noise_ar1: f64,
+}
+
+/// What a cell's records are made of.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// The rig, noise included.
+    pub rig: Rig,
+    /// Noise standard deviations, K.
+    pub noise_std_k: [f64; 2],
+}
+
+impl Plan {
+    /// Reads a plan.
+    ///
+    /// # Errors
+    /// For text that is no plan, with the line at fault, and for a plan that cannot run.
+    pub fn from_toml(text: &str) -> Result<Self, ExperimentError> {
+        let plan: Self = toml::from_str(text).map_err(|e| ExperimentError::Plan(e.to_string()))?;
+        plan.check()?;
+        Ok(plan)
+    }
+
+    fn check(&self) -> Result<(), ExperimentError> {
+        let refuse = |what: String| Err(ExperimentError::Plan(what));
+        if self.trials == 0 || self.block == 0 {
+            return refuse("trials and block must be positive".into());
+        }
+        if self.cells().is_empty() || self.methods.is_empty() {
+            return refuse("a plan needs a gas, a noise level and a method at least".into());
+        }
+        for (i, method) in self.methods.iter().enumerate() {
+            if self.methods[..i].iter().any(|m| m.name == method.name) {
+                return refuse(format!("two methods are called \"{}\"", method.name));
+            }
+            if method.start == Start::Grid && self.grid_s.is_empty() {
+                return refuse(format!("method \"{}\" starts on the grid, but the plan has no grid_s", method.name));
+            }
+        }
+        for cell in self.cells() {
+            self.bench(&cell, 0)?;
+        }
+        Ok(())
+    }
+
+    /// What decides the numbers: the plan without its pictures and summaries.
+    #[must_use]
+    pub fn decisive(&self) -> Self {
+        Self { pictures: Vec::new(), summaries: Vec::new(), ..self.clone() }
+    }
+
+    /// All cells, in order.
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut out = Vec::new();
+        for gas in 0..self.gases.len() {
+            for &samples in &self.samples {
+                for &sample_period_s in &self.sample_period_s {
+                    for &tau_s in &self.time_constants_s {
+                        for &noise_of in &self.noise_of {
+                            for &noise_ratio in &self.noise_ratio {
+                                for &noise_ar1 in &self.noise_ar1 {
+                                    for &noise_percent in &self.noise_percent {
+                                        out.push(Cell {
+                                            gas,
+                                            samples,
+                                            sample_period_s,
+                                            tau_s,
+                                            noise_percent,
+                                            noise_of,
+                                            noise_ratio,
+                                            noise_ar1,
+                                        });
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The rig of a cell, the `index`-th: each has a seed of its own.
+    ///
+    /// # Errors
+    /// For a rig that cannot be.
+    pub fn bench(&self, cell: &Cell, index: usize) -> Result<Bench, ExperimentError> {
+        let seed = self.seed.wrapping_add(index as u64 * 0x9E37_79B9);
+        let sensor = |channel: &str, tau_s: f64, noise: Option<Noise>| {
+            let mut sensor = Sensor::new(channel, tau_s);
+            sensor.noise = noise;
+            sensor
+        };
+        let record = Record::new(cell.samples, cell.sample_period_s);
+        let rig = |noise: [Option<Noise>; 2]| {
+            let [n1, n2] = noise;
+            let sensors = [sensor("T1", cell.tau_s[0], n1), sensor("T2", cell.tau_s[1], n2)];
+            Rig::new(seed, record.clone(), self.gases[cell.gas].gas.clone(), sensors)
+        };
+        let clean = rig([None, None])?.clean(0)?;
+        let scale = match cell.noise_of {
+            NoiseOf::Gas => [standard_deviation(&clean.gas_c); 2],
+            NoiseOf::Reading => [0, 1].map(|i| standard_deviation(&clean.readings_c[i])),
+        };
+        let louder = cell.noise_ratio.max(1.0);
+        let noise_std_k = [1.0 / louder, cell.noise_ratio / louder].map(|share| 0.01 * cell.noise_percent * share);
+        let noise_std_k = [noise_std_k[0] * scale[0], noise_std_k[1] * scale[1]];
+        let noise = noise_std_k.map(|std_k| {
+            let mut noise = Noise::white(std_k);
+            noise.ar1 = cell.noise_ar1;
+            Some(noise)
+        });
+        Ok(Bench { rig: rig(noise)?, noise_std_k })
+    }
+}
+
+fn standard_deviation(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    (x.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+impl Method {
+    /// What this method is told of noise that is `std_k` and `ar1`. Noise of zero is told as next to nothing, for the sake of
+    /// weights.
+    pub(crate) fn told(&self, std_k: [f64; 2], ar1: f64) -> NoiseKnowledge {
+        let least = 1e-6;
+        match self.noise {
+            Told::Known => {
+                let stated = |i: usize| (std_k[i] * self.variance_factor[i].sqrt()).max(least);
+                NoiseKnowledge::Known { std_k: [stated(0), stated(1)], ar1: [ar1; 2] }
+            }
+            Told::Found => NoiseKnowledge::Found(NoiseColour::White),
+            Told::FoundAutoregressive => NoiseKnowledge::Found(NoiseColour::Autoregressive),
+            Told::Ratio => NoiseKnowledge::Ratio(if std_k[0] > 0.0 { std_k[1] / std_k[0] } else { 1.0 }),
+        }
+    }
+}

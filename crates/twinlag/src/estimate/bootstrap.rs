@@ -1,0 +1,212 @@
+//! Intervals by parametric bootstrap: the same estimator on records simulated from what it found.
+//!
+//! A gas with the power that the record shows, noise taken off, is passed through both fitted sensors; noise of the found
+//! levels is added, anew for each replicate; and the estimator answers each. The spread of `ln(τ*/τ)` turned round gives the
+//! interval. It takes a hundred times as long as a standard error, and makes no use of one: for estimators that have none, and
+//! to check those that do. The estimator's own model makes the records, so it cannot tell that the model is wrong.
+//!
+//! # Source
+//! Efron and Tibshirani 1993, the basic bootstrap interval.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use realfft::RealFftPlanner;
+use realfft::num_complex::Complex;
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::{CostError, InferredInputs, Readings, Segment, Steps, inferred_inputs};
+
+use super::{Estimate, Outcome, Task};
+use crate::error::Error;
+
+/// Fewest replicates: the outermost of 39 are the 2.5 % and 97.5 % points.
+const FEWEST: usize = 39;
+/// Most of them that may fail.
+const MOST_FAILED: f64 = 0.1;
+
+/// A seeded parametric bootstrap.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Bootstrap {
+    /// Simulated records, at least 39.
+    pub replicates: usize,
+    /// Seed of the noise; replicate `i` draws from streams `2 i` and `2 i + 1`.
+    pub seed: u64,
+}
+
+impl Default for Bootstrap {
+    fn default() -> Self {
+        Self { replicates: 199, seed: 1 }
+    }
+}
+
+impl Bootstrap {
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        if self.replicates >= FEWEST {
+            return Ok(());
+        }
+        Err(Error::Option {
+            option: "--replicates",
+            expected: format!("at least {FEWEST}"),
+            got: self.replicates.to_string(),
+        })
+    }
+
+    /// 95 % intervals of both time constants, s, for what `estimator` made of `task`; `None` where more than a tenth of the
+    /// replicates cannot be answered.
+    ///
+    /// # Errors
+    /// [`Error::Option`] for too few replicates; what the estimator says of `task` itself, such as uneven sampling.
+    pub fn intervals(
+        &self,
+        estimator: &dyn Estimate,
+        task: &Task<'_>,
+        outcome: &Outcome,
+    ) -> Result<Option<[[f64; 2]; 2]>, Error> {
+        self.check()?;
+        let [t1, t2] = outcome.tau_s;
+        let [s1, s2] = outcome.second_tau_s.map(|s| s.unwrap_or(0.0));
+        let Some(levels_k) = outcome.noise_std_k else { return Ok(None) };
+        let inputs = inferred_inputs(task.readings, task.hold, &[t1, t2, 1.0, 0.0, s1, s2])?;
+        let clean = clean_readings(&inputs, levels_k, outcome.noise_ar1);
+        let mut logs: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
+        for replicate in 0..self.replicates {
+            let readings = self.replicate(replicate as u64, &clean, task, levels_k, outcome.noise_ar1)?;
+            let again = Task { readings: &readings, starts_s: vec![outcome.tau_s], intervals: false, ..*task };
+            let found = match estimator.estimate(&again) {
+                Err(Error::Cost(CostError::Singular)) => continue,
+                found => found?,
+            };
+            if found.end.is_usable() {
+                for i in 0..2 {
+                    logs[i].push((found.tau_s[i] / outcome.tau_s[i]).ln());
+                }
+            }
+        }
+        let failed = self.replicates - logs[0].len();
+        if failed as f64 > MOST_FAILED * self.replicates as f64 {
+            return Ok(None);
+        }
+        logs.iter_mut().for_each(|l| l.sort_by(f64::total_cmp));
+        // The k-th of n lies at k/(n + 1).
+        let quantile = |sorted: &[f64], share: f64| {
+            let place = share * (sorted.len() + 1) as f64 - 1.0;
+            let below = (place.floor() as usize).min(sorted.len() - 2);
+            sorted[below] + (place - below as f64) * (sorted[below + 1] - sorted[below])
+        };
+        let interval = |i: usize| [0.975, 0.025].map(|share| outcome.tau_s[i] * (-quantile(&logs[i], share)).exp());
+        Ok(Some([interval(0), interval(1)]))
+    }
+
+    fn replicate(
+        &self,
+        replicate: u64,
+        clean: &[[Vec<f64>; 2]],
+        task: &Task<'_>,
+        levels_k: [f64; 2],
+        ar1: [f64; 2],
+    ) -> Result<Readings, Error> {
+        let mut noise = [0, 1].map(|channel| {
+            let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+            rng.set_stream(2 * replicate + channel);
+            rng
+        });
+        let mut noisy = |channel: usize, y: &[f64]| -> Vec<f64> {
+            let (std_k, phi) = (levels_k[channel], ar1[channel]);
+            let fresh_k = std_k * (1.0 - phi * phi).sqrt();
+            let mut last_k: Option<f64> = None;
+            y.iter()
+                .map(|y| {
+                    let draw: f64 = noise[channel].sample(StandardNormal);
+                    let now_k = last_k.map_or(std_k * draw, |last| phi * last + fresh_k * draw);
+                    last_k = Some(now_k);
+                    y + now_k
+                })
+                .collect()
+        };
+        let segments = clean.iter().zip(task.readings.segments()).map(|([y1, y2], segment)| {
+            let steps: &Steps = segment.steps();
+            Segment::new(noisy(0, y1), noisy(1, y2), steps.clone())
+        });
+        Ok(Readings::new(segments.collect::<Result<_, _>>()?)?)
+    }
+}
+
+/// Readings without noise whose gas has the power that `inputs` show: both channels of each stretch.
+fn clean_readings(inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) -> Vec<[Vec<f64>; 2]> {
+    let mut planner = RealFftPlanner::new();
+    inputs
+        .segments
+        .iter()
+        .map(|[f1, f2]| {
+            let gas = gas([f1, f2], inputs, levels_k, ar1, &mut planner);
+            [0, 1].map(|i| undo(&inputs.filters[i], &gas))
+        })
+        .collect()
+}
+
+/// The best combination of both inferred inputs, its noise's power taken off.
+fn gas(
+    f: [&[f64]; 2],
+    inputs: &InferredInputs,
+    levels_k: [f64; 2],
+    ar1: [f64; 2],
+    planner: &mut RealFftPlanner<f64>,
+) -> Vec<f64> {
+    let n = f[0].len();
+    // A straight line between the ends is taken off before the circular transform, and put back after it.
+    let ends = [0.5 * (f[0][0] + f[1][0]), 0.5 * (f[0][n - 1] + f[1][n - 1])];
+    let line = |k: usize| ends[0] + (ends[1] - ends[0]) * k as f64 / (n - 1) as f64;
+    let (forward, back) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
+    let [first, second] = f.map(|f| {
+        let mut input: Vec<f64> = f.iter().enumerate().map(|(k, v)| v - line(k)).collect();
+        let mut output = forward.make_output_vec();
+        forward.process(&mut input, &mut output).expect("buffers are those of the plan");
+        output
+    });
+    let noise = |i: usize, bin: usize| {
+        let turn = Complex::from_polar(1.0, std::f64::consts::TAU * bin as f64 / n as f64);
+        let gain = inputs.filters[i].iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr();
+        let phi = ar1[i];
+        let colour = (1.0 - phi * phi) / (1.0 + phi * phi - 2.0 * phi * turn.re);
+        n as f64 * levels_k[i].powi(2) * gain * colour
+    };
+    let mut spectrum: Vec<(Complex<f64>, f64)> = (0..first.len())
+        .map(|bin| {
+            let (n1, n2) = (noise(0, bin), noise(1, bin));
+            ((first[bin] * n2 + second[bin] * n1) / (n1 + n2), n1 * n2 / (n1 + n2))
+        })
+        .collect();
+    // Mean power and mean noise in windows that widen with frequency.
+    let mut sums = vec![(0.0, 0.0)];
+    for (x, noise) in &spectrum {
+        let (power, level) = sums[sums.len() - 1];
+        sums.push((power + x.norm_sqr(), level + noise));
+    }
+    let bins = spectrum.len();
+    for (bin, (x, _)) in spectrum.iter_mut().enumerate() {
+        let (low, high) = (bin - bin / 10 - bin.min(2), (bin + bin / 10 + 3).min(bins));
+        let (power, noise) = (sums[high].0 - sums[low].0, sums[high].1 - sums[low].1);
+        // Power, not the series itself, is what the replicates have to have right.
+        *x *= if power > 0.0 { (1.0 - noise / power).max(0.0).sqrt() } else { 0.0 };
+    }
+    let mut spectrum: Vec<Complex<f64>> = spectrum.into_iter().map(|(x, _)| x).collect();
+    spectrum[0].im = 0.0;
+    if n.is_multiple_of(2) {
+        spectrum[bins - 1].im = 0.0;
+    }
+    let mut out = back.make_output_vec();
+    back.process(&mut spectrum, &mut out).expect("real at both ends");
+    out.iter().enumerate().map(|(k, v)| v / n as f64 + line(k)).collect()
+}
+
+/// The series that `filter` (oldest sample first, unit gain at rest) takes to `f`, at rest before it.
+fn undo(filter: &[f64], f: &[f64]) -> Vec<f64> {
+    let (newest, older) = filter.split_last().expect("a filter has coefficients");
+    let mut y = vec![f[0]; older.len()];
+    for (k, f) in f.iter().enumerate() {
+        let known: f64 = older.iter().zip(&y[k..]).map(|(c, y)| c * y).sum();
+        y.push((f - known) / newest);
+    }
+    y
+}

@@ -1,0 +1,257 @@
+//! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
+
+mod surface;
+
+use std::fs;
+use std::io::IsTerminal;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, bail, ensure};
+use clap::{Args, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use twinlag_experiment::{Experiment, Plan, Table, write};
+use twinlag_study::{Options, Shard};
+
+use crate::root;
+
+/// What to do with the experiments.
+#[derive(Subcommand)]
+pub(crate) enum Task {
+    /// Their names, and what each shows.
+    List,
+    /// Runs one, or all of them.
+    Run(Run),
+    /// Draws pictures and tables of stored results again, after a change of how the plan wants them.
+    Draw {
+        /// The experiment; `all` draws every one.
+        name: String,
+    },
+    /// Joins the parts of shards, in any order, into the table and the pictures.
+    Merge {
+        /// The experiment.
+        name: String,
+        /// The parts.
+        #[arg(required = true)]
+        parts: Vec<PathBuf>,
+        /// Where the results go.
+        #[arg(long)]
+        out: PathBuf,
+    },
+}
+
+#[derive(Args, Clone)]
+pub(crate) struct Run {
+    /// The experiment; `all` runs every one.
+    name: String,
+    /// Trials in each cell, in place of the plan's.
+    #[arg(long)]
+    trials: Option<u64>,
+    /// Seed, in place of the plan's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Threads; by default one for each processor. The result does not depend on them.
+    #[arg(long)]
+    threads: Option<NonZeroUsize>,
+    /// Where the results go; by default the experiment's own folder in the book, which needs the plan as it stands.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Goes on where an interrupted run stopped.
+    #[arg(long)]
+    resume: bool,
+    /// Runs part `k/n` alone (`k` from 0), into OUT/part-k-of-n.json; see `merge`.
+    #[arg(long, requires = "out")]
+    shard: Option<Shard>,
+    /// Runs again and names the first cell that differs from the stored table; writes nothing.
+    #[arg(long, conflicts_with_all = ["trials", "seed", "out", "shard"])]
+    check: bool,
+}
+
+const FOLDER: &str = "docs/src/experiments";
+
+pub(crate) fn run(task: Task) -> Result<()> {
+    match task {
+        Task::List => {
+            for name in names()? {
+                println!("{name:16} {}", title(&name)?);
+            }
+            Ok(())
+        }
+        Task::Run(run) if run.name == "all" => names()?.iter().try_for_each(|name| {
+            let out = run.out.as_ref().map(|out| out.join(name));
+            one(name, &Run { out, ..run.clone() })
+        }),
+        Task::Run(run) => one(&run.name, &run),
+        Task::Draw { name } if name == "all" => names()?.iter().try_for_each(|name| draw(name)),
+        Task::Draw { name } => draw(&name),
+        Task::Merge { name, parts, out } => {
+            let plan = plan(&name)?;
+            let results = twinlag_study::merge(&parts)?;
+            // The plan of the parts is in their header; a table is only made of the one that is asked for.
+            let plan = with_trials_of(plan, &results);
+            ensure!(
+                results.header().plan() == twinlag_study::Study::plan(&Experiment::new(&plan)?),
+                "the parts are of another plan than {name}, or of another version of it"
+            );
+            write(&plan, &Table::new(&plan, &results)?, &out)?;
+            println!("{name}: {}", out.display());
+            Ok(())
+        }
+    }
+}
+
+/// Every experiment with two trials in each cell, into `out`: that they run, not what they say.
+pub(crate) fn quick(out: &Path) -> Result<()> {
+    let run = Run {
+        name: "all".into(),
+        trials: Some(2),
+        seed: None,
+        threads: None,
+        out: Some(out.to_owned()),
+        resume: false,
+        shard: None,
+        check: false,
+    };
+    self::run(Task::Run(run))
+}
+
+fn with_trials_of(mut plan: Plan, results: &twinlag_study::Results) -> Plan {
+    plan.trials = results.header().trials();
+    plan
+}
+
+fn names() -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(root()?.join(FOLDER))? {
+        let path = entry?.path();
+        if path.join("plan.toml").exists() {
+            names.extend(path.file_name().map(|n| n.to_string_lossy().into_owned()));
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn text(name: &str) -> Result<String> {
+    let path = root()?.join(FOLDER).join(name).join("plan.toml");
+    match fs::read_to_string(&path) {
+        Ok(text) => Ok(text),
+        Err(_) => bail!("there is no experiment called \"{name}\"; there are {}", names()?.join(", ")),
+    }
+}
+
+fn plan(name: &str) -> Result<Plan> {
+    Ok(Plan::from_toml(&text(name)?)?)
+}
+
+fn title(name: &str) -> Result<String> {
+    if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
+}
+
+fn draw(name: &str) -> Result<()> {
+    if name == surface::NAME {
+        println!("{name}: its picture is drawn by running it");
+        return Ok(());
+    }
+    let (plan, folder) = (plan(name)?, root()?.join(FOLDER).join(name));
+    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
+    let mut table: Table = serde_json::from_str(&stored).context("the stored table cannot be read")?;
+    ensure!(table.plan.decisive() == plan.decisive(), "{name}: the stored table is of another plan: run it again");
+    table.plan = plan.decisive();
+    write(&plan, &table, &folder)?;
+    println!("{name}: {}", folder.display());
+    Ok(())
+}
+
+fn one(name: &str, run: &Run) -> Result<()> {
+    let folder = root()?.join(FOLDER).join(name);
+    if name == surface::NAME {
+        return surface::run(&surface::Plan::read(&text(name)?)?, run.out.as_deref().unwrap_or(&folder), run.check);
+    }
+    let mut plan = plan(name)?;
+    ensure!(
+        run.out.is_some() || (run.trials.is_none() && run.seed.is_none()),
+        "other trials or another seed than the plan's need --out DIR: the stored results are those of the plan"
+    );
+    plan.trials = run.trials.unwrap_or(plan.trials);
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    let out = run.out.clone().unwrap_or(folder.clone());
+    let shard = run.shard.unwrap_or(Shard::WHOLE);
+    let part = match (run.check, run.shard) {
+        (true, _) => None,
+        (_, Some(shard)) => Some(out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()))),
+        _ => Some(out.join("checkpoint.json")),
+    };
+    if part.is_some() {
+        fs::create_dir_all(&out)?;
+    }
+    let options = Options {
+        threads: run.threads.unwrap_or(Options::default().threads),
+        shard,
+        checkpoint: part.clone(),
+        resume: run.resume,
+        ..Options::default()
+    };
+    let start = Instant::now();
+    let bar = bar(name);
+    let finished = twinlag_study::run(&Experiment::new(&plan)?, &options, |p| {
+        bar.set_length(p.total);
+        bar.set_position(p.done);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    let seconds = start.elapsed().as_secs_f64();
+    if let Some(shard) = run.shard {
+        println!("{name}: part {shard} in {seconds:.0} s");
+        return Ok(());
+    }
+    let table = Table::new(&plan, &finished.into_results()?)?;
+    if run.check {
+        let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
+        let stored: Table = serde_json::from_str(&stored).context("the stored table cannot be read")?;
+        match table.first_difference(&stored) {
+            Some(difference) => bail!("{name}: {difference}"),
+            None => println!("{name}: the stored table holds, to the byte; {seconds:.0} s"),
+        }
+        return Ok(());
+    }
+    write(&plan, &table, &out)?;
+    provenance(&plan, &out, seconds, options.threads.get())?;
+    if let Some(part) = part {
+        fs::remove_file(part)?;
+    }
+    println!("{name}: {} trials in {seconds:.0} s, {}", plan.trials * plan.cells().len() as u64, out.display());
+    Ok(())
+}
+
+fn bar(name: &str) -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{prefix:16} {bar:40} {percent:>3} %, {eta} left");
+    ProgressBar::new(1).with_prefix(name.to_owned()).with_style(style.unwrap_or(ProgressStyle::default_bar()))
+}
+
+/// What made the results: everything that may change from run to run, kept apart from the table that may not.
+fn provenance(plan: &Plan, out: &Path, seconds: f64, threads: usize) -> Result<()> {
+    let first_line = |program: &str, arguments: &[&str]| {
+        let output = Command::new(program).args(arguments).current_dir(root().ok()?).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = first_line("git", &["rev-parse", "HEAD"]);
+    let is_clean = first_line("git", &["status", "--porcelain", "--", "crates", "Cargo.lock"]).map(|s| s.is_empty());
+    let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
+        let line = text.lines().find(|l| l.starts_with("model name"))?;
+        Some(line.split(':').nth(1)?.trim().to_owned())
+    });
+    let value = json!({
+        "experiment": plan.name, "seed": plan.seed, "trials": plan.trials, "version": env!("CARGO_PKG_VERSION"),
+        "commit": commit, "sources_as_committed": is_clean, "rustc": first_line("rustc", &["--version"]),
+        "processor": cpu, "threads": threads, "seconds": (10.0 * seconds).round() / 10.0,
+    });
+    Ok(fs::write(out.join("provenance.json"), format!("{}\n", serde_json::to_string_pretty(&value)?))?)
+}
