@@ -14,8 +14,8 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use twinlag_experiment::{Experiment, Plan, Table, write};
-use twinlag_study::{Options, Shard};
+use twinlag_experiment::{Experiment, Method, Plan, Table, write};
+use twinlag_study::{Options, Outcome, Shard, Study as _};
 
 use crate::root;
 
@@ -94,7 +94,7 @@ pub(crate) fn run(task: Task) -> Result<()> {
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
             let plan = with_trials_of(plan, &results);
             ensure!(
-                results.header().plan() == twinlag_study::Study::plan(&Experiment::new(&plan)?),
+                results.header().plan() == Experiment::new(&plan)?.plan(),
                 "the parts are of another plan than {name}, or of another version of it"
             );
             write(&plan, &Table::new(&plan, &results)?, &out)?;
@@ -221,6 +221,9 @@ fn one(name: &str, run: &Run) -> Result<()> {
     }
     write(&plan, &table, &out)?;
     provenance(&plan, &out, seconds, options.threads.get())?;
+    if plan.timed {
+        fs::write(out.join("times.md"), times(&plan)?)?;
+    }
     if let Some(part) = part {
         fs::remove_file(part)?;
     }
@@ -234,6 +237,37 @@ fn bar(name: &str) -> ProgressBar {
     }
     let style = ProgressStyle::with_template("{prefix:16} {bar:40} {percent:>3} %, {eta} left");
     ProgressBar::new(1).with_prefix(name.to_owned()).with_style(style.unwrap_or(ProgressStyle::default_bar()))
+}
+
+/// Milliseconds of a fit by each method, the record's simulation taken off: one thread, mean over the first trials of each
+/// gas's first cell.
+fn times(plan: &Plan) -> Result<String> {
+    let trials = plan.trials.min(50);
+    let mean_ms = |plan: &Plan, cell: usize| -> Result<f64> {
+        let experiment = Experiment::new(plan)?;
+        let mut scratch = experiment.scratch(cell).map_err(|e| anyhow::anyhow!("{e}"))?;
+        let mut outcome = Outcome::new(&experiment.quantities(cell));
+        let start = Instant::now();
+        for trial in 0..trials {
+            outcome.clear();
+            experiment.trial(cell, trial, &mut scratch, &mut outcome).map_err(|e| anyhow::anyhow!("{e}"))?;
+        }
+        Ok(1e3 * start.elapsed().as_secs_f64() / trials as f64)
+    };
+    let first_cell = |gas: usize| plan.cells().iter().position(|c| c.gas == gas).context("each gas has a cell");
+    let names: Vec<&str> = plan.gases.iter().map(|g| g.name.as_str()).collect();
+    let mut lines = vec![format!("| method | {} |", names.join(" | ")), format!("|---|{}", "---|".repeat(names.len()))];
+    for method in &plan.methods {
+        let alone = |methods: Vec<Method>| Plan { methods, ..plan.clone() };
+        let mut cells = Vec::new();
+        for gas in 0..names.len() {
+            let cell = first_cell(gas)?;
+            let fit_ms = mean_ms(&alone(vec![method.clone()]), cell)? - mean_ms(&alone(Vec::new()), cell)?;
+            cells.push(format!("{fit_ms:.2}"));
+        }
+        lines.push(format!("| {} | {} |", method.name, cells.join(" | ")));
+    }
+    Ok(lines.join("\n") + "\n")
 }
 
 /// What made the results: everything that may change from run to run, kept apart from the table that may not.

@@ -8,7 +8,7 @@
 //!
 //! The error is known exactly: interpolating `1/λ` leaves the relative error `Π_q β (x − x_q)/λ(x_q)`, at most
 //! `ε = 2 (|β| h/2)^Q / Π_q λ(x_q)` in a band of half width `h`. Bands are a factor of two wide in `1 − x`, so `ε ≤ 5.1e-5`
-//! (`1/T₆(3)`) whatever the parameters, and far less where noise is white in the band. [`shift_bound`] turns it into a bound on
+//! (`1/T₆(3)`) whatever the parameters, and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a bound on
 //! what the minimum can move.
 
 use num_dual::DualSVec64;

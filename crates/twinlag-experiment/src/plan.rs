@@ -55,6 +55,9 @@ pub struct Plan {
     /// Time constants of a grid of starts (every pair of two of them), s, for methods that start there.
     #[serde(default)]
     pub grid_s: Vec<f64>,
+    /// Whether the methods are timed as well; times go into a file of their own, since no two runs agree on them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub timed: bool,
     /// Pictures of the table.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pictures: Vec<PictureSpec>,
@@ -257,10 +260,10 @@ impl Plan {
         Ok(())
     }
 
-    /// What decides the numbers: the plan without its pictures and summaries.
+    /// What decides the numbers: the plan without its pictures, summaries and timing.
     #[must_use]
     pub fn decisive(&self) -> Self {
-        Self { pictures: Vec::new(), summaries: Vec::new(), ..self.clone() }
+        Self { timed: false, pictures: Vec::new(), summaries: Vec::new(), ..self.clone() }
     }
 
     /// All cells, in order.

@@ -39,7 +39,7 @@ impl Series {
         Self::new(name, x.into(), y.into(), Shape::Line)
     }
 
-    /// A line without markers, of any number of points: it is thinned with [`crate::decimate`].
+    /// A line without markers, of any number of points: it is thinned with [`decimate`](crate::decimate()).
     pub fn trace(name: impl Into<String>, x: impl Into<Vec<f64>>, y: impl Into<Vec<f64>>) -> Self {
         Self::new(name, x.into(), y.into(), Shape::Trace)
     }
