@@ -29,6 +29,8 @@ const MOST_COLOURED: f64 = 0.97;
 const FEWEST_AT_REST: f64 = 8.0;
 /// Step of a coefficient in differences.
 const AR1_STEP: f64 = 0.01;
+/// Change of a level, relative, or of a coefficient, that is none.
+const SETTLED: f64 = 0.01;
 /// Rounds of weights and coefficients.
 const ROUNDS: usize = 3;
 
@@ -74,6 +76,18 @@ pub enum NoiseSource {
     InferredInputs,
     /// The residual's own energy: only the ratio of the levels was given, or could be told.
     Residual,
+}
+
+impl NoiseColour {
+    /// Rounds of levels and fit at most. For white noise the second changes levels by a few per cent of their standard error; with
+    /// its colour to be found as well, time constants, levels and coefficients follow each other slowly where the samples lie
+    /// far apart.
+    pub(crate) fn rounds(self) -> usize {
+        match self {
+            Self::White => 2,
+            Self::Autoregressive => 8,
+        }
+    }
 }
 
 /// Noise levels and how well they are known.
@@ -213,6 +227,15 @@ impl Levels {
         let variance: f64 =
             (0..2).map(|i| (0..2).map(|j| shares[i] * self.log_covariance[i][j] * shares[j]).sum::<f64>()).sum();
         variance.max(0.0).sqrt()
+    }
+
+    /// Whether another round of levels and fit would change nothing: for white noise the levels are the same, for coloured noise
+    /// levels and coefficients are to a hundredth.
+    pub(crate) fn agrees_with(&self, other: &Self, colour: NoiseColour) -> bool {
+        let is_close = (0..2).all(|i| {
+            (self.std_k[i] / other.std_k[i] - 1.0).abs() < SETTLED && (self.ar1[i] - other.ar1[i]).abs() < SETTLED
+        });
+        self == other || (colour == NoiseColour::Autoregressive && is_close)
     }
 
     /// Levels in the light of a fit at `theta`. `first` are those of the third differences. Unchanged where the levels were

@@ -24,8 +24,6 @@ use crate::starts::{hold_known, second_lags, starts};
 
 /// A residual test below this p-value rejects the model: four tests, so one false alarm in a thousand records.
 pub(crate) const REJECT: f64 = 1e-3 / 4.0;
-/// Rounds of levels and fit: the second changes levels by a few per cent of their standard error.
-const LEVEL_ROUNDS: usize = 2;
 /// The other hold must lower the sum of squares by this many times the residual's energy per degree of freedom.
 const CLEARLY_BETTER: f64 = 10.0;
 
@@ -486,14 +484,14 @@ impl<'a, const P: usize> Question<'a, P> {
 
     /// Levels in the light of the fit, and the fit again in the light of the levels.
     fn settle_levels(&mut self, first: &Levels, best: &mut Fitted<'a>) -> Result<(), Error> {
-        for _ in 0..LEVEL_ROUNDS {
+        for _ in 0..self.options.noise_colour.rounds() {
             if !best.fit.end.is_usable() {
                 break;
             }
             let theta: [f64; P] = std::array::from_fn(|i| best.fit.x[i]);
             let colour = self.options.noise_colour;
             let refined = Levels::refined(first, self.readings, best.whitened.hold(), &theta, colour);
-            if refined == self.levels {
+            if refined.agrees_with(&self.levels, colour) {
                 break;
             }
             self.levels = refined;

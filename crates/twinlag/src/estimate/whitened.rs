@@ -11,8 +11,6 @@ use crate::fitting::{Minimised, minimise_whitened};
 use crate::levels::{Levels, NoiseColour};
 use crate::starts::{second_lags, starts};
 
-/// Rounds of levels and fit: the second changes levels by a few per cent of their standard error.
-const ROUNDS: usize = 2;
 
 /// The fit itself, for whoever goes on from it.
 pub(super) struct Found<'a, const P: usize> {
@@ -86,13 +84,13 @@ pub(super) fn find<'a, const P: usize>(task: &Task<'a>) -> Result<Found<'a, P>, 
     let mut levels = first;
     let mut evaluations = Evaluations::default();
     let mut fitted = fit::<P>(task, &levels, None, &mut evaluations)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..colour.rounds() {
         let best = fitted.all.best();
         if first.given || !best.end.is_usable() {
             break;
         }
         let refined = Levels::refined::<P>(&first, task.readings, task.hold, &point(best), colour);
-        if refined == levels {
+        if refined.agrees_with(&levels, colour) {
             break;
         }
         levels = refined;
