@@ -180,6 +180,11 @@ fn one(name: &str, run: &Run) -> Result<()> {
     plan.trials = run.trials.unwrap_or(plan.trials);
     plan.seed = run.seed.unwrap_or(plan.seed);
     let out = run.out.clone().unwrap_or(folder.clone());
+    ensure!(
+        run.out.is_none() || run.shard.is_some() || !out.join("results.json").exists(),
+        "{}: holds results already; name another folder, or remove them",
+        out.display()
+    );
     let shard = run.shard.unwrap_or(Shard::WHOLE);
     let part = match (run.check, run.shard) {
         (true, _) => None,

@@ -500,7 +500,11 @@ fn what_has_no_part_in_a_closed_form_is_wrong_usage() {
 fn what_needs_even_sampling_says_so() {
     let bench = Bench::with("uneven", "run.csv", Trace { jitter: 0.3, ..Trace::GOOD }.csv());
     bench.refuses(3, &[&FILE[..], &["--estimator", "difference-equation-gtls"]].concat(), &["even"]);
-    bench.refuses(3, &[&FILE[..], &["--intervals", "bootstrap"]].concat(), &["even"]);
+    for further in
+        [&["--intervals", "bootstrap"][..], &["--second-order", "T1,T2"], &["--noise-colour", "autoregressive"]]
+    {
+        bench.refuses(2, &[&FILE[..], further].concat(), &[further[0], "evenly spaced", "--sampling uniform"]);
+    }
 }
 
 #[test]

@@ -22,10 +22,10 @@ use crate::readings::Readings;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DifferenceEquationEstimator {
     /// `W = diag(0, 0, 1)`, all the noise in the third column: least squares by QR factorisation. Noise in the regressors biases
-    /// it to short time constants, badly from a few per cent on.
+    /// it, badly from a few per cent on; with sensor 1 the faster, to short time constants.
     LeastSquares,
     /// `W = 1`, equal and independent noise in the three columns: the smallest right singular vector. But all three hold
-    /// `y2[k−1]`, and their noise is neither equal nor independent, so it stays biased, nearly as much as least squares.
+    /// `y2[k−1]`, and their noise is neither equal nor independent, so it stays biased, and at high noise wildly.
     TotalLeastSquares,
     /// `W` the covariance that white noise gives the three columns: consistent. The smallest right singular vector of the columns
     /// whitened by its Cholesky factor.

@@ -226,10 +226,15 @@ impl<'a> Whitened<'a> {
     /// Value and gradient are the same in both forms. The Gauss-Newton matrices belong to different square roots of `V⁻¹` and
     /// differ by terms of the size of the residual.
     ///
+    /// Infinite for second lags on uneven steps, which have no inverse here.
+    ///
     /// With known noise levels the sum is chi-square distributed with about [`Whitened::terms`] less `P` degrees of
     /// freedom at the minimum.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let pair = Pair::variables(theta);
+        if self.has_no_inverse(&pair) {
+            return CostValue { value: f64::INFINITY, gradient: [0.0; P], hessian: [[0.0; P]; P] };
+        }
         let mut sums = Sums::ZERO;
         match (&self.transformed, &self.compressed) {
             (Some(segments), Some(all)) if self.is_compressed_at(&pair) => {
@@ -267,6 +272,9 @@ impl<'a> Whitened<'a> {
     /// The whitened residual in order of time with its derivatives `[∂r/∂θ_i]`, one vector for each segment.
     pub fn jacobian<const P: usize>(&self, theta: &[f64; P]) -> Vec<Vec<(f64, [f64; P])>> {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
+        if self.has_no_inverse(&pair) {
+            return Vec::new();
+        }
         let of = |segment| {
             let mut out = Vec::new();
             banded::sweep(segment, &self.model, &pair, |residual| out.push(parts(residual)));
@@ -282,6 +290,12 @@ impl<'a> Whitened<'a> {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         let segments = self.transformed.as_ref().filter(|_| is_one_step(&self.model, &pair))?;
         Some(segments.iter().map(|s| spectral::residuals(s, &self.model, &pair)).collect())
+    }
+
+    /// Whether the steps are uneven and the inverse looks further than one of them.
+    fn has_no_inverse<D>(&self, pair: &Pair<D>) -> bool {
+        !is_one_step(&self.model, pair)
+            && self.readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_)))
     }
 
     fn is_compressed_at<const P: usize>(&self, pair: &Pair<DualSVec64<P>>) -> bool {

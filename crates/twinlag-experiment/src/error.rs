@@ -23,9 +23,9 @@ pub enum ExperimentError {
     Study(#[from] StudyError),
     #[error("picture {name}: {source}")]
     Picture { name: String, source: ReportError },
-    #[error("picture {name}: no row of the table matches")]
+    #[error("{name}: no row of the table matches")]
     NoRows { name: String },
-    #[error("picture {name}: the table has no column \"{column}\"")]
+    #[error("{name}: the table has no column \"{column}\"")]
     NoColumn { name: String, column: String },
     #[error("{path}: could not be written: {reason}")]
     Write { path: PathBuf, reason: String },

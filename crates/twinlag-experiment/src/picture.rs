@@ -5,7 +5,8 @@ use serde_json::Value;
 use twinlag_report::{Axis, Chart, Figure, Reference, Series};
 
 use crate::error::ExperimentError;
-use crate::table::{Row, Table};
+use crate::plan::Plan;
+use crate::table::{Row, Table, check_names};
 
 /// A figure: one panel for each value of a label, one series for each method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -96,6 +97,14 @@ pub(crate) fn text(value: &Value) -> String {
 }
 
 impl PictureSpec {
+    /// Whether `plan`, whose table has the columns `known`, has all that this names.
+    pub(crate) fn check(&self, plan: &Plan, known: &[String]) -> Result<(), ExperimentError> {
+        let labels = self.panels.iter().chain(self.only.iter().map(|(label, _)| label));
+        let drawn = [Some(&self.x.column), Some(&self.y.column), self.y_error.as_ref()];
+        let columns = labels.chain(drawn.into_iter().flatten()).chain(self.y_interval.iter().flatten());
+        check_names(plan, known, &self.file, columns, &self.methods)
+    }
+
     /// The figure of `table`, as SVG.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ use twinlag::signal::{Gas, Noise, Record, Rig, Sensor};
 use crate::error::ExperimentError;
 use crate::picture::PictureSpec;
 use crate::summary::SummarySpec;
+use crate::table::columns;
 
 /// An experiment, as its TOML file has it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -244,9 +245,32 @@ impl Plan {
             return refuse("trials and block must be positive".into());
         }
         if self.cells().is_empty() || self.methods.is_empty() {
-            return refuse("a plan needs a gas, a noise level and a method at least".into());
+            return refuse("a plan needs a method, and one entry at least in each of its lists".into());
+        }
+        let positive = |v: &f64| v.is_finite() && *v > 0.0;
+        if !self.noise_percent.iter().all(|v| v.is_finite() && *v >= 0.0) {
+            return refuse(format!("noise_percent must not be negative, got {:?}", self.noise_percent));
+        }
+        if !self.noise_ratio.iter().chain(&self.grid_s).all(positive) {
+            return refuse(format!(
+                "noise_ratio and grid_s must be positive, got {:?} and {:?}",
+                self.noise_ratio, self.grid_s
+            ));
+        }
+        if let Some((i, gas)) =
+            self.gases.iter().enumerate().find(|(i, g)| self.gases[..*i].iter().any(|h| h.name == g.name))
+        {
+            return refuse(format!("two gases are called \"{}\", the last of them number {}", gas.name, i + 1));
         }
         for (i, method) in self.methods.iter().enumerate() {
+            if !method.variance_factor.iter().all(positive) {
+                return refuse(format!("method \"{}\": variance_factor must be positive", method.name));
+            }
+            if let Start::At(tau_s) = method.start
+                && !tau_s.iter().all(positive)
+            {
+                return refuse(format!("method \"{}\": it must start at positive time constants", method.name));
+            }
             if self.methods[..i].iter().any(|m| m.name == method.name) {
                 return refuse(format!("two methods are called \"{}\"", method.name));
             }
@@ -257,7 +281,9 @@ impl Plan {
         for cell in self.cells() {
             self.bench(&cell, 0)?;
         }
-        Ok(())
+        let known = columns(self);
+        self.pictures.iter().try_for_each(|picture| picture.check(self, &known))?;
+        self.summaries.iter().try_for_each(|summary| summary.check(self, &known))
     }
 
     /// What decides the numbers: the plan without its pictures, summaries and timing.

@@ -5,7 +5,11 @@ use serde_json::Value;
 
 use crate::error::ExperimentError;
 use crate::picture::{has, text};
-use crate::table::{Row, Table};
+use crate::plan::Plan;
+use crate::table::{Row, Table, check_names};
+
+/// Digits behind the decimal point that a table may show.
+const MOST_DIGITS: usize = 9;
 
 /// A table with a row for each combination of labels and a column for each method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,6 +38,15 @@ pub struct SummarySpec {
 }
 
 impl SummarySpec {
+    /// Whether `plan`, whose table has the columns `known`, has all that this names.
+    pub(crate) fn check(&self, plan: &Plan, known: &[String]) -> Result<(), ExperimentError> {
+        if self.digits > MOST_DIGITS {
+            return Err(ExperimentError::Plan(format!("{}: at most {MOST_DIGITS} digits", self.file)));
+        }
+        let rows = self.rows.iter().map(|(label, _)| label).chain(self.only.iter().map(|(label, _)| label));
+        check_names(plan, known, &self.file, rows.chain([&self.value]).chain(&self.error), &self.methods)
+    }
+
     /// The table as Markdown.
     ///
     /// # Errors

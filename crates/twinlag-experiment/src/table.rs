@@ -6,7 +6,7 @@ use twinlag_study::{Results, Tally, Values};
 
 use crate::error::ExperimentError;
 use crate::plan::{Cell, Plan};
-use crate::trial::Experiment;
+use crate::trial::{Experiment, quantities};
 
 /// Significant digits of the numbers in tables.
 const DIGITS: i32 = 7;
@@ -117,6 +117,37 @@ impl Table {
         }
         (self.rows.len() != other.rows.len())
             .then(|| format!("there are {} rows, the stored table has {}", self.rows.len(), other.rows.len()))
+    }
+}
+
+/// The columns of the table of `plan`.
+pub(crate) fn columns(plan: &Plan) -> Vec<String> {
+    let mut row = plan.cells().first().map(|cell| labels(plan, cell)).unwrap_or_default();
+    row.insert("method".into(), Value::Null);
+    row.insert("sensor".into(), Value::Null);
+    let method = plan.methods.first().map_or("", |m| m.name.as_str());
+    statistics(&mut row, method, 0, &Tally::new(&quantities(method)), None);
+    row.keys().cloned().collect()
+}
+
+/// Refuses a name that a plan gives to a file, a column or a method, and that is none.
+pub(crate) fn check_names<'n>(
+    plan: &Plan,
+    known: &[String],
+    file: &str,
+    columns: impl IntoIterator<Item = &'n String>,
+    methods: &[String],
+) -> Result<(), ExperimentError> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if file.is_empty() || !file.chars().all(is_plain) {
+        return Err(ExperimentError::Plan(format!("\"{file}\" is no file name: letters, digits, - and _")));
+    }
+    if let Some(column) = columns.into_iter().find(|c| !known.contains(c)) {
+        return Err(ExperimentError::NoColumn { name: file.into(), column: column.clone() });
+    }
+    match methods.iter().find(|m| plan.methods.iter().all(|own| own.name != **m)) {
+        Some(method) => Err(ExperimentError::Plan(format!("{file}: there is no method called \"{method}\""))),
+        None => Ok(()),
     }
 }
 

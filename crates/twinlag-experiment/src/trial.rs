@@ -103,7 +103,15 @@ impl<'a> Experiment<'a> {
         let estimator = |m: &Method| -> Result<Box<dyn Estimate + 'a>, ExperimentError> {
             match own.estimators.iter().find(|(name, _)| *name == m.estimator) {
                 Some((_, estimator)) => Ok(Box::new(Borrowed(*estimator))),
-                None => Ok(Box::new(m.estimator.parse::<Estimator>()?)),
+                None => match m.estimator.parse::<Estimator>() {
+                    Ok(estimator) => Ok(Box::new(estimator)),
+                    Err(_) => Err(ExperimentError::Plan(format!(
+                        "method \"{}\": there is no estimator called \"{}\"; there are {}",
+                        m.name,
+                        m.estimator,
+                        Estimator::ALL.map(Estimator::name).join(", ")
+                    ))),
+                },
             }
         };
         let optimiser = |m: &Method| -> Result<Box<dyn Minimiser + Sync + 'a>, ExperimentError> {

@@ -26,6 +26,7 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
 pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>) -> Result<Characterisation, Error> {
     check(options)?;
     let readings = readings(record, options)?;
+    check_sampling(&readings, options)?;
     let levels = Levels::of(record, &readings, options)?;
     if options.has_second_lag() != [false; 2] {
         Question::<6>::new(record, &readings, options, levels, watch).answer()
@@ -57,6 +58,23 @@ pub fn readings(record: &Record, options: &Options) -> Result<Readings, Error> {
     } else {
         Readings::new(segments)?
     })
+}
+
+/// What takes evenly spaced samples.
+fn check_sampling(readings: &Readings, options: &Options) -> Result<(), Error> {
+    let wants = [
+        (options.has_second_lag() != [false; 2], "--second-order"),
+        (options.noise_colour == NoiseColour::Autoregressive, "--noise-colour autoregressive"),
+        (matches!(options.intervals, Intervals::Bootstrap(_)), "--intervals bootstrap"),
+    ];
+    match wants.into_iter().find(|(is_asked, _)| *is_asked) {
+        Some((_, option)) if readings.even_period_s().is_none() => Err(Error::Option {
+            option,
+            expected: "a record with evenly spaced samples; if the stamps are only ragged, --sampling uniform".into(),
+            got: "uneven time stamps".into(),
+        }),
+        _ => Ok(()),
+    }
 }
 
 fn check(options: &Options) -> Result<(), Error> {
@@ -152,7 +170,7 @@ fn check_estimator(options: &Options) -> Result<(), Error> {
     if options.estimator.is_closed_form() {
         let asked = [
             (options.free_gain || options.free_offset, "--free"),
-            (options.second_order != [false; 2], "--second-order"),
+            (options.has_second_lag() != [false; 2], "--second-order"),
             (!options.known.is_empty(), "--known"),
         ];
         if let Some((_, what)) = asked.into_iter().find(|(is_asked, _)| *is_asked) {

@@ -180,6 +180,13 @@ impl Estimate for Estimator {
 
     fn estimate(&self, task: &Task<'_>) -> Result<Outcome, Error> {
         let is_second_order = task.second_order != [false; 2];
+        if is_second_order && task.readings.even_period_s().is_none() {
+            return Err(Error::Option {
+                option: "second-order sensors",
+                expected: "evenly spaced samples".into(),
+                got: "uneven ones".into(),
+            });
+        }
         match self {
             Self::Whitened if is_second_order => whitened::estimate::<6>(task),
             Self::Whitened => whitened::estimate::<2>(task),

@@ -28,7 +28,7 @@ pub enum Estimator {
     Normalised,
     /// The compensated cost in units of the noise's own standard deviation; needs the noise levels.
     Hybrid,
-    /// Least squares on the difference equation. Noise biases it to short time constants.
+    /// Least squares on the difference equation. Noise biases it; which way depends on which sensor comes first.
     DifferenceEquationLs,
     /// Total least squares on it. Biased too, since its columns share their noise.
     DifferenceEquationTls,

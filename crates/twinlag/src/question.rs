@@ -163,6 +163,11 @@ impl<'a, const P: usize> Question<'a, P> {
             best = self.without_unseen(best)?;
         }
         self.settle_levels(&first_levels, &mut best)?;
+        if P == 6 {
+            // Weights from wrong levels can make a lag look needed.
+            best = self.without_unseen(best)?;
+            self.settle_levels(&first_levels, &mut best)?;
+        }
         if self.levels_are_those_of_the_residual() && best.fit.end.is_usable() {
             self.scale_to_residual(&mut best)?;
             if !self.priors.is_empty() {
@@ -275,7 +280,7 @@ impl<'a, const P: usize> Question<'a, P> {
         };
         let bias = match self.options.estimator {
             Estimator::DifferenceEquationLs => {
-                "noise biases least squares on the difference equation to short time constants"
+                "noise biases least squares on the difference equation, and which way depends on which sensor is called T1"
             }
             Estimator::DifferenceEquationTls => "noise biases total least squares on the difference equation",
             _ => "",
@@ -485,7 +490,12 @@ impl<'a, const P: usize> Question<'a, P> {
     /// Levels in the light of the fit, and the fit again in the light of the levels.
     fn settle_levels(&mut self, first: &Levels, best: &mut Fitted<'a>) -> Result<(), Error> {
         for _ in 0..self.options.noise_colour.rounds() {
-            if !best.fit.end.is_usable() {
+            // A second lag on its bound is none, and says nothing against the rest.
+            let tells = match &best.fit.end {
+                End::OnBound(which) => which.iter().all(|&i| i >= 4),
+                end => end.is_usable(),
+            };
+            if !tells {
                 break;
             }
             let theta: [f64; P] = std::array::from_fn(|i| best.fit.x[i]);

@@ -38,6 +38,15 @@ impl<'a, const P: usize> Question<'a, P> {
     /// Both are tried together first: a lag that the sensors share drops out of how they disagree, so each of two alike looks
     /// needed as long as the other is there.
     pub(crate) fn without_unseen(&mut self, mut best: Fitted<'a>) -> Result<Fitted<'a>, Error> {
+        // With one left out the other may turn out not to be seen either.
+        while let Some(without) = self.without_least_seen(&best)? {
+            best = Fitted { starts: best.starts, ..without };
+        }
+        Ok(best)
+    }
+
+    /// The fit without both second lags, or without the one that is in more doubt; `None` where what is there is needed.
+    fn without_least_seen(&mut self, best: &Fitted<'a>) -> Result<Option<Fitted<'a>>, Error> {
         let free = self.free();
         let theta: [f64; P] = best.theta();
         let covariance = best.whitened.covariance(&theta, &free, &self.prior_std(), Middle::WhiteNoise);
@@ -53,12 +62,11 @@ impl<'a, const P: usize> Question<'a, P> {
         let both = (second.len() == 2).then_some(second);
         for (left_out, limit) in [(both, CHI2_95_OF_TWO), (alone, CHI2_95)] {
             let Some(left_out) = left_out else { continue };
-            if let Some(without) = self.without(&best, &left_out, limit)? {
-                best = Fitted { starts: best.starts, ..without };
-                break;
+            if let Some(without) = self.without(best, &left_out, limit)? {
+                return Ok(Some(without));
             }
         }
-        Ok(best)
+        Ok(None)
     }
 
     /// The fit with the second lags `left_out` at none, where that raises the cost by no more than `limit`.

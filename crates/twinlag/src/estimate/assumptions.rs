@@ -43,7 +43,9 @@ pub(super) fn assumes(estimator: Estimator) -> &'static str {
         }
         Estimator::Normalised => "as the compensated one, but only the ratio of the levels",
         Estimator::Hybrid => "as the compensated one; half as sensitive to a wrong level",
-        Estimator::DifferenceEquationLs => "no noise at all: noise makes its time constants too short",
+        Estimator::DifferenceEquationLs => {
+            "no noise at all: noise biases it, with sensor 1 the faster to short time constants"
+        }
         Estimator::DifferenceEquationTls => {
             "first-order sensors, and noise of one level that is independent between the columns, which it is not: biased too"
         }

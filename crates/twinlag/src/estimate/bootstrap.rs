@@ -177,18 +177,11 @@ fn gas(
             ((first[bin] * n2 + second[bin] * n1) / (n1 + n2), n1 * n2 / (n1 + n2))
         })
         .collect();
-    // Mean power and mean noise in windows that widen with frequency.
-    let mut sums = vec![(0.0, 0.0)];
-    for (x, noise) in &spectrum {
-        let (power, level) = sums[sums.len() - 1];
-        sums.push((power + x.norm_sqr(), level + noise));
-    }
     let bins = spectrum.len();
+    let ratios: Vec<f64> = spectrum.iter().map(|(x, noise)| x.norm_sqr() / noise).collect();
     for (bin, (x, _)) in spectrum.iter_mut().enumerate() {
-        let (low, high) = (bin - bin / 10 - bin.min(2), (bin + bin / 10 + 3).min(bins));
-        let (power, noise) = (sums[high].0 - sums[low].0, sums[high].1 - sums[low].1);
         // Power, not the series itself, is what the replicates have to have right.
-        *x *= if power > 0.0 { (1.0 - noise / power).max(0.0).sqrt() } else { 0.0 };
+        *x *= gas_share(&ratios, bin, bins).sqrt();
     }
     let mut spectrum: Vec<Complex<f64>> = spectrum.into_iter().map(|(x, _)| x).collect();
     spectrum[0].im = 0.0;
@@ -198,6 +191,25 @@ fn gas(
     let mut out = back.make_output_vec();
     back.process(&mut spectrum, &mut out).expect("real at both ends");
     out.iter().enumerate().map(|(k, v)| v / n as f64 + line(k)).collect()
+}
+
+/// The gas's share of the power at `bin`, given each bin's power over that of its noise.
+///
+/// From the median over bins within an eighth of the frequency, which lines do not touch; where that is no clear sign of gas, two
+/// standard errors above noise alone, there is none. A bin that stands out five times above its surroundings, its neighbours with
+/// it, is a line and counts by itself. Anything less strict leaves noise in the gas, which would tell the replicates more
+/// about the sensors than the record does.
+fn gas_share(ratios: &[f64], bin: usize, bins: usize) -> f64 {
+    let (low, high) = (bin - (bin / 8 + 4).min(bin), (bin + bin / 8 + 5).min(bins));
+    let mut around = ratios[low..high].to_vec();
+    let count = around.len();
+    let median = *around.select_nth_unstable_by(count / 2, f64::total_cmp).1 / std::f64::consts::LN_2;
+    let near = &ratios[bin.saturating_sub(1)..(bin + 2).min(bins)];
+    let peak = near.iter().sum::<f64>() / near.len() as f64;
+    let level = if peak > 5.0 * median.max(1.0) { ratios[bin] } else { median };
+    // The median of so many exponential variables has the standard error 1/(ln 2 √count).
+    let clear = 1.0 + 2.0 / (std::f64::consts::LN_2 * (count as f64).sqrt());
+    if level > clear { 1.0 - 1.0 / level } else { 0.0 }
 }
 
 /// The series that `filter` (oldest sample first, unit gain at rest) takes to `f`, at rest before it.

@@ -11,7 +11,6 @@ use crate::fitting::{Minimised, minimise_whitened};
 use crate::levels::{Levels, NoiseColour};
 use crate::starts::{second_lags, starts};
 
-
 /// The fit itself, for whoever goes on from it.
 pub(super) struct Found<'a, const P: usize> {
     pub(super) whitened: Whitened<'a>,
