@@ -154,9 +154,14 @@ fn gas(
     planner: &mut RealFftPlanner<f64>,
 ) -> Vec<f64> {
     let n = f[0].len();
-    // A straight line between the ends is taken off before the circular transform, and put back after it.
-    let ends = [0.5 * (f[0][0] + f[1][0]), 0.5 * (f[0][n - 1] + f[1][n - 1])];
-    let line = |k: usize| ends[0] + (ends[1] - ends[0]) * k as f64 / (n - 1) as f64;
+    // A straight line through all samples is taken off before the circular transform, and put back after it. (One between the ends
+    // would hold their noise, ten times that of the readings, as a slow gas signal.)
+    let centre = 0.5 * (n - 1) as f64;
+    let mean = f.iter().map(|f| f.iter().sum::<f64>()).sum::<f64>() / (2 * n) as f64;
+    let moment = n as f64 * ((n * n) as f64 - 1.0) / 12.0;
+    let along = |f: &[f64]| -> f64 { f.iter().enumerate().map(|(k, v)| (k as f64 - centre) * v).sum() };
+    let slope = 0.5 * (along(f[0]) + along(f[1])) / moment;
+    let line = |k: usize| mean + slope * (k as f64 - centre);
     let (forward, back) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
     let [first, second] = f.map(|f| {
         let mut input: Vec<f64> = f.iter().enumerate().map(|(k, v)| v - line(k)).collect();
