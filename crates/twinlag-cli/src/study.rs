@@ -100,7 +100,7 @@ fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
         ControlFlow::Continue(())
     });
     bar.finish_and_clear();
-    done.map_err(failure)?;
+    done?;
     if run.shard.is_some() {
         say(talk, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
             format!("{}: done; when all parts are, twinlag study merge {out}", part.display())
@@ -119,15 +119,15 @@ fn merge(dir: &Path, talk: Talk) -> Result<u8, Failure> {
     if parts.is_empty() {
         return Err(Failure::File(format!("{name}: holds no part of a study: run `twinlag study run` first")));
     }
-    let results = twinlag_study::merge(&parts).map_err(failure)?;
-    let experiment = Experiment::new(&plan).map_err(other)?;
+    let results = twinlag_study::merge(&parts)?;
+    let experiment = Experiment::new(&plan)?;
     if results.header().plan() != experiment.plan() {
         return Err(Failure::File(format!(
             "{name}: the parts are of another plan than plan.toml, or of another version"
         )));
     }
-    let table = Table::of(&experiment, &results).map_err(other)?;
-    write(&plan, &table, dir).map_err(other)?;
+    let table = Table::of(&experiment, &results)?;
+    write(&plan, &table, dir)?;
     let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
     say(talk, &json!({"schema": "twinlag.study/1", "out": dir, "trials": trials, "rows": table.rows}), || {
         format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len())
@@ -151,16 +151,20 @@ fn say(talk: Talk, object: &serde_json::Value, text: impl FnOnce() -> String) ->
     }
 }
 
-fn other(error: ExperimentError) -> Failure {
-    Failure::Other(error.to_string())
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        Self::Other(error.to_string())
+    }
 }
 
 /// A part that is there already, or is not there yet, is a matter of how the program was called.
-fn failure(error: StudyError) -> Failure {
-    match error {
-        StudyError::Exists { .. } => Failure::Usage(error.to_string()),
-        StudyError::Incomplete { .. } => Failure::NotYet(error.to_string()),
-        StudyError::Damaged { .. } | StudyError::OtherStudy { .. } => Failure::File(error.to_string()),
-        _ => Failure::Other(error.to_string()),
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Exists { .. } => Self::Usage(error.to_string()),
+            StudyError::Incomplete { .. } => Self::NotYet(error.to_string()),
+            StudyError::Damaged { .. } | StudyError::OtherStudy { .. } => Self::File(error.to_string()),
+            _ => Self::Other(error.to_string()),
+        }
     }
 }
