@@ -5,6 +5,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
+use pulldown_cmark::{Event, Parser, Tag};
 
 use crate::root;
 
@@ -57,8 +58,9 @@ fn links() -> Result<()> {
     let mut count = 0;
     for page in &pages {
         let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
-        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            let target = link.split('#').next().unwrap_or("");
+        for event in Parser::new(&text) {
+            let Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) = event else { continue };
+            let target = dest_url.split('#').next().unwrap_or("");
             if target.is_empty() || target.contains("://") {
                 continue;
             }
