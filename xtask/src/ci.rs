@@ -14,11 +14,13 @@ pub(crate) fn run() -> Result<()> {
     step("format", "cargo", &["fmt", "--all", "--check"])?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
-    step("the README's main job", "cargo", &["run", "--release", "--", "demo"])?;
-    step("example: all estimators", "cargo", &["run", "--release", "-p", "twinlag", "--example", "characterise"])?;
-    step("example: a solver of one's own", "cargo", &["run", "--release", "-p", "own-solver"])?;
-    step("example: a cost of one's own", "cargo", &["run", "--release", "-p", "own-cost"])?;
-    step("example: an estimator of one's own", "cargo", &["run", "--release", "-p", "own-estimator"])?;
+    // In one build: asked for one by one, packages take features one by one, and are compiled anew each time.
+    step("release build", "cargo", &["build", "--release", "--workspace", "--bins", "--examples"])?;
+    step("the README's main job", "target/release/twinlag", &["demo"])?;
+    step("example: all estimators", "target/release/examples/characterise", &[])?;
+    step("example: a solver of one's own", "target/release/own-solver", &[])?;
+    step("example: a cost of one's own", "target/release/own-cost", &[])?;
+    step("example: an estimator of one's own", "target/release/own-estimator", &[])?;
     let quick = root()?.join("target/quick-experiments");
     if quick.exists() {
         fs::remove_dir_all(&quick)?;

@@ -1,6 +1,7 @@
 //! Checks of single numbers, which put the place in the rig file into the error.
 
 use crate::SignalError;
+use crate::effects::ZERO_CELSIUS_K;
 
 /// `within.name`, as a rig file's reader would write it.
 pub(crate) fn path(within: &str, name: &str) -> String {
@@ -9,6 +10,15 @@ pub(crate) fn path(within: &str, name: &str) -> String {
 
 pub(crate) fn finite(within: &str, name: &str, value: f64) -> Result<(), SignalError> {
     if value.is_finite() { Ok(()) } else { Err(SignalError::NotFinite { field: path(within, name), value }) }
+}
+
+/// `value` is a temperature in °C that something may have.
+pub(crate) fn above_absolute_zero(within: &str, name: &str, value: f64) -> Result<(), SignalError> {
+    if value.is_finite() && value > -ZERO_CELSIUS_K {
+        Ok(())
+    } else {
+        Err(SignalError::NotAboveAbsoluteZero { field: path(within, name), value })
+    }
 }
 
 pub(crate) fn positive(within: &str, name: &str, value: f64) -> Result<(), SignalError> {

@@ -4,20 +4,32 @@
 //! 1e-10 of the swing. A gas held over each sample period is constant within every step, and never seen across its
 //! jump.
 //!
-//! A new physical effect is a term in [`Sensor::derivative`], or in [`Sensor::reading_c`] if it acts on the reading.
+//! A new physical effect is a term in [`Sensor::derivative`], or in [`Sensor::calibrated_c`] if it acts on the reading.
+//!
+//! Readings between two steps, which a delay asks for, are interpolated by the cubic with the states and slopes of both
+//! (Hermite): its error is `h⁴ |T⁗|/384`.
 
+use crate::effects::Play;
 use crate::gas::GasPath;
-use crate::{Hold, Sensor};
+use crate::{Flow, Hold, Sensor};
 
 /// Temperatures of the sensor's bodies, °C: first pole, second pole, slow body. Bodies that a sensor lacks stay put.
 pub(crate) type State = [f64; 3];
 
 impl Sensor {
     /// Rate of change of the state, K/s, at `time_s` in gas of `gas_c`.
-    pub(crate) fn derivative(&self, _time_s: f64, gas_c: f64, state: &State) -> State {
+    fn derivative(&self, flow: Option<&Flow>, time_s: f64, gas_c: f64, state: &State) -> State {
         let [first_c, second_c, slow_c] = *state;
+        let mut tau_s = self.time_constant_s;
+        if let Some(flow) = flow {
+            tau_s *= flow.factor(time_s);
+        }
+        if let Some(dependence) = &self.temperature_dependence {
+            tau_s *= dependence.factor(first_c);
+        }
+        let loss_k = self.radiation.map_or(0.0, |radiation| radiation.loss_k(first_c));
         [
-            (gas_c - first_c) / self.time_constant_s,
+            (gas_c - first_c - loss_k) / tau_s,
             self.second_time_constant_s.map_or(0.0, |tau_s| (first_c - second_c) / tau_s),
             self.slow_mode.map_or(0.0, |mode| (self.direct_c(state) - slow_c) / mode.time_constant_s),
         ]
@@ -28,29 +40,56 @@ impl Sensor {
         if self.second_time_constant_s.is_some() { state[1] } else { state[0] }
     }
 
-    /// The reading without noise and ADC, °C.
-    pub(crate) fn reading_c(&self, state: &State) -> f64 {
+    /// Temperature of the junction, °C.
+    fn junction_c(&self, state: &State) -> f64 {
         let direct_c = self.direct_c(state);
-        let junction_c = self.slow_mode.map_or(direct_c, |mode| direct_c + mode.fraction * (state[2] - direct_c));
-        self.gain * junction_c + self.offset_k
+        self.slow_mode.map_or(direct_c, |mode| direct_c + mode.fraction * (state[2] - direct_c))
     }
 
-    /// Readings at the sample instants from time zero on, °C. Starts in equilibrium with the gas at the grid's start.
+    /// What the calibration makes of a junction at `junction_c`, °C.
+    fn calibrated_c(&self, junction_c: f64) -> f64 {
+        let linear_c = self.gain * junction_c + self.offset_k;
+        if self.curvature_per_k == 0.0 {
+            linear_c
+        } else {
+            linear_c + self.curvature_per_k * (junction_c - self.curvature_about_c).powi(2)
+        }
+    }
+
+    /// When the samples from time zero on are read, in integration steps after the start of the run-in, not before it.
+    fn read_at_steps(&self, gas: &GasPath, oversampling: usize) -> Vec<f64> {
+        let grid = gas.grid;
+        let (samples, settle) = (grid.samples(), grid.before / grid.per_sample);
+        let period_s = grid.sample_period_s();
+        (settle..samples)
+            .map(|sample| {
+                let late_s =
+                    self.delay_s + self.clock_slip.map_or(0.0, |slip| slip.late_s((sample - settle) as f64 * period_s));
+                // Without a delay this is a whole number, and no interpolation.
+                ((sample * oversampling) as f64 - late_s / period_s * oversampling as f64).max(0.0)
+            })
+            .collect()
+    }
+
+    /// Readings at the sample instants from time zero on, °C. Starts in equilibrium with the gas at the grid's start,
+    /// radiation aside.
     ///
+    /// - `flow`: what the flow does to the first time constant
     /// - `oversampling`: integration steps per sample period, the number with which `gas` was made
-    pub(crate) fn follow(&self, gas: &GasPath, oversampling: usize) -> Vec<f64> {
+    pub(crate) fn follow(&self, gas: &GasPath, flow: Option<&Flow>, oversampling: usize) -> Vec<f64> {
         let grid = gas.grid;
         let step_s = grid.sample_period_s() / oversampling as f64;
-        let (samples, settle) = (grid.samples(), grid.before / grid.per_sample);
-        let mut readings_c = Vec::with_capacity(samples - settle);
+        let samples = grid.samples();
+        let read_at = self.read_at_steps(gas, oversampling);
+        // A slipping clock reads some times twice: in the order of time, and each put where it belongs.
+        let mut order: Vec<usize> = (0..read_at.len()).collect();
+        order.sort_by(|&a, &b| read_at[a].total_cmp(&read_at[b]));
+        let mut pending = order.into_iter().peekable();
+
+        let mut readings_c = vec![0.0; read_at.len()];
         let mut state = [gas.values_c[0]; 3];
-        for sample in 0..samples {
-            if sample >= settle {
-                readings_c.push(self.reading_c(&state));
-            }
-            if sample + 1 == samples {
-                break;
-            }
+        let mut play = Play::new(self.hysteresis, self.junction_c(&state));
+        for sample in 0..samples - 1 {
             let start = sample * grid.per_sample;
             for step in 0..oversampling {
                 let during_c = match gas.hold {
@@ -61,11 +100,38 @@ impl Sensor {
                     }
                 };
                 let time_s = grid.time_s(start) + step as f64 * step_s;
-                state = runge_kutta_4(&state, time_s, step_s, during_c, |t, x, s| self.derivative(t, x, s));
+                let derivative = |t: f64, x: f64, s: &State| self.derivative(flow, t, x, s);
+                let next = runge_kutta_4(&state, time_s, step_s, during_c, derivative);
+                let now = (sample * oversampling + step) as f64;
+                while let Some(reading) = pending.next_if(|&reading| read_at[reading] < now + 1.0) {
+                    let u = read_at[reading] - now;
+                    let then = if u == 0.0 {
+                        state
+                    } else {
+                        let slopes =
+                            [derivative(time_s, during_c[0], &state), derivative(time_s + step_s, during_c[2], &next)];
+                        hermite(u, step_s, [&state, &next], slopes)
+                    };
+                    readings_c[reading] = self.calibrated_c(play.output_c(self.junction_c(&then)));
+                }
+                state = next;
+                play.advance(self.junction_c(&state));
             }
+        }
+        for reading in pending {
+            readings_c[reading] = self.calibrated_c(play.output_c(self.junction_c(&state)));
         }
         readings_c
     }
+}
+
+/// The cubic through two states with their slopes, at the part `u` of the step between them.
+fn hermite(u: f64, step_s: f64, states: [&State; 2], slopes: [State; 2]) -> State {
+    let v = 1.0 - u;
+    std::array::from_fn(|i| {
+        let level = v * v * (1.0 + 2.0 * u) * states[0][i] + u * u * (1.0 + 2.0 * v) * states[1][i];
+        level + step_s * u * v * (v * slopes[0][i] - u * slopes[1][i])
+    })
 }
 
 /// One step of the classical rule; `gas_c` at the step's start, middle and end.

@@ -16,6 +16,8 @@ pub enum SignalError {
     NotPositive { field: String, value: f64 },
     #[error("{field} must be finite and not negative, got {value}")]
     Negative { field: String, value: f64 },
+    #[error("{field} must be finite and above absolute zero (-273.15), got {value}")]
+    NotAboveAbsoluteZero { field: String, value: f64 },
     #[error("{field} must lie between {low} and {high}, got {value}")]
     OutOfRange { field: String, value: f64, low: f64, high: f64 },
     #[error("{field} must be below {other} ({limit}), got {value}")]
@@ -28,6 +30,8 @@ pub enum SignalError {
     EmptyName { field: String },
     #[error("sensors[0].channel and sensors[1].channel must differ, both are {channel:?}")]
     SameChannel { channel: String },
+    #[error("{field} must be one of the channels {channels:?}, got {got:?}")]
+    UnknownChannel { field: String, got: String, channels: [String; 2] },
     #[error(
         "the integration step {step_s} s is not shorter than {field} = {time_constant_s} s: raise record.oversampling to \
          at least {oversampling}"
@@ -42,6 +46,11 @@ pub enum SignalError {
         "{steps:e} integration steps are more than {limit:e}: lower record.samples, record.oversampling or {field}"
     )]
     TooLarge { field: String, steps: f64, limit: f64 },
+    #[error(
+        "the readings of channel {channel:?} are not finite at {time_s} s: its equations have left the temperatures for \
+         which they are meant"
+    )]
+    Diverged { channel: String, time_s: f64 },
     #[error("gas of kind \"series\" needs either path, or values_c and period_s")]
     SeriesSource,
     #[error("the gas series ends at {end_s} s, the record at {needed_s} s")]

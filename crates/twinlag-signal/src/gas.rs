@@ -87,8 +87,7 @@ impl Gas {
     pub(crate) fn check(&self, record: &Record) -> Result<(), SignalError> {
         let within = "gas";
         finite(within, "mean_c", self.mean_c)?;
-        // A held gas is taken at the sample instants alone: nothing happens between them that a step could miss.
-        let resolution = Resolution { record: (self.hold == Hold::Continuous).then_some(record) };
+        let resolution = Resolution::new(self.hold, record);
         match &self.signal {
             Signal::Sine(tone) => tone.check(within, resolution),
             Signal::MultiTone(tones) => tones.check(within, resolution),
@@ -104,11 +103,16 @@ impl Gas {
 /// Whether the integration step follows a signal: ten steps per period at least, where the rule's error is
 /// `(2π/10)⁴/2880` of the amplitude or 5e-5.
 #[derive(Clone, Copy)]
-struct Resolution<'a> {
+pub(crate) struct Resolution<'a> {
     record: Option<&'a Record>,
 }
 
-impl Resolution<'_> {
+impl<'a> Resolution<'a> {
+    /// A held gas is taken at the sample instants alone: nothing happens between them that a step could miss.
+    pub(crate) fn new(hold: Hold, record: &'a Record) -> Self {
+        Self { record: (hold == Hold::Continuous).then_some(record) }
+    }
+
     const STEPS_PER_PERIOD: f64 = 10.0;
 
     /// Refuses `frequency_hz` if it is too fast, naming the field `name`, whose own value is `value`.
@@ -130,7 +134,7 @@ impl Resolution<'_> {
 }
 
 /// Half a raised cosine: 0 at 0, 1 at 1, level at both.
-fn smooth_step(u: f64) -> f64 {
+pub(crate) fn smooth_step(u: f64) -> f64 {
     0.5 * (1.0 - (std::f64::consts::PI * u).cos())
 }
 
@@ -157,6 +161,12 @@ impl GasPath {
             *value_c += gas.mean_c;
         }
         Ok(Self { grid, hold: gas.hold, values_c })
+    }
+
+    /// The same with something added at every grid point, K.
+    pub(crate) fn plus(&self, added_k: &[f64]) -> Self {
+        let values_c = self.values_c.iter().zip(added_k).map(|(value_c, added_k)| value_c + added_k).collect();
+        Self { grid: self.grid, hold: self.hold, values_c }
     }
 
     /// The values at the sample instants from time zero on, °C.

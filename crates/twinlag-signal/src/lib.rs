@@ -51,6 +51,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! # Effects
+//!
+//! Two first-order lags in white noise are where a rig starts. A [`Sensor`] may have more: further poles, radiation, a
+//! time constant that depends on temperature, a curved calibration, delay, drift, mains pick-up, crosstalk, noise with a
+//! memory, spikes, and some defects; the two share a [`Flow`] that changes, or meet slightly different gas
+//! ([`Mismatch`]). Each is off if left out, and its documentation says the formula. [`undeclared`] draws rigs with one of
+//! them at random, for the trial of a diagnosis.
+//!
 //! # What the numbers mean
 //!
 //! Temperatures are in °C (`_c`), differences of temperature in K (`_k`), times in s, frequencies in Hz. The record's
@@ -60,7 +68,9 @@
 
 mod adc;
 mod check;
+mod disturbance;
 mod dynamics;
+mod effects;
 mod error;
 mod gas;
 mod grid;
@@ -70,8 +80,13 @@ mod rig;
 mod sensor;
 mod simulated;
 mod streams;
+pub mod undeclared;
 
 pub use adc::Adc;
+pub use effects::{
+    ClockSlip, ColouredNoise, Flow, FlowSine, FlowStep, Hysteresis, IntermittentContact, Mains, Mismatch, Radiation,
+    Replaced, Spikes, TemperatureDependence,
+};
 pub use error::SignalError;
 pub use gas::{Broadband, Engine, Gas, Hold, MultiTone, Plunge, Series, Signal, Tone, Turbulence};
 pub use noise::Noise;

@@ -21,7 +21,8 @@ pub struct Record {
     pub oversampling: usize,
     /// Run-in before the first sample with the gas signal running, s, rounded up to whole sample periods.
     ///
-    /// Left out: ten times the slowest time constant, after which 5e-5 of any start error is left. At the start of the
+    /// Left out: ten times the slowest time constant, after which 5e-5 of any start error is left, and the longest
+    /// delay. At the start of the
     /// run-in both sensors are in equilibrium with the gas of that moment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settle_s: Option<f64>,
@@ -42,19 +43,19 @@ impl Record {
         self.sample_period_s / self.oversampling as f64
     }
 
-    /// Whole sample periods before the first sample, given the slowest time constant.
-    pub(crate) fn settle_samples(&self, slowest_s: f64) -> f64 {
-        (self.settle_s.unwrap_or(10.0 * slowest_s) / self.sample_period_s).ceil()
+    /// Whole sample periods before the first sample, given the run-in that the sensors need.
+    pub(crate) fn settle_samples(&self, needed_s: f64) -> f64 {
+        (self.settle_s.unwrap_or(needed_s) / self.sample_period_s).ceil()
     }
 
-    pub(crate) fn check(&self, slowest_s: f64) -> Result<(), SignalError> {
+    pub(crate) fn check(&self, needed_s: f64) -> Result<(), SignalError> {
         at_least("record", "samples", self.samples, 2)?;
         positive("record", "sample_period_s", self.sample_period_s)?;
         at_least("record", "oversampling", self.oversampling, 1)?;
         if let Some(settle_s) = self.settle_s {
             not_negative("record", "settle_s", settle_s)?;
         }
-        let samples = self.samples as f64 + self.settle_samples(slowest_s);
+        let samples = self.samples as f64 + self.settle_samples(needed_s);
         grid::check_size(samples * self.oversampling as f64, "record.settle_s")
     }
 }

@@ -5,10 +5,13 @@ use std::path::{Path, PathBuf};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::gas::GasPath;
+use crate::disturbance::cross_talk;
+use crate::gas::{GasPath, Resolution};
 use crate::grid::Grid;
 use crate::streams::{Purpose, stream};
-use crate::{Clean, Gas, Record, Sensor, SignalError, Simulated};
+use crate::{Clean, Flow, Gas, Mismatch, Record, Sensor, SignalError, Simulated};
+
+const WITHIN: [&str; 2] = ["sensors[0]", "sensors[1]"];
 
 /// A described rig, valid by construction; deserialising checks it as [`Rig::new`] does, and refuses unknown fields.
 ///
@@ -20,6 +23,10 @@ pub struct Rig {
     record: Record,
     gas: Gas,
     sensors: [Sensor; 2],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    flow: Option<Flow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mismatch: Option<Mismatch>,
     #[serde(skip)]
     base_dir: PathBuf,
 }
@@ -31,6 +38,10 @@ struct Unchecked {
     record: Record,
     gas: Gas,
     sensors: Vec<Sensor>,
+    #[serde(default)]
+    flow: Option<Flow>,
+    #[serde(default)]
+    mismatch: Option<Mismatch>,
 }
 
 impl TryFrom<Unchecked> for Rig {
@@ -39,30 +50,60 @@ impl TryFrom<Unchecked> for Rig {
     fn try_from(file: Unchecked) -> Result<Self, SignalError> {
         let sensors =
             file.sensors.try_into().map_err(|got: Vec<Sensor>| SignalError::SensorCount { got: got.len() })?;
-        Self::new(file.seed, file.record, file.gas, sensors)
+        let (seed, record, gas) = (file.seed, file.record, file.gas);
+        Self { seed, record, gas, sensors, flow: file.flow, mismatch: file.mismatch, base_dir: PathBuf::new() }
+            .checked()
     }
 }
 
 impl Rig {
-    /// A rig from its parts.
+    /// A rig from its parts, with steady flow and one gas for both sensors.
     ///
     /// # Errors
     /// Any number that is not finite, or not positive where it must be; channel names empty or equal; an integration
     /// step as long as a time constant ([`SignalError::StepTooLong`]) or too long for the gas
     /// ([`SignalError::NotResolved`]); more than 2e8 integration steps ([`SignalError::TooLarge`]).
     pub fn new(seed: u64, record: Record, gas: Gas, sensors: [Sensor; 2]) -> Result<Self, SignalError> {
-        for (sensor, within) in sensors.iter().zip(["sensors[0]", "sensors[1]"]) {
-            sensor.check(within)?;
+        Self { seed, record, gas, sensors, flow: None, mismatch: None, base_dir: PathBuf::new() }.checked()
+    }
+
+    /// The same rig in a flow that changes both time constants.
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_flow(self, flow: Flow) -> Result<Self, SignalError> {
+        Self { flow: Some(flow), ..self }.checked()
+    }
+
+    /// The same rig with another gas for one of the sensors.
+    ///
+    /// # Errors
+    /// As [`Rig::new`]; [`SignalError::UnknownChannel`] if no sensor has the channel that it names.
+    pub fn with_mismatch(self, mismatch: Mismatch) -> Result<Self, SignalError> {
+        Self { mismatch: Some(mismatch), ..self }.checked()
+    }
+
+    fn checked(self) -> Result<Self, SignalError> {
+        let Self { record, gas, sensors, flow, mismatch, .. } = &self;
+        for (sensor, within) in sensors.iter().zip(WITHIN) {
+            sensor.check(within, record)?;
         }
         if sensors[0].channel == sensors[1].channel {
             return Err(SignalError::SameChannel { channel: sensors[0].channel.clone() });
         }
-        record.check(slowest_s(&sensors))?;
-        for (sensor, within) in sensors.iter().zip(["sensors[0]", "sensors[1]"]) {
-            sensor.check_step(within, &record)?;
+        if let Some(flow) = flow {
+            flow.check()?;
         }
-        gas.check(&record)?;
-        Ok(Self { seed, record, gas, sensors, base_dir: PathBuf::new() })
+        record.check(self.run_in_s())?;
+        for (sensor, within) in sensors.iter().zip(WITHIN) {
+            sensor.check_step(within, record, flow.as_ref(), gas.mean_c)?;
+        }
+        gas.check(record)?;
+        if let Some(mismatch) = mismatch {
+            mismatch.check(Resolution::new(gas.hold, record))?;
+            mismatch.sensor(self.channels())?;
+        }
+        Ok(self)
     }
 
     /// The same rig, looking for a gas series with a relative path in `dir` (the rig file's directory, usually).
@@ -99,6 +140,16 @@ impl Rig {
         &self.sensors
     }
 
+    /// What the flow does to the time constants, if it changes.
+    pub fn flow(&self) -> Option<&Flow> {
+        self.flow.as_ref()
+    }
+
+    /// What the gas of one sensor differs by, if it does.
+    pub fn mismatch(&self) -> Option<&Mismatch> {
+        self.mismatch.as_ref()
+    }
+
     /// Trial 0: [`Rig::simulate_trial`].
     ///
     /// # Errors
@@ -121,30 +172,64 @@ impl Rig {
     ///
     /// # Errors
     /// What a gas series may meet: a file that cannot be read, a line that is not two numbers, times that do not
-    /// increase, an end before the record's.
+    /// increase, an end before the record's. [`SignalError::Diverged`], if radiation or a temperature-dependent time
+    /// constant led to readings that are not finite.
     pub fn clean(&self, trial: u64) -> Result<Clean, SignalError> {
-        let settle_samples = self.record.settle_samples(slowest_s(&self.sensors)) as usize;
+        let settle_samples = self.record.settle_samples(self.run_in_s()) as usize;
         let grid = Grid::new(&self.record, settle_samples, self.gas.hold);
         let gas_trial = if self.gas.per_trial { trial } else { 0 };
         let gas = GasPath::new(&self.gas, grid, &self.base_dir, &mut stream(self.seed, gas_trial, Purpose::Gas))?;
+        let time_s: Vec<f64> = (0..self.record.samples).map(|k| k as f64 * self.record.sample_period_s).collect();
+
+        let mut readings_c = [self.follow(0, &gas), self.follow(1, &gas)];
+        if let Some(mismatch) = &self.mismatch {
+            let sensor = mismatch.sensor(self.channels())?;
+            let added_k = mismatch.values_k(grid, &mut stream(self.seed, gas_trial, Purpose::Mismatch));
+            readings_c[sensor] = self.follow(sensor, &gas.plus(&added_k));
+        }
+        let contacts = [Purpose::FirstContact, Purpose::SecondContact];
+        for ((sensor, readings_c), purpose) in self.sensors.iter().zip(&mut readings_c).zip(contacts) {
+            sensor.disturb(&time_s, readings_c, &mut stream(self.seed, gas_trial, purpose));
+            if let Some(k) = readings_c.iter().position(|reading_c| !reading_c.is_finite()) {
+                return Err(SignalError::Diverged { channel: sensor.channel.clone(), time_s: time_s[k] });
+            }
+        }
+        cross_talk(&self.sensors, &mut readings_c);
         Ok(Clean {
-            time_s: (0..self.record.samples).map(|k| k as f64 * self.record.sample_period_s).collect(),
+            time_s,
             gas_c: gas.at_samples().collect(),
-            readings_c: [
-                self.sensors[0].follow(&gas, self.record.oversampling),
-                self.sensors[1].follow(&gas, self.record.oversampling),
-            ],
+            readings_c,
             sensors: self.sensors.clone(),
+            sample_period_s: self.record.sample_period_s,
         })
     }
 
+    /// Readings of one channel in `gas`, replacement included, °C.
+    fn follow(&self, sensor: usize, gas: &GasPath) -> Vec<f64> {
+        let sensor = &self.sensors[sensor];
+        let follow = |sensor: &Sensor| sensor.follow(gas, self.flow.as_ref(), self.record.oversampling);
+        let mut readings_c = follow(sensor);
+        if let Some((at_s, successor)) = sensor.successor() {
+            let first = (0..readings_c.len()).find(|&k| k as f64 * self.record.sample_period_s >= at_s);
+            let first = first.unwrap_or(readings_c.len());
+            readings_c[first..].copy_from_slice(&follow(&successor)[first..]);
+        }
+        readings_c
+    }
+
+    fn channels(&self) -> [&str; 2] {
+        self.sensors.each_ref().map(|sensor| sensor.channel.as_str())
+    }
+
+    /// The run-in that the sensors need to forget their start, s.
+    fn run_in_s(&self) -> f64 {
+        let [first_s, second_s] = self.sensors.each_ref().map(|sensor| sensor.run_in_s(self.flow.as_ref()));
+        first_s.max(second_s)
+    }
+
     /// The generators of the two channels' noise in one trial: streams `8 · trial + 1` and `8 · trial + 2` of the seed
-    /// (`8 · trial` is the gas; the others are kept free).
+    /// (`8 · trial` is the gas; from 3 on come what other effects draw).
     pub fn noise_streams(&self, trial: u64) -> [ChaCha8Rng; 2] {
         [Purpose::FirstNoise, Purpose::SecondNoise].map(|purpose| stream(self.seed, trial, purpose))
     }
-}
-
-fn slowest_s(sensors: &[Sensor; 2]) -> f64 {
-    sensors[0].slowest_s().max(sensors[1].slowest_s())
 }

@@ -13,9 +13,10 @@ pub struct Clean {
     pub time_s: Vec<f64>,
     /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds from there on.
     pub gas_c: Vec<f64>,
-    /// Both sensors' readings with gain and offset, before noise and ADC, °C, `[n]` each.
+    /// Both sensors' readings with calibration and disturbances, before noise, spikes and ADC, °C, `[n]` each.
     pub readings_c: [Vec<f64>; 2],
     pub(crate) sensors: [Sensor; 2],
+    pub(crate) sample_period_s: f64,
 }
 
 /// A simulated record with its truth.
@@ -35,31 +36,40 @@ pub struct Simulated {
 }
 
 impl Clean {
-    /// Adds each channel's noise and passes it through its ADC.
+    /// Adds each channel's noise and spikes and passes it through its ADC.
     ///
-    /// - `noise`: one generator per channel, such as [`Rig::noise_streams`](crate::Rig::noise_streams); one number per
-    ///   sample is drawn from it, none if the channel has no noise
+    /// - `noise`: one generator per channel, such as [`Rig::noise_streams`](crate::Rig::noise_streams); first
+    ///   one number per sample is drawn from it for the noise, then one for the coloured noise, then one or two for the
+    ///   spikes; none for what the channel does not have. So coloured noise does not move the other noise, nor spikes
+    ///   either
     pub fn with_noise(&self, noise: &mut [impl Rng; 2]) -> Simulated {
         let [first, second] = noise;
         Simulated {
             time_s: self.time_s.clone(),
-            t1_c: read(&self.sensors[0], &self.readings_c[0], first),
-            t2_c: read(&self.sensors[1], &self.readings_c[1], second),
+            t1_c: self.read(0, first),
+            t2_c: self.read(1, second),
             gas_c: self.gas_c.clone(),
             channels: [self.sensors[0].channel.clone(), self.sensors[1].channel.clone()],
         }
     }
-}
 
-fn read(sensor: &Sensor, clean_c: &[f64], rng: &mut impl Rng) -> Vec<f64> {
-    let mut readings_c = clean_c.to_vec();
-    if let Some(noise) = &sensor.noise {
-        noise.add_to(&mut readings_c, rng);
-    }
-    if let Some(adc) = &sensor.adc {
-        for reading_c in &mut readings_c {
-            *reading_c = adc.convert(*reading_c);
+    fn read(&self, channel: usize, rng: &mut impl Rng) -> Vec<f64> {
+        let sensor = &self.sensors[channel];
+        let mut readings_c = self.readings_c[channel].clone();
+        if let Some(noise) = &sensor.noise {
+            noise.add_to(&mut readings_c, rng);
         }
+        if let Some(noise) = &sensor.coloured_noise {
+            noise.add_to(&mut readings_c, self.sample_period_s, rng);
+        }
+        if let Some(spikes) = &sensor.spikes {
+            spikes.add_to(&mut readings_c, rng);
+        }
+        if let Some(adc) = &sensor.adc {
+            for reading_c in &mut readings_c {
+                *reading_c = adc.convert(*reading_c);
+            }
+        }
+        readings_c
     }
-    readings_c
 }

@@ -27,7 +27,7 @@ pub struct Broadband {
 }
 
 impl Broadband {
-    pub(super) fn values_k(&self, grid: Grid, rng: &mut impl Rng) -> Vec<f64> {
+    pub(crate) fn values_k(&self, grid: Grid, rng: &mut impl Rng) -> Vec<f64> {
         let decay = TAU * self.corner_hz * grid.step_s;
         let (kept, fresh_k) = ((-decay).exp(), self.std_k * (-(-2.0 * decay).exp_m1()).sqrt());
         let first: f64 = rng.sample(StandardNormal);
@@ -42,7 +42,7 @@ impl Broadband {
         values_k
     }
 
-    pub(super) fn check(&self, within: &str, resolution: Resolution) -> Result<(), SignalError> {
+    pub(crate) fn check(&self, within: &str, resolution: Resolution) -> Result<(), SignalError> {
         positive(within, "std_k", self.std_k)?;
         positive(within, "corner_hz", self.corner_hz)?;
         resolution.check(within, "corner_hz", self.corner_hz, self.corner_hz)

@@ -2,9 +2,11 @@
 
 mod channel;
 mod dynamics;
+mod effects;
 mod gas;
 mod reproducible;
 mod rig_file;
+mod undeclared;
 
 use twinlag_signal::{Gas, Record, Rig, Sensor, Signal};
 

@@ -1,8 +1,8 @@
 //! Rig files: what is read, what is written, what is refused.
 
-use twinlag_signal::{Hold, Rig, Series, Signal};
+use twinlag_signal::{Flow, FlowStep, Hold, Rig, Series, Signal};
 
-const RIGS: [(&str, &str); 8] = [
+const RIGS: [(&str, &str); 9] = [
     ("sine", include_str!("../rigs/sine.toml")),
     ("multi-tone", include_str!("../rigs/multi-tone.toml")),
     ("engine", include_str!("../rigs/engine.toml")),
@@ -11,6 +11,7 @@ const RIGS: [(&str, &str); 8] = [
     ("broadband", include_str!("../rigs/broadband.toml")),
     ("series", include_str!("../rigs/series.toml")),
     ("everything", include_str!("../rigs/everything.toml")),
+    ("effects", include_str!("../rigs/effects.toml")),
 ];
 
 fn read(text: &str) -> Result<Rig, toml::de::Error> {
@@ -155,4 +156,86 @@ fn what_is_not_a_rig_is_refused() {
     ] {
         assert_refused(rig, from, to, wanted);
     }
+}
+
+#[test]
+fn invalid_effects_are_refused_with_the_name_of_their_field() {
+    for (from, to, wanted) in [
+        ("curvature_per_k = 1e-4", "curvature_per_k = nan", "sensors[0].curvature_per_k must be finite"),
+        ("curvature_about_c = 400.0", "curvature_about_c = inf", "sensors[0].curvature_about_c must be finite"),
+        ("delay_s = 0.0031", "delay_s = -0.1", "sensors[0].delay_s must be finite and not negative"),
+        ("drift_k_per_s = 0.25", "drift_k_per_s = nan", "sensors[0].drift_k_per_s must be finite"),
+        ("crosstalk = 0.03", "crosstalk = 1.5", "sensors[0].crosstalk must lie between -1 and 1"),
+        ("coefficient_per_k3 = 5e-11", "coefficient_per_k3 = -1.0", "sensors[0].radiation.coefficient_per_k3"),
+        ("wall_c = 350.0", "wall_c = -300.0", "sensors[0].radiation.wall_c must be finite and above absolute zero"),
+        ("exponent = -0.5", "exponent = nan", "sensors[0].temperature_dependence.exponent must be finite"),
+        ("reference_c = 440.0", "reference_c = -273.15", "sensors[0].temperature_dependence.reference_c must be"),
+        ("width_k = 0.75", "width_k = -1.0", "sensors[0].hysteresis.width_k must be finite and not negative"),
+        ("at_s = 2.5", "at_s = nan", "sensors[0].clock_slip.at_s must be finite"),
+        ("by_s = 0.005", "by_s = -0.005", "sensors[0].clock_slip.by_s must be finite and not negative"),
+        ("at_s = 3.5", "at_s = inf", "sensors[0].replaced.at_s must be finite"),
+        ("time_constant_s = 0.05 }", "time_constant_s = 0.0 }", "sensors[0].replaced.time_constant_s"),
+        ("rate_hz = 0.5", "rate_hz = 501.0", "sensors[0].intermittent_contact.rate_hz must lie between 0 and 500"),
+        ("mean_duration_s = 0.1", "mean_duration_s = 0.0", "sensors[0].intermittent_contact.mean_duration_s"),
+        ("drop_fraction = 0.06", "drop_fraction = 1.06", "sensors[0].intermittent_contact.drop_fraction"),
+        ("towards_c = 25.0", "towards_c = nan", "sensors[0].intermittent_contact.towards_c must be finite"),
+        ("frequency_hz = 150.0", "frequency_hz = 0.0", "sensors[0].mains[1].frequency_hz"),
+        ("amplitude_k = 0.5", "amplitude_k = -0.5", "sensors[0].mains[0].amplitude_k"),
+        ("phase_rad = 1.0", "phase_rad = inf", "sensors[0].mains[1].phase_rad"),
+        ("std_k = 0.5, corr", "std_k = -0.5, corr", "sensors[0].coloured_noise.std_k must be finite and not negative"),
+        ("correlation_time_s = 0.02", "correlation_time_s = 0.0", "sensors[0].coloured_noise.correlation_time_s"),
+        (
+            "rate_per_sample = 0.01",
+            "rate_per_sample = 1.01",
+            "sensors[0].spikes.rate_per_sample must lie between 0 and 1",
+        ),
+        ("size_k = 8.0", "size_k = -8.0", "sensors[0].spikes.size_k must be finite and not negative"),
+        ("depth = 0.2", "depth = 1.0", "flow.depth must lie between -1 and 1"),
+        ("depth = 0.2", "depth = nan", "flow.depth"),
+        ("period_s = 4.0", "period_s = 0.0", "flow.period_s must be finite and positive"),
+        ("phase_rad = 0.5", "phase_rad = nan", "flow.phase_rad must be finite"),
+        ("kind = \"sine\"\ndepth", "kind = \"saw\"\ndepth", "saw"),
+        ("phase_rad = 0.5", "phase = 0.5", "phase"),
+        ("channel = \"T1\"\nstd_k", "channel = \"T3\"\nstd_k", "mismatch.channel must be one of the channels"),
+        ("std_k = 0.5\ncorner", "std_k = 0.0\ncorner", "mismatch.std_k must be finite and positive"),
+        ("corner_hz = 10.0", "corner_hz = 2000.0", "mismatch.corner_hz = 2000 is too fast"),
+        ("wall_c = 350.0", "wall = 350.0", "wall"),
+        ("width_k = 0.75", "width = 0.75", "width"),
+    ] {
+        assert_refused("effects", from, to, wanted);
+    }
+}
+
+#[test]
+fn stepping_flow_is_read_and_refused() {
+    let sine = "kind = \"sine\"\ndepth = 0.2\nperiod_s = 4.0\nphase_rad = 0.5";
+    let step = "kind = \"step\"\nfactor = 1.5\nat_s = 2.0\nover_s = 0.5";
+    let rig = read(&RIGS[8].1.replacen(sine, step, 1)).unwrap();
+    assert_eq!(rig.flow(), Some(&Flow::Step(FlowStep::new(1.5, 2.0, 0.5))));
+    assert_eq!(read(&toml::to_string(&rig).unwrap()).unwrap(), rig);
+    for (from, to, wanted) in [
+        ("factor = 1.5", "factor = 0.0", "flow.factor must be finite and positive"),
+        ("at_s = 2.0", "at_s = nan", "flow.at_s must be finite"),
+        ("over_s = 0.5", "over_s = 0.0", "flow.over_s must be finite and positive"),
+        ("over_s = 0.5", "over = 0.5", "over"),
+    ] {
+        assert_refused("effects", sine, &step.replacen(from, to, 1), wanted);
+    }
+}
+
+/// What shortens a time constant counts: 0.0001 s is 1.2 steps, and less than one when flow or radiation shorten it.
+#[test]
+fn steps_too_long_for_a_shortened_time_constant_are_refused() {
+    let short = |extra: &str| format!("time_constant_s = 0.0001\n{extra}");
+    read(&RIGS[0].1.replacen("time_constant_s = 0.0238", &short(""), 1)).unwrap();
+    let flow = "[flow]\nkind = \"step\"\nfactor = 0.5\nat_s = 1.0\nover_s = 1.0\n[record]";
+    let message =
+        read(&RIGS[0].1.replacen("0.0238", "0.0001", 1).replacen("[record]", flow, 1)).unwrap_err().to_string();
+    let wanted =
+        "sensors[0].time_constant_s (shortened by the flow) = 0.00005 s: raise record.oversampling to at least 41";
+    assert!(message.contains(wanted), "{message}");
+    let hot = short("radiation = { coefficient_per_k3 = 5e-10, wall_c = 300.0 }");
+    assert_refused("sine", "time_constant_s = 0.0238", &hot, "sensors[0].time_constant_s (shortened by radiation)");
+    let faster = short("temperature_dependence = { exponent = -1.0, reference_c = 20.0 }");
+    assert_refused("sine", "time_constant_s = 0.0238", &faster, "(at the mean temperature of the gas)");
 }

@@ -1,0 +1,276 @@
+//! From readings to inferred gas temperature, one first-order factor after the other, with the noise carried along.
+//!
+//! A sensor `(1 + τ₁ s)(1 + τ₂ s) … y = x` is inverted factor by factor. On evenly spaced samples both operators of a factor
+//! are those of the cubic spline through the samples,
+//!
+//! `S₀ = (z + 4 + z⁻¹)/6`, `S₁ = (z − z⁻¹)/(2 Ts)`, so that `S₁/S₀ = s (1 − (ω Ts)⁴/180 + …)`:
+//!
+//! a factor gives `S₀ v + τ S₁ v = S₀ (v + τ v')`. `S₀` cannot be taken off (its inverse is not local), so both sensors' chains get
+//! the same number of factors and are compared with all their `S₀` on. On uneven samples the operators are the mean and the
+//! slope of each interval. Every value is a local function of a few readings; its derivatives with respect to them are the rows
+//! that carry the noise.
+
+use crate::observations::Stretch;
+
+/// The derivatives of each value with respect to the readings: row `k` belongs to the samples `start + k …`.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows {
+    pub(crate) width: usize,
+    pub(crate) start: usize,
+    /// One row if all are the same, otherwise all of them.
+    data: Vec<f64>,
+    is_same: bool,
+}
+
+impl Rows {
+    pub(crate) fn identity() -> Self {
+        Self { width: 1, start: 0, data: vec![1.0], is_same: true }
+    }
+
+    pub(crate) fn at(&self, k: usize) -> &[f64] {
+        let from = if self.is_same { 0 } else { k * self.width };
+        &self.data[from..from + self.width]
+    }
+
+    pub(crate) fn is_same(&self) -> bool {
+        self.is_same
+    }
+
+    /// Each row times its own factor.
+    fn scale_each(&mut self, factors: &[f64]) {
+        let width = self.width;
+        let data = (0..factors.len()).flat_map(|k| self.at(k).iter().map(move |c| c * factors[k])).collect();
+        (self.data, self.is_same, self.width) = (data, false, width);
+    }
+
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.data.iter_mut().for_each(|c| *c *= factor);
+    }
+
+    /// `self + factor · other`, which belongs to the same values.
+    pub(crate) fn plus(&self, other: &Self, factor: f64, values: usize) -> Self {
+        let start = self.start.min(other.start);
+        let end = (self.start + self.width).max(other.start + other.width);
+        let width = end - start;
+        let is_same = self.is_same && other.is_same;
+        let count = if is_same { 1 } else { values };
+        let mut data = vec![0.0; count * width];
+        for k in 0..count {
+            let row = &mut data[k * width..(k + 1) * width];
+            self.at(k).iter().enumerate().for_each(|(j, c)| row[self.start - start + j] += c);
+            other.at(k).iter().enumerate().for_each(|(j, c)| row[other.start - start + j] += factor * c);
+        }
+        Self { width, start, data, is_same }
+    }
+
+    /// Rows of `Σ_j taps(k)[j] · v[k + j]`, of which there are `values`.
+    fn combine(&self, values: usize, length: usize, taps: &Taps) -> Self {
+        let width = self.width + length - 1;
+        let is_same = self.is_same && taps.is_same();
+        let count = if is_same { 1 } else { values };
+        let mut data = vec![0.0; count * width];
+        for (k, row) in data.chunks_exact_mut(width).enumerate() {
+            for j in 0..length {
+                let tap = taps.at(k, j);
+                for (c, old) in row[j..].iter_mut().zip(self.at(k + j)) {
+                    *c += tap * old;
+                }
+            }
+        }
+        Self { width, start: self.start, data, is_same }
+    }
+}
+
+/// The weights of neighbouring values.
+enum Taps {
+    Same(Vec<f64>),
+    Each { length: usize, data: Vec<f64> },
+}
+
+impl Taps {
+    fn is_same(&self) -> bool {
+        matches!(self, Self::Same(_))
+    }
+
+    fn at(&self, k: usize, j: usize) -> f64 {
+        match self {
+            Self::Same(taps) => taps[j],
+            Self::Each { length, data } => data[k * length + j],
+        }
+    }
+}
+
+/// A number that may change along the record.
+pub(crate) enum Along {
+    Same(f64),
+    /// One for each value that the factor gives.
+    Each(Vec<f64>),
+}
+
+impl Along {
+    fn at(&self, k: usize) -> f64 {
+        match self {
+            Self::Same(x) => *x,
+            Self::Each(all) => all[k],
+        }
+    }
+}
+
+/// A function of each value, with its derivative.
+pub(crate) struct Pointwise {
+    pub(crate) value: Vec<f64>,
+    pub(crate) derivative: Vec<f64>,
+}
+
+/// Values on their own instants, and how they depend on the readings of one channel.
+#[derive(Clone, Debug)]
+pub(crate) struct Chain {
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) value: Vec<f64>,
+    pub(crate) rows: Rows,
+    period_s: Option<f64>,
+}
+
+impl Chain {
+    pub(crate) fn of(stretch: &Stretch, channel: usize, period_s: Option<f64>) -> Self {
+        Self {
+            time_s: stretch.time_s.clone(),
+            value: stretch.reading_c[channel].clone(),
+            rows: Rows::identity(),
+            period_s,
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.value.len()
+    }
+
+    /// Taps of a factor.
+    fn length(&self) -> usize {
+        if self.period_s.is_some() { 3 } else { 2 }
+    }
+
+    /// Values after another factor.
+    pub(crate) fn after_factor(&self) -> usize {
+        self.len() + 1 - self.length()
+    }
+
+    /// Instants after another factor, s.
+    pub(crate) fn times_after_factor(&self) -> Vec<f64> {
+        match self.period_s {
+            Some(_) => self.time_s[1..self.len() - 1].to_vec(),
+            None => self.time_s.windows(2).map(|t| 0.5 * (t[0] + t[1])).collect(),
+        }
+    }
+
+    /// Adds to every value what depends on time alone, and multiplies: `(v + add(t)) · by`.
+    pub(crate) fn affine(&mut self, add: impl Fn(f64) -> f64, by: f64) {
+        for (v, t) in self.value.iter_mut().zip(&self.time_s) {
+            *v = (*v + add(*t)) * by;
+        }
+        self.rows.scale(by);
+    }
+
+    /// Each value through a function that returns value and derivative.
+    pub(crate) fn map(&mut self, f: impl Fn(f64) -> (f64, f64)) {
+        let (value, derivative): (Vec<f64>, Vec<f64>) = self.value.iter().map(|v| f(*v)).unzip();
+        self.value = value;
+        self.rows.scale_each(&derivative);
+    }
+
+    /// `S₀ F(v) + τ S₁ G(v)`, where `F` and `G` are the identity unless given.
+    pub(crate) fn factor(&mut self, tau_s: &Along, value: Option<&Pointwise>, slope: Option<&Pointwise>) {
+        let count = self.after_factor();
+        let length = self.length();
+        let times = self.times_after_factor();
+        let even = self.period_s.map(|t| ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5 / t, 0.0, 0.5 / t]));
+        // Weights of F and of G in value k.
+        let weights = |k: usize, j: usize| match even {
+            Some((mean, difference)) => (mean[j], difference[j]),
+            None => {
+                let step_s = self.time_s[k + 1] - self.time_s[k];
+                (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
+            }
+        };
+        let taps = match (tau_s, value, slope, even) {
+            (Along::Same(tau), None, None, Some((mean, difference))) => {
+                Taps::Same((0..3).map(|j| mean[j] + tau * difference[j]).collect())
+            }
+            _ => {
+                let mut data = Vec::with_capacity(count * length);
+                for k in 0..count {
+                    let tau = tau_s.at(k);
+                    for j in 0..length {
+                        let (mean, difference) = weights(k, j);
+                        let df = value.map_or(1.0, |f| f.derivative[k + j]);
+                        let dg = slope.map_or(1.0, |g| g.derivative[k + j]);
+                        data.push(mean * df + tau * difference * dg);
+                    }
+                }
+                Taps::Each { length, data }
+            }
+        };
+        let new = if value.is_none() && slope.is_none() {
+            (0..count).map(|k| (0..length).map(|j| taps.at(k, j) * self.value[k + j]).sum()).collect()
+        } else {
+            let (f, g) = (value.map_or(&self.value, |f| &f.value), slope.map_or(&self.value, |g| &g.value));
+            (0..count)
+                .map(|k| {
+                    let tau = tau_s.at(k);
+                    (0..length)
+                        .map(|j| {
+                            let (mean, difference) = weights(k, j);
+                            mean * f[k + j] + tau * difference * g[k + j]
+                        })
+                        .sum()
+                })
+                .collect()
+        };
+        self.rows = self.rows.combine(count, length, &taps);
+        (self.value, self.time_s) = (new, times);
+    }
+
+    /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the spline's own
+    /// values between the samples. On uneven samples the mean and slope of each interval stand in.
+    pub(crate) fn advance(&mut self, delay_s: f64, reach: usize) {
+        let Some(period_s) = self.period_s else {
+            return self.factor(&Along::Same(delay_s), None, None);
+        };
+        let shift = delay_s / period_s;
+        let whole = shift.floor().clamp(-(reach as f64), reach as f64 - 1.0);
+        let d = shift - whole;
+        // The cubic B-spline at the four samples around, and nothing at the fifth.
+        let c = 1.0 - d;
+        let taps = vec![
+            c * c * c / 6.0,
+            (4.0 - 6.0 * d * d + 3.0 * d * d * d) / 6.0,
+            (4.0 - 6.0 * c * c + 3.0 * c * c * c) / 6.0,
+            d * d * d / 6.0,
+        ];
+        // Value k is of sample k + reach + 1; its first tap is one sample before that.
+        let first = (reach as f64 + whole) as usize;
+        let count = self.len() - 2 * reach - 3;
+        let new = (0..count).map(|k| (0..4).map(|j| taps[j] * self.value[first + k + j]).sum()).collect();
+        let mut rows = Self::skip(&self.rows, first);
+        rows = rows.combine(count, 4, &Taps::Same(taps));
+        rows.start = self.rows.start + first;
+        self.rows = rows;
+        self.value = new;
+        self.time_s = self.time_s[reach + 1..reach + 1 + count].to_vec();
+    }
+
+    /// `v[k+1] − ρ v[k]`.
+    pub(crate) fn difference(&mut self, rho: f64) {
+        let count = self.len() - 1;
+        self.value = self.value.windows(2).map(|v| v[1] - rho * v[0]).collect();
+        self.rows = self.rows.combine(count, 2, &Taps::Same(vec![-rho, 1.0]));
+        self.time_s.remove(0);
+    }
+
+    fn skip(rows: &Rows, first: usize) -> Rows {
+        if rows.is_same || first == 0 {
+            return rows.clone();
+        }
+        Rows { data: rows.data[first * rows.width..].to_vec(), ..rows.clone() }
+    }
+}

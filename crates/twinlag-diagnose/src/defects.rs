@@ -1,0 +1,236 @@
+//! Defects of the data, which come before every model: readings at the end of the range, coarse steps, isolated wrong readings.
+
+use std::collections::HashMap;
+
+use twinlag_bias::estimate_noise;
+use twinlag_cross_relation::{Readings, Segment, Steps};
+
+use crate::observations::Observations;
+use crate::plant::{Evaluation, Part};
+
+/// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
+const COARSE: f64 = 0.5;
+/// Readings at an extreme value that two in a row of which no noise explains.
+const FEWEST_AT_END: usize = 8;
+/// Robust standard deviations beyond which a single reading is wrong.
+const FAR: f64 = 6.0;
+/// More of the readings than this are no single ones.
+const MOST_SPIKES: f64 = 0.05;
+
+/// Noise of the channels as third differences show it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Levels {
+    pub(crate) std_k: [f64; 2],
+    /// Standard error of the logarithm.
+    pub(crate) log_error: [f64; 2],
+    /// Step of each converter where it is coarse beside the noise, K.
+    pub(crate) coarse_step_k: [Option<f64>; 2],
+}
+
+/// The channels as the costs of the other layers take them.
+pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
+    let segments = observations.stretches.iter().map(|s| {
+        let steps = match observations.period_s {
+            Some(period_s) => Steps::Even(period_s),
+            None => Steps::Uneven(s.time_s.windows(2).map(|t| t[1] - t[0]).collect()),
+        };
+        Segment::new(s.reading_c[0].clone(), s.reading_c[1].clone(), steps).ok()
+    });
+    Readings::new(segments.collect::<Option<Vec<_>>>()?).ok()
+}
+
+/// Levels from third differences.
+pub(crate) fn levels(observations: &Observations) -> Option<Levels> {
+    let found = estimate_noise(&readings(observations)?).ok()?;
+    let nothing = 1e-5 * observations.swing_k();
+    Some(Levels {
+        std_k: found.map(|l| l.std_k.max(nothing)),
+        log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
+        coarse_step_k: found.map(|l| l.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE * l.std_k)),
+    })
+}
+
+/// Masks readings that lie at an extreme of their channel again and again, one after the other. Returns how many in each
+/// channel.
+///
+/// - `steps_k`: of a coarse converter, whose every value comes again and again
+pub(crate) fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2]) -> [usize; 2] {
+    let mut out = [0; 2];
+    for i in 0..2 {
+        let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
+        let highest = observations.channel(i).fold(f64::NEG_INFINITY, f64::max);
+        for end in [lowest, highest] {
+            let at = |y: &f64| *y == end;
+            let count = observations.channel(i).filter(|y| at(y)).count();
+            // The next value inwards: on a coarse grid the ends must be far more crowded than it.
+            let crowded = match steps_k[i] {
+                None => count >= FEWEST_AT_END,
+                Some(step_k) => {
+                    let next = end + if end == lowest { step_k } else { -step_k };
+                    let beside = observations.channel(i).filter(|y| (*y - next).abs() < 0.25 * step_k).count();
+                    count >= 4 * FEWEST_AT_END && count > 4 * beside
+                }
+            };
+            let pairs: usize = observations
+                .stretches
+                .iter()
+                .map(|s| s.reading_c[i].windows(2).filter(|w| at(&w[0]) && at(&w[1])).count())
+                .sum();
+            if !crowded || 2 * pairs < count {
+                continue;
+            }
+            for stretch in &mut observations.stretches {
+                for (masked, y) in stretch.masked[i].iter_mut().zip(&stretch.reading_c[i]) {
+                    *masked |= *y == end;
+                }
+            }
+            out[i] += count;
+        }
+    }
+    out
+}
+
+/// What the best single change of each reading would take off, in robust standard deviations.
+fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
+    let weighted = part.whitened.weighted();
+    let rows = &part.sources[channel].rows;
+    let mut out = vec![0.0; samples];
+    for (k, w) in weighted.iter().enumerate() {
+        for (j, c) in rows.at(k).iter().enumerate() {
+            if let Some(s) = out.get_mut(rows.start + k + j) {
+                *s += c * w;
+            }
+        }
+    }
+    let scale = 1.4826 * median(out.iter().map(|s| s.abs()));
+    out.iter().map(|s| if scale > 0.0 { s / scale } else { 0.0 }).collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    if all.is_empty() {
+        return 0.0;
+    }
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
+/// reading does, and out of their own neighbours; and they come when the gas does nothing in particular.
+pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation) -> [Vec<usize>; 2] {
+    let mut out = [Vec::new(), Vec::new()];
+    for channel in 0..2 {
+        let mut found: Vec<usize> = Vec::new();
+        let mut ranks = Vec::new();
+        for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+            let n = stretch.len();
+            if n < 16 {
+                continue;
+            }
+            let scores = scores(part, channel, n);
+            let y = &stretch.reading_c[channel];
+            let beside: Vec<f64> = (0..n)
+                .map(|k| {
+                    if k < 2 || k + 2 >= n {
+                        return 0.0;
+                    }
+                    y[k] - (4.0 * (y[k - 1] + y[k + 1]) - y[k - 2] - y[k + 2]) / 6.0
+                })
+                .collect();
+            let scale = 1.4826 * median(beside.iter().map(|b| b.abs()));
+            let other = &stretch.reading_c[1 - channel];
+            let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
+            let mut slopes: Vec<f64> = (0..n).map(slope).collect();
+            slopes.sort_by(f64::total_cmp);
+            for k in 0..n {
+                let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
+                if is_peak && scores[k].abs() > FAR && beside[k].abs() > FAR * scale && !stretch.masked[channel][k] {
+                    found.push(part.first_sample + k);
+                    ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
+                }
+            }
+        }
+        let m = found.len() as f64;
+        let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
+        if found.len() >= 2 && m < MOST_SPIKES * observations.samples() as f64 && related < 3.5 {
+            out[channel] = found;
+        }
+    }
+    out
+}
+
+/// Masks `samples` of `channel`.
+pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[usize]) {
+    let mut first = 0;
+    for stretch in &mut observations.stretches {
+        for sample in samples {
+            if let Some(masked) = sample.checked_sub(first).and_then(|k| stretch.masked[channel].get_mut(k)) {
+                *masked = true;
+            }
+        }
+        first += stretch.len();
+    }
+}
+
+/// Share of neighbours that are equal.
+pub(crate) fn repeated(observations: &Observations, channel: usize) -> f64 {
+    let (equal, all) = observations.stretches.iter().fold((0, 0), |(equal, all), s| {
+        let pairs = s.reading_c[channel].windows(2);
+        (equal + pairs.clone().filter(|w| w[0] == w[1]).count(), all + pairs.len())
+    });
+    equal as f64 / all.max(1) as f64
+}
+
+/// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
+pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Line> {
+    let Some(period_s) = observations.period_s else { return Vec::new() };
+    // What does not count is zero; twice the length, so that no frequency is far from a bin.
+    let Some(last) = evaluation.sample.iter().max() else { return Vec::new() };
+    let n = 2 * (last + 1);
+    let mut run = vec![0.0; n];
+    let mut count = 0usize;
+    for (r, sample) in evaluation.residual.iter().zip(&evaluation.sample) {
+        if holds(*sample) {
+            run[*sample] = *r;
+            count += 1;
+        }
+    }
+    if count < 64 {
+        return Vec::new();
+    }
+    let mut planner = realfft::RealFftPlanner::<f64>::new();
+    let plan = planner.plan_fft_forward(n);
+    let mut input = run;
+    let mut spectrum = plan.make_output_vec();
+    plan.process(&mut input, &mut spectrum).expect("lengths agree");
+    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / count as f64).collect();
+    let mut found: HashMap<usize, f64> = HashMap::new();
+    for bin in 3..power.len().saturating_sub(1) {
+        let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];
+        // Around it, the peak itself left out.
+        let (from, to) = (bin.saturating_sub(60).max(1), (bin + 61).min(power.len()));
+        let around = (from..to).filter(|j| j.abs_diff(bin) > 5).map(|j| power[j]);
+        let level = median(around) / std::f64::consts::LN_2;
+        if is_peak && level > 0.0 {
+            let ratio = power[bin] / level;
+            // Of exponentially distributed powers the largest of all exceeds this once in a thousand records.
+            if ratio > (power.len() as f64 / 1e-3).ln() + 3.0 {
+                found.insert(bin, ratio);
+            }
+        }
+    }
+    let mut out: Vec<Line> = found
+        .into_iter()
+        .map(|(bin, ratio)| Line { frequency_hz: bin as f64 / (n as f64 * period_s), ratio })
+        .collect();
+    out.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+    out
+}
+
+/// A line of the residual.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub(crate) frequency_hz: f64,
+    /// Its power beside that of its neighbours.
+    pub(crate) ratio: f64,
+}

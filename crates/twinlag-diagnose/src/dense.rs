@@ -1,0 +1,39 @@
+//! Small dense linear algebra, by faer.
+
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without
+/// any weight stay zero. `None` where it is singular.
+pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = matrix.len();
+    let used: Vec<usize> = (0..n).filter(|&i| matrix[i][i] > 0.0).collect();
+    let scale: Vec<f64> = used.iter().map(|&i| matrix[i][i].sqrt()).collect();
+    let scaled = Mat::from_fn(used.len(), used.len(), |p, q| matrix[used[p]][used[q]] / (scale[p] * scale[q]));
+    let factor = scaled.llt(Side::Lower).ok()?;
+    let identity = Mat::<f64>::identity(used.len(), used.len());
+    let solved = factor.solve(&identity);
+    let mut out = vec![vec![0.0; n]; n];
+    for (p, &i) in used.iter().enumerate() {
+        for (q, &j) in used.iter().enumerate() {
+            out[i][j] = solved[(p, q)] / (scale[p] * scale[q]);
+            // A diagonal this large after scaling is a direction that the data do not see.
+            if !out[i][j].is_finite() || (p == q && solved[(p, q)] > 1e12) {
+                return None;
+            }
+        }
+    }
+    Some(out)
+}
+
+pub(crate) fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
+    matrix.iter().map(|row| dot(row, vector)).collect()
+}
+
+pub(crate) fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    (0..a.len()).map(|i| (0..b.len()).map(|j| (0..b.len()).map(|k| a[i][k] * b[k][j]).sum()).collect()).collect()
+}

@@ -1,0 +1,171 @@
+//! What a diagnosis says.
+
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::ResidualTest;
+
+use crate::effect::Identifier;
+
+/// Whether the model is found to be complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Verdict {
+    /// Two first-order lags leave nothing but noise.
+    Adequate,
+    /// With the effects that are named, nothing but noise is left.
+    Explained,
+    /// The effects that are named explain a part; something else is left.
+    PartlyExplained,
+    /// Something is left over that no known effect accounts for.
+    Unexplained,
+    /// The record cannot be diagnosed.
+    Refused,
+}
+
+/// A fitted number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// Its name.
+    pub name: String,
+    /// The number.
+    pub value: f64,
+    /// Its standard error; `None` where the record does not determine it.
+    pub standard_error: Option<f64>,
+    /// Its 95 % interval.
+    pub interval_95: Option<[f64; 2]>,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// Why an effect was added.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Likelihood-ratio statistic, the level of the noise free.
+    pub statistic: f64,
+    /// Parameters that it took.
+    pub dof: usize,
+    /// Probability of such a statistic if the effect is not there.
+    pub p_value: f64,
+    /// Nats of likelihood gained on blocks that were left out of the fit.
+    pub held_out_gain_nats: f64,
+    /// The statistic with a free noise level in every frequency band; `None` for effects of the noise.
+    pub robust_statistic: Option<f64>,
+}
+
+/// An effect that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Which.
+    pub effect: Identifier,
+    /// Channel that it sits in, 0 or 1; `None` where it is of both.
+    pub channel: Option<usize>,
+    /// Its parameters.
+    pub parameters: Vec<Value>,
+    /// Why it was added; `None` for defects of the data, which are seen, not inferred.
+    pub evidence: Option<Evidence>,
+    /// Effects that explain this record as well.
+    pub alternatives: Vec<Identifier>,
+    /// What was seen, where it is no parameter: a count, a step.
+    pub seen: Option<String>,
+}
+
+/// A time constant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimeConstant {
+    /// The estimate, s; `None` where the record does not determine it.
+    pub value_s: Option<f64>,
+    /// Its standard error, s.
+    pub standard_error_s: Option<f64>,
+    /// Its 95 % interval, s.
+    pub interval_95_s: Option<[f64; 2]>,
+}
+
+/// One number before and after the effects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BeforeAfter<T> {
+    /// Of two first-order lags.
+    pub before: T,
+    /// With the effects.
+    pub after: T,
+}
+
+/// How large the error is before and after. On blocks that neither chose the effects nor were fitted, but for the first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorBudget {
+    /// Energy of the whitened residual per degree of freedom, on the whole record.
+    pub chi2_per_dof: BeforeAfter<f64>,
+    /// Root mean square of the whitened residual.
+    pub held_out_normalised_rms: BeforeAfter<f64>,
+    /// Root mean square of the difference between the two inferred gas temperatures, as the operators smooth it, K.
+    #[serde(rename = "held_out_input_difference_K")]
+    pub held_out_input_difference_k: BeforeAfter<f64>,
+}
+
+/// Something that is left over.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Unexplained {
+    /// In words.
+    pub description: String,
+    /// Where in frequency, Hz: the band with most of it.
+    #[serde(rename = "band_Hz")]
+    pub band_hz: Option<[f64; 2]>,
+    /// How many times the energy of the noise there.
+    pub energy_ratio: f64,
+    /// Where in time, s: the tenth of the record with most of it.
+    pub worst_s: Option<[f64; 2]>,
+}
+
+/// A fit as a picture needs it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Instants, s.
+    pub time_s: Vec<f64>,
+    /// Whitened residual.
+    pub residual: Vec<f64>,
+    /// Mean of both inferred gas temperatures, °C.
+    pub gas_c: Vec<f64>,
+    /// Difference of both, K.
+    pub disagreement_k: Vec<f64>,
+    /// Power of the residual in bands: frequency in Hz, power, degrees of freedom.
+    pub bands: Vec<[f64; 3]>,
+}
+
+/// One model of the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelFit {
+    /// Both time constants.
+    pub time_constants: [TimeConstant; 2],
+    /// `τ₂ − τ₁`.
+    pub difference: TimeConstant,
+    /// Noise of the channels, K.
+    pub noise_std_k: [f64; 2],
+    /// Tests of what it leaves over.
+    pub tests: Vec<ResidualTest>,
+    /// Energy of the residual per degree of freedom.
+    pub chi2_per_dof: f64,
+    /// Whether intervals rest on the residual's own spectrum.
+    pub is_weighted_by_residual: bool,
+    /// For pictures.
+    pub trace: Trace,
+}
+
+/// The whole answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Diagnosis {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Effects in the order in which they were added.
+    pub effects: Vec<Found>,
+    /// Two first-order lags.
+    pub base: ModelFit,
+    /// With the effects.
+    pub last: ModelFit,
+    /// Errors before and after.
+    pub error: ErrorBudget,
+    /// What is left.
+    pub unexplained: Option<Unexplained>,
+    /// What this record cannot tell.
+    pub not_testable: Vec<String>,
+    /// Effects that were looked at and not taken, with the reason.
+    pub rejected: Vec<String>,
+}

@@ -1,0 +1,248 @@
+//! What an effect is. Each has a file of its own in `effect/`, and a line in [`Identifier::ALL`].
+
+pub(crate) mod calibration;
+pub(crate) mod coloured_noise;
+pub(crate) mod crosstalk;
+pub(crate) mod delay;
+pub(crate) mod drift;
+pub(crate) mod input_mismatch;
+pub(crate) mod mains_pickup;
+pub(crate) mod quantisation;
+pub(crate) mod radiation;
+pub(crate) mod saturation;
+pub(crate) mod second_order;
+pub(crate) mod slow_mode;
+pub(crate) mod spikes;
+pub(crate) mod temperature_dependence;
+pub(crate) mod varying;
+
+use std::fmt;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use twinlag_optimise::Variable;
+
+use crate::error::DiagnoseError;
+use crate::plant::Plant;
+
+/// The effects, by the names that scripts use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Identifier {
+    /// A reading that saturates.
+    Saturation,
+    /// A converter coarser than the noise.
+    Quantisation,
+    /// Isolated wrong readings.
+    Spikes,
+    /// Sinusoids in a reading.
+    MainsPickup,
+    /// Relative gain, offset, static curvature.
+    Calibration,
+    /// One channel later than the other.
+    Delay,
+    /// A second lag in series.
+    SecondOrder,
+    /// A slow parallel path.
+    SlowMode,
+    /// A share of one channel in the other.
+    Crosstalk,
+    /// Time constants that change along the record.
+    VaryingTimeConstant,
+    /// Time constants that change with temperature.
+    TemperatureDependentTimeConstant,
+    /// Radiation to walls.
+    Radiation,
+    /// An offset that changes with time.
+    Drift,
+    /// Noise of a reading that is not white.
+    ColouredNoise,
+    /// Sensors that do not see the same gas.
+    InputMismatch,
+}
+
+impl Identifier {
+    /// All of them.
+    pub const ALL: [Self; 15] = [
+        Self::Saturation,
+        Self::Quantisation,
+        Self::Spikes,
+        Self::MainsPickup,
+        Self::Calibration,
+        Self::Delay,
+        Self::SecondOrder,
+        Self::SlowMode,
+        Self::Crosstalk,
+        Self::VaryingTimeConstant,
+        Self::TemperatureDependentTimeConstant,
+        Self::Radiation,
+        Self::Drift,
+        Self::ColouredNoise,
+        Self::InputMismatch,
+    ];
+
+    /// The name that scripts use.
+    pub fn name(self) -> &'static str {
+        self.about().name
+    }
+
+    /// What there is to say of it.
+    pub fn about(self) -> &'static About {
+        match self {
+            Self::Saturation => &saturation::ABOUT,
+            Self::Quantisation => &quantisation::ABOUT,
+            Self::Spikes => &spikes::ABOUT,
+            Self::MainsPickup => &mains_pickup::ABOUT,
+            Self::Calibration => &calibration::ABOUT,
+            Self::Delay => &delay::ABOUT,
+            Self::SecondOrder => &second_order::ABOUT,
+            Self::SlowMode => &slow_mode::ABOUT,
+            Self::Crosstalk => &crosstalk::ABOUT,
+            Self::VaryingTimeConstant => &varying::ABOUT,
+            Self::TemperatureDependentTimeConstant => &temperature_dependence::ABOUT,
+            Self::Radiation => &radiation::ABOUT,
+            Self::Drift => &drift::ABOUT,
+            Self::ColouredNoise => &coloured_noise::ABOUT,
+            Self::InputMismatch => &input_mismatch::ABOUT,
+        }
+    }
+}
+
+impl fmt::Display for Identifier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Identifier {
+    type Err = DiagnoseError;
+
+    fn from_str(text: &str) -> Result<Self, DiagnoseError> {
+        Self::ALL.into_iter().find(|e| e.name() == text).ok_or_else(|| DiagnoseError::UnknownEffect {
+            name: text.into(),
+            known: Self::ALL.map(Self::name).join(", "),
+        })
+    }
+}
+
+/// What there is to say of an effect.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct About {
+    /// The name that scripts use.
+    pub name: &'static str,
+    /// What it is, in one sentence.
+    pub explanation: &'static str,
+    /// What can be done about it at the rig.
+    pub advice: &'static str,
+    /// Effects that look like it where it is small or the gas says little.
+    pub confusable: &'static [Identifier],
+    /// What part of it no record of two sensors shows.
+    pub unseen: &'static str,
+}
+
+/// A parameter of an effect.
+#[derive(Clone, Debug)]
+pub(crate) struct Parameter {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) variable: Variable,
+}
+
+impl Parameter {
+    pub(crate) fn new(name: &'static str, unit: &'static str, variable: Variable) -> Self {
+        Self { name, unit, variable }
+    }
+}
+
+/// An effect in one place with its parameters: what can be added to the model.
+pub(crate) trait Effect: Send + Sync {
+    fn identifier(&self) -> Identifier;
+
+    /// The channel that it sits in; `None` where it is of both, or relative.
+    fn channel(&self) -> Option<usize>;
+
+    /// Parameters that are fitted, in the order in which `install` takes them.
+    fn parameters(&self) -> &[Parameter];
+
+    /// Values to start from, at least one set.
+    fn starts(&self) -> Vec<Vec<f64>>;
+
+    /// Puts the effect into the model.
+    fn install(&self, values: &[f64], plant: &mut Plant);
+
+    /// Whether it is a model of noise, fitted by the likelihood of the residual, not by its energy.
+    fn is_noise(&self) -> bool {
+        false
+    }
+
+    /// The number that makes the effect, for the check that it is there at all: an effect whose number is not clear of the
+    /// neutral value is none. Indices of parameters, each with its neutral value.
+    fn neutral(&self) -> Vec<(usize, f64)>;
+
+    /// The same effect with more or fewer parameters, to be tried once it is chosen.
+    fn sizes(&self) -> Vec<Shared> {
+        Vec::new()
+    }
+
+    /// Values to be reported beside the fitted ones: name, unit, function of the parameters.
+    fn derived(&self) -> Vec<Derived> {
+        Vec::new()
+    }
+}
+
+/// A number that follows from the parameters.
+pub(crate) struct Derived {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) of: fn(&[f64], &dyn Effect) -> f64,
+}
+
+/// What candidates are made from.
+#[derive(Clone, Debug)]
+pub(crate) struct Context {
+    /// Ends of the record, s.
+    pub(crate) ends_s: [f64; 2],
+    pub(crate) step_s: f64,
+    pub(crate) is_even: bool,
+    pub(crate) samples: usize,
+    /// Mean of each channel, °C.
+    pub(crate) mean_c: [f64; 2],
+    /// Standard deviation of the livelier channel, K.
+    pub(crate) swing_k: f64,
+    /// White noise of the channels, K.
+    pub(crate) noise_std_k: [f64; 2],
+    /// Time constants of the model so far, s.
+    pub(crate) tau_s: [f64; 2],
+    /// Lines that stick out of the residual, Hz.
+    pub(crate) lines_hz: Vec<f64>,
+}
+
+impl Context {
+    pub(crate) fn span_s(&self) -> f64 {
+        self.ends_s[1] - self.ends_s[0]
+    }
+}
+
+/// An effect that may be shared between models.
+pub(crate) type Shared = Arc<dyn Effect>;
+
+/// Every candidate of the effects that change the model; the data defects are dealt with before.
+pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
+    let mut out: Vec<Shared> = Vec::new();
+    out.extend(mains_pickup::candidates(context));
+    out.extend(calibration::candidates(context));
+    out.extend(delay::candidates(context));
+    out.extend(second_order::candidates(context));
+    out.extend(slow_mode::candidates(context));
+    out.extend(crosstalk::candidates(context));
+    out.extend(varying::candidates(context));
+    out.extend(temperature_dependence::candidates(context));
+    out.extend(radiation::candidates(context));
+    out.extend(drift::candidates(context));
+    out.extend(coloured_noise::candidates(context));
+    out.extend(input_mismatch::candidates(context));
+    out
+}

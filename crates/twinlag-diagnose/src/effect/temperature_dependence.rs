@@ -1,0 +1,54 @@
+//! Time constants that change with the sensor's own temperature: `τᵢ(T) = τᵢ (T/T_mean)^p` in kelvin, one exponent for both
+//! sensors or for one of them.
+
+use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
+use crate::plant::{Plant, ZERO_CELSIUS_K};
+use std::sync::Arc;
+use twinlag_optimise::Variable;
+
+pub(crate) const ABOUT: About = About {
+    name: "temperature-dependent-time-constant",
+    explanation: "time constants change with temperature: heat capacity, the gas's conductivity, radiative transfer",
+    advice: "take records over a smaller range of temperature, or use the exponent that was found",
+    confusable: &[Identifier::VaryingTimeConstant, Identifier::Radiation],
+    unseen: "a dependence of both on the gas temperature that leaves their disagreement alone",
+};
+
+struct TemperatureDependence {
+    parameters: Vec<Parameter>,
+    reference_k: f64,
+}
+
+pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
+    let reference_k = (0.5 * (context.mean_c[0] + context.mean_c[1]) + ZERO_CELSIUS_K).max(1.0);
+    // A factor of three over the swing, either way.
+    let widest = (1.1 * reference_k / context.swing_k).max(8.0);
+    let variable = Variable::linear("exponent", 0.01 * widest, -widest, widest);
+    vec![Arc::new(TemperatureDependence { parameters: vec![Parameter::new("exponent", "1", variable)], reference_k })]
+}
+
+impl Effect for TemperatureDependence {
+    fn identifier(&self) -> Identifier {
+        Identifier::TemperatureDependentTimeConstant
+    }
+
+    fn channel(&self) -> Option<usize> {
+        None
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        vec![vec![0.0]]
+    }
+
+    fn install(&self, values: &[f64], plant: &mut Plant) {
+        plant.exponent = Some([values[0], self.reference_k]);
+    }
+
+    fn neutral(&self) -> Vec<(usize, f64)> {
+        vec![(0, 0.0)]
+    }
+}

@@ -1,0 +1,71 @@
+//! Time constants that change along the record by the same share: `τᵢ(t) = τᵢ (1 + m(t))`, as they do when the flow changes. `m`
+//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record.
+
+use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
+use crate::plant::Plant;
+use crate::spline::Spline;
+use std::sync::Arc;
+use twinlag_optimise::Variable;
+
+pub(crate) const ABOUT: About = About {
+    name: "varying-time-constant",
+    explanation: "both time constants change along the record by the same share, as they do when the flow changes",
+    advice: "log the flow velocity, or take records at steady flow",
+    confusable: &[Identifier::TemperatureDependentTimeConstant],
+    unseen: "which of the two a change of their ratio belongs to",
+};
+
+/// Coefficients that it is looked for with.
+const FIRST: usize = 9;
+/// Those that are tried once it is found.
+const SIZES: [usize; 4] = [4, 6, 14, 21];
+
+struct Varying {
+    ends_s: [f64; 2],
+    samples: usize,
+    parameters: Vec<Parameter>,
+}
+
+fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
+    const NAMES: [&str; 21] = [
+        "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
+        "m18", "m19", "m20", "m21",
+    ];
+    let parameters =
+        NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -3.0, 3.0))).collect();
+    (60 * size <= samples).then(|| Arc::new(Varying { ends_s, samples, parameters }) as Shared)
+}
+
+pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
+    of_size(FIRST, context.ends_s, context.samples).into_iter().collect()
+}
+
+impl Effect for Varying {
+    fn identifier(&self) -> Identifier {
+        Identifier::VaryingTimeConstant
+    }
+
+    fn channel(&self) -> Option<usize> {
+        None
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        vec![vec![0.0; self.parameters.len()]]
+    }
+
+    fn install(&self, values: &[f64], plant: &mut Plant) {
+        plant.modulation = Some(Spline::new(self.ends_s[0], self.ends_s[1], values));
+    }
+
+    fn sizes(&self) -> Vec<Shared> {
+        SIZES.into_iter().filter_map(|size| of_size(size, self.ends_s, self.samples)).collect()
+    }
+
+    fn neutral(&self) -> Vec<(usize, f64)> {
+        Vec::new()
+    }
+}

@@ -1,0 +1,18 @@
+//! What can go wrong before a diagnosis starts.
+
+use thiserror::Error;
+
+/// Why a record cannot be diagnosed.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum DiagnoseError {
+    #[error("a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}")]
+    TooShort { samples: usize, needed: usize },
+    #[error("expected finite readings and times, got one that is not")]
+    NotFinite,
+    #[error("channel {channel} never changes: there is no dynamics to see in it")]
+    Constant { channel: usize },
+    #[error("there is no effect called \"{name}\"; there are {known}")]
+    UnknownEffect { name: String, known: String },
+}

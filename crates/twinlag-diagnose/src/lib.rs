@@ -1,0 +1,28 @@
+//! What a two-sensor model leaves over, and which physical effect it lacks.
+#![allow(dead_code)]
+
+mod chain;
+mod defects;
+mod dense;
+mod diagnose;
+mod diagnosis;
+mod effect;
+mod error;
+mod held_out;
+mod model;
+mod observations;
+mod plant;
+mod search;
+mod spectrum;
+mod spline;
+mod weighting;
+mod whitening;
+
+pub use diagnose::{Settings, Watch, diagnose};
+pub use diagnosis::{
+    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, ModelFit, TimeConstant, Trace, Unexplained, Value, Verdict,
+};
+pub use effect::{About, Identifier};
+pub use error::DiagnoseError;
+pub use model::KnownTimeConstant;
+pub use observations::{Observations, Stretch};

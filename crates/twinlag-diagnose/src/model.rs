@@ -1,0 +1,328 @@
+//! A model: two lags and the effects added so far; and its least-squares fit to the whitened disagreement.
+
+use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Scale, Variable};
+
+use crate::dense;
+use crate::effect::{Parameter, Shared};
+use crate::observations::Observations;
+use crate::plant::{Evaluation, Plant};
+use crate::weighting::Weighting;
+
+/// Something known of a time constant beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownTimeConstant {
+    /// Sensor 0 or 1.
+    pub sensor: usize,
+    /// Its time constant, s.
+    pub value_s: f64,
+    /// Standard deviation of that knowledge, s; `None` holds it.
+    pub std_s: Option<f64>,
+}
+
+/// Two lags and effects. Parameters are in the order τ₁, τ₂, then those of each effect.
+#[derive(Clone)]
+pub(crate) struct Model {
+    pub(crate) effects: Vec<Shared>,
+    known: Vec<KnownTimeConstant>,
+    noise_std_k: [f64; 2],
+}
+
+/// Which residuals count, by the sample in the middle of their reach.
+#[derive(Clone, Debug)]
+pub(crate) struct Selection {
+    pub(crate) counts: Vec<bool>,
+    /// Which frequencies count.
+    pub(crate) weighting: Weighting,
+}
+
+impl Selection {
+    pub(crate) fn holds(&self, sample: usize) -> bool {
+        self.counts.get(sample).copied().unwrap_or(false)
+    }
+
+    /// The residuals that count, filtered.
+    fn of(&self, evaluation: &Evaluation) -> Vec<f64> {
+        let mut out = Vec::with_capacity(evaluation.residual.len());
+        let ends = evaluation.begins.iter().skip(1).copied().chain([evaluation.residual.len()]);
+        for (from, to) in evaluation.begins.iter().copied().zip(ends) {
+            let filtered = self.weighting.apply(&evaluation.residual[from..to]);
+            let pairs = filtered.iter().zip(&evaluation.sample[from..to]);
+            out.extend(pairs.filter(|(_, s)| self.holds(**s)).map(|(r, _)| *r));
+        }
+        out
+    }
+}
+
+impl Model {
+    pub(crate) fn new(known: &[KnownTimeConstant], noise_std_k: [f64; 2]) -> Self {
+        Self { effects: Vec::new(), known: known.to_vec(), noise_std_k }
+    }
+
+    pub(crate) fn with(&self, effect: Shared) -> Self {
+        let mut out = self.clone();
+        out.effects.push(effect);
+        out
+    }
+
+    pub(crate) fn without(&self, index: usize) -> Self {
+        let mut out = self.clone();
+        out.effects.remove(index);
+        out
+    }
+
+    pub(crate) fn with_noise(mut self, noise_std_k: [f64; 2]) -> Self {
+        self.noise_std_k = noise_std_k;
+        self
+    }
+
+    pub(crate) fn noise_std_k(&self) -> [f64; 2] {
+        self.noise_std_k
+    }
+
+    /// Where the parameters of effect `index` are.
+    pub(crate) fn range(&self, index: usize) -> std::ops::Range<usize> {
+        let from = 2 + self.effects[..index].iter().map(|e| e.parameters().len()).sum::<usize>();
+        from..from + self.effects[index].parameters().len()
+    }
+
+    pub(crate) fn parameters(&self) -> impl Iterator<Item = &Parameter> {
+        self.effects.iter().flat_map(|e| e.parameters())
+    }
+
+    /// Number of all parameters.
+    pub(crate) fn len(&self) -> usize {
+        2 + self.parameters().count()
+    }
+
+    /// Number of parameters that are fitted to the readings, known ones left out.
+    pub(crate) fn fitted(&self) -> usize {
+        self.len() - self.known.iter().filter(|k| k.std_s.is_none()).count()
+    }
+
+    /// Whether each parameter is one of noise.
+    fn is_noise(&self) -> Vec<bool> {
+        let mut out = vec![false; 2];
+        for effect in &self.effects {
+            out.extend(effect.parameters().iter().map(|_| effect.is_noise()));
+        }
+        out
+    }
+
+    pub(crate) fn plant(&self, theta: &[f64], observations: &Observations) -> Plant {
+        let mut plant = Plant::new(observations, [theta[0], theta[1]], self.noise_std_k);
+        for (index, effect) in self.effects.iter().enumerate() {
+            effect.install(&theta[self.range(index)], &mut plant);
+        }
+        plant
+    }
+
+    pub(crate) fn evaluate(&self, theta: &[f64], observations: &Observations) -> Evaluation {
+        self.plant(theta, observations).whitened(observations, false)
+    }
+
+    /// Variables of the fit. Noise is held: its likelihood is another.
+    fn variables(&self, theta: &[f64], observations: &Observations) -> Vec<Variable> {
+        let [first, last] = observations.ends_s();
+        let tau = |i: usize| {
+            let name = ["tau 1", "tau 2"][i];
+            let variable = Variable::logarithmic(name, 0.1 * observations.step_s(), 10.0 * (last - first));
+            match self.known.iter().find(|k| k.sensor == i) {
+                Some(known) if known.std_s.is_none() => variable.held_at(known.value_s),
+                _ => variable,
+            }
+        };
+        let mut out = vec![tau(0), tau(1)];
+        out.extend(self.parameters().map(|p| p.variable.clone()));
+        for (i, is_noise) in self.is_noise().into_iter().enumerate() {
+            if is_noise {
+                out[i] = out[i].clone().held_at(theta[i]);
+            }
+        }
+        out
+    }
+}
+
+/// A fitted model.
+#[derive(Clone)]
+pub(crate) struct Fitted {
+    pub(crate) model: Model,
+    pub(crate) theta: Vec<f64>,
+    /// Energy of the selected residuals, as the fit weighs frequencies, and their number as it does.
+    pub(crate) chi2: f64,
+    pub(crate) count: f64,
+    pub(crate) end: End,
+}
+
+impl Fitted {
+    /// Energy per residual that counts.
+    pub(crate) fn mean_energy(&self) -> f64 {
+        self.chi2 / self.count.max(1.0)
+    }
+}
+
+struct Squares<'a> {
+    model: &'a Model,
+    observations: &'a Observations,
+    selection: &'a Selection,
+    variables: Vec<Variable>,
+}
+
+impl Squares<'_> {
+    fn residual(&self, theta: &[f64]) -> Vec<f64> {
+        let evaluation = self.model.evaluate(theta, self.observations);
+        let mut out = self.selection.of(&evaluation);
+        for known in &self.model.known {
+            if let Some(std_s) = known.std_s {
+                out.push((theta[known.sensor] - known.value_s) / std_s);
+            }
+        }
+        out
+    }
+
+    fn columns(&self, theta: &[f64], base: &[f64]) -> Vec<Vec<f64>> {
+        (0..theta.len())
+            .map(|i| {
+                let variable = &self.variables[i];
+                if variable.lower == variable.upper {
+                    return vec![0.0; base.len()];
+                }
+                let step = difference_step(variable, theta[i]);
+                let mut moved = theta.to_vec();
+                moved[i] += step;
+                self.residual(&moved).iter().zip(base).map(|(a, b)| (a - b) / step).collect()
+            })
+            .collect()
+    }
+}
+
+/// A step that is small for the parameter and large beside rounding, into the allowed range.
+fn difference_step(variable: &Variable, x: f64) -> f64 {
+    let step = match variable.scale {
+        Scale::Logarithmic => 1e-5 * x,
+        Scale::Linear { typical } => 1e-3 * typical,
+    };
+    if x + step > variable.upper { -step } else { step }
+}
+
+impl Cost for Squares<'_> {
+    fn value(&self, theta: &[f64]) -> f64 {
+        self.residual(theta).iter().map(|r| r * r).sum()
+    }
+
+    fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
+        let r = self.residual(theta);
+        let columns = self.columns(theta, &r);
+        Some(Derivatives {
+            value: r.iter().map(|r| r * r).sum(),
+            gradient: columns.iter().map(|c| 2.0 * dense::dot(c, &r)).collect(),
+            curvature: columns
+                .iter()
+                .map(|a| columns.iter().map(|b| 2.0 * dense::dot(a, b)).collect())
+                .collect(),
+        })
+    }
+}
+
+/// How hard a fit tries.
+#[derive(Clone, Copy)]
+pub(crate) enum Effort {
+    /// Enough to rank it.
+    Look,
+    /// To the end.
+    Finish,
+}
+
+impl Model {
+    /// The fit from `start`, noise parameters held.
+    pub(crate) fn fit(
+        &self,
+        start: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        effort: Effort,
+    ) -> Fitted {
+        let variables = self.variables(start, observations);
+        let cost = Squares { model: self, observations, selection, variables: variables.clone() };
+        let (iterations, step_tolerance) = match effort {
+            Effort::Look => (10, 2e-2),
+            Effort::Finish => (40, 1e-4),
+        };
+        let problem = Problem::new(&cost, variables).expect("bounds are in order and the time constants are free");
+        let budget = Budget { iterations, evaluations: 4 * iterations };
+        let fit = Optimiser::LevenbergMarquardt { step_tolerance }
+            .minimise(&problem, start, &budget)
+            .expect("the start is finite and there are derivatives");
+        let count = cost.residual(&fit.x).len() as f64 * selection.weighting.mean();
+        Fitted { model: self.clone(), theta: fit.x, chi2: fit.value, count, end: fit.end }
+    }
+
+    /// The energy at a point.
+    pub(crate) fn energy(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
+        let evaluation = self.evaluate(theta, observations);
+        let sum: f64 = selection.of(&evaluation).iter().map(|r| r * r).sum();
+        if sum.is_finite() { sum } else { f64::INFINITY }
+    }
+
+    /// Residual and its derivatives at a point, in units of the parameters, for the samples that count.
+    pub(crate) fn linearised(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+    ) -> Linearised {
+        let variables = self.variables(theta, observations);
+        let cost = Squares { model: self, observations, selection, variables };
+        let evaluation = self.evaluate(theta, observations);
+        let samples: Vec<usize> = evaluation.sample.into_iter().filter(|s| selection.holds(*s)).collect();
+        let residual = cost.residual(theta);
+        let columns = cost.columns(theta, &residual);
+        Linearised { samples, residual, columns }
+    }
+}
+
+impl Model {
+    /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive definite.
+    pub(crate) fn curvature(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        lin: &Linearised,
+    ) -> Option<Vec<Vec<f64>>> {
+        let p = theta.len();
+        let variables = self.variables(theta, observations);
+        let products: Vec<Vec<f64>> =
+            (0..p).map(|a| (0..p).map(|b| dense::dot(&lin.columns[a], &lin.columns[b])).collect()).collect();
+        let scale = |i: usize| products[i][i].max(f64::MIN_POSITIVE).sqrt();
+        let slope = |lin: &Linearised| -> Vec<f64> { lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect() };
+        let mut second = vec![vec![0.0; p]; p];
+        for i in 0..p {
+            if variables[i].lower == variables[i].upper {
+                continue;
+            }
+            // A step of about a third of a standard error either way.
+            let step = 0.3 / scale(i);
+            let moved = |by: f64| {
+                let mut at = theta.to_vec();
+                at[i] = (at[i] + by).clamp(variables[i].lower, variables[i].upper);
+                (at[i] - theta[i], slope(&self.linearised(&at, observations, selection)))
+            };
+            let ((up, above), (down, below)) = (moved(step), moved(-step));
+            for j in 0..p {
+                second[i][j] = (above[j] - below[j]) / (up - down);
+            }
+        }
+        let symmetric: Vec<Vec<f64>> =
+            (0..p).map(|i| (0..p).map(|j| 0.5 * (second[i][j] + second[j][i])).collect()).collect();
+        dense::inverse(&symmetric).or_else(|| dense::inverse(&products))
+    }
+}
+
+/// A whitened residual with its derivatives.
+pub(crate) struct Linearised {
+    /// Samples of the residuals; knowledge beforehand comes after them in both of the others.
+    pub(crate) samples: Vec<usize>,
+    pub(crate) residual: Vec<f64>,
+    /// One column for each parameter.
+    pub(crate) columns: Vec<Vec<f64>>,
+}

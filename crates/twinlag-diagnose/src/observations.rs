@@ -1,0 +1,128 @@
+//! The two channels as the diagnosis takes them: absolute temperatures in unbroken stretches.
+
+use crate::error::DiagnoseError;
+
+/// Fewest samples of a stretch that is used.
+const SHORTEST: usize = 8;
+/// Fewest samples of a record that can be diagnosed: fewer leave no blocks to be held out.
+const FEWEST: usize = 60;
+
+/// An unbroken stretch of both channels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// Sample instants, s, rising.
+    pub time_s: Vec<f64>,
+    /// Readings of channels 1 and 2, °C.
+    pub reading_c: [Vec<f64>; 2],
+    /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
+    pub(crate) masked: [Vec<bool>; 2],
+}
+
+impl Stretch {
+    /// A stretch of which every sample counts.
+    pub fn new(time_s: Vec<f64>, reading_c: [Vec<f64>; 2]) -> Self {
+        let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
+        Self { time_s, reading_c, masked }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.time_s.len()
+    }
+}
+
+/// Both channels of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observations {
+    pub(crate) stretches: Vec<Stretch>,
+    pub(crate) period_s: Option<f64>,
+    /// Standard deviation of the more lively channel, K.
+    swing_k: f64,
+}
+
+impl Observations {
+    /// - `stretches`: in order of time; those of fewer than 8 samples are left out
+    /// - `period_s`: the sample period where samples are evenly spaced within each stretch, s
+    ///
+    /// # Errors
+    /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`].
+    pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, DiagnoseError> {
+        stretches.retain(|s| s.len() >= SHORTEST);
+        let samples: usize = stretches.iter().map(Stretch::len).sum();
+        if samples < FEWEST {
+            return Err(DiagnoseError::TooShort { samples, needed: FEWEST });
+        }
+        let is_sound = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
+        if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {
+            return Err(DiagnoseError::NotFinite);
+        }
+        let mut out = Self { stretches, period_s, swing_k: 0.0 };
+        out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);
+        Ok(out)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.stretches.iter().map(Stretch::len).sum()
+    }
+
+    /// First and last instant, s.
+    pub(crate) fn ends_s(&self) -> [f64; 2] {
+        let first = self.stretches.first().map_or(0.0, |s| s.time_s[0]);
+        let last = self.stretches.last().map_or(1.0, |s| s.time_s[s.len() - 1]);
+        [first, last]
+    }
+
+    /// Mean time from sample to sample, s.
+    pub(crate) fn step_s(&self) -> f64 {
+        self.period_s.unwrap_or_else(|| {
+            let (sum, count) = self.stretches.iter().fold((0.0, 0), |(sum, count), s| {
+                (sum + s.time_s[s.len() - 1] - s.time_s[0], count + s.len() - 1)
+            });
+            sum / count as f64
+        })
+    }
+
+    /// Every reading of a channel.
+    pub(crate) fn channel(&self, i: usize) -> impl Iterator<Item = f64> + '_ {
+        self.stretches.iter().flat_map(move |s| s.reading_c[i].iter().copied())
+    }
+
+    /// Mean and standard deviation of a channel.
+    pub(crate) fn mean_and_std(&self, i: usize) -> [f64; 2] {
+        let n = self.samples() as f64;
+        let mean = self.channel(i).sum::<f64>() / n;
+        [mean, (self.channel(i).map(|y| (y - mean) * (y - mean)).sum::<f64>() / n).sqrt()]
+    }
+
+    /// The standard deviation of the more lively channel, K.
+    pub(crate) fn swing_k(&self) -> f64 {
+        self.swing_k
+    }
+
+    /// Pieces spread over the record, about `samples` in all, where it is longer than that: for a quick look.
+    pub(crate) fn excerpt(&self, samples: usize, pieces: usize) -> Self {
+        let total = self.samples();
+        if total <= 2 * samples {
+            return self.clone();
+        }
+        let length = samples / pieces;
+        let mut stretches = Vec::new();
+        for piece in 0..pieces {
+            let mut from = piece * (total - length) / (pieces - 1).max(1);
+            for stretch in &self.stretches {
+                let n = stretch.len();
+                if from + length <= n {
+                    let cut = from..from + length;
+                    stretches.push(Stretch {
+                        time_s: stretch.time_s[cut.clone()].to_vec(),
+                        reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
+                        masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
+                    });
+                    break;
+                }
+                from = from.saturating_sub(n);
+            }
+        }
+        if stretches.is_empty() { self.clone() } else { Self { stretches, ..self.clone() } }
+    }
+}

@@ -1,0 +1,383 @@
+//! The inverse of the whole rig: from both channels' readings to the disagreement of the gas temperatures that they imply.
+//!
+//! A [`Plant`] is the two-lag model with every effect in its place; an effect that is absent has its neutral value. Each
+//! effect's file says which of these numbers are its parameters, nothing more, so any of them can be in the model together.
+
+use crate::chain::{Along, Chain, Pointwise, Rows};
+use crate::observations::{Observations, Stretch};
+use crate::spline::Spline;
+use crate::whitening::{Source, Variance, Whitened, whiten};
+
+/// 0 °C, K.
+pub(crate) const ZERO_CELSIUS_K: f64 = 273.15;
+
+/// What is done to a reading to have the temperature of the sensor.
+#[derive(Clone, Debug)]
+pub(crate) struct Reading {
+    /// Static gain.
+    pub(crate) gain: f64,
+    /// Added to it, K, at 0 °C.
+    pub(crate) offset_k: f64,
+    /// Added to it per second, from the middle of the record on.
+    pub(crate) drift_k_per_s: f64,
+    /// Static curvature `κ (T − about)²`, 1/K, and about which temperature, °C.
+    pub(crate) curvature: Option<[f64; 2]>,
+    /// Sinusoids: frequency in Hz, amplitudes of cosine and sine in K.
+    pub(crate) lines: Vec<[f64; 3]>,
+    /// Share of the other channel in the reading.
+    pub(crate) crosstalk: f64,
+    /// The temperature of the other channel that adds nothing, °C.
+    pub(crate) crosstalk_about_c: f64,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self { gain: 1.0, offset_k: 0.0, drift_k_per_s: 0.0, curvature: None, lines: Vec::new(), crosstalk: 0.0, crosstalk_about_c: 0.0 }
+    }
+}
+
+/// One sensor.
+#[derive(Clone, Debug)]
+pub(crate) struct Sensor {
+    pub(crate) reading: Reading,
+    pub(crate) tau_s: f64,
+    pub(crate) second_tau_s: Option<f64>,
+    /// Share and time constant of a slow parallel path.
+    pub(crate) slow: Option<[f64; 2]>,
+    /// Radiation `k (T⁴ − T_wall⁴)` in kelvin: `k` in 1/K³, and what it takes away at the mean temperature, K.
+    pub(crate) radiation: Option<Radiation>,
+}
+
+/// Radiation to walls, about the sensor's mean temperature.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Radiation {
+    /// `k`, 1/K³.
+    pub(crate) coefficient_per_k3: f64,
+    /// `k (T_mean⁴ − T_wall⁴)`, K.
+    pub(crate) loss_k: f64,
+    /// `T_mean`, K.
+    pub(crate) mean_k: f64,
+}
+
+/// Noise beside the white noise of the channels: autoregressive of first order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extra {
+    pub(crate) place: Place,
+    pub(crate) std_k: f64,
+    pub(crate) correlation_s: f64,
+}
+
+/// Where extra noise enters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// The reading of a channel.
+    Reading(usize),
+    /// The gas: the sensors do not see the same.
+    Gas,
+}
+
+/// The rig's inverse.
+#[derive(Clone, Debug)]
+pub(crate) struct Plant {
+    pub(crate) sensors: [Sensor; 2],
+    /// White noise of the channels, K.
+    pub(crate) noise_std_k: [f64; 2],
+    /// How much later channel 2 is than channel 1, s.
+    pub(crate) delay_s: Option<f64>,
+    /// How many samples a delay may reach.
+    pub(crate) reach: usize,
+    /// Relative change of both time constants along the record.
+    pub(crate) modulation: Option<Spline>,
+    /// `τ ∝ T^p` of each sensor's own temperature in kelvin, and the temperature at which `τ` is what it is called, K.
+    pub(crate) exponent: Option<[f64; 2]>,
+    pub(crate) extra: Vec<Extra>,
+    /// The middle of the record, s.
+    pub(crate) middle_s: f64,
+}
+
+impl Plant {
+    /// Two first-order lags.
+    pub(crate) fn new(observations: &Observations, tau_s: [f64; 2], noise_std_k: [f64; 2]) -> Self {
+        let sensor =
+            |tau_s| Sensor { reading: Reading::default(), tau_s, second_tau_s: None, slow: None, radiation: None };
+        let [first_s, last_s] = observations.ends_s();
+        Self {
+            sensors: tau_s.map(sensor),
+            noise_std_k,
+            delay_s: None,
+            reach: reach(observations.samples()),
+            modulation: None,
+            exponent: None,
+            extra: Vec::new(),
+            middle_s: 0.5 * (first_s + last_s),
+        }
+    }
+
+    /// Each inferred gas temperature and what carries the noise.
+    fn invert(&self, stretch: &Stretch, period_s: Option<f64>, has_gas: bool) -> Inverted {
+        let mut chains = [0, 1].map(|i| Chain::of(stretch, i, period_s));
+        self.take_off_crosstalk(&mut chains);
+        for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
+            self.correct(chain, &sensor.reading);
+        }
+        // Extra noise of the gas passes the factors that both sensors have.
+        let mut gas = has_gas.then(|| Chain::of(stretch, 0, period_s));
+        let pass = |gas: &mut Option<Chain>, tau_s: f64| {
+            if let Some(gas) = gas {
+                gas.factor(&Along::Same(tau_s), None, None);
+            }
+        };
+        if let Some(delay_s) = self.delay_s {
+            chains[0].advance(0.0, self.reach);
+            chains[1].advance(delay_s, self.reach);
+            if let Some(gas) = &mut gas {
+                gas.advance(0.0, self.reach);
+            }
+        }
+        for i in 0..2 {
+            if let Some(tau_s) = self.sensors[i].second_tau_s {
+                chains[i].factor(&Along::Same(tau_s), None, None);
+                chains[1 - i].factor(&Along::Same(0.0), None, None);
+                pass(&mut gas, 0.0);
+            }
+        }
+        for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
+            self.lag(chain, sensor);
+        }
+        pass(&mut gas, 0.0);
+        for i in 0..2 {
+            if let Some([share, tau_s]) = self.sensors[i].slow {
+                chains[i].factor(&Along::Same(tau_s), None, None);
+                chains[1 - i].factor(&Along::Same((1.0 - share) * tau_s), None, None);
+                pass(&mut gas, (1.0 - share) * tau_s);
+            }
+        }
+        Inverted { chains, gas }
+    }
+
+    /// `y₁ − ε (y₂ − about)`.
+    fn take_off_crosstalk(&self, chains: &mut [Chain; 2]) {
+        for i in 0..2 {
+            let Reading { crosstalk: share, crosstalk_about_c: about_c, .. } = self.sensors[i].reading;
+            if share != 0.0 {
+                let other = chains[1 - i].value.clone();
+                for (v, o) in chains[i].value.iter_mut().zip(other) {
+                    *v -= share * (o - about_c);
+                }
+            }
+        }
+    }
+
+    fn correct(&self, chain: &mut Chain, reading: &Reading) {
+        let lines = |t: f64| -> f64 {
+            reading
+                .lines
+                .iter()
+                .map(|[hz, cosine, sine]| {
+                    let (s, c) = (std::f64::consts::TAU * hz * t).sin_cos();
+                    cosine * c + sine * s
+                })
+                .sum()
+        };
+        let is_plain = reading.gain == 1.0
+            && reading.offset_k == 0.0
+            && reading.drift_k_per_s == 0.0
+            && reading.lines.is_empty();
+        if !is_plain {
+            chain.affine(
+                |t| -reading.offset_k - reading.drift_k_per_s * (t - self.middle_s) - lines(t),
+                1.0 / reading.gain,
+            );
+        }
+        if let Some([curvature, about_c]) = reading.curvature {
+            chain.map(|v| {
+                let from = v - about_c;
+                // The temperature T with T + κ (T − about)² = v, near v.
+                let root = (1.0 + 4.0 * curvature * from).max(0.04).sqrt();
+                (about_c + 2.0 * from / (1.0 + root), 1.0 / root)
+            });
+        }
+    }
+
+    fn lag(&self, chain: &mut Chain, sensor: &Sensor) {
+        let tau_s = match &self.modulation {
+            None => Along::Same(sensor.tau_s),
+            Some(spline) => {
+                let times = chain.times_after_factor();
+                Along::Each(times.iter().map(|t| sensor.tau_s * (1.0 + spline.at(*t)).max(0.02)).collect())
+            }
+        };
+        let value = sensor.radiation.map(|radiation| pointwise(&chain.value, |v| radiation.add_to(v)));
+        let slope = self.exponent.map(|[p, reference_k]| {
+            pointwise(&chain.value, |v| {
+                let q = (v + ZERO_CELSIUS_K).max(1.0) / reference_k;
+                // ∫ (T/T₀)^p dT from T₀ on.
+                let l = q.ln();
+                let e = (p + 1.0) * l;
+                let integral = if e.abs() < 1e-6 { l * (1.0 + 0.5 * e) } else { e.exp_m1() / (p + 1.0) };
+                (reference_k * integral, q.powf(p))
+            })
+        });
+        chain.factor(&tau_s, value.as_ref(), slope.as_ref());
+    }
+
+    /// The rows, in the middle of the record, by which noise of either channel and of the gas enters the disagreement.
+    pub(crate) fn noise_paths(&self, observations: &Observations) -> [Vec<f64>; 3] {
+        let stretch = observations.stretches.iter().max_by_key(|s| s.len()).expect("not empty");
+        let (middle, around) = (stretch.len() / 2, self.reach + 16);
+        let (from, to) = (middle.saturating_sub(around), (middle + around).min(stretch.len()));
+        let cut = Stretch::new(
+            stretch.time_s[from..to].to_vec(),
+            [0, 1].map(|i| stretch.reading_c[i][from..to].to_vec()),
+        );
+        let Inverted { chains, gas } = self.invert(&cut, observations.period_s, true);
+        let k = chains[0].len() / 2;
+        let [one, two] = &chains;
+        let gas = gas.expect("asked for");
+        [one.rows.at(k).to_vec(), two.rows.at(k).to_vec(), gas.rows.at(k).to_vec()]
+    }
+
+    /// The whitened disagreement along the record.
+    pub(crate) fn whitened(&self, observations: &Observations, keep: bool) -> Evaluation {
+        let mut out = Evaluation::default();
+        let mut first_sample = 0;
+        for stretch in &observations.stretches {
+            let has_gas = self.extra.iter().any(|e| e.place == Place::Gas);
+            let Inverted { mut chains, gas } = self.invert(stretch, observations.period_s, has_gas);
+            let mut sources = Vec::new();
+            for i in 0..2 {
+                let variance = self.noise_std_k[i] * self.noise_std_k[i];
+                sources.push(Source {
+                    rows: Rows::identity(),
+                    variance: mask(variance, &stretch.masked[i], observations.swing_k()),
+                });
+            }
+            // Innovations of the extra noise, before the difference that makes them of it.
+            let mut extra_rows: Vec<Rows> = Vec::new();
+            for (index, extra) in self.extra.iter().enumerate() {
+                let rho = (-observations.step_s() / extra.correlation_s).exp();
+                let mut rows = match extra.place {
+                    Place::Reading(i) => chains[i].rows.clone(),
+                    Place::Gas => gas.as_ref().expect("made for it").rows.clone(),
+                };
+                // Those before have had their differences; the gas chain has not.
+                if extra.place == Place::Gas {
+                    for before in &self.extra[..index] {
+                        let rho = (-observations.step_s() / before.correlation_s).exp();
+                        let mut chain = gas.clone().expect("made for it");
+                        chain.rows = rows;
+                        chain.difference(rho);
+                        rows = chain.rows;
+                    }
+                }
+                let mut chain_of_rows = Vec::new();
+                for other in &mut extra_rows {
+                    let mut chain = chains[0].clone();
+                    chain.rows = other.clone();
+                    chain.difference(rho);
+                    chain_of_rows.push(chain.rows);
+                }
+                extra_rows = chain_of_rows;
+                rows.start += 1;
+                extra_rows.push(rows);
+                chains.iter_mut().for_each(|c| c.difference(rho));
+            }
+            let [one, two] = chains;
+            let count = one.len().min(two.len());
+            let u: Vec<f64> = one.value.iter().zip(&two.value).map(|(a, b)| a - b).collect();
+            let minus_two = {
+                let mut rows = two.rows.clone();
+                rows.scale(-1.0);
+                rows
+            };
+            let [e1, e2] = [0, 1].map(|i| self.sensors[i].reading.crosstalk);
+            sources[0].rows = if e2 == 0.0 { one.rows.clone() } else { one.rows.plus(&minus_two, -e2, count) };
+            sources[1].rows = if e1 == 0.0 { minus_two.clone() } else { minus_two.plus(&one.rows, -e1, count) };
+            for (rows, extra) in extra_rows.into_iter().zip(&self.extra) {
+                let rho = (-observations.step_s() / extra.correlation_s).exp();
+                let variance = extra.std_k * extra.std_k * (1.0 - rho * rho);
+                sources.push(Source { rows, variance: Variance::Same(variance) });
+            }
+            let first_s = one.time_s[0];
+            let start = stretch.time_s.partition_point(|t| *t < first_s - 0.25 * observations.step_s());
+            let whitened = whiten(&u, &sources, keep);
+            out.begins.push(out.sample.len());
+            out.sample.extend((0..count).map(|k| first_sample + start + k));
+            out.time_s.extend_from_slice(&one.time_s);
+            out.gas_c.extend(one.value.iter().zip(&two.value).map(|(a, b)| 0.5 * (a + b)));
+            out.disagreement_k.extend_from_slice(&u);
+            out.residual.extend_from_slice(&whitened.residual);
+            out.log_determinant += whitened.log_determinant;
+            if keep {
+                out.parts.push(Part { sources, whitened, inferred_c: [one.value, two.value], first_sample });
+            }
+            first_sample += stretch.len();
+        }
+        out
+    }
+}
+
+impl Radiation {
+    /// `T + k (T⁴ − T_mean⁴) + loss`, T in °C, with its derivative.
+    fn add_to(&self, reading_c: f64) -> (f64, f64) {
+        let t = reading_c + ZERO_CELSIUS_K;
+        let (k, m) = (self.coefficient_per_k3, self.mean_k);
+        let more = k * (t - m) * (t + m) * (t * t + m * m) + self.loss_k;
+        (reading_c + more, 1.0 + 4.0 * k * t * t * t)
+    }
+}
+
+fn pointwise(values: &[f64], f: impl Fn(f64) -> (f64, f64)) -> Pointwise {
+    let (value, derivative) = values.iter().map(|v| f(*v)).unzip();
+    Pointwise { value, derivative }
+}
+
+/// How many samples a delay may reach in a record of so many.
+pub(crate) fn reach(samples: usize) -> usize {
+    (samples / 50).clamp(2, 64)
+}
+
+/// Variance of each sample: boundless, to all purposes, where it is masked.
+fn mask(variance: f64, masked: &[bool], swing_k: f64) -> Variance {
+    if masked.iter().any(|m| *m) {
+        let boundless = (1e3 * swing_k).powi(2);
+        Variance::Each(masked.iter().map(|m| if *m { boundless } else { variance }).collect())
+    } else {
+        Variance::Same(variance)
+    }
+}
+
+struct Inverted {
+    chains: [Chain; 2],
+    gas: Option<Chain>,
+}
+
+/// The whitened disagreement of a whole record.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Evaluation {
+    /// Whitened residual.
+    pub(crate) residual: Vec<f64>,
+    /// The sample, counted through all stretches, in the middle of each residual's reach.
+    pub(crate) sample: Vec<usize>,
+    /// Its instant, s.
+    pub(crate) time_s: Vec<f64>,
+    /// Mean of the two inferred gas temperatures, smoothed by the operators, °C.
+    pub(crate) gas_c: Vec<f64>,
+    /// Their difference, K.
+    pub(crate) disagreement_k: Vec<f64>,
+    /// Where stretches begin among the residuals.
+    pub(crate) begins: Vec<usize>,
+    /// Logarithm of the determinant of the noise covariance.
+    pub(crate) log_determinant: f64,
+    /// Details by stretch, where they were asked for.
+    pub(crate) parts: Vec<Part>,
+}
+
+/// One stretch with its factor.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) sources: Vec<Source>,
+    pub(crate) whitened: Whitened,
+    pub(crate) inferred_c: [Vec<f64>; 2],
+    pub(crate) first_sample: usize,
+}

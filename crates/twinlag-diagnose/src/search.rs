@@ -1,0 +1,360 @@
+//! The search: fit, look at what is left over, add what explains it best, and look again.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use crate::effect::{Context, Identifier, Shared, candidates};
+use crate::held_out::held_out_gain;
+use crate::dense;
+use crate::model::{Effort, Fitted, Model, Selection};
+use crate::observations::Observations;
+use crate::plant::Place;
+use crate::spectrum::{Bands, fit_noise, runs};
+
+/// Probability, over all candidates of a round, of taking one that is not there.
+pub(crate) const FALSE_ALARM: f64 = 1e-3;
+/// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
+const TIE: f64 = 10.0;
+
+/// A candidate with its fit.
+#[derive(Clone)]
+pub(crate) struct Tried {
+    pub(crate) effect: Shared,
+    pub(crate) fitted: Fitted,
+    /// Parameters it added.
+    pub(crate) added: usize,
+    /// `−2 ln L` saved, noise white with the levels that there are.
+    pub(crate) gain: f64,
+    /// The same with a free noise level in every band: what noise of any colour does not explain.
+    pub(crate) robust_gain: f64,
+    /// Nats that it saves on blocks that were left out.
+    pub(crate) held_out_nats: f64,
+}
+
+impl Tried {
+    fn penalty(&self) -> f64 {
+        self.added as f64 * self.fitted.count.max(2.0).ln()
+    }
+
+    fn score(&self) -> f64 {
+        self.gain - self.penalty()
+    }
+
+    fn robust_score(&self) -> f64 {
+        self.robust_gain - self.penalty()
+    }
+}
+
+/// What a search works on.
+pub(crate) struct Search<'a> {
+    pub(crate) observations: &'a Observations,
+    pub(crate) selection: &'a Selection,
+    pub(crate) context: Context,
+    /// Effects that may be named.
+    pub(crate) allowed: &'a [Identifier],
+    pub(crate) watch: &'a (dyn Fn(&str, usize, usize) + Sync),
+    /// Pieces of the record, for a quick look, and what counts of them.
+    pub(crate) excerpt: (Observations, Selection),
+}
+
+impl Search<'_> {
+    pub(crate) fn bands(&self, fitted: &Fitted) -> Bands {
+        let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
+        Bands::of(&runs(&evaluation, |s| self.selection.holds(s)))
+    }
+
+    fn robust(&self, fitted: &Fitted) -> f64 {
+        self.bands(fitted).robust(|omega| self.selection.weighting.at(omega))
+    }
+
+    /// The best fit of the model without effects, from a grid of time constants.
+    pub(crate) fn base(&self, model: &Model) -> Fitted {
+        self.from_grid(model, &[], 3)
+    }
+
+    /// The best fit with effect values as given, from the best points of a grid of time constants.
+    fn from_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
+        let step_s = self.context.step_s;
+        let span_s = self.context.span_s();
+        let (low, high) = (1.5 * step_s, 0.1 * span_s);
+        let points = 7;
+        let at = |i: usize| low * (high / low).powf(i as f64 / (points - 1) as f64);
+        let mut starts = Vec::new();
+        for i in 0..points {
+            for j in 0..points {
+                if i != j {
+                    let mut theta = vec![at(i), at(j)];
+                    theta.extend_from_slice(rest);
+                    let energy = model.energy(&theta, self.observations, self.selection);
+                    starts.push((energy, theta));
+                }
+            }
+        }
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Of either order the best.
+        let is_first_faster = |theta: &[f64]| theta[0] < theta[1];
+        let mut chosen: Vec<Vec<f64>> = starts.iter().take(most).map(|s| s.1.clone()).collect();
+        let order = is_first_faster(&chosen[0]);
+        if let Some(other) = starts.iter().find(|s| is_first_faster(&s.1) != order) {
+            chosen.push(other.1.clone());
+        }
+        chosen
+            .iter()
+            .map(|start| model.fit(start, self.observations, self.selection, Effort::Look))
+            .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+            .map(|best| model.fit(&best.theta, self.observations, self.selection, Effort::Finish))
+            .expect("at least one start")
+    }
+
+    /// `−2 ln L` saved by going from `before` to `after`, the level of the noise free.
+    fn gain(before: &Fitted, after: &Fitted) -> f64 {
+        let n = after.count;
+        n * (before.mean_energy() / after.mean_energy().max(1e-300)).ln()
+    }
+
+    /// Every candidate that may be added to `current`: those that may explain something are fitted.
+    ///
+    /// - `thorough`: where the model is far off, the score at it says little, and every candidate is fitted, from a grid of time
+    ///   constants as well
+    pub(crate) fn try_all(&self, current: &Fitted, thorough: bool) -> Vec<Tried> {
+        let all: Vec<Shared> = candidates(&self.context)
+            .into_iter()
+            .filter(|c| self.allowed.contains(&c.identifier()) && self.is_new(current, c))
+            .collect();
+        let robust_before = self.robust(current);
+        let looked = self.in_parallel(&all, |effect| {
+            if effect.is_noise() {
+                return self.try_noise(current, effect);
+            }
+            let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
+            (thorough || self.promise(current, effect) > least)
+                .then(|| self.try_one(current, effect, robust_before, thorough))
+        });
+        // The best few are fitted to the end.
+        let mut looked: Vec<Tried> = looked.into_iter().flatten().collect();
+        let (noise, mut mean): (Vec<Tried>, Vec<Tried>) = looked.drain(..).partition(|t| t.effect.is_noise());
+        mean.sort_by(|a, b| (b.gain - b.penalty()).total_cmp(&(a.gain - a.penalty())));
+        mean.truncate(8);
+        let finished = self.in_parallel(&mean, |tried| {
+            let model = &tried.fitted.model;
+            let fitted = model.fit(&tried.fitted.theta, self.observations, self.selection, Effort::Finish);
+            let robust = self.robust(&fitted);
+            Some(Tried {
+                gain: Self::gain(current, &fitted),
+                robust_gain: robust_before - robust,
+                fitted,
+                ..tried.clone()
+            })
+        });
+        finished.into_iter().flatten().chain(noise).collect()
+    }
+
+    fn in_parallel<T: Sync, R: Send + Clone>(&self, items: &[T], work: impl Fn(&T) -> Option<R> + Sync) -> Vec<Option<R>> {
+        let next = AtomicUsize::new(0);
+        let done = AtomicUsize::new(0);
+        let results: Mutex<Vec<Option<R>>> = Mutex::new(vec![None; items.len()]);
+        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(8);
+        std::thread::scope(|scope| {
+            for _ in 0..threads.min(items.len()) {
+                scope.spawn(|| {
+                    loop {
+                        let index = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(item) = items.get(index) else { break };
+                        let result = work(item);
+                        results.lock().expect("no thread panics")[index] = result;
+                        (self.watch)("candidates", done.fetch_add(1, Ordering::Relaxed) + 1, items.len());
+                    }
+                });
+            }
+        });
+        results.into_inner().expect("no thread panics")
+    }
+
+    /// Whether the model lacks the candidate, and can take it.
+    fn is_new(&self, current: &Fitted, candidate: &Shared) -> bool {
+        let effects = &current.model.effects;
+        let has = |name: &str| current.model.parameters().any(|p| p.name == name);
+        let repeats = effects.iter().any(|e| {
+            e.identifier() == candidate.identifier()
+                && (e.channel() == candidate.channel() || candidate.identifier() != Identifier::MainsPickup)
+        });
+        let clashes = candidate.parameters().iter().any(|p| p.name == "offset" && has("offset"));
+        let radiates = |id: Identifier| id == Identifier::Radiation || id == Identifier::Calibration;
+        let twice = radiates(candidate.identifier()) && effects.iter().any(|e| radiates(e.identifier()));
+        !repeats && !clashes && !twice
+    }
+
+    /// What a candidate would take off the energy if the residual were linear in everything, from the best of its starts.
+    ///
+    /// The residual is that of the candidate's own model: another number of factors is another whitening of the same disagreement.
+    fn promise(&self, current: &Fitted, effect: &Shared) -> f64 {
+        let model = current.model.with(effect.clone());
+        let of = |start: &Vec<f64>| -> f64 {
+            let mut theta = current.theta.clone();
+            theta.extend_from_slice(start);
+            let lin = model.linearised(&theta, self.observations, self.selection);
+            let matrix: Vec<Vec<f64>> =
+                lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect();
+            let slope: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
+            // Where it is singular, along the diagonal: less than it could take off, but no more than it can.
+            let taken = dense::inverse(&matrix).map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
+            current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
+        };
+        let promise = effect.starts().iter().map(of).fold(0.0, f64::max);
+        if std::env::var_os("TWINLAG_TRACE").is_some() {
+            eprintln!("   promise {} {:?} {promise:.1}", effect.identifier(), effect.channel());
+        }
+        promise
+    }
+
+    /// The chosen candidate in the size that the data support.
+    fn sized(&self, current: &Fitted, mut chosen: Tried, robust_before: f64) -> Tried {
+        for effect in chosen.effect.sizes() {
+            let other = self.try_one(current, &effect, robust_before, false);
+            if other.score() > chosen.score() {
+                chosen = other;
+            }
+        }
+        chosen
+    }
+
+    fn try_one(&self, current: &Fitted, effect: &Shared, robust_before: f64, thorough: bool) -> Tried {
+        let model = current.model.with(effect.clone());
+        let mut best: Option<Fitted> = None;
+        for start in effect.starts() {
+            let mut rest = current.theta[2..].to_vec();
+            rest.extend_from_slice(&start);
+            let mut theta = current.theta[..2].to_vec();
+            theta.extend_from_slice(&rest);
+            let mut fits = vec![model.fit(&theta, self.observations, self.selection, Effort::Look)];
+            if thorough && effect.parameters().len() <= 3 {
+                fits.push(self.from_grid_quickly(&model, &rest));
+            }
+            for fit in fits {
+                if best.as_ref().is_none_or(|b| fit.chi2 < b.chi2) {
+                    best = Some(fit);
+                }
+            }
+        }
+        let fitted = best.expect("every effect has a start");
+        let robust = self.robust(&fitted);
+        Tried {
+            gain: Self::gain(current, &fitted),
+            robust_gain: robust_before - robust,
+            added: effect.parameters().len(),
+            effect: effect.clone(),
+            fitted,
+            held_out_nats: 0.0,
+        }
+    }
+
+    fn from_grid_quickly(&self, model: &Model, rest: &[f64]) -> Fitted {
+        let (excerpt, selection) = &self.excerpt;
+        let (low, high) = (2.0 * self.context.step_s, 0.03 * self.context.span_s());
+        let points = 5;
+        let at = |i: usize| low * (high / low).powf(i as f64 / (points - 1) as f64);
+        let mut best = (f64::INFINITY, Vec::new());
+        for i in 0..points {
+            for j in 0..points {
+                let mut theta = vec![at(i), at(j)];
+                theta.extend_from_slice(rest);
+                let energy = model.energy(&theta, excerpt, selection);
+                if energy < best.0 || best.1.is_empty() {
+                    best = (energy, theta);
+                }
+            }
+        }
+        let near = model.fit(&best.1, excerpt, selection, Effort::Look);
+        model.fit(&near.theta, self.observations, self.selection, Effort::Look)
+    }
+
+    fn try_noise(&self, current: &Fitted, effect: &Shared) -> Option<Tried> {
+        let plant = current.model.plant(&current.theta, self.observations);
+        let bands = self.bands(current);
+        let place = match effect.channel() {
+            Some(i) => Place::Reading(i),
+            None => Place::Gas,
+        };
+        let starts: Vec<[f64; 2]> = effect.starts().iter().map(|s| [s[0], s[1]]).collect();
+        let white = fit_noise(&plant, self.observations, &bands, None, &[]);
+        let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts);
+        let extra = with.extra?;
+        let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
+        let mut theta = current.theta.clone();
+        theta.extend([extra.std_k, extra.correlation_s]);
+        // The weights move the time constants, and these the noise: once more is enough.
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        Some(Tried {
+            gain: white.likelihood - with.likelihood,
+            robust_gain: 0.0,
+            added: 2,
+            effect: effect.clone(),
+            fitted,
+            held_out_nats: 0.5 * (white.held_out - with.held_out),
+        })
+    }
+
+    /// The candidate that explains the residual best, with those that do it as well; `None` where none is significant.
+    pub(crate) fn choose(&self, current: &Fitted, tried: &[Tried]) -> Option<(Tried, Vec<Tried>)> {
+        if std::env::var_os("TWINLAG_TRACE").is_some() {
+            for t in tried {
+                eprintln!("   {:36} {:?} added {:2} gain {:10.1} robust {:9.1} chi2 {:9.4} end {:?} {:?} {:?}", t.effect.identifier().name(), t.effect.channel(), t.added, t.gain, t.robust_gain, t.fitted.mean_energy(), t.fitted.end, &t.fitted.theta[..2], &t.fitted.theta[t.fitted.theta.len() - t.added..][..t.added.min(3)]);
+            }
+        }
+        let count = tried.len().max(1) as f64;
+        let is_sound = |t: &Tried| t.fitted.end.is_usable() || matches!(t.fitted.end, twinlag_optimise::End::LimitReached);
+        let mut mean: Vec<Tried> = tried
+            .iter()
+            .filter(|t| !t.effect.is_noise() && is_sound(t) && Self::is_there(t))
+            .filter(|t| t.robust_gain > threshold(t.added, FALSE_ALARM / count))
+            .filter(|t| t.score() > 0.0)
+            .cloned()
+            .collect();
+        mean.sort_by(|a, b| b.robust_score().total_cmp(&a.robust_score()));
+        let mut noise: Vec<Tried> = tried
+            .iter()
+            .filter(|t| t.effect.is_noise() && t.gain > threshold(t.added, FALSE_ALARM / count) && t.score() > 0.0)
+            .cloned()
+            .collect();
+        noise.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let mut pool = if mean.is_empty() {
+            noise
+        } else {
+            // Those that are as good whatever the noise, the best of them with white noise first.
+            let best = mean[0].robust_score();
+            let mut near: Vec<Tried> = mean.into_iter().filter(|t| t.robust_score() > best - 2.0 * TIE).collect();
+            near.sort_by(|a, b| b.score().total_cmp(&a.score()));
+            near
+        };
+        while !pool.is_empty() {
+            let mut first = self.sized(current, pool.remove(0), self.robust(current));
+            if !first.effect.is_noise() {
+                first.held_out_nats = held_out_gain(self.observations, self.selection, current, &first.fitted);
+            }
+            if first.held_out_nats > 0.0 {
+                let ties = pool
+                    .into_iter()
+                    .filter(|t| t.effect.identifier() != first.effect.identifier() && first.score() - t.score() < TIE)
+                    .collect();
+                return Some((first, ties));
+            }
+        }
+        None
+    }
+
+    /// Whether the effect's size is clear of nothing, or of a bound that means nothing.
+    fn is_there(t: &Tried) -> bool {
+        let range = t.fitted.model.range(t.fitted.model.effects.len() - 1);
+        t.effect.parameters().iter().zip(&t.fitted.theta[range]).all(|(p, x)| {
+            let width = p.variable.upper - p.variable.lower;
+            x.is_finite() && (*x - p.variable.lower) > 1e-9 * width && (p.variable.upper - *x) > 1e-9 * width
+        })
+    }
+}
+
+/// The gain that noise alone makes with probability `p` when `added` parameters are added.
+pub(crate) fn threshold(added: usize, p: f64) -> f64 {
+    use statrs::distribution::{ChiSquared, ContinuousCDF};
+    let chi2 = ChiSquared::new(added.max(1) as f64).expect("a positive number");
+    chi2.inverse_cdf(1.0 - p)
+}

@@ -1,0 +1,119 @@
+//! Which frequencies a fit listens to.
+//!
+//! Where the gas has no power the whitened residual is noise whatever the parameters are, and still its energy depends on them:
+//! noise of one channel multiplied by noise of the other. Its expectation does not, so a fixed weight over frequency leaves the
+//! estimate consistent, and the weight `SNR/(1 + SNR)` takes off most of what such frequencies add to its scatter: sensors
+//! that are sampled twenty times per time constant have most of theirs there. `SNR` is that of the disagreement,
+//! `1/(1/SNR₁ + 1/SNR₂)` of the channels.
+
+use num_complex::Complex64;
+use realfft::RealFftPlanner;
+
+use crate::observations::Observations;
+
+/// Points of the spectra.
+const POINTS: usize = 256;
+/// Taps on either side of the filter's middle.
+const HALF: usize = 24;
+
+/// A filter of zero phase for the whitened residual, its squared gain the weight; or none.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Weighting {
+    taps: Vec<f64>,
+}
+
+impl Weighting {
+    /// From the spectra of the readings over noise of `noise_std_k`. None where samples are uneven or stretches short.
+    pub(crate) fn of(observations: &Observations, noise_std_k: [f64; 2]) -> Self {
+        if observations.period_s.is_none() || observations.samples() < 8 * POINTS {
+            return Self::default();
+        }
+        let snr = [0, 1].map(|i| {
+            let power = spectrum(observations, i);
+            let noise = noise_std_k[i] * noise_std_k[i];
+            power.iter().map(|p| (p / noise - 1.0).max(0.0)).collect::<Vec<f64>>()
+        });
+        let gain: Vec<f64> = (0..snr[0].len())
+            .map(|j| {
+                // The mean of its neighbours: a single bin is uncertain by its own size.
+                let around = j.saturating_sub(2)..(j + 3).min(snr[0].len());
+                let n = around.len() as f64;
+                let [a, b] = [0, 1].map(|i| around.clone().map(|k| snr[i][k]).sum::<f64>() / n);
+                let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
+                (snr / (1.0 + snr)).sqrt()
+            })
+            .collect();
+        if gain.iter().all(|g| *g > 0.9) {
+            return Self::default();
+        }
+        let mut planner = RealFftPlanner::<f64>::new();
+        let plan = planner.plan_fft_inverse(POINTS);
+        let mut input: Vec<Complex64> = gain.iter().map(|g| Complex64::new(*g, 0.0)).collect();
+        let mut response = plan.make_output_vec();
+        plan.process(&mut input, &mut response).expect("lengths agree");
+        let taps = (0..=2 * HALF)
+            .map(|j| {
+                let lag = j.abs_diff(HALF);
+                let window = 0.5 + 0.5 * (std::f64::consts::PI * lag as f64 / (HALF + 1) as f64).cos();
+                response[lag] / POINTS as f64 * window
+            })
+            .collect();
+        Self { taps }
+    }
+
+    /// How many residuals at either end have no filtered value.
+    pub(crate) fn half(&self) -> usize {
+        self.taps.len() / 2
+    }
+
+    /// The mean weight over frequency: degrees of freedom per residual.
+    pub(crate) fn mean(&self) -> f64 {
+        if self.taps.is_empty() { 1.0 } else { self.taps.iter().map(|t| t * t).sum() }
+    }
+
+    /// The weight at `omega` radians per sample.
+    pub(crate) fn at(&self, omega: f64) -> f64 {
+        if self.taps.is_empty() {
+            return 1.0;
+        }
+        let middle = self.half();
+        let gain: f64 = self.taps[middle]
+            + 2.0 * (1..=middle).map(|l| self.taps[middle + l] * (omega * l as f64).cos()).sum::<f64>();
+        gain * gain
+    }
+
+    /// The filtered values, zero where the filter reaches past an end.
+    pub(crate) fn apply(&self, values: &[f64]) -> Vec<f64> {
+        let width = self.taps.len();
+        if width == 0 {
+            return values.to_vec();
+        }
+        let mut out = vec![0.0; values.len()];
+        for (k, window) in values.windows(width).enumerate() {
+            out[k + width / 2] = self.taps.iter().zip(window).map(|(t, v)| t * v).sum();
+        }
+        out
+    }
+}
+
+/// Mean power of a channel, white noise of unit variance having 1, in `POINTS/2 + 1` bins: Hann's window.
+fn spectrum(observations: &Observations, channel: usize) -> Vec<f64> {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let plan = planner.plan_fft_forward(POINTS);
+    let window: Vec<f64> =
+        (0..POINTS).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / POINTS as f64).cos()).collect();
+    let scale: f64 = window.iter().map(|w| w * w).sum();
+    let mut sum = vec![0.0; POINTS / 2 + 1];
+    let mut count = 0.0_f64;
+    for stretch in &observations.stretches {
+        for piece in stretch.reading_c[channel].windows(POINTS).step_by(POINTS / 2) {
+            let mean = piece.iter().sum::<f64>() / POINTS as f64;
+            let mut input: Vec<f64> = piece.iter().zip(&window).map(|(y, w)| (y - mean) * w).collect();
+            let mut spectrum = plan.make_output_vec();
+            plan.process(&mut input, &mut spectrum).expect("lengths agree");
+            sum.iter_mut().zip(&spectrum).for_each(|(s, x)| *s += x.norm_sqr() / scale);
+            count += 1.0;
+        }
+    }
+    sum.iter().map(|s| s / count.max(1.0)).collect()
+}

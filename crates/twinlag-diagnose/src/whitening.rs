@@ -1,0 +1,124 @@
+//! Exact whitening of a disagreement whose noise is a sum of moving averages: `V = L Lᵀ`, banded, `r = L⁻¹ u`.
+
+use crate::chain::Rows;
+
+/// Relative difference that rounding makes.
+const SAME: f64 = 4.0 * f64::EPSILON;
+/// Rows of the factor in a row that must agree before it counts as settled.
+const AGREEING: usize = 6;
+
+/// Noise that enters the disagreement through rows of weights.
+#[derive(Clone, Debug)]
+pub(crate) struct Source {
+    pub(crate) rows: Rows,
+    pub(crate) variance: Variance,
+}
+
+/// Variance of white noise, K².
+#[derive(Clone, Debug)]
+pub(crate) enum Variance {
+    Same(f64),
+    /// One for each sample.
+    Each(Vec<f64>),
+}
+
+impl Variance {
+    fn at(&self, sample: usize) -> f64 {
+        match self {
+            Self::Same(v) => *v,
+            Self::Each(all) => all[sample.min(all.len() - 1)],
+        }
+    }
+
+    fn is_same(&self) -> bool {
+        matches!(self, Self::Same(_))
+    }
+}
+
+/// A whitened disagreement.
+#[derive(Clone, Debug)]
+pub(crate) struct Whitened {
+    pub(crate) residual: Vec<f64>,
+    pub(crate) log_determinant: f64,
+    /// Rows of `L`, lags `0..=band`, if they were to be kept.
+    factor: Vec<f64>,
+    band: usize,
+}
+
+/// Covariance of value `k` with value `k − lag`.
+fn covariance(sources: &[Source], k: usize, lag: usize) -> f64 {
+    let mut sum = 0.0;
+    for source in sources {
+        let (now, then) = (source.rows.at(k), source.rows.at(k - lag));
+        if lag >= now.len() {
+            continue;
+        }
+        sum += match &source.variance {
+            Variance::Same(v) => v * now.iter().zip(&then[lag..]).map(|(a, b)| a * b).sum::<f64>(),
+            each @ Variance::Each(_) => {
+                let first = source.rows.start + k;
+                now.iter().zip(&then[lag..]).enumerate().map(|(j, (a, b))| a * b * each.at(first + j)).sum()
+            }
+        };
+    }
+    sum
+}
+
+pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
+    let band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
+    let stride = band + 1;
+    let is_same = sources.iter().all(|s| s.rows.is_same() && s.variance.is_same());
+    let fixed: Vec<f64> =
+        if is_same && u.len() > band { (0..stride).map(|lag| covariance(sources, band, lag)).collect() } else { Vec::new() };
+    let mut residual = Vec::with_capacity(u.len());
+    let mut log_determinant = 0.0;
+    let mut kept = Vec::with_capacity(if keep { u.len() * stride } else { 0 });
+    // The last rows of L, newest first.
+    let mut recent = vec![0.0; stride * stride];
+    let mut row = vec![0.0; stride];
+    let mut agreeing = 0;
+    for k in 0..u.len() {
+        let reach = band.min(k);
+        if agreeing < AGREEING {
+            for lag in (0..=reach).rev() {
+                let mut entry = if fixed.is_empty() { covariance(sources, k, lag) } else { fixed[lag] };
+                for older in lag + 1..=reach {
+                    let other = if lag == 0 { row[older] } else { recent[(lag - 1) * stride + older - lag] };
+                    entry -= row[older] * other;
+                }
+                row[lag] = if lag == 0 { entry.max(f64::MIN_POSITIVE).sqrt() } else { entry / recent[(lag - 1) * stride] };
+            }
+            let agrees = !fixed.is_empty()
+                && k > band
+                && row.iter().zip(&recent[..stride]).all(|(a, b)| (a - b).abs() <= SAME * row[0]);
+            agreeing = if agrees { agreeing + 1 } else { 0 };
+            recent.rotate_right(stride);
+            recent[..stride].copy_from_slice(&row);
+        }
+        let mut r = u[k];
+        for lag in 1..=reach {
+            r -= row[lag] * residual[k - lag];
+        }
+        residual.push(r / row[0]);
+        log_determinant += 2.0 * row[0].ln();
+        if keep {
+            kept.extend_from_slice(&row);
+        }
+    }
+    Whitened { residual, log_determinant, factor: kept, band }
+}
+
+impl Whitened {
+    /// `V⁻¹ u = L⁻ᵀ r`, if the factor was kept.
+    pub(crate) fn weighted(&self) -> Vec<f64> {
+        let (n, stride) = (self.residual.len(), self.band + 1);
+        let mut w = self.residual.clone();
+        for k in (0..n).rev() {
+            w[k] /= self.factor[k * stride];
+            for lag in 1..=self.band.min(k) {
+                w[k - lag] -= self.factor[k * stride + lag] * w[k];
+            }
+        }
+        w
+    }
+}
