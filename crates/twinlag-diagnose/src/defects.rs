@@ -27,16 +27,28 @@ pub(crate) struct Levels {
     pub(crate) coarse_step_k: [Option<f64>; 2],
 }
 
-/// The channels as the costs of the other layers take them.
+/// The channels as the costs of the other layers take them, without what is masked.
 pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
-    let segments = observations.stretches.iter().map(|s| {
-        let steps = match observations.period_s {
-            Some(period_s) => Steps::Even(period_s),
-            None => Steps::Uneven(s.time_s.windows(2).map(|t| t[1] - t[0]).collect()),
-        };
-        Segment::new(s.reading_c[0].clone(), s.reading_c[1].clone(), steps).ok()
-    });
-    Readings::new(segments.collect::<Option<Vec<_>>>()?).ok()
+    let mut segments = Vec::new();
+    for s in &observations.stretches {
+        let is_masked = |k: usize| s.masked[0][k] || s.masked[1][k];
+        let mut from = 0;
+        for k in 0..=s.len() {
+            if k < s.len() && !is_masked(k) {
+                continue;
+            }
+            if k >= from + 8 {
+                let steps = match observations.period_s {
+                    Some(period_s) => Steps::Even(period_s),
+                    None => Steps::Uneven(s.time_s[from..k].windows(2).map(|t| t[1] - t[0]).collect()),
+                };
+                let cut = |i: usize| s.reading_c[i][from..k].to_vec();
+                segments.push(Segment::new(cut(0), cut(1), steps).ok()?);
+            }
+            from = k + 1;
+        }
+    }
+    Readings::new(segments).ok()
 }
 
 /// Levels from third differences.
@@ -62,15 +74,8 @@ pub(crate) fn mask_saturation(observations: &mut Observations, steps_k: [Option<
         for end in [lowest, highest] {
             let at = |y: &f64| *y == end;
             let count = observations.channel(i).filter(|y| at(y)).count();
-            // The next value inwards: on a coarse grid the ends must be far more crowded than it.
-            let crowded = match steps_k[i] {
-                None => count >= FEWEST_AT_END,
-                Some(step_k) => {
-                    let next = end + if end == lowest { step_k } else { -step_k };
-                    let beside = observations.channel(i).filter(|y| (*y - next).abs() < 0.25 * step_k).count();
-                    count >= 4 * FEWEST_AT_END && count > 4 * beside
-                }
-            };
+            // On a coarse grid every value comes again and again.
+            let crowded = steps_k[i].is_none() && count >= FEWEST_AT_END;
             let pairs: usize = observations
                 .stretches
                 .iter()
@@ -221,10 +226,27 @@ pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds:
     }
     let mut out: Vec<Line> = found
         .into_iter()
+        .filter(|(bin, _)| !is_in_the_gas(evaluation, std::f64::consts::TAU * *bin as f64 / n as f64))
         .map(|(bin, ratio)| Line { frequency_hz: bin as f64 / (n as f64 * period_s), ratio })
         .collect();
     out.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
     out
+}
+
+/// Whether both sensors see a line at `omega` radians per sample, as they do of the gas: what one of them alone sees is as large
+/// in their difference as in their mean.
+fn is_in_the_gas(evaluation: &Evaluation, omega: f64) -> bool {
+    let amplitude = |values: &[f64]| -> f64 {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let (mut re, mut im) = (0.0, 0.0);
+        for (v, sample) in values.iter().zip(&evaluation.sample) {
+            let (s, c) = (omega * *sample as f64).sin_cos();
+            re += (v - mean) * c;
+            im += (v - mean) * s;
+        }
+        re.hypot(im)
+    };
+    amplitude(&evaluation.disagreement_k) < 0.7 * amplitude(&evaluation.gas_c)
 }
 
 /// A line of the residual.

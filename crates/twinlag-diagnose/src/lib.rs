@@ -12,6 +12,7 @@ mod held_out;
 mod model;
 mod observations;
 mod plant;
+mod residual;
 mod search;
 mod spectrum;
 mod spline;

@@ -116,6 +116,20 @@ impl Model {
         plant
     }
 
+    /// The readings with the lines of the model taken off.
+    pub(crate) fn without_lines(&self, theta: &[f64], observations: &Observations) -> Observations {
+        let plant = self.plant(theta, observations);
+        let mut out = observations.clone();
+        for stretch in &mut out.stretches {
+            for (i, sensor) in plant.sensors.iter().enumerate() {
+                for (y, t) in stretch.reading_c[i].iter_mut().zip(&stretch.time_s) {
+                    *y -= sensor.reading.lines_at(*t);
+                }
+            }
+        }
+        out
+    }
+
     pub(crate) fn evaluate(&self, theta: &[f64], observations: &Observations) -> Evaluation {
         self.plant(theta, observations).whitened(observations, false)
     }

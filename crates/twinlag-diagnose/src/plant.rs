@@ -36,6 +36,19 @@ impl Default for Reading {
     }
 }
 
+impl Reading {
+    /// The sum of the sinusoids at a time, K.
+    pub(crate) fn lines_at(&self, time_s: f64) -> f64 {
+        self.lines
+            .iter()
+            .map(|[hz, cosine, sine]| {
+                let (s, c) = (std::f64::consts::TAU * hz * time_s).sin_cos();
+                cosine * c + sine * s
+            })
+            .sum()
+    }
+}
+
 /// One sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Sensor {
@@ -46,6 +59,8 @@ pub(crate) struct Sensor {
     pub(crate) slow: Option<[f64; 2]>,
     /// Radiation `k (T⁴ − T_wall⁴)` in kelvin: `k` in 1/K³, and what it takes away at the mean temperature, K.
     pub(crate) radiation: Option<Radiation>,
+    /// `τ ∝ T^p` of its own temperature in kelvin, and the temperature at which `τ` is what it is called, K.
+    pub(crate) exponent: Option<[f64; 2]>,
 }
 
 /// Radiation to walls, about the sensor's mean temperature.
@@ -88,8 +103,6 @@ pub(crate) struct Plant {
     pub(crate) reach: usize,
     /// Relative change of both time constants along the record.
     pub(crate) modulation: Option<Spline>,
-    /// `τ ∝ T^p` of each sensor's own temperature in kelvin, and the temperature at which `τ` is what it is called, K.
-    pub(crate) exponent: Option<[f64; 2]>,
     pub(crate) extra: Vec<Extra>,
     /// The middle of the record, s.
     pub(crate) middle_s: f64,
@@ -99,7 +112,7 @@ impl Plant {
     /// Two first-order lags.
     pub(crate) fn new(observations: &Observations, tau_s: [f64; 2], noise_std_k: [f64; 2]) -> Self {
         let sensor =
-            |tau_s| Sensor { reading: Reading::default(), tau_s, second_tau_s: None, slow: None, radiation: None };
+            |tau_s| Sensor { reading: Reading::default(), tau_s, second_tau_s: None, slow: None, radiation: None, exponent: None };
         let [first_s, last_s] = observations.ends_s();
         Self {
             sensors: tau_s.map(sensor),
@@ -107,7 +120,6 @@ impl Plant {
             delay_s: None,
             reach: reach(observations.samples()),
             modulation: None,
-            exponent: None,
             extra: Vec::new(),
             middle_s: 0.5 * (first_s + last_s),
         }
@@ -169,23 +181,13 @@ impl Plant {
     }
 
     fn correct(&self, chain: &mut Chain, reading: &Reading) {
-        let lines = |t: f64| -> f64 {
-            reading
-                .lines
-                .iter()
-                .map(|[hz, cosine, sine]| {
-                    let (s, c) = (std::f64::consts::TAU * hz * t).sin_cos();
-                    cosine * c + sine * s
-                })
-                .sum()
-        };
         let is_plain = reading.gain == 1.0
             && reading.offset_k == 0.0
             && reading.drift_k_per_s == 0.0
             && reading.lines.is_empty();
         if !is_plain {
             chain.affine(
-                |t| -reading.offset_k - reading.drift_k_per_s * (t - self.middle_s) - lines(t),
+                |t| -reading.offset_k - reading.drift_k_per_s * (t - self.middle_s) - reading.lines_at(t),
                 1.0 / reading.gain,
             );
         }
@@ -208,7 +210,7 @@ impl Plant {
             }
         };
         let value = sensor.radiation.map(|radiation| pointwise(&chain.value, |v| radiation.add_to(v)));
-        let slope = self.exponent.map(|[p, reference_k]| {
+        let slope = sensor.exponent.map(|[p, reference_k]| {
             pointwise(&chain.value, |v| {
                 let q = (v + ZERO_CELSIUS_K).max(1.0) / reference_k;
                 // ∫ (T/T₀)^p dT from T₀ on.

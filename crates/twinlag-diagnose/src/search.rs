@@ -16,6 +16,9 @@ pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
 const TIE: f64 = 10.0;
 
+/// The same up to which they are the same model in two guises.
+const EQUAL: f64 = 2.0;
+
 /// A candidate with its fit.
 #[derive(Clone)]
 pub(crate) struct Tried {
@@ -112,6 +115,22 @@ impl Search<'_> {
         n * (before.mean_energy() / after.mean_energy().max(1e-300)).ln()
     }
 
+    /// Both gains of a candidate. A line has its own frequency, and is judged there: with no weight over frequency, and no free
+    /// level in a band that is wider than it.
+    fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> (f64, f64) {
+        if effect.identifier() != Identifier::MainsPickup {
+            return (Self::gain(before, after), robust);
+        }
+        let energy = |fitted: &Fitted| {
+            let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
+            let pairs = evaluation.residual.iter().zip(&evaluation.sample);
+            pairs.filter(|(_, s)| self.selection.holds(**s)).fold((0.0, 0.0), |(sum, n), (r, _)| (sum + r * r, n + 1.0))
+        };
+        let ((b, n), (a, _)) = (energy(before), energy(after));
+        let gain = n * (b / a.max(1e-300)).ln();
+        (gain, gain)
+    }
+
     /// Every candidate that may be added to `current`: those that may explain something are fitted.
     ///
     /// - `thorough`: where the model is far off, the score at it says little, and every candidate is fitted, from a grid of time
@@ -127,7 +146,7 @@ impl Search<'_> {
                 return self.try_noise(current, effect);
             }
             let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
-            (thorough || self.promise(current, effect) > least)
+            (thorough || effect.identifier() == Identifier::MainsPickup || self.promise(current, effect) > least)
                 .then(|| self.try_one(current, effect, robust_before, thorough))
         });
         // The best few are fitted to the end.
@@ -139,12 +158,8 @@ impl Search<'_> {
             let model = &tried.fitted.model;
             let fitted = model.fit(&tried.fitted.theta, self.observations, self.selection, Effort::Finish);
             let robust = self.robust(&fitted);
-            Some(Tried {
-                gain: Self::gain(current, &fitted),
-                robust_gain: robust_before - robust,
-                fitted,
-                ..tried.clone()
-            })
+            let (gain, robust_gain) = self.gains(current, &fitted, &tried.effect, robust_before - robust);
+            Some(Tried { gain, robust_gain, fitted, ..tried.clone() })
         });
         finished.into_iter().flatten().chain(noise).collect()
     }
@@ -238,9 +253,10 @@ impl Search<'_> {
         }
         let fitted = best.expect("every effect has a start");
         let robust = self.robust(&fitted);
+        let (gain, robust_gain) = self.gains(current, &fitted, effect, robust_before - robust);
         Tried {
-            gain: Self::gain(current, &fitted),
-            robust_gain: robust_before - robust,
+            gain,
+            robust_gain,
             added: effect.parameters().len(),
             effect: effect.clone(),
             fitted,
@@ -324,6 +340,14 @@ impl Search<'_> {
             let best = mean[0].robust_score();
             let mut near: Vec<Tried> = mean.into_iter().filter(|t| t.robust_score() > best - 2.0 * TIE).collect();
             near.sort_by(|a, b| b.score().total_cmp(&a.score()));
+            // Of those that are the same to rounding the one that is more often the case.
+            let best = near[0].score();
+            if let Some(index) = (0..near.len())
+                .filter(|&i| best - near[i].score() < EQUAL)
+                .min_by_key(|&i| (near[i].effect.identifier(), i))
+            {
+                near.swap(0, index);
+            }
             near
         };
         while !pool.is_empty() {

@@ -13,6 +13,8 @@ use crate::observations::Observations;
 
 /// Points of the spectra.
 const POINTS: usize = 256;
+/// No frequency has less weight: a line that is not in the gas is seen there.
+const LEAST: f64 = 0.02;
 /// Taps on either side of the filter's middle.
 const HALF: usize = 24;
 
@@ -40,7 +42,7 @@ impl Weighting {
                 let n = around.len() as f64;
                 let [a, b] = [0, 1].map(|i| around.clone().map(|k| snr[i][k]).sum::<f64>() / n);
                 let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
-                (snr / (1.0 + snr)).sqrt()
+                (snr / (1.0 + snr)).max(LEAST).sqrt()
             })
             .collect();
         if gain.iter().all(|g| *g > 0.9) {

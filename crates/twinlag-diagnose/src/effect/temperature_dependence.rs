@@ -15,6 +15,7 @@ pub(crate) const ABOUT: About = About {
 };
 
 struct TemperatureDependence {
+    sensors: [bool; 2],
     parameters: Vec<Parameter>,
     reference_k: f64,
 }
@@ -24,7 +25,13 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     // A factor of three over the swing, either way.
     let widest = (1.1 * reference_k / context.swing_k).max(8.0);
     let variable = Variable::linear("exponent", 0.01 * widest, -widest, widest);
-    vec![Arc::new(TemperatureDependence { parameters: vec![Parameter::new("exponent", "1", variable)], reference_k })]
+    [[true, true], [true, false], [false, true]]
+        .into_iter()
+        .map(|sensors| {
+            let parameters = vec![Parameter::new("exponent", "1", variable.clone())];
+            Arc::new(TemperatureDependence { sensors, parameters, reference_k }) as Shared
+        })
+        .collect()
 }
 
 impl Effect for TemperatureDependence {
@@ -33,7 +40,11 @@ impl Effect for TemperatureDependence {
     }
 
     fn channel(&self) -> Option<usize> {
-        None
+        match self.sensors {
+            [true, false] => Some(0),
+            [false, true] => Some(1),
+            _ => None,
+        }
     }
 
     fn parameters(&self) -> &[Parameter] {
@@ -45,7 +56,9 @@ impl Effect for TemperatureDependence {
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.exponent = Some([values[0], self.reference_k]);
+        for (sensor, has) in plant.sensors.iter_mut().zip(self.sensors) {
+            sensor.exponent = has.then_some([values[0], self.reference_k]);
+        }
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {

@@ -1,0 +1,207 @@
+//! Tests of what a model leaves over, beside those of its energy and whiteness.
+//!
+//! The residual is tested against the *estimated* input, not against a channel: each channel's noise is in the residual as well. The
+//! mean of both inferred inputs with weights `1/(s² τ²)` is uncorrelated with their disagreement where noise matters.
+
+use realfft::RealFftPlanner;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use twinlag_cross_relation::ResidualTest;
+
+use crate::dense;
+use crate::model::{Fitted, Selection};
+use crate::observations::Observations;
+
+/// Points of a segment for the coherence.
+const SEGMENT: usize = 256;
+/// Parts of the record whose energies are compared.
+const PARTS: usize = 20;
+
+/// Residual and estimated input where they count, in unbroken runs.
+struct Pairs {
+    runs: Vec<(Vec<f64>, Vec<f64>)>,
+}
+
+impl Pairs {
+    fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Self {
+        let plant = fitted.model.plant(&fitted.theta, observations);
+        let evaluation = plant.whitened(observations, true);
+        let weight = [0, 1].map(|i| (plant.noise_std_k[i] * plant.sensors[i].tau_s).max(1e-300).powi(-2));
+        let share = weight[0] / (weight[0] + weight[1]);
+        let inferred: Vec<f64> = evaluation
+            .parts
+            .iter()
+            .flat_map(|p| p.inferred_c[0].iter().zip(&p.inferred_c[1]).map(|(a, b)| share * a + (1.0 - share) * b))
+            .collect();
+        let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut last = None;
+        for (k, sample) in evaluation.sample.iter().enumerate().filter(|(_, s)| selection.holds(**s)) {
+            if last.is_none_or(|l| *sample != l + 1) {
+                runs.push((Vec::new(), Vec::new()));
+            }
+            let run = runs.last_mut().expect("begun");
+            run.0.push(evaluation.residual[k]);
+            run.1.push(inferred[k]);
+            last = Some(*sample);
+        }
+        Self { runs }
+    }
+
+    fn residual(&self) -> impl Iterator<Item = f64> + '_ {
+        self.runs.iter().flat_map(|r| r.0.iter().copied())
+    }
+
+    fn input(&self) -> impl Iterator<Item = f64> + '_ {
+        self.runs.iter().flat_map(|r| r.1.iter().copied())
+    }
+}
+
+/// Coherence with the estimated input, dependence on its level and rate, on time, and tails.
+pub(crate) fn tests(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Vec<ResidualTest> {
+    let pairs = Pairs::of(fitted, observations, selection);
+    let r: Vec<f64> = pairs.residual().collect();
+    if r.len() < 100 {
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    out.extend(coherence(&pairs));
+    out.extend(level(&pairs, &r));
+    out.push(rate(&pairs, &r));
+    out.push(time(&r));
+    out.push(tails(&r));
+    out
+}
+
+fn test(name: &str, statistic: f64, degrees_of_freedom: Option<f64>, p_value: f64) -> ResidualTest {
+    ResidualTest { test: name.into(), statistic, degrees_of_freedom, p_value: p_value.clamp(0.0, 1.0) }
+}
+
+fn two_sided(deviate: f64) -> f64 {
+    2.0 * Normal::new(0.0, 1.0).expect("the standard normal exists").sf(deviate.abs())
+}
+
+/// Largest coherence of all frequencies: under a right model that of `L` independent segments exceeds `c` with probability
+/// `(1 − c)^(L − 1)`.
+fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
+    let mut planner = RealFftPlanner::<f64>::new();
+    let plan = planner.plan_fft_forward(SEGMENT);
+    let window: Vec<f64> =
+        (0..SEGMENT).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / SEGMENT as f64).cos()).collect();
+    let bins = SEGMENT / 2 - 2;
+    let mut cross = vec![num_complex::Complex64::default(); bins];
+    let (mut of_r, mut of_x) = (vec![0.0; bins], vec![0.0; bins]);
+    let mut count = 0.0_f64;
+    for (r, x) in &pairs.runs {
+        let mut from = 0;
+        while from + SEGMENT <= r.len() {
+            let transform = |v: &[f64]| {
+                // Both ends on a straight line: a slope would leak into every bin.
+                let (a, b) = (v[0], v[SEGMENT - 1]);
+                let mean = v.iter().sum::<f64>() / SEGMENT as f64;
+                let middle = 0.5 * (a + b);
+                let mut input: Vec<f64> = v
+                    .iter()
+                    .zip(&window)
+                    .enumerate()
+                    .map(|(k, (v, w))| {
+                        let line = (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
+                        let _ = middle;
+                        (v - mean - line) * w
+                    })
+                    .collect();
+                let mut spectrum = plan.make_output_vec();
+                plan.process(&mut input, &mut spectrum).expect("lengths agree");
+                spectrum
+            };
+            let (fr, fx) = (transform(&r[from..from + SEGMENT]), transform(&x[from..from + SEGMENT]));
+            for j in 0..bins {
+                cross[j] += fr[j + 2] * fx[j + 2].conj();
+                of_r[j] += fr[j + 2].norm_sqr();
+                of_x[j] += fx[j + 2].norm_sqr();
+            }
+            count += 1.0;
+            from += SEGMENT / 2;
+        }
+    }
+    // Half overlapping segments under Hann's window share a thirty-sixth of their power.
+    let independent = count / (1.0 + 2.0 / 36.0);
+    if independent < 4.0 {
+        return None;
+    }
+    let largest = (0..bins).map(|j| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300)).fold(0.0, f64::max);
+    let of_one = (1.0 - largest).max(0.0).powf(independent - 1.0);
+    let p = -((bins as f64) * (-of_one).ln_1p()).exp_m1();
+    Some(test("coherence", largest, Some(independent), p))
+}
+
+/// The residual itself against the level of the input, in ten classes of equal size: a static error shows as a mean that differs.
+fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
+    const CLASSES: usize = 10;
+    let x: Vec<f64> = pairs.input().collect();
+    let mut order: Vec<usize> = (0..x.len()).collect();
+    order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
+    let variance = dense::dot(r, r) / r.len() as f64;
+    let size = r.len() / CLASSES;
+    if variance <= 0.0 || size < 10 {
+        return None;
+    }
+    let statistic: f64 = order
+        .chunks(size)
+        .take(CLASSES)
+        .map(|class| {
+            let sum: f64 = class.iter().map(|&k| r[k]).sum();
+            sum * sum / (class.len() as f64 * variance)
+        })
+        .sum();
+    let p = ChiSquared::new(CLASSES as f64).ok()?.sf(statistic);
+    Some(test("level", statistic, Some(CLASSES as f64), p))
+}
+
+/// Correlation of the residual's energy with how fast the input changes.
+fn rate(pairs: &Pairs, r: &[f64]) -> ResidualTest {
+    let slope: Vec<f64> = pairs
+        .runs
+        .iter()
+        .flat_map(|(_, x)| (0..x.len()).map(|k| (x[(k + 4).min(x.len() - 1)] - x[k.saturating_sub(4)]).abs()))
+        .collect();
+    let energy: Vec<f64> = r.iter().map(|r| r * r).collect();
+    let z = correlation(&energy, &slope) * (r.len() as f64).sqrt();
+    test("rate", z, None, two_sided(z))
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len() as f64;
+    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        ab += (a - ma) * (b - mb);
+        aa += (a - ma) * (a - ma);
+        bb += (b - mb) * (b - mb);
+    }
+    ab / (aa * bb).sqrt().max(1e-300)
+}
+
+/// Energies of twenty parts of the record against each other.
+fn time(r: &[f64]) -> ResidualTest {
+    let size = r.len() / PARTS;
+    let mean = dense::dot(r, r) / r.len() as f64;
+    let statistic: f64 = r
+        .chunks(size)
+        .take(PARTS)
+        .map(|part| {
+            let n = part.len() as f64;
+            let z = (dense::dot(part, part) / (n * mean) - 1.0) * (0.5 * n).sqrt();
+            z * z
+        })
+        .sum();
+    let dof = (PARTS - 1) as f64;
+    test("time", statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
+}
+
+/// Kurtosis: Gaussian noise has 3 with standard error `√(24/n)`.
+fn tails(r: &[f64]) -> ResidualTest {
+    let n = r.len() as f64;
+    let second = dense::dot(r, r) / n;
+    let fourth = r.iter().map(|r| r.powi(4)).sum::<f64>() / n;
+    let z = (fourth / (second * second).max(1e-300) - 3.0) / (24.0 / n).sqrt();
+    test("tails", z, None, two_sided(z))
+}
