@@ -26,7 +26,8 @@ fn main() {
                 let z: Vec<String> = (0..2).map(|i| { let t = &d.last.time_constants[i]; match (t.value_s, t.standard_error_s) { (Some(v), Some(s)) => format!("{:+.2}%({:+.1})", 100.0 * (v / tau[i] - 1.0), (v - tau[i]) / s), _ => "-".into() } }).collect();
                 let names: Vec<String> = d.effects.iter().map(|e| format!("{}{}{}", e.effect, e.channel.map_or(String::new(), |c| format!("{}", c + 1)), if e.alternatives.is_empty() { String::new() } else { format!("|{}", e.alternatives.iter().map(|a| a.name()).collect::<Vec<_>>().join("|")) })).collect();
                 let line = format!("{:34} {seed} {:10} ch {:?} size {:.4} tau {:?} noise {:.3?} -> {:?} [{}] chi2 {:.3}->{:.3} ho {:.3}->{:.3} {} {:.1}s", kind.name(), u.gas.name(), u.channel, u.size, tau.iter().map(|t| (t / period).round()).collect::<Vec<_>>(), d.last.noise_std_k, d.verdict, names.join(", "), d.base.chi2_per_dof, d.last.chi2_per_dof, d.error.held_out_normalised_rms.before, d.error.held_out_normalised_rms.after, z.join(" "), now.elapsed().as_secs_f64());
-                println!("{line}");
+                let fails: Vec<String> = d.last.tests.iter().filter(|t| t.p_value < 1e-4).map(|t| format!("{} {:.2} p {:.0e}", t.test, t.statistic, t.p_value)).collect();
+                println!("{line} FAILS {fails:?}");
                 let right = match (kind.effect(), d.effects.first()) { (Some(e), Some(f)) => f.effect.name() == e, (None, None) => true, _ => false };
                 let tie = right || matches!((kind.effect(), d.effects.first()), (Some(e), Some(f)) if f.alternatives.iter().any(|a| a.name() == e));
                 let mut o = out.lock().unwrap();

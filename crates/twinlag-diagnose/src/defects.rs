@@ -12,8 +12,6 @@ use crate::plant::{Evaluation, Part};
 const COARSE: f64 = 0.5;
 /// Readings at an extreme value that two in a row of which no noise explains.
 const FEWEST_AT_END: usize = 8;
-/// Robust standard deviations beyond which a single reading is wrong.
-const FAR: f64 = 6.0;
 /// More of the readings than this are no single ones.
 const MOST_SPIKES: f64 = 0.05;
 
@@ -121,8 +119,9 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
-/// reading does, and out of their own neighbours; and they come when the gas does nothing in particular.
-pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation) -> [Vec<usize>; 2] {
+/// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
+/// particular.
+pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) -> [Vec<usize>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
@@ -149,7 +148,7 @@ pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation) -> [V
             slopes.sort_by(f64::total_cmp);
             for k in 0..n {
                 let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
-                if is_peak && scores[k].abs() > FAR && beside[k].abs() > FAR * scale && !stretch.masked[channel][k] {
+                if is_peak && scores[k].abs() > far && beside[k].abs() > far * scale && !stretch.masked[channel][k] {
                     found.push(part.first_sample + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
                 }

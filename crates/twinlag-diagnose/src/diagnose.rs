@@ -26,6 +26,9 @@ const BLOCKS: usize = 80;
 const EXCERPT: usize = 4000;
 /// Energy of the residual per degree of freedom beyond which a model is far off.
 const FAR_OFF: f64 = 3.0;
+/// Robust standard deviations beyond which a single reading is wrong, and where others are.
+const SPIKE: f64 = 6.0;
+const SPIKE_AMONG_OTHERS: f64 = 4.5;
 /// Below this p-value of any test something is left over.
 const LEFT_OVER: f64 = 1e-4;
 
@@ -78,10 +81,19 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     // Isolated wrong readings show once there is a model.
     if settings.effects.contains(&Identifier::Spikes) {
         let evaluation = current.model.plant(&current.theta, &observations).whitened(&observations, true);
-        let spikes = defects::spikes(&observations, &evaluation);
-        for (i, samples) in spikes.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
-            defects::mask(&mut observations, i, samples);
-            found.push(defect(Identifier::Spikes, i, format!("{} single readings", samples.len())));
+        let mut counts = [0; 2];
+        for far in [SPIKE, SPIKE_AMONG_OTHERS] {
+            let spikes = defects::spikes(&observations, &evaluation, far);
+            for i in 0..2 {
+                // Where there are some there are smaller ones.
+                if far == SPIKE || counts[i] > 0 {
+                    defects::mask(&mut observations, i, &spikes[i]);
+                    counts[i] += spikes[i].len();
+                }
+            }
+        }
+        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
+            found.push(defect(Identifier::Spikes, i, format!("{count} single readings")));
         }
         if found.iter().any(|f| f.effect == Identifier::Spikes) {
             current = search_in(&observations, &searched, &context, settings, watch).base(&model);
@@ -348,12 +360,11 @@ fn covariance(
 fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection, levels: &Levels) -> ModelFit {
     let evaluation = fitted.model.evaluate(&fitted.theta, observations);
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
-    let masked: usize = observations.stretches.iter().flat_map(|s| &s.masked).flatten().filter(|m| **m).count();
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
-    let mut tests = residual_tests(&residual_runs, fitted.model.fitted() + masked, level_std);
+    let mut tests = residual_tests(&residual_runs, fitted.model.fitted(), level_std);
     tests.extend(crate::residual::tests(fitted, observations, selection));
     let count: usize = residual_runs.iter().map(Vec::len).sum();
-    let dof = count.saturating_sub(fitted.model.fitted() + masked).max(1);
+    let dof = count.saturating_sub(fitted.model.fitted()).max(1);
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
     let rejects = tests.iter().any(|t| t.p_value < LEFT_OVER);
     let covariance = covariance(fitted, observations, selection, rejects);

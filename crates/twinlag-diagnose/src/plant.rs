@@ -11,6 +11,11 @@ use crate::whitening::{Source, Variance, Whitened, whiten};
 /// 0 °C, K.
 pub(crate) const ZERO_CELSIUS_K: f64 = 273.15;
 
+/// Noise of a masked reading beside the swing: far beyond what it could say, not so far that rounding is lost to it.
+const BOUNDLESS: f64 = 20.0;
+/// A disagreement that is this many times less certain than most says nothing: it rests on a masked reading.
+const UNINFORMED: f64 = 10.0;
+
 /// What is done to a reading to have the temperature of the sensor.
 #[derive(Clone, Debug)]
 pub(crate) struct Reading {
@@ -309,6 +314,8 @@ impl Plant {
             out.gas_c.extend(one.value.iter().zip(&two.value).map(|(a, b)| 0.5 * (a + b)));
             out.disagreement_k.extend_from_slice(&u);
             out.residual.extend_from_slice(&whitened.residual);
+            let typical = median(&whitened.diagonal);
+            out.is_informed.extend(whitened.diagonal.iter().map(|d| *d < UNINFORMED * typical));
             out.log_determinant += whitened.log_determinant;
             if keep {
                 out.parts.push(Part { sources, whitened, inferred_c: [one.value, two.value], first_sample });
@@ -342,11 +349,20 @@ pub(crate) fn reach(samples: usize) -> usize {
 /// Variance of each sample: boundless, to all purposes, where it is masked.
 fn mask(variance: f64, masked: &[bool], swing_k: f64) -> Variance {
     if masked.iter().any(|m| *m) {
-        let boundless = (1e3 * swing_k).powi(2);
+        let boundless = (BOUNDLESS * swing_k).powi(2);
         Variance::Each(masked.iter().map(|m| if *m { boundless } else { variance }).collect())
     } else {
         Variance::Same(variance)
     }
+}
+
+fn median(values: &[f64]) -> f64 {
+    if values.is_empty() {
+        return 1.0;
+    }
+    let mut all = values.to_vec();
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 struct Inverted {
@@ -367,6 +383,8 @@ pub(crate) struct Evaluation {
     pub(crate) gas_c: Vec<f64>,
     /// Their difference, K.
     pub(crate) disagreement_k: Vec<f64>,
+    /// Whether it says anything: one for each masked reading does not.
+    pub(crate) is_informed: Vec<bool>,
     /// Where stretches begin among the residuals.
     pub(crate) begins: Vec<usize>,
     /// Logarithm of the determinant of the noise covariance.
@@ -382,4 +400,21 @@ pub(crate) struct Part {
     pub(crate) whitened: Whitened,
     pub(crate) inferred_c: [Vec<f64>; 2],
     pub(crate) first_sample: usize,
+}
+
+impl Part {
+    /// The noise of each reading of a channel that makes both inputs agree with the least of it, K: `s² Bᵀ V⁻¹ u`.
+    pub(crate) fn noise_of(&self, channel: usize, samples: usize) -> Vec<f64> {
+        let source = &self.sources[channel];
+        let mut out = vec![0.0; samples];
+        for (k, w) in self.whitened.weighted().iter().enumerate() {
+            for (j, c) in source.rows.at(k).iter().enumerate() {
+                let sample = source.rows.start + k + j;
+                if let Some(n) = out.get_mut(sample) {
+                    *n += c * w * source.variance.at(sample);
+                }
+            }
+        }
+        out
+    }
 }

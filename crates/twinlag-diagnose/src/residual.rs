@@ -1,7 +1,8 @@
 //! Tests of what a model leaves over, beside those of its energy and whiteness.
 //!
-//! The residual is tested against the *estimated* input, not against a channel: each channel's noise is in the residual as well. The
-//! mean of both inferred inputs with weights `1/(s² τ²)` is uncorrelated with their disagreement where noise matters.
+//! The residual is tested against the *estimated* input, not against a channel: each channel's noise is in the residual as well. What
+//! stands for the input is a reading with its estimated noise taken off, `ŷ = y − Σ Bᵀ V⁻¹ u`: the projection that makes it
+//! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
 use realfft::RealFftPlanner;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -10,6 +11,7 @@ use twinlag_cross_relation::ResidualTest;
 use crate::dense;
 use crate::model::{Fitted, Selection};
 use crate::observations::Observations;
+use crate::plant::Place;
 
 /// Points of a segment for the coherence.
 const SEGMENT: usize = 256;
@@ -25,23 +27,26 @@ impl Pairs {
     fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
         let evaluation = plant.whitened(observations, true);
-        let weight = [0, 1].map(|i| (plant.noise_std_k[i] * plant.sensors[i].tau_s).max(1e-300).powi(-2));
-        let share = weight[0] / (weight[0] + weight[1]);
-        let inferred: Vec<f64> = evaluation
-            .parts
-            .iter()
-            .flat_map(|p| p.inferred_c[0].iter().zip(&p.inferred_c[1]).map(|(a, b)| share * a + (1.0 - share) * b))
-            .collect();
+        // A channel without noise of its own beside the white.
+        let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
+        let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s < plant.sensors[0].tau_s));
+        let mut cleaned = Vec::with_capacity(observations.samples());
+        for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+            let noise = part.noise_of(channel, stretch.len());
+            cleaned.extend(stretch.reading_c[channel].iter().zip(noise).map(|(y, n)| y - n));
+        }
         let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         let mut last = None;
         for (k, sample) in evaluation.sample.iter().enumerate().filter(|(_, s)| selection.holds(**s)) {
             if last.is_none_or(|l| *sample != l + 1) {
                 runs.push((Vec::new(), Vec::new()));
             }
-            let run = runs.last_mut().expect("begun");
-            run.0.push(evaluation.residual[k]);
-            run.1.push(inferred[k]);
             last = Some(*sample);
+            if evaluation.is_informed[k] {
+                let run = runs.last_mut().expect("begun");
+                run.0.push(evaluation.residual[k]);
+                run.1.push(cleaned[*sample]);
+            }
         }
         Self { runs }
     }
@@ -97,14 +102,12 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
                 // Both ends on a straight line: a slope would leak into every bin.
                 let (a, b) = (v[0], v[SEGMENT - 1]);
                 let mean = v.iter().sum::<f64>() / SEGMENT as f64;
-                let middle = 0.5 * (a + b);
                 let mut input: Vec<f64> = v
                     .iter()
                     .zip(&window)
                     .enumerate()
                     .map(|(k, (v, w))| {
                         let line = (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
-                        let _ = middle;
                         (v - mean - line) * w
                     })
                     .collect();

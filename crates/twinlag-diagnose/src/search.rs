@@ -16,6 +16,8 @@ pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
 const TIE: f64 = 10.0;
 
+/// Candidates that are fitted to the end.
+const MOST_FITTED: usize = 8;
 /// The same up to which they are the same model in two guises.
 const EQUAL: f64 = 2.0;
 
@@ -141,19 +143,28 @@ impl Search<'_> {
             .filter(|c| self.allowed.contains(&c.identifier()) && self.is_new(current, c))
             .collect();
         let robust_before = self.robust(current);
-        let looked = self.in_parallel(&all, |effect| {
+        let promises = self.in_parallel(&all, |effect| {
+            let is_line = effect.identifier() == Identifier::MainsPickup;
+            let promise = if effect.is_noise() || is_line || thorough { f64::INFINITY } else { self.promise(current, effect) };
+            let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
+            Some((promise > least).then_some(promise))
+        });
+        let mut promising: Vec<(f64, Shared)> =
+            all.iter().zip(promises).filter_map(|(effect, p)| Some((p??, effect.clone()))).collect();
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let certain = promising.iter().take_while(|p| p.0.is_infinite()).count();
+        promising.truncate(certain + MOST_FITTED);
+        let looked = self.in_parallel(&promising, |(_, effect)| {
             if effect.is_noise() {
                 return self.try_noise(current, effect);
             }
-            let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
-            (thorough || effect.identifier() == Identifier::MainsPickup || self.promise(current, effect) > least)
-                .then(|| self.try_one(current, effect, robust_before, thorough))
+            Some(self.try_one(current, effect, robust_before, thorough))
         });
         // The best few are fitted to the end.
         let mut looked: Vec<Tried> = looked.into_iter().flatten().collect();
         let (noise, mut mean): (Vec<Tried>, Vec<Tried>) = looked.drain(..).partition(|t| t.effect.is_noise());
         mean.sort_by(|a, b| (b.gain - b.penalty()).total_cmp(&(a.gain - a.penalty())));
-        mean.truncate(8);
+        mean.truncate(MOST_FITTED);
         let finished = self.in_parallel(&mean, |tried| {
             let model = &tried.fitted.model;
             let fitted = model.fit(&tried.fitted.theta, self.observations, self.selection, Effort::Finish);

@@ -274,20 +274,22 @@ pub(crate) fn fit_noise(
     }
 }
 
-/// Unbroken runs of the residuals that count.
+/// Unbroken runs of the residuals that count and say anything.
 pub(crate) fn runs(evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
     let mut out: Vec<Vec<f64>> = Vec::new();
     let mut last = None;
-    for (r, sample) in evaluation.residual.iter().zip(&evaluation.sample) {
+    for (k, sample) in evaluation.sample.iter().enumerate() {
         if !holds(*sample) {
             continue;
         }
-        if last.is_some_and(|l| *sample == l + 1) {
-            out.last_mut().expect("begun").push(*r);
-        } else {
-            out.push(vec![*r]);
+        if last.is_none_or(|l| *sample != l + 1) {
+            out.push(Vec::new());
         }
         last = Some(*sample);
+        // A masked reading takes one residual away; those around it are white all the same.
+        if evaluation.is_informed[k] {
+            out.last_mut().expect("begun").push(evaluation.residual[k]);
+        }
     }
     out
 }

@@ -23,7 +23,7 @@ pub(crate) enum Variance {
 }
 
 impl Variance {
-    fn at(&self, sample: usize) -> f64 {
+    pub(crate) fn at(&self, sample: usize) -> f64 {
         match self {
             Self::Same(v) => *v,
             Self::Each(all) => all[sample.min(all.len() - 1)],
@@ -40,6 +40,8 @@ impl Variance {
 pub(crate) struct Whitened {
     pub(crate) residual: Vec<f64>,
     pub(crate) log_determinant: f64,
+    /// Standard deviation of each disagreement given those before it.
+    pub(crate) diagonal: Vec<f64>,
     /// Rows of `L`, lags `0..=band`, if they were to be kept.
     factor: Vec<f64>,
     band: usize,
@@ -71,6 +73,7 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
     let fixed: Vec<f64> =
         if is_same && u.len() > band { (0..stride).map(|lag| covariance(sources, band, lag)).collect() } else { Vec::new() };
     let mut residual = Vec::with_capacity(u.len());
+    let mut diagonal = Vec::with_capacity(u.len());
     let mut log_determinant = 0.0;
     let mut kept = Vec::with_capacity(if keep { u.len() * stride } else { 0 });
     // The last rows of L, newest first.
@@ -100,12 +103,13 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
             r -= row[lag] * residual[k - lag];
         }
         residual.push(r / row[0]);
+        diagonal.push(row[0]);
         log_determinant += 2.0 * row[0].ln();
         if keep {
             kept.extend_from_slice(&row);
         }
     }
-    Whitened { residual, log_determinant, factor: kept, band }
+    Whitened { residual, log_determinant, diagonal, factor: kept, band }
 }
 
 impl Whitened {
