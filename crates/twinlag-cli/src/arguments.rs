@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
 use twinlag::record::{ColumnRef, SamplingChoice, Selection};
 use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise::Optimiser};
@@ -21,6 +22,7 @@ use crate::study::Study;
 Try it without a file:   twinlag demo
 On a logger file:        twinlag characterise run.csv
 With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
+What the model lacks:    twinlag diagnose run.csv --report run.html
 For a script:            twinlag characterise run.csv --json
 
 Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 75 try again (a shard of a
@@ -54,6 +56,9 @@ impl Arguments {
 pub(crate) enum Command {
     /// Both time constants of a record, with intervals, noise levels and residual tests.
     Characterise(Box<Characterise>),
+    /// The closed loop: what two first-order lags leave over, which physical effect accounts for it, and the error before and
+    /// after it is in the model.
+    Diagnose(Box<Diagnose>),
     /// A record from a described rig: gas, sensors, noise, converter.
     Simulate(Simulate),
     /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
@@ -87,6 +92,45 @@ pub(crate) struct Characterise {
     pub(crate) columns: Columns,
     #[command(flatten)]
     pub(crate) method: Method,
+    /// A model that `twinlag diagnose --save` wrote: its effects stay as they are, the time constants are fitted.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) model: Option<PathBuf>,
+}
+
+/// What two first-order lags leave over, and why.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+What the verdict says:
+  adequate          two first-order lags leave nothing but noise
+  explained         with the effects that are named, nothing but noise is left
+  partly-explained  the effects that are named explain a part, something else is left
+  unexplained       something is left that no known effect accounts for
+  refused           the record cannot be diagnosed, such as one with a single tone
+
+An effect is named if it explains the residual whatever the colour of the noise, on blocks of the record that were left out of
+the fit as well; errors before and after are those of other blocks, which neither chose the effects nor were fitted. Effects that
+explain the record as well are named as alternatives.
+
+Exit codes: 0 diagnosed, 4 refused, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
+pub(crate) struct Diagnose {
+    /// The record; `-` reads standard input.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) columns: Columns,
+    #[command(flatten)]
+    pub(crate) method: Method,
+    /// Writes a report to look at: one HTML file that needs nothing else.
+    #[arg(long, value_name = "HTML")]
+    pub(crate) report: Option<PathBuf>,
+    /// Writes the model with its effects, for `twinlag characterise --model`.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) save: Option<PathBuf>,
+    /// An effect that is not to be considered; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub(crate) without: Vec<Identifier>,
+    /// Overwrite outputs that exist.
+    #[arg(long)]
+    pub(crate) force: bool,
 }
 
 /// Which columns, and how time is meant.

@@ -4,7 +4,7 @@ use std::io::{Read, stdin};
 use std::path::Path;
 
 use twinlag::record::{Record, Selection, Table};
-use twinlag::{Characterisation, Options, Status};
+use twinlag::{Characterisation, Model, Options, Status};
 
 use crate::arguments::{Characterise, Talk};
 use crate::failure::Failure;
@@ -15,9 +15,27 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
     let options = command.method.options()?;
     let record = read(&command.file, &command.columns.selection())?;
     print::notes(&record, talk);
-    let answer = characterise(&record, &options, talk)?;
+    let answer = match &command.model {
+        Some(path) => {
+            let _progress = Progress::start(talk, format!("characterising {} samples", record.len()));
+            twinlag::characterise_with(&record, &model(path)?, &options)?
+        }
+        None => characterise(&record, &options, talk)?,
+    };
     print::characterisation(&answer, talk)?;
     Ok(exit_code(answer.status))
+}
+
+fn model(path: &Path) -> Result<Model, Failure> {
+    let wrong = |what: String| Failure::File(format!("{}: {what}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+    let model: Model = serde_json::from_str(&text)
+        .map_err(|e| wrong(format!("expected a model as `twinlag diagnose --save` writes it: {e}")))?;
+    if model.schema == Model::SCHEMA {
+        Ok(model)
+    } else {
+        Err(wrong(format!("expected schema {}, got {}", Model::SCHEMA, model.schema)))
+    }
 }
 
 pub(crate) fn characterise(record: &Record, options: &Options, talk: Talk) -> Result<Characterisation, Failure> {
@@ -31,7 +49,7 @@ pub(crate) fn exit_code(status: Status) -> u8 {
     if status == Status::Ok { 0 } else { 4 }
 }
 
-fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
+pub(crate) fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
     if file == Path::new("-") {
         let mut bytes = Vec::new();
         stdin().read_to_end(&mut bytes).map_err(|e| Failure::File(format!("standard input: cannot be read: {e}")))?;

@@ -8,6 +8,7 @@
 mod arguments;
 mod characterise;
 mod demo;
+mod diagnose;
 mod failure;
 mod print;
 mod progress;
@@ -25,6 +26,7 @@ fn main() -> ExitCode {
     let talk = arguments.talk();
     let result = match arguments.command {
         Command::Characterise(command) => characterise::run(&command, talk),
+        Command::Diagnose(command) => diagnose::run(&command, talk),
         Command::Simulate(command) => simulate::run(&command, talk),
         Command::Study(command) => study::run(&command, talk),
         Command::Demo(command) => demo::run(&command, talk),

@@ -5,7 +5,8 @@ use std::io::{Write, stdout};
 use serde::Serialize;
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
-use twinlag::{Characterisation, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status};
+use twinlag::diagnosis::Verdict;
+use twinlag::{Characterisation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status};
 
 use crate::arguments::Talk;
 use crate::failure::Failure;
@@ -92,6 +93,103 @@ fn text(answer: &Characterisation) -> String {
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// The answer of the closed loop, as text or as JSON.
+pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
+    if talk.json {
+        return json(answer);
+    }
+    let text = diagnosis_text(answer);
+    stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
+}
+
+fn diagnosis_text(answer: &Diagnosis) -> String {
+    let record = &answer.base.record;
+    let mut lines =
+        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
+    lines.push(format!("verdict: {}", verdict(answer.verdict)));
+    for effect in &answer.effects {
+        lines.push(String::new());
+        let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
+        lines.push(format!("  {}{place}: {}", effect.effect, effect.explanation));
+        if let Some(seen) = &effect.seen {
+            lines.push(format!("    {seen}"));
+        }
+        for p in effect.parameters.iter().take(MOST_PARAMETERS) {
+            let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+            let number = match p.interval_95 {
+                Some([low, high]) => interval(p.value, low, high, &unit),
+                None => format!("{}{unit}", digits(p.value, 4)),
+            };
+            lines.push(format!("    {} {number}", p.name.replace('_', " ")));
+        }
+        if effect.parameters.len() > MOST_PARAMETERS {
+            lines.push(format!("    and {} parameters more (--json)", effect.parameters.len() - MOST_PARAMETERS));
+        }
+        if let Some(e) = &effect.evidence {
+            lines.push(format!(
+                "    evidence: {} for {} parameters; {} nats on blocks that were left out",
+                digits(e.statistic, 3),
+                e.dof,
+                digits(e.held_out_gain_nats, 3)
+            ));
+        }
+        if !effect.alternatives.is_empty() {
+            let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
+            lines.push(format!("    explained as well by: {}", names.join(", ")));
+        }
+        lines.push(format!("    at the rig: {}", effect.advice));
+    }
+    lines.push(String::new());
+    lines.push(format!("  {:34} {:>12} {:>12}", "", "two lags", "with effects"));
+    let width = 34;
+    let mut row = |name: &str, before: String, after: String| {
+        lines.push(format!("  {name:width$} {before:>12} {after:>12}"));
+    };
+    let number = |x: f64| digits(x, 4);
+    for i in 0..2 {
+        let tau = |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
+        row(&format!("time constant {}", answer.base.sensors[i].channel), tau(&answer.base), tau(&answer.last));
+        let error = |c: &Characterisation| {
+            c.sensors[i].standard_error_s.map_or("-".into(), |t| format!("± {} s", digits(t, 2)))
+        };
+        row("", error(&answer.base), error(&answer.last));
+    }
+    let e = &answer.error;
+    row("energy of the residual / noise", number(e.chi2_per_dof.before), number(e.chi2_per_dof.after));
+    row("rms residual, held out", number(e.held_out_normalised_rms.before), number(e.held_out_normalised_rms.after));
+    let k = |x: f64| format!("{} K", digits(x, 3));
+    let inputs = e.held_out_input_difference_k;
+    row("inferred inputs apart, held out", k(inputs.before), k(inputs.after));
+    if let Some(r) = e.reference_rmse_k {
+        row("gas temperature against reference", k(r.before), k(r.after));
+    }
+    lines.push(String::new());
+    if let Some(left) = &answer.unexplained {
+        lines.push(format!("left over: {}", left.description));
+    }
+    lines.extend(answer.remarks.iter().map(|r| format!("note: {r}")));
+    if !answer.last.not_identifiable.is_empty() {
+        lines.push(format!("this record cannot tell: {}", answer.last.not_identifiable.join(", ")));
+    }
+    lines.push(format!("no record of two sensors tells: {}", answer.not_testable.join("; ")));
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// Parameters of an effect that are printed.
+const MOST_PARAMETERS: usize = 4;
+
+fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Adequate => "adequate: two first-order lags leave nothing but noise",
+        Verdict::Explained => "explained: with these effects nothing but noise is left",
+        Verdict::PartlyExplained => "partly-explained: these effects explain a part, something else is left",
+        Verdict::Unexplained => "unexplained: something is left that no known effect accounts for",
+        Verdict::Refused => "refused: this record cannot be diagnosed",
+        _ => "unknown",
+    }
 }
 
 fn status(status: Status) -> &'static str {

@@ -3,11 +3,12 @@
 use twinlag_cross_relation::{ResidualTest, residual_tests};
 
 use crate::defects::{self, Levels};
+use crate::excitation::tones;
 use crate::dense;
 use crate::diagnosis::{
     BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, ModelFit, TimeConstant, Trace, Unexplained, Value, Verdict,
 };
-use crate::effect::{Context, Effect, Identifier};
+use crate::effect::{Context, Effect, Identifier, Shared, candidates};
 use crate::error::DiagnoseError;
 use crate::model::{Effort, Fitted, KnownTimeConstant, Model, Selection};
 use crate::observations::Observations;
@@ -62,6 +63,7 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
             return Err(DiagnoseError::Constant { channel: i + 1 });
         }
     }
+    let tones = tones(observations);
     let mut observations = observations.clone();
     let samples = observations.samples();
     let mut levels = defects::levels(&observations).ok_or(DiagnoseError::TooShort { samples, needed: 60 })?;
@@ -115,8 +117,9 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     let mut search = search_in(&observations, &searched, &context, settings, watch);
     let mut base = current.clone();
     let mut steps: Vec<(Tried, Vec<Tried>)> = Vec::new();
-    let mut rejected = Vec::new();
-    while steps.len() < MOST_EFFECTS {
+    let is_refused = tones == Some(1);
+    let mut remarks = Vec::new();
+    while steps.len() < MOST_EFFECTS && !is_refused {
         search.context.tau_s = [current.theta[0], current.theta[1]];
         let evaluation = current.model.evaluate(&current.theta, &observations);
         let lines = defects::lines(&observations, &evaluation, |s| searched.holds(s));
@@ -134,13 +137,17 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
             (current, base) = (again(&current), again(&base));
         }
         steps.push((chosen, ties));
-        current = drop_needless(&search, current, &mut steps, &mut rejected);
+        current = drop_needless(&search, current, &mut steps, &mut remarks);
     }
 
+    let limits = search.limits(&current);
     let last = current.model.fit(&current.theta, &observations, &everything, Effort::Finish);
     let first = base.model.fit(&base.theta, &observations, &everything, Effort::Finish);
     let base_fit = summarise(&first, &observations, &everything, &levels);
-    let last_fit = summarise(&last, &observations, &everything, &levels);
+    let mut last_fit = summarise(&last, &observations, &everything, &levels);
+    if let [(_, ties)] = &steps[..] {
+        widen(&mut last_fit, ties, &observations, &everything, &mut remarks);
+    }
     let rms = |fitted: &Fitted| {
         let evaluation = fitted.model.evaluate(&fitted.theta, &observations);
         let mean = |values: &[f64]| {
@@ -163,7 +170,14 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     };
     found.extend(steps.iter().enumerate().map(|(index, (tried, ties))| name(index, tried, ties, &last, &observations, &everything)));
     let left = what_is_left(&last, &last_fit, &observations, &everything, &levels);
+    if is_refused {
+        remarks.push(
+            "the gas is a single tone: its amplitude and phase are two equations for two time constants, and whatever else is              missing hides in them without a trace. Take a record in which the gas changes at more than one rate"
+                .into(),
+        );
+    }
     let verdict = match (found.is_empty(), &left) {
+        _ if is_refused => Verdict::Refused,
         (true, None) => Verdict::Adequate,
         (true, Some(_)) => Verdict::Unexplained,
         // Two effects can be told apart; what takes more has some other cause that together they imitate.
@@ -177,10 +191,67 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
         base: base_fit,
         last: last_fit,
         error,
-        unexplained: left,
-        not_testable: Vec::new(),
-        rejected,
+        unexplained: left.filter(|_| !is_refused),
+        not_testable: not_testable(&observations),
+        limits,
+        remarks,
     })
+}
+
+/// An effect as it was found in another record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownEffect {
+    /// Which.
+    pub effect: Identifier,
+    /// Channel, 0 or 1; `None` where it is of both, or relative.
+    pub channel: Option<usize>,
+    /// Its parameters by name.
+    pub parameters: Vec<(String, f64)>,
+}
+
+/// Both time constants of `observations` with `effects` as they are in the model; defects of the data are dealt with as in
+/// [`diagnose`].
+///
+/// # Errors
+/// As [`diagnose`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
+pub fn fit_with(
+    observations: &Observations,
+    settings: &Settings,
+    effects: &[KnownEffect],
+) -> Result<ModelFit, DiagnoseError> {
+    let mut observations = observations.clone();
+    let samples = observations.samples();
+    let mut levels = defects::levels(&observations).ok_or(DiagnoseError::TooShort { samples, needed: 60 })?;
+    levels.std_k = settings.noise_std_k.unwrap_or(levels.std_k);
+    data_defects(&mut observations, &levels, &settings.effects);
+    let mut context = context(&observations, &levels);
+    let mut model = Model::new(&settings.known, levels.std_k);
+    model.is_frozen = true;
+    let mut rest = Vec::new();
+    for known in effects {
+        let is_defect = [Identifier::Saturation, Identifier::Quantisation, Identifier::Spikes].contains(&known.effect);
+        if is_defect {
+            continue;
+        }
+        let value = |name: &str| known.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+        context.lines_hz = value("frequency").into_iter().collect();
+        let fits = |e: &Shared| {
+            e.identifier() == known.effect
+                && e.channel() == known.channel
+                && e.parameters().iter().all(|p| value(p.name).is_some())
+        };
+        let all = candidates(&context);
+        let sizes: Vec<Shared> = all.iter().flat_map(|e| e.sizes()).collect();
+        // Of those whose parameters are all given the one with the most of them.
+        let effect = all.into_iter().chain(sizes).filter(fits).max_by_key(|e| e.parameters().len());
+        let effect = effect.ok_or_else(|| DiagnoseError::Model { effect: known.effect.name() })?;
+        rest.extend(effect.parameters().iter().filter_map(|p| value(p.name)));
+        model = model.with(effect);
+    }
+    let everything = selection(&observations, false, &Weighting::of(&observations, levels.std_k));
+    let search = search_in(&observations, &everything, &context, settings, &|_, _, _| ());
+    let fitted = search.from_grid(&model, &rest, 3);
+    Ok(summarise(&fitted, &observations, &everything, &levels))
 }
 
 fn search_in<'a>(
@@ -195,12 +266,59 @@ fn search_in<'a>(
     Search { observations, selection, context: context.clone(), allowed: &settings.effects, watch, excerpt: (excerpt, whole) }
 }
 
+/// Intervals of both time constants that hold whichever of the tied effects is the right one.
+fn widen(
+    fit: &mut ModelFit,
+    ties: &[Tried],
+    observations: &Observations,
+    selection: &Selection,
+    remarks: &mut Vec<String>,
+) {
+    let mut widened = Vec::new();
+    for tie in ties {
+        let other = tie.fitted.model.fit(&tie.fitted.theta, observations, selection, Effort::Finish);
+        let Some(covariance) = covariance(&other, observations, selection, false) else { continue };
+        for i in 0..2 {
+            let (value, se) = (other.theta[i], covariance[i][i].max(0.0).sqrt());
+            let Some([low, high]) = &mut fit.time_constants[i].interval_95_s else { continue };
+            if se > 0.0 && se < 0.5 * value {
+                let f = (Z_975 * se / value).exp();
+                if value / f < 0.999 * *low || value * f > 1.001 * *high {
+                    widened.push(tie.effect.identifier().name());
+                }
+                (*low, *high) = (low.min(value / f), high.max(value * f));
+            }
+        }
+    }
+    widened.sort_unstable();
+    widened.dedup();
+    if !widened.is_empty() {
+        remarks.push(format!(
+            "the intervals of the time constants hold for the alternatives as well ({}), which put them elsewhere",
+            widened.join(", ")
+        ));
+    }
+}
+
+/// What no record of two sensors tells, and what this one does not.
+fn not_testable(observations: &Observations) -> Vec<String> {
+    let mut out = vec![
+        "anything that both sensors share: gain, offset, drift, delay, a second lag, a slow mode, radiation".to_owned(),
+        "crosstalk that takes the place of a part of the reading: it is a wrong time constant and nothing else".to_owned(),
+        "which channel picks up a line that only one of them has".to_owned(),
+    ];
+    if observations.period_s.is_none() {
+        out.push("coloured noise, input mismatch and lines: these take evenly spaced samples".to_owned());
+    }
+    out
+}
+
 /// Takes out earlier effects that the later ones made needless.
 fn drop_needless(
     search: &Search<'_>,
     mut current: Fitted,
     steps: &mut Vec<(Tried, Vec<Tried>)>,
-    rejected: &mut Vec<String>,
+    remarks: &mut Vec<String>,
 ) -> Fitted {
     let mut index = 0;
     while steps.len() > 1 && index + 1 < steps.len() {
@@ -216,7 +334,7 @@ fn drop_needless(
         let n = current.count;
         let loss = n * (without.mean_energy() / current.mean_energy()).ln();
         if loss < threshold(range.len(), FALSE_ALARM).max(range.len() as f64 * n.ln()) {
-            rejected.push(format!("{} was no longer needed", effect.identifier()));
+            remarks.push(format!("{} was taken up first and found needless once more was known", effect.identifier()));
             current = without;
             steps.remove(index);
         } else {
@@ -396,6 +514,7 @@ fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection
     ModelFit {
         time_constants: [0, 1].map(|i| time_constant(theta[i], variance(i), true)),
         difference: time_constant(theta[1] - theta[0], difference, false),
+        fit: fitted.report.clone(),
         noise_std_k: fitted.model.noise_std_k(),
         tests,
         chi2_per_dof,
@@ -403,7 +522,9 @@ fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection
         trace: Trace {
             time_s: evaluation.time_s,
             residual: evaluation.residual,
-            gas_c: evaluation.gas_c,
+            gas_c: crate::residual::estimated_gas(fitted, observations),
+            is_judge: evaluation.sample.iter().map(|s| selection.holds(*s) && is_judge(*s, observations.samples())).collect(),
+            sample: evaluation.sample,
             disagreement_k: evaluation.disagreement_k,
             bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
         },

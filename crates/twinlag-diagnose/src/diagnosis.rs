@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
+use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
 
@@ -115,6 +116,21 @@ pub struct Unexplained {
     pub worst_s: Option<[f64; 2]>,
 }
 
+/// What the search would have seen of an effect that it did not find.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Limit {
+    /// Which.
+    pub effect: Identifier,
+    /// Channel, 0 or 1; `None` where it is of both, or relative.
+    pub channel: Option<usize>,
+    /// Its main parameter.
+    pub parameter: String,
+    /// The smallest size that would have been taken for more than chance.
+    pub size: f64,
+    /// Unit of the size.
+    pub unit: String,
+}
+
 /// A fit as a picture needs it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
@@ -122,7 +138,11 @@ pub struct Trace {
     pub time_s: Vec<f64>,
     /// Whitened residual.
     pub residual: Vec<f64>,
-    /// Mean of both inferred gas temperatures, °C.
+    /// The sample, counted through the stretches, that each belongs to.
+    pub sample: Vec<usize>,
+    /// Whether the sample is of the blocks that judge.
+    pub is_judge: Vec<bool>,
+    /// Estimated gas temperature, °C: both inferred inputs together, without the frequencies in which there is only noise.
     pub gas_c: Vec<f64>,
     /// Difference of both, K.
     pub disagreement_k: Vec<f64>,
@@ -137,6 +157,8 @@ pub struct ModelFit {
     pub time_constants: [TimeConstant; 2],
     /// `τ₂ − τ₁`.
     pub difference: TimeConstant,
+    /// How the fit ended.
+    pub fit: Fit,
     /// Noise of the channels, K.
     pub noise_std_k: [f64; 2],
     /// Tests of what it leaves over.
@@ -166,6 +188,8 @@ pub struct Diagnosis {
     pub unexplained: Option<Unexplained>,
     /// What this record cannot tell.
     pub not_testable: Vec<String>,
-    /// Effects that were looked at and not taken, with the reason.
-    pub rejected: Vec<String>,
+    /// What would have been seen of the effects that were not found.
+    pub limits: Vec<Limit>,
+    /// Why the record was refused, or what to know before using the numbers.
+    pub remarks: Vec<String>,
 }

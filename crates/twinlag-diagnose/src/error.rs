@@ -13,6 +13,8 @@ pub enum DiagnoseError {
     NotFinite,
     #[error("channel {channel} never changes: there is no dynamics to see in it")]
     Constant { channel: usize },
+    #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]
+    Model { effect: &'static str },
     #[error("there is no effect called \"{name}\"; there are {known}")]
     UnknownEffect { name: String, known: String },
 }

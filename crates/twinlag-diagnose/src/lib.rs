@@ -8,6 +8,7 @@ mod diagnose;
 mod diagnosis;
 mod effect;
 mod error;
+mod excitation;
 mod held_out;
 mod model;
 mod observations;
@@ -19,9 +20,9 @@ mod spline;
 mod weighting;
 mod whitening;
 
-pub use diagnose::{Settings, Watch, diagnose};
+pub use diagnose::{KnownEffect, Settings, Watch, diagnose, fit_with};
 pub use diagnosis::{
-    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, ModelFit, TimeConstant, Trace, Unexplained, Value, Verdict,
+    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, ModelFit, TimeConstant, Trace, Unexplained, Value, Verdict,
 };
 pub use effect::{About, Identifier};
 pub use error::DiagnoseError;

@@ -1,6 +1,6 @@
 //! A model: two lags and the effects added so far; and its least-squares fit to the whitened disagreement.
 
-use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Scale, Variable};
+use twinlag_optimise::{Budget, Cost, Derivatives, End, Fit, Minimiser, Optimiser, Problem, Scale, Variable};
 
 use crate::dense;
 use crate::effect::{Parameter, Shared};
@@ -25,6 +25,8 @@ pub(crate) struct Model {
     pub(crate) effects: Vec<Shared>,
     known: Vec<KnownTimeConstant>,
     noise_std_k: [f64; 2],
+    /// Whether the effects stay as they are, and the time constants alone are fitted.
+    pub(crate) is_frozen: bool,
 }
 
 /// Which residuals count, by the sample in the middle of their reach.
@@ -55,7 +57,7 @@ impl Selection {
 
 impl Model {
     pub(crate) fn new(known: &[KnownTimeConstant], noise_std_k: [f64; 2]) -> Self {
-        Self { effects: Vec::new(), known: known.to_vec(), noise_std_k }
+        Self { effects: Vec::new(), known: known.to_vec(), noise_std_k, is_frozen: false }
     }
 
     pub(crate) fn with(&self, effect: Shared) -> Self {
@@ -148,7 +150,7 @@ impl Model {
         let mut out = vec![tau(0), tau(1)];
         out.extend(self.parameters().map(|p| p.variable.clone()));
         for (i, is_noise) in self.is_noise().into_iter().enumerate() {
-            if is_noise {
+            if is_noise || (self.is_frozen && i >= 2) {
                 out[i] = out[i].clone().held_at(theta[i]);
             }
         }
@@ -165,6 +167,8 @@ pub(crate) struct Fitted {
     pub(crate) chi2: f64,
     pub(crate) count: f64,
     pub(crate) end: End,
+    /// The report of the solver.
+    pub(crate) report: Fit,
 }
 
 impl Fitted {
@@ -267,7 +271,7 @@ impl Model {
             .minimise(&problem, start, &budget)
             .expect("the start is finite and there are derivatives");
         let count = cost.residual(&fit.x).len() as f64 * selection.weighting.mean();
-        Fitted { model: self.clone(), theta: fit.x, chi2: fit.value, count, end: fit.end }
+        Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
     }
 
     /// The energy at a point.

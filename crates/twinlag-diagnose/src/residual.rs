@@ -12,6 +12,7 @@ use crate::dense;
 use crate::model::{Fitted, Selection};
 use crate::observations::Observations;
 use crate::plant::Place;
+use crate::weighting::Weighting;
 
 /// Points of a segment for the coherence.
 const SEGMENT: usize = 256;
@@ -58,6 +59,33 @@ impl Pairs {
     fn input(&self) -> impl Iterator<Item = f64> + '_ {
         self.runs.iter().flat_map(|r| r.1.iter().copied())
     }
+}
+
+/// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
+pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
+    let plant = fitted.model.plant(&fitted.theta, observations);
+    let evaluation = plant.whitened(observations, true);
+    let filter = Weighting::of_gas(observations, plant.noise_std_k);
+    let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
+    let mut out = Vec::with_capacity(evaluation.residual.len());
+    for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+        let noise = part.noise_of(channel, stretch.len());
+        let rows = &part.sources[channel].rows;
+        // Rows have the sign of the disagreement.
+        let sign = if channel == 0 { 1.0 } else { -1.0 };
+        let inferred: Vec<f64> = part.inferred_c[channel]
+            .iter()
+            .enumerate()
+            .map(|(k, f)| {
+                let first = rows.start + k;
+                let taken: f64 =
+                    rows.at(k).iter().enumerate().map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum();
+                f - sign * taken
+            })
+            .collect();
+        out.extend(filter.smooth(&inferred));
+    }
+    out
 }
 
 /// Coherence with the estimated input, dependence on its level and rate, on time, and tails.

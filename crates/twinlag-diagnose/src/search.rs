@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::diagnosis::Limit;
 use crate::effect::{Context, Identifier, Shared, candidates};
 use crate::held_out::held_out_gain;
 use crate::dense;
@@ -16,6 +17,9 @@ pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
 const TIE: f64 = 10.0;
 
+/// Share of what noise of another colour explains that an effect must explain whatever the noise, to come before it, unless it
+/// takes off half as much energy.
+const BESIDE_NOISE: f64 = 0.03;
 /// Candidates that are fitted to the end.
 const MOST_FITTED: usize = 8;
 /// The same up to which they are the same model in two guises.
@@ -78,7 +82,7 @@ impl Search<'_> {
     }
 
     /// The best fit with effect values as given, from the best points of a grid of time constants.
-    fn from_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
+    pub(crate) fn from_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
         let step_s = self.context.step_s;
         let span_s = self.context.span_s();
         let (low, high) = (1.5 * step_s, 0.1 * span_s);
@@ -233,6 +237,46 @@ impl Search<'_> {
         promise
     }
 
+    /// For each candidate that the model lacks, the smallest size that the search would have seen: the square root of the threshold
+    /// times the standard error that its main parameter would have.
+    pub(crate) fn limits(&self, current: &Fitted) -> Vec<Limit> {
+        let all: Vec<Shared> = candidates(&self.context)
+            .into_iter()
+            .filter(|c| self.allowed.contains(&c.identifier()) && self.is_new(current, c) && !c.is_noise())
+            .filter(|c| !c.neutral().is_empty())
+            .collect();
+        let count = all.len().max(1) as f64;
+        let found = self.in_parallel(&all, |effect| {
+            let &(main, _) = effect.neutral().first()?;
+            let model = current.model.with(effect.clone());
+            let mut theta = current.theta.clone();
+            theta.extend_from_slice(effect.starts().first()?);
+            let lin = model.linearised(&theta, self.observations, self.selection);
+            let matrix: Vec<Vec<f64>> =
+                lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect();
+            let inverse = dense::inverse(&matrix)?;
+            let index = current.theta.len() + main;
+            let size = (inverse[index][index] * current.mean_energy().max(1.0)).sqrt()
+                * threshold(effect.parameters().len(), FALSE_ALARM / count).sqrt();
+            let parameter = &effect.parameters()[main];
+            (size > 0.0 && size.is_finite()).then(|| Limit {
+                effect: effect.identifier(),
+                channel: effect.channel(),
+                parameter: parameter.name.into(),
+                size,
+                unit: parameter.unit.into(),
+            })
+        });
+        let mut out: Vec<Limit> = Vec::new();
+        for limit in found.into_iter().flatten() {
+            let is_same = |o: &Limit| o.effect == limit.effect && o.channel == limit.channel;
+            if !out.iter().any(is_same) {
+                out.push(limit);
+            }
+        }
+        out
+    }
+
     /// The chosen candidate in the size that the data support.
     fn sized(&self, current: &Fitted, mut chosen: Tried, robust_before: f64) -> Tried {
         for effect in chosen.effect.sizes() {
@@ -344,6 +388,9 @@ impl Search<'_> {
             .cloned()
             .collect();
         noise.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        // Noise that explains incomparably more comes first: fitted with wrong weights, an effect absorbs a little of it.
+        let loudest = noise.first().map_or(0.0, |n| n.gain);
+        mean.retain(|t| t.robust_gain > BESIDE_NOISE * loudest || current.chi2 - t.fitted.chi2 > 0.5 * loudest);
         let mut pool = if mean.is_empty() {
             noise
         } else {

@@ -27,6 +27,18 @@ pub(crate) struct Weighting {
 impl Weighting {
     /// From the spectra of the readings over noise of `noise_std_k`. None where samples are uneven or stretches short.
     pub(crate) fn of(observations: &Observations, noise_std_k: [f64; 2]) -> Self {
+        Self::by(observations, noise_std_k, |[a, b]| {
+            let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
+            (snr / (1.0 + snr)).max(LEAST).sqrt()
+        })
+    }
+
+    /// Wiener's filter for the gas temperature that both readings together give: `SNR/(1 + SNR)`, `SNR = SNR₁ + SNR₂`.
+    pub(crate) fn of_gas(observations: &Observations, noise_std_k: [f64; 2]) -> Self {
+        Self::by(observations, noise_std_k, |[a, b]| (a + b) / (1.0 + a + b))
+    }
+
+    fn by(observations: &Observations, noise_std_k: [f64; 2], gain: impl Fn([f64; 2]) -> f64) -> Self {
         if observations.period_s.is_none() || observations.samples() < 8 * POINTS {
             return Self::default();
         }
@@ -40,9 +52,7 @@ impl Weighting {
                 // The mean of its neighbours: a single bin is uncertain by its own size.
                 let around = j.saturating_sub(2)..(j + 3).min(snr[0].len());
                 let n = around.len() as f64;
-                let [a, b] = [0, 1].map(|i| around.clone().map(|k| snr[i][k]).sum::<f64>() / n);
-                let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
-                (snr / (1.0 + snr)).max(LEAST).sqrt()
+                gain([0, 1].map(|i| around.clone().map(|k| snr[i][k]).sum::<f64>() / n))
             })
             .collect();
         if gain.iter().all(|g| *g > 0.9) {
@@ -82,6 +92,23 @@ impl Weighting {
         let gain: f64 = self.taps[middle]
             + 2.0 * (1..=middle).map(|l| self.taps[middle + l] * (omega * l as f64).cos()).sum::<f64>();
         gain * gain
+    }
+
+    /// Smoothed values: the filter on what departs from the nearest end where it reaches past one, with unit gain at rest.
+    pub(crate) fn smooth(&self, values: &[f64]) -> Vec<f64> {
+        let width = self.taps.len();
+        if width == 0 || values.len() < width {
+            return values.to_vec();
+        }
+        let sum: f64 = self.taps.iter().sum();
+        let half = self.half() as isize;
+        let last = values.len() as isize - 1;
+        (0..=last)
+            .map(|k| {
+                let at = |l: isize| values[(k + l).clamp(0, last) as usize];
+                (-half..=half).map(|l| self.taps[(l + half) as usize] * at(l)).sum::<f64>() / sum
+            })
+            .collect()
     }
 
     /// The filtered values, zero where the filter reaches past an end.

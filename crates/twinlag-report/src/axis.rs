@@ -296,7 +296,7 @@ fn scientific(value: f64, largest: f64, step: f64) -> String {
     minus(&format!("{mantissa}×10{}", superscript(exponent)))
 }
 
-fn superscript(exponent: i32) -> String {
+pub(crate) fn superscript(exponent: i32) -> String {
     exponent
         .to_string()
         .chars()

@@ -1,8 +1,10 @@
-//! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped bars.
+//! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped bars; and pages of them
+//! with text and tables, as one HTML file each.
 //!
 //! For anyone who has numbers and wants a figure for a report, without a plotting environment: error bars and intervals,
 //! logarithmic axes, reference lines, contour lines, one colour-blind-safe palette, and a legend that hides no data. The
-//! same data give the same bytes, so figures can be kept under version control and compared. What it does not do:
+//! same data give the same bytes, so figures can be kept under version control and compared. A [`Document`] puts figures,
+//! tables and text on a page that needs no network and no script; [`plus_minus`] and its like round the numbers. What it does not do:
 //! interaction, three dimensions, filled contours. Whoever wants those, or a kind of chart that is not here, is better
 //! served by [kuva](https://docs.rs/kuva), which writes the SVG here too but does not show in the signatures.
 //!
@@ -34,8 +36,10 @@ mod chart;
 mod chart_drawing;
 mod contour;
 mod decimate;
+mod document;
 mod error;
 mod figure;
+mod number;
 mod palette;
 mod surface;
 mod surface_drawing;
@@ -43,7 +47,9 @@ mod surface_drawing;
 pub use axis::Axis;
 pub use chart::{Chart, Reference, Series};
 pub use decimate::decimate;
+pub use document::{Document, Table};
 pub use error::ReportError;
 pub use figure::{Figure, Panel};
+pub use number::{between, plus_minus, probability, rounded};
 pub use palette::Colour;
 pub use surface::{Mark, Surface};

@@ -1,6 +1,7 @@
 use thiserror::Error;
 use twinlag_bias::NoiseError;
 use twinlag_cross_relation::CostError;
+use twinlag_diagnose::DiagnoseError;
 use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
 use twinlag_signal::SignalError;
@@ -14,6 +15,8 @@ pub enum Error {
     Record(#[from] RecordError),
     #[error(transparent)]
     Cost(#[from] CostError),
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
     #[error(transparent)]
     Noise(#[from] NoiseError),
     #[error(transparent)]

@@ -59,6 +59,7 @@
 
 mod characterisation;
 mod characterise;
+mod diagnose;
 mod error;
 pub mod estimate;
 mod fitting;
@@ -76,6 +77,10 @@ pub use characterisation::{
     SensorEstimate, Status,
 };
 pub use characterise::{characterise, characterise_watched, readings};
+pub use diagnose::{
+    DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, characterise_with,
+    diagnose,
+};
 pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
@@ -83,6 +88,7 @@ pub use question::Watch;
 
 pub use twinlag_bias as bias;
 pub use twinlag_cross_relation as cross_relation;
+pub use twinlag_diagnose as diagnosis;
 pub use twinlag_optimise as optimise;
 pub use twinlag_record as record;
 pub use twinlag_sensor as sensor;

@@ -1,0 +1,61 @@
+//! `twinlag diagnose FILE`: the closed loop.
+
+use std::path::Path;
+
+use twinlag::diagnosis::Verdict;
+use twinlag::record::Record;
+use twinlag::{DiagnoseOptions, Diagnosis};
+
+use crate::arguments::{Diagnose, Talk};
+use crate::characterise::read;
+use crate::failure::Failure;
+use crate::print;
+use crate::progress::Progress;
+
+pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
+    for path in [&command.report, &command.save].into_iter().flatten() {
+        if path.exists() && !command.force {
+            return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
+        }
+    }
+    let options = DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() };
+    let record = read(&command.file, &command.columns.selection())?;
+    print::notes(&record, talk);
+    let answer = diagnose(&record, &options, talk)?;
+    if let Some(path) = &command.save {
+        let model = serde_json::to_string_pretty(&answer.model())
+            .map_err(|e| Failure::Other(format!("the model has no JSON: {e}")))?;
+        write(path, &model)?;
+    }
+    if let Some(path) = &command.report {
+        let line: Vec<String> = std::env::args().map(|a| quoted(&a)).collect();
+        let _ = (path, line); // WIRE REPORT
+    }
+    print::diagnosis(&answer, talk)?;
+    Ok(exit_code(&answer))
+}
+
+pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -> Result<Diagnosis, Failure> {
+    let progress = Progress::start(talk, format!("diagnosing {} samples", record.len()));
+    let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
+    Ok(twinlag::diagnose(record, options, &watch)?)
+}
+
+/// 0 for an answer; 4 where the data were read but do not give one.
+pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
+    u8::from(answer.verdict == Verdict::Refused) * 4
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::Other(format!("{}: cannot be written: {e}", path.display())))
+}
+
+/// An argument as a shell takes it.
+fn quoted(argument: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
+    if !argument.is_empty() && argument.chars().all(is_plain) {
+        argument.to_owned()
+    } else {
+        format!("'{}'", argument.replace('\'', "'\\''"))
+    }
+}

@@ -1,0 +1,50 @@
+//! What the gas does: how many tones there are to learn from.
+
+use realfft::RealFftPlanner;
+
+use crate::defects::levels;
+use crate::observations::Observations;
+
+/// A bin counts if it has this many times the power of the noise.
+const CLEAR: f64 = 30.0;
+/// Bins of one tone under the window.
+const WIDTH: usize = 12;
+
+/// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples are uneven or the power is
+/// spread. Each tone gives two equations, and two time constants take two.
+pub(crate) fn tones(observations: &Observations) -> Option<usize> {
+    observations.period_s?;
+    let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
+    let stretch = observations.stretches.iter().max_by_key(|s| s.len())?;
+    let y = &stretch.reading_c[channel];
+    let n = y.len() & !1;
+    let noise_k = levels(observations)?.std_k[channel];
+    let mean = y[..n].iter().sum::<f64>() / n as f64;
+    // Blackman and Harris: side lobes of a millionth of a millionth part of the power.
+    let window = |k: usize| {
+        let x = std::f64::consts::TAU * (k as f64 + 0.5) / n as f64;
+        0.35875 - 0.48829 * x.cos() + 0.14128 * (2.0 * x).cos() - 0.01168 * (3.0 * x).cos()
+    };
+    let mut input: Vec<f64> = y[..n].iter().enumerate().map(|(k, y)| (y - mean) * window(k)).collect();
+    let scale: f64 = (0..n).map(|k| window(k) * window(k)).sum();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let plan = planner.plan_fft_forward(n);
+    let mut spectrum = plan.make_output_vec();
+    plan.process(&mut input, &mut spectrum).ok()?;
+    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
+    let largest = power.iter().copied().fold(0.0, f64::max);
+    let least = (CLEAR * noise_k * noise_k).max(1e-9 * largest);
+    let (mut tones, mut bin) = (0, 0);
+    while bin < power.len() {
+        if power[bin] <= least {
+            bin += 1;
+            continue;
+        }
+        let from = bin;
+        while bin < power.len() && power[bin] > least {
+            bin += 1;
+        }
+        tones += 1 + (bin - from) / WIDTH;
+    }
+    Some(tones)
+}

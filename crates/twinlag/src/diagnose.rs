@@ -1,0 +1,379 @@
+//! The closed loop on a record: schema `twinlag.diagnosis/1`.
+
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::Parameter;
+use twinlag_diagnose::{
+    BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, Limit, ModelFit, Observations, Settings,
+    Stretch, TimeConstant, Unexplained, Value, Verdict,
+};
+use twinlag_record::{Record, SamplingKind};
+
+use crate::characterisation::{
+    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    SensorEstimate, Status,
+};
+use crate::characterise::characterise;
+use crate::error::Error;
+use crate::estimate::IntervalBasis;
+use crate::options::Options;
+
+/// Samples of a stretch below which it is left out.
+const SHORTEST: usize = 8;
+
+/// What a diagnosis may assume besides the options of a characterisation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DiagnoseOptions {
+    /// Noise, known time constants, and how the two-lag model is characterised.
+    pub characterise: Options,
+    /// Effects that are not to be considered, by name.
+    pub without: Vec<Identifier>,
+}
+
+/// An effect that was found, as scripts read it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedEffect {
+    /// Which.
+    pub effect: Identifier,
+    /// Name of the channel that it sits in; `None` where it is of both.
+    pub channel: Option<String>,
+    /// Its parameters.
+    pub parameters: Vec<Value>,
+    /// Why it was added; `None` for defects of the data, which are seen, not inferred.
+    pub evidence: Option<Evidence>,
+    /// Effects that explain this record as well.
+    pub alternatives: Vec<Identifier>,
+    /// What was seen, where it is no parameter.
+    pub seen: Option<String>,
+    /// What it is.
+    pub explanation: String,
+    /// What can be done about it at the rig.
+    pub advice: String,
+}
+
+/// Errors before and after, none of them on data that chose the effects, but for the first.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ErrorBeforeAfter {
+    /// Energy of the whitened residual per degree of freedom, on the whole record.
+    pub chi2_per_dof: BeforeAfter<f64>,
+    /// Root mean square of the whitened residual on blocks that were held out.
+    pub held_out_normalised_rms: BeforeAfter<f64>,
+    /// Root mean square difference of the two inferred gas temperatures there, K.
+    #[serde(rename = "held_out_input_difference_K")]
+    pub held_out_input_difference_k: BeforeAfter<f64>,
+    /// Root mean square error of the gas temperature against the reference there, K; `None` without a reference.
+    #[serde(rename = "reference_rmse_K")]
+    pub reference_rmse_k: Option<BeforeAfter<f64>>,
+}
+
+/// The answer of the closed loop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Diagnosis {
+    /// `twinlag.diagnosis/1`.
+    pub schema: String,
+    /// The two-first-order-lag model.
+    pub base: Characterisation,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Effects in the order in which they were added.
+    pub effects: Vec<NamedEffect>,
+    /// Errors before and after.
+    pub error: ErrorBeforeAfter,
+    /// The model with the effects.
+    #[serde(rename = "final")]
+    pub last: Characterisation,
+    /// What is left over.
+    pub unexplained: Option<Unexplained>,
+    /// What no record of two sensors, or not this one, can tell.
+    pub not_testable: Vec<String>,
+    /// What would have been seen of the effects that were not found.
+    pub limits: Vec<Limit>,
+    /// What to know before using the numbers.
+    pub remarks: Vec<String>,
+    /// Pictures' numbers; not part of the JSON.
+    #[serde(skip)]
+    pub core: Option<Box<Core>>,
+}
+
+impl Diagnosis {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.diagnosis/1";
+}
+
+/// A model that was found in one record, to be used on others: schema `twinlag.model/1`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// `twinlag.model/1`.
+    pub schema: String,
+    /// Names of the channels.
+    pub channels: [String; 2],
+    /// Time constants, s; `None` where the record did not determine them.
+    pub time_constants_s: [Option<f64>; 2],
+    /// Noise of the channels, K.
+    #[serde(rename = "noise_std_K")]
+    pub noise_std_k: [f64; 2],
+    /// The effects.
+    pub effects: Vec<ModelEffect>,
+    /// What made it.
+    pub made_by: MadeBy,
+}
+
+/// An effect of a [`Model`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelEffect {
+    /// Which.
+    pub effect: Identifier,
+    /// Name of its channel; `None` where it is of both.
+    pub channel: Option<String>,
+    /// Its parameters.
+    pub parameters: Vec<Value>,
+}
+
+impl Model {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.model/1";
+}
+
+impl Diagnosis {
+    /// The model with the effects that were found, to be used on other records of the same rig.
+    pub fn model(&self) -> Model {
+        Model {
+            schema: Model::SCHEMA.into(),
+            channels: self.last.record.channels.clone(),
+            time_constants_s: [0, 1].map(|i| self.last.sensors[i].time_constant_s),
+            noise_std_k: [0, 1].map(|i| self.last.sensors[i].noise_std_k),
+            effects: self
+                .effects
+                .iter()
+                .map(|e| ModelEffect {
+                    effect: e.effect,
+                    channel: e.channel.clone(),
+                    parameters: e.parameters.clone(),
+                })
+                .collect(),
+            made_by: self.last.made_by.clone(),
+        }
+    }
+}
+
+/// Both time constants of `record` with the effects of `model` as they are.
+///
+/// # Errors
+/// As [`diagnose`]; an effect whose parameters are none of this version's.
+pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
+    let base = characterise(record, options)?;
+    let observations = observations(record)?;
+    let settings =
+        Settings { noise_std_k: options.noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
+    let effects: Vec<KnownEffect> = model
+        .effects
+        .iter()
+        .map(|e| KnownEffect {
+            effect: e.effect,
+            channel: e.channel.as_ref().and_then(|name| model.channels.iter().position(|c| c == name)),
+            parameters: e.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
+        })
+        .collect();
+    let fit = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
+    let is_left = fit.tests.iter().any(|t| t.p_value < 1e-4);
+    let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some());
+    let status = match (is_determined, is_left) {
+        (false, _) => Status::NotIdentifiable,
+        (true, true) => Status::ModelRejected,
+        (true, false) => Status::Ok,
+    };
+    let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
+    let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
+    out.warnings.push(if names.is_empty() {
+        "the model has no effects: two first-order lags".to_owned()
+    } else {
+        format!("with the effects of the model as they are there: {}", names.join(", "))
+    });
+    Ok(out)
+}
+
+/// Told what a diagnosis is doing, how much of that is done, and of how much.
+pub type DiagnoseWatch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// Finds what two first-order lags leave over in `record`, and which effects account for it.
+///
+/// # Errors
+/// As [`characterise`]; [`Error::Diagnose`] for a record that is too short or in which a channel never changes.
+pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch<'_>) -> Result<Diagnosis, Error> {
+    let base = characterise(record, &options.characterise)?;
+    let rows = rows(record);
+    let observations = observations(record)?;
+    let settings = Settings {
+        noise_std_k: options.characterise.noise_std_k,
+        known: known(&options.characterise),
+        effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
+    };
+    let core = twinlag_diagnose::diagnose(&observations, &settings, watch)?;
+    let error = ErrorBeforeAfter {
+        chi2_per_dof: core.error.chi2_per_dof,
+        held_out_normalised_rms: core.error.held_out_normalised_rms,
+        held_out_input_difference_k: core.error.held_out_input_difference_k,
+        reference_rmse_k: reference_rmse(record, &rows, &core),
+    };
+    let effects = core
+        .effects
+        .iter()
+        .map(|f| NamedEffect {
+            effect: f.effect,
+            channel: f.channel.map(|i| record.channels[i].clone()),
+            parameters: f.parameters.clone(),
+            evidence: f.evidence,
+            alternatives: f.alternatives.clone(),
+            seen: f.seen.clone(),
+            explanation: f.effect.about().explanation.into(),
+            advice: f.effect.about().advice.into(),
+        })
+        .collect();
+    let last = if core.verdict == Verdict::Adequate { base.clone() } else { with_effects(&base, &core, options) };
+    Ok(Diagnosis {
+        schema: Diagnosis::SCHEMA.into(),
+        base,
+        verdict: core.verdict,
+        effects,
+        error,
+        last,
+        unexplained: core.unexplained.clone(),
+        not_testable: core.not_testable.clone(),
+        limits: core.limits.clone(),
+        remarks: core.remarks.clone(),
+        core: Some(Box::new(core)),
+    })
+}
+
+/// Stretches that a diagnosis uses, as rows of the record.
+fn rows(record: &Record) -> Vec<usize> {
+    record.segments.iter().filter(|s| s.len() >= SHORTEST).flat_map(Clone::clone).collect()
+}
+
+fn observations(record: &Record) -> Result<Observations, Error> {
+    let period_s = (record.sampling.kind != SamplingKind::Irregular).then_some(record.sampling.period_s);
+    let stretches = record
+        .segments
+        .iter()
+        .filter(|s| s.len() >= SHORTEST)
+        .map(|rows| {
+            let time_s = match period_s {
+                // Evenly spaced, whatever the stamps say of each.
+                Some(period_s) => {
+                    let first_s = record.time_s[rows.start];
+                    (0..rows.len()).map(|k| first_s + k as f64 * period_s).collect()
+                }
+                None => record.time_s[rows.clone()].to_vec(),
+            };
+            Stretch::new(time_s, [record.t1_c[rows.clone()].to_vec(), record.t2_c[rows.clone()].to_vec()])
+        })
+        .collect();
+    Ok(Observations::new(stretches, period_s)?)
+}
+
+fn known(options: &Options) -> Vec<KnownTimeConstant> {
+    options
+        .known
+        .iter()
+        .filter_map(|k| {
+            let sensor = match k.parameter {
+                Parameter::Tau1 => 0,
+                Parameter::Tau2 => 1,
+                _ => return None,
+            };
+            Some(KnownTimeConstant { sensor, value_s: k.value, std_s: k.std })
+        })
+        .collect()
+}
+
+/// Errors of the estimated gas temperature against the reference on the blocks that judge.
+fn reference_rmse(record: &Record, rows: &[usize], core: &Core) -> Option<BeforeAfter<f64>> {
+    let reference = record.reference_c.as_ref()?;
+    let rmse = |fit: &ModelFit| {
+        let trace = &fit.trace;
+        let errors: Vec<f64> = (0..trace.sample.len())
+            .filter(|&k| trace.is_judge[k])
+            .map(|k| trace.gas_c[k] - reference[rows[trace.sample[k]]])
+            .filter(|e| e.is_finite())
+            .collect();
+        (!errors.is_empty()).then(|| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
+    };
+    Some(BeforeAfter { before: rmse(&core.base)?, after: rmse(&core.last)? })
+}
+
+/// The characterisation with the effects in the model.
+fn with_effects(base: &Characterisation, core: &Core, options: &DiagnoseOptions) -> Characterisation {
+    let fit = &core.last;
+    let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some());
+    let status = match (core.verdict, is_determined) {
+        (Verdict::Refused, _) | (_, false) => Status::NotIdentifiable,
+        (Verdict::Explained, _) => Status::Ok,
+        _ => Status::ModelRejected,
+    };
+    let free = |name: &str| {
+        core.effects.iter().filter(|f| f.effect == Identifier::Calibration).flat_map(|f| &f.parameters).find_map(|p| {
+            let interval_95 = p.interval_95?;
+            (p.name == name).then_some(Estimate { value: p.value, standard_error: p.standard_error, interval_95 })
+        })
+    };
+    let free = FreeParameters { gain: free("gain"), offset_k: free("offset") };
+    let mut out = of_fit(base, fit, status, free, &options.characterise);
+    out.warnings.clone_from(&core.remarks);
+    out
+}
+
+/// A characterisation with the numbers of `fit`.
+fn of_fit(
+    base: &Characterisation,
+    fit: &ModelFit,
+    status: Status,
+    free: FreeParameters,
+    options: &Options,
+) -> Characterisation {
+    let sensor = |i: usize| -> SensorEstimate {
+        let TimeConstant { value_s, standard_error_s, interval_95_s } = fit.time_constants[i];
+        SensorEstimate {
+            time_constant_s: value_s,
+            standard_error_s,
+            interval_95_s,
+            interval_basis: interval_95_s.map(|_| IntervalBasis::StandardError),
+            second_time_constant_s: None,
+            noise_std_k: fit.noise_std_k[i],
+            ..base.sensors[i].clone()
+        }
+    };
+    let not_identifiable = (0..2)
+        .filter(|&i| fit.time_constants[i].value_s.is_none())
+        .map(|i| format!("{} time constant", base.sensors[i].channel))
+        .collect();
+    Characterisation {
+        schema: Characterisation::SCHEMA.into(),
+        record: RecordSummary { ..base.record.clone() },
+        estimator: "whitened".into(),
+        optimiser: fit.fit.optimiser.clone(),
+        hold: if base.record.sampling.kind == SamplingKind::Irregular { "bilinear" } else { "cubic-spline" }.into(),
+        hold_sensitivity: None,
+        sensors: [sensor(0), sensor(1)],
+        time_constant_difference_s: Difference {
+            value: fit.difference.value_s,
+            interval_95_s: fit.difference.interval_95_s,
+        },
+        free,
+        residual: Residual {
+            chi2_per_dof: Some(fit.chi2_per_dof),
+            white: fit.tests.iter().find(|t| t.test == "whiteness").is_none_or(|t| t.p_value > 1e-3),
+            tests: fit.tests.clone(),
+        },
+        interval_method: if fit.is_weighted_by_residual {
+            IntervalMethod::ResidualSpectrum
+        } else {
+            IntervalMethod::Information
+        },
+        status,
+        not_identifiable,
+        warnings: Vec::new(),
+        fit: fit.fit.clone(),
+        starts: 1,
+        notes: base.notes.clone(),
+        made_by: MadeBy { options: options.clone(), ..base.made_by.clone() },
+    }
+}
