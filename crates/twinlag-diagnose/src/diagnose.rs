@@ -13,7 +13,7 @@ use crate::error::DiagnoseError;
 use crate::model::{Effort, Fitted, KnownTimeConstant, Model, Selection};
 use crate::observations::Observations;
 use crate::plant::reach;
-use crate::search::{FALSE_ALARM, Search, Tried, threshold};
+use crate::search::{FALSE_ALARM, FAR_OFF, Search, Tried, threshold};
 use crate::spectrum::{Bands, runs};
 use crate::weighting::Weighting;
 
@@ -25,11 +25,13 @@ const Z_975: f64 = 1.959_963_984_540_054;
 const BLOCKS: usize = 80;
 /// Samples of an excerpt for a quick look.
 const EXCERPT: usize = 4000;
-/// Energy of the residual per degree of freedom beyond which a model is far off.
-const FAR_OFF: f64 = 3.0;
 /// Robust standard deviations beyond which a single reading is wrong, and where others are.
 const SPIKE: f64 = 6.0;
 const SPIKE_AMONG_OTHERS: f64 = 4.5;
+/// A time constant shorter than this share of a sample period is none.
+const UNRESOLVED: f64 = 0.2;
+/// Effects that are noise.
+const NOISE: [Identifier; 2] = [Identifier::ColouredNoise, Identifier::InputMismatch];
 /// Below this p-value of any test something is left over.
 const LEFT_OVER: f64 = 1e-4;
 
@@ -173,6 +175,16 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     if is_refused {
         remarks.push(
             "the gas is a single tone: its amplitude and phase are two equations for two time constants, and whatever else is              missing hides in them without a trace. Take a record in which the gas changes at more than one rate"
+                .into(),
+        );
+    }
+    let is_coherent = last_fit.tests.iter().any(|t| t.test == "coherence" && t.p_value < LEFT_OVER);
+    if is_coherent && found.iter().any(|f| NOISE.contains(&f.effect)) {
+        // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the same.
+        found.retain(|f| !NOISE.contains(&f.effect));
+        remarks.push(
+            "what is left over goes with the gas temperature: it is an error of the model, not noise. The fit is weighted by its \
+             spectrum, and the intervals rest on it"
                 .into(),
         );
     }
@@ -411,6 +423,7 @@ fn context(observations: &Observations, levels: &Levels) -> Context {
         is_even: observations.period_s.is_some(),
         samples: observations.samples(),
         mean_c: [0, 1].map(|i| observations.mean_and_std(i)[0]),
+        moments: observations.moments(),
         swing_k: observations.swing_k(),
         noise_std_k: levels.std_k,
         tau_s: [10.0 * step_s; 2],
@@ -506,13 +519,18 @@ fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection
         }
     };
     let theta = &fitted.theta;
+    // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
+    let unresolved = (0..2).any(|i| !fitted.model.knows(i) && theta[i] < UNRESOLVED * observations.step_s());
     let c = covariance.as_ref();
     let variance = |i: usize| c.map(|c| c[i][i]);
     let difference = c.map(|c| c[0][0] + c[1][1] - 2.0 * c[0][1]);
     let bands = Bands::of(&residual_runs);
     let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
     ModelFit {
-        time_constants: [0, 1].map(|i| time_constant(theta[i], variance(i), true)),
+        time_constants: [0, 1].map(|i| {
+            let out = time_constant(theta[i], variance(i), true);
+            if unresolved && !fitted.model.knows(i) { TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None } } else { out }
+        }),
         difference: time_constant(theta[1] - theta[0], difference, false),
         fit: fitted.report.clone(),
         noise_std_k: fitted.model.noise_std_k(),

@@ -210,6 +210,8 @@ pub(crate) struct Context {
     pub(crate) samples: usize,
     /// Mean of each channel, °C.
     pub(crate) mean_c: [f64; 2],
+    /// Mean in °C, variance in K², and third moment over variance in K of both channels together.
+    pub(crate) moments: [f64; 3],
     /// Standard deviation of the livelier channel, K.
     pub(crate) swing_k: f64,
     /// White noise of the channels, K.

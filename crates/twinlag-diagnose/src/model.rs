@@ -81,6 +81,11 @@ impl Model {
         self.noise_std_k
     }
 
+    /// Whether a time constant is held at a known value.
+    pub(crate) fn knows(&self, sensor: usize) -> bool {
+        self.known.iter().any(|k| k.sensor == sensor && k.std_s.is_none())
+    }
+
     /// Where the parameters of effect `index` are.
     pub(crate) fn range(&self, index: usize) -> std::ops::Range<usize> {
         let from = 2 + self.effects[..index].iter().map(|e| e.parameters().len()).sum::<usize>();

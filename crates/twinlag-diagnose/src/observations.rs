@@ -94,6 +94,16 @@ impl Observations {
         [mean, (self.channel(i).map(|y| (y - mean) * (y - mean)).sum::<f64>() / n).sqrt()]
     }
 
+    /// Mean, variance and third central moment over variance of the mean of both channels.
+    pub(crate) fn moments(&self) -> [f64; 3] {
+        let level = || self.channel(0).zip(self.channel(1)).map(|(a, b)| 0.5 * (a + b));
+        let n = self.samples() as f64;
+        let mean = level().sum::<f64>() / n;
+        let second = level().map(|y| (y - mean).powi(2)).sum::<f64>() / n;
+        let third = level().map(|y| (y - mean).powi(3)).sum::<f64>() / n;
+        [mean, second, if second > 0.0 { third / second } else { 0.0 }]
+    }
+
     /// The standard deviation of the more lively channel, K.
     pub(crate) fn swing_k(&self) -> f64 {
         self.swing_k

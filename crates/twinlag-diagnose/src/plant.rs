@@ -25,8 +25,8 @@ pub(crate) struct Reading {
     pub(crate) offset_k: f64,
     /// Added to it per second, from the middle of the record on.
     pub(crate) drift_k_per_s: f64,
-    /// Static curvature `κ (T − about)²`, 1/K, and about which temperature, °C.
-    pub(crate) curvature: Option<[f64; 2]>,
+    /// Static curvature.
+    pub(crate) curvature: Option<Curvature>,
     /// Sinusoids: frequency in Hz, amplitudes of cosine and sine in K.
     pub(crate) lines: Vec<[f64; 3]>,
     /// Share of the other channel in the reading.
@@ -38,6 +38,29 @@ pub(crate) struct Reading {
 impl Default for Reading {
     fn default() -> Self {
         Self { gain: 1.0, offset_k: 0.0, drift_k_per_s: 0.0, curvature: None, lines: Vec::new(), crosstalk: 0.0, crosstalk_about_c: 0.0 }
+    }
+}
+
+/// Static curvature `κ ((T − m)² − v − c (T − m))`, with which gain and offset stay those of the straight line through the record:
+/// `m`, `v` and `c` are mean, variance and third moment over variance of its temperatures.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Curvature {
+    /// `κ`, 1/K.
+    pub(crate) per_k: f64,
+    /// `m` in °C, `v` in K², `c` in K.
+    pub(crate) moments: [f64; 3],
+}
+
+impl Curvature {
+    /// The temperature whose reading is `reading_c`, and its derivative.
+    fn straighten(&self, reading_c: f64) -> (f64, f64) {
+        let [mean, variance, skew] = self.moments;
+        let k = self.per_k;
+        // (1 − κ c) d + κ d² = reading − mean + κ v, d = T − mean: the root near the reading.
+        let linear = 1.0 - k * skew;
+        let from = reading_c - mean + k * variance;
+        let root = (linear * linear + 4.0 * k * from).max(0.04).sqrt();
+        (mean + 2.0 * from / (linear + root), 1.0 / root)
     }
 }
 
@@ -196,13 +219,8 @@ impl Plant {
                 1.0 / reading.gain,
             );
         }
-        if let Some([curvature, about_c]) = reading.curvature {
-            chain.map(|v| {
-                let from = v - about_c;
-                // The temperature T with T + κ (T − about)² = v, near v.
-                let root = (1.0 + 4.0 * curvature * from).max(0.04).sqrt();
-                (about_c + 2.0 * from / (1.0 + root), 1.0 / root)
-            });
+        if let Some(curvature) = reading.curvature {
+            chain.map(|v| curvature.straighten(v));
         }
     }
 

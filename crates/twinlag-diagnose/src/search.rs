@@ -20,6 +20,10 @@ const TIE: f64 = 10.0;
 /// Share of what noise of another colour explains that an effect must explain whatever the noise, to come before it, unless it
 /// takes off half as much energy.
 const BESIDE_NOISE: f64 = 0.03;
+/// Energy of the residual per degree of freedom beyond which a model is far off.
+pub(crate) const FAR_OFF: f64 = 3.0;
+/// Energy per degree of freedom that the best of the candidates leaves, beyond which no single effect explains the record.
+const INCOMPLETE: f64 = 1.5;
 /// Candidates that are fitted to the end.
 const MOST_FITTED: usize = 8;
 /// The same up to which they are the same model in two guises.
@@ -395,6 +399,7 @@ impl Search<'_> {
             noise
         } else {
             // Those that are as good whatever the noise, the best of them with white noise first.
+            let all_mean = mean.clone();
             let best = mean[0].robust_score();
             let mut near: Vec<Tried> = mean.into_iter().filter(|t| t.robust_score() > best - 2.0 * TIE).collect();
             near.sort_by(|a, b| b.score().total_cmp(&a.score()));
@@ -405,6 +410,27 @@ impl Search<'_> {
                 .min_by_key(|&i| (near[i].effect.identifier(), i))
             {
                 near.swap(0, index);
+            }
+            // A static disagreement comes before its subtler imitators, and where no single effect explains the record, since that
+            // is the part of it that depends least on the rest.
+            let is_far_off = near[0].fitted.mean_energy() > INCOMPLETE;
+            let imitates = matches!(near[0].effect.identifier(), Identifier::Radiation | Identifier::Drift);
+            if imitates || is_far_off {
+                let calibration = near
+                    .iter()
+                    .chain(&all_mean)
+                    .filter(|t| t.effect.identifier() == Identifier::Calibration)
+                    .max_by(|a, b| a.score().total_cmp(&b.score()))
+                    .filter(|t| {
+                        best - t.score() < TIE || (is_far_off && t.score() > 0.5 * best && t.robust_gain > 0.0)
+                    })
+                    .cloned();
+                match (calibration, noise.first()) {
+                    (Some(calibration), _) => near.insert(0, calibration),
+                    // Model error dominates: what more can be told is told by weights that are those of the residual itself.
+                    (None, Some(noise)) if is_far_off => near.insert(0, noise.clone()),
+                    _ => {}
+                }
             }
             near
         };

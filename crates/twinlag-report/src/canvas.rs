@@ -234,8 +234,8 @@ impl Canvas {
             // Half pixels: shorter numbers, and steadier glyphs.
             x: (x * 2.0).round() / 2.0,
             y: (y * 2.0).round() / 2.0,
-            // kuva would read `$…$` as mathematics.
-            content: content.replace('$', "\\$"),
+            // kuva would read `$…$` as mathematics, and lets through what XML forbids.
+            content: content.replace(char::is_whitespace, " ").replace(is_unprintable, "\u{fffd}").replace('$', "\\$"),
             size: style.size,
             anchor: match style.anchor {
                 Anchor::Start => TextAnchor::Start,
@@ -254,6 +254,11 @@ impl Canvas {
         // kuva leaves out the view box; without it a page cannot scale the picture.
         svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {width} {height}\" "), 1)
     }
+}
+
+/// What no page may hold, and marks of direction, which would turn what follows them.
+pub(crate) fn is_unprintable(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
 }
 
 #[derive(Clone, Copy, Debug)]

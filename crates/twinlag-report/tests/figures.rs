@@ -131,7 +131,7 @@ fn odd_data_are_drawn() {
     let one = [1.0];
     let charts = [
         chart([Series::line("one", one, one)]),
-        chart([Series::line("zero", [0.0, 1.0], [0.0, 0.0]), Series::points("<&\"$x$>", one, one)]),
+        chart([Series::line("zero", [0.0, 1.0], [0.0, 0.0]), Series::points("<&\"$x$>\u{0}\n", one, one)]),
         chart([Series::steps("huge", [0.0, 1.0, 2.0], [-1e300, 1e300, 0.0])]),
         chart([Series::steps("tiny", [0.0, 1.0, 2.0], [-1e-300, 1e-300, 0.0])]),
         Chart::new("cut", Axis::linear("x").range(0.0, 1.0), Axis::linear("y").range(0.0, 1e-3))
@@ -147,6 +147,7 @@ fn odd_data_are_drawn() {
         for size in [(440.0, 330.0), (160.0, 120.0)] {
             let svg = Figure::new("").panel(chart.clone()).panel_size(size.0, size.1).to_svg().expect("drawable");
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{title}");
+            assert!(!svg.contains('\0'), "{title}: XML has no such character");
         }
     }
     let flat =

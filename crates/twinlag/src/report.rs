@@ -5,7 +5,7 @@ use std::ops::Range;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twinlag_diagnose::{Diagnosis, Found, Identifier, ModelFit, TimeConstant, Trace, Verdict};
 use twinlag_report::{
-    Axis, Chart, Colour, Document, Figure, Reference, ReportError, Series, Table, between, plus_minus, probability, rounded,
+    Axis, Chart, Colour, Document, Figure, ReportError, Series, Table, between, plus_minus, probability, rounded,
 };
 
 const ABSENT: &str = "not determined";
@@ -18,6 +18,8 @@ const PARTS: usize = 100;
 /// The part of the record that is shown larger, and the fewest samples that it may have.
 const ZOOM: f64 = 0.05;
 const ZOOM_SAMPLES: usize = 60;
+/// A step so many times the usual one is a gap.
+const GAP: f64 = 10.0;
 
 /// What a report needs beside the diagnosis.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,20 +79,26 @@ struct Page<'a> {
     changed: bool,
 }
 
+/// A model with its name in pictures and in tables.
+struct Model<'a> {
+    name: &'static str,
+    column: &'static str,
+    fit: &'a ModelFit,
+    colour: Colour,
+}
+
 impl Page<'_> {
-    fn channel(&self, channel: Option<usize>) -> String {
-        match channel.and_then(|k| self.context.channels.get(k)) {
-            Some(name) => name.clone(),
-            None => "both channels, or between them".into(),
-        }
+    fn place(&self, channel: Option<usize>) -> String {
+        channel.and_then(|k| self.context.channels.get(k)).map_or("both, or between them".into(), Clone::clone)
     }
 
-    /// `delay (T2), or second order`.
+    /// `delay (T2) or second order`.
     fn named(&self, found: &Found) -> String {
         let place = found.channel.and_then(|k| self.context.channels.get(k));
         let place = place.map_or(String::new(), |name| format!(" ({name})"));
-        let others: String = found.alternatives.iter().map(|other| format!(" or {}", words(*other))).collect();
-        format!("{}{place}{others}", words(found.effect))
+        let first = format!("{}{place}", words(found.effect));
+        let others = found.alternatives.iter().map(|other| words(*other));
+        [first].into_iter().chain(others).collect::<Vec<_>>().join(" or ")
     }
 
     fn verdict(&self, document: Document) -> Document {
@@ -123,8 +131,20 @@ impl Page<'_> {
         let samples = context.time_s.len();
         let span_s = context.time_s.last().zip(context.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
         let mut document = document.heading("Verdict").lead(lead);
-        if diagnosis.verdict == Verdict::Refused {
-            document = document.list(diagnosis.not_testable.iter().cloned());
+        if diagnosis.verdict != Verdict::Refused {
+            let [first, second] = &diagnosis.last.time_constants;
+            document = document.paragraph(format!(
+                "Time constants{}: {} {}, {} {}.",
+                if self.changed { " with the effects" } else { "" },
+                context.channels[0],
+                estimate(first),
+                context.channels[1],
+                estimate(second)
+            ));
+        }
+        // Why it was refused, or what to know before the numbers are used.
+        for remark in &diagnosis.remarks {
+            document = document.warning(sentence(remark));
         }
         if diagnosis.verdict == Verdict::Unexplained {
             document = document.paragraph(
@@ -135,7 +155,7 @@ impl Page<'_> {
         }
         for found in &diagnosis.effects {
             let about = found.effect.about();
-            let mut facts = vec![("Where", self.channel(found.channel)), ("What it is", sentence(about.explanation))];
+            let mut facts = vec![("Where", self.place(found.channel)), ("What it is", sentence(about.explanation))];
             let sizes: Vec<String> = found.parameters.iter().map(parameter).collect();
             let seen = found.seen.iter().cloned().chain((!sizes.is_empty()).then(|| sizes.join("; ")));
             facts.push(("What was found", sentence(&seen.collect::<Vec<_>>().join("; "))));
@@ -165,45 +185,45 @@ impl Page<'_> {
         };
         let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 320.0).panel(whole);
         let mut caption = format!(
-            "Readings of {} and {}, and the gas temperature inferred from both, the mean of the two inferred inputs",
-            context.channels[0], context.channels[1]
+            "Readings of {} and {}, and the gas temperature inferred from both{}.",
+            context.channels[0],
+            context.channels[1],
+            if context.reference_c.is_some() { "; the reference was not used" } else { "" }
         );
-        if context.reference_c.is_some() {
-            caption.push_str("; the reference was not used");
-        }
-        caption.push('.');
         if zoom.len() < everything.len()
             && let Some(chart) = self.trace_chart("Where the readings move most", zoom)
         {
             figure = figure.panel(chart.without_legend());
-            caption.push_str(&format!(" Below, the {:.0} % of the record where the readings move most.", 100.0 * ZOOM));
+            caption.push_str(" Below, the part of the record where the readings move most, larger.");
         }
         Ok(document.figure(figure.to_svg()?, caption))
     }
 
     /// Readings, gas and reference of some samples; `None` if there is nothing to be drawn.
     fn trace_chart(&self, title: &str, samples: Range<usize>) -> Option<Chart> {
-        let (context, trace) = (self.context, &self.diagnosis.last.trace);
+        let (context, fitted) = (self.context, &self.diagnosis.last.trace);
         let time_s = &context.time_s[samples.clone()];
         let (from, to) = (*time_s.first()?, *time_s.last()?);
         let mut series = Vec::new();
-        let (gas_s, gas_c): (Vec<f64>, Vec<f64>) = pairs(&trace.time_s, &trace.gas_c, from, to).unzip();
-        series.push(Series::trace("gas, inferred", gas_s, gas_c).colour(Colour::Green));
+        let (gas_s, gas_c): (Vec<f64>, Vec<f64>) = pairs(&fitted.time_s, &fitted.gas_c, from, to).unzip();
+        series.push(trace("gas, inferred", &gas_s, &gas_c, Colour::Green));
         if let Some(reference) = context.reference_c {
-            let reference = &reference[samples.clone()];
-            series.push(Series::trace("reference", time_s, reference).colour(Colour::Black).dashed());
+            let reference = trace("reference", time_s, &reference[samples.clone()], Colour::Black);
+            series.push(reference.map(Series::dashed));
         }
         for (k, column) in [context.t1_c, context.t2_c].into_iter().enumerate() {
             let colour = [Colour::Blue, Colour::Vermilion][k];
-            series.push(Series::trace(short(&context.channels[k]), time_s, &column[samples.clone()]).colour(colour));
+            series.push(trace(short(&context.channels[k]), time_s, &column[samples.clone()], colour));
         }
-        chart(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"), series)
+        chart(title, [Axis::linear("time (s)"), Axis::linear("temperature (°C)")], series)
     }
 
-    /// The models to be shown, with their names: one, if no effect was added.
-    fn models(&self) -> Vec<(&'static str, &ModelFit, Colour)> {
-        let before = (BEFORE, &self.diagnosis.base, Colour::Vermilion);
-        if self.changed { vec![before, (AFTER, &self.diagnosis.last, Colour::Blue)] } else { vec![before] }
+    /// The models to be shown: one, if no effect was added.
+    fn models(&self) -> Vec<Model<'_>> {
+        let (base, last) = (&self.diagnosis.base, &self.diagnosis.last);
+        let before = Model { name: BEFORE, column: "before", fit: base, colour: Colour::Vermilion };
+        let after = Model { name: AFTER, column: "after", fit: last, colour: Colour::Blue };
+        if self.changed { vec![before, after] } else { vec![Model { column: "value", ..before }] }
     }
 
     fn residual(&self, document: Document) -> Result<Document, ReportError> {
@@ -218,10 +238,8 @@ impl Page<'_> {
         };
         let mut document = document.figure(
             figure.to_svg()?,
-            format!(
-                "The residual along the record, and its root mean square in {PARTS} parts of it, with the range that holds \
-                 95 % of such parts if it is white noise of unit variance."
-            ),
+            "The residual along the record, and its root mean square in hundredths of it, with the range that holds 95 % of \
+             such parts if it is white noise of unit variance.",
         );
         if let Some(figure) = frequency_figure(&models) {
             document = document.figure(
@@ -250,7 +268,7 @@ impl Page<'_> {
         ]);
         let mut sizes = Table::new(["effect", "parameter", "value", "95 % interval", "unit"]);
         for found in &self.diagnosis.effects {
-            let place = found.channel.map_or("both, or between".into(), |k| self.channel(Some(k)));
+            let place = self.place(found.channel);
             let absent = || "–".to_owned();
             let others = if found.alternatives.is_empty() { "none".into() } else { identifiers(&found.alternatives) };
             evidence = evidence.row(match &found.evidence {
@@ -264,7 +282,16 @@ impl Page<'_> {
                     e.robust_statistic.map_or_else(absent, |s| rounded(s, 4)),
                     others,
                 ],
-                None => [words(found.effect), place, "seen in the data".into(), absent(), absent(), absent(), absent(), others],
+                None => [
+                    words(found.effect),
+                    place,
+                    "seen in the data".into(),
+                    absent(),
+                    absent(),
+                    absent(),
+                    absent(),
+                    others,
+                ],
             });
             for value in &found.parameters {
                 let error = value.standard_error;
@@ -290,42 +317,36 @@ impl Page<'_> {
         if !sizes.is_empty() {
             document = document.table(sizes.caption("Parameters of the effects, with standard errors."));
         }
-        if !self.diagnosis.rejected.is_empty() {
-            document = document
-                .subheading("Looked at and not taken")
-                .list(self.diagnosis.rejected.iter().map(|text| sentence(text)));
-        }
         document
     }
 
     fn numbers(&self, document: Document) -> Result<Document, ReportError> {
-        let (base, last) = (&self.diagnosis.base, &self.diagnosis.last);
+        let models = self.models();
         let [first, second] = &self.context.channels;
-        let mut table = Table::new(["", "before", "95 % interval", "after", "95 % interval"]);
+        let interval_95 = || "95 % interval".to_owned();
+        let header = models.iter().flat_map(|m| [m.column.to_owned(), interval_95()]);
+        let mut table = Table::new([String::new()].into_iter().chain(header));
         let names = [format!("time constant of {first}"), format!("time constant of {second}"), "difference".into()];
-        let of = |fit: &ModelFit| [fit.time_constants[0], fit.time_constants[1], fit.difference];
-        for ((name, before), after) in names.into_iter().zip(of(base)).zip(of(last)) {
-            let [value, interval, value_after, interval_after] =
-                [estimate(&before), interval(&before), estimate(&after), interval(&after)];
-            table = table.row([name, value, interval, value_after, interval_after]);
+        for (k, name) in names.into_iter().enumerate() {
+            let of = |m: &Model<'_>| [m.fit.time_constants[0], m.fit.time_constants[1], m.fit.difference][k];
+            let cells = models.iter().flat_map(|m| [estimate(&of(m)), interval(&of(m))]);
+            table = table.row([name].into_iter().chain(cells));
         }
         for (k, channel) in self.context.channels.iter().enumerate() {
-            let noise = |fit: &ModelFit| with_unit(&rounded(fit.noise_std_k[k], 3), "K");
-            table = table.row([format!("noise of {channel}"), noise(base), String::new(), noise(last), String::new()]);
+            let noise = |m: &Model<'_>| with_unit(&rounded(m.fit.noise_std_k[k], 3), "K");
+            let cells = models.iter().flat_map(|m| [noise(m), String::new()]);
+            table = table.row([format!("noise of {channel}")].into_iter().chain(cells));
         }
         let mut document = document.heading("Time constants and noise, before and after").table(table);
-        for (fit, when) in [(base, "before"), (last, "after")] {
-            if fit.is_weighted_by_residual && (self.changed || when == "after") {
-                let when = if self.changed { format!(" {when}") } else { String::new() };
-                document = document.note(format!(
-                    "The residual{when} is not white: the errors{when} rest on its own spectrum. They do not cover the \
-                     bias that what is left may cause."
-                ));
-            }
+        for model in models.iter().filter(|m| m.fit.is_weighted_by_residual) {
+            let when = if self.changed { format!(" {}", model.column) } else { String::new() };
+            document = document.note(format!(
+                "The residual{when} is not white: the errors{when} rest on its own spectrum. They do not cover the bias \
+                 that what is left may cause."
+            ));
         }
         if let Some(figure) = self.time_constant_figure() {
-            document =
-                document.figure(figure.to_svg()?, "Both time constants with 95 % intervals, before and after the effects.");
+            document = document.figure(figure.to_svg()?, "Both time constants with their 95 % intervals.");
         }
         Ok(document)
     }
@@ -334,16 +355,21 @@ impl Page<'_> {
         let models = self.models();
         let mut figure = None;
         for k in 0..2 {
-            let names = models.iter().map(|m| m.0);
-            let of: Vec<&TimeConstant> = models.iter().map(|m| &m.1.time_constants[k]).collect();
+            let of: Vec<&TimeConstant> = models.iter().map(|m| &m.fit.time_constants[k]).collect();
+            let names = models.iter().map(|m| match m.fit.time_constants[k].value_s {
+                Some(_) => m.name.to_owned(),
+                None => format!("{}: {ABSENT}", m.name),
+            });
             let values: Vec<f64> = of.iter().map(|t| t.value_s.unwrap_or(f64::NAN)).collect();
             let (low, high): (Vec<f64>, Vec<f64>) =
                 of.iter().map(|t| t.interval_95_s.map_or((f64::NAN, f64::NAN), |[a, b]| (a, b))).unzip();
             let places: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
-            let series = Series::points("", places, values).interval(low, high).colour(Colour::Blue);
-            let axes = (Axis::categories("", names), Axis::linear("time constant (s)"));
-            if let Some(chart) = chart(short(&self.context.channels[k]), axes.0, axes.1, [series]) {
-                figure = Some(figure.unwrap_or(Figure::new("").columns(2).panel_size(WIDTH_PX / 2.0, 270.0)).panel(chart));
+            let known = values.iter().any(|v| v.is_finite());
+            let series = known.then(|| Series::points("", places, values).interval(low, high).colour(Colour::Blue));
+            let axes = [Axis::categories("", names), Axis::linear("time constant (s)")];
+            if let Some(chart) = chart(short(&self.context.channels[k]), axes, [series]) {
+                figure =
+                    Some(figure.unwrap_or(Figure::new("").columns(2).panel_size(WIDTH_PX / 2.0, 270.0)).panel(chart));
             }
         }
         figure
@@ -366,31 +392,41 @@ impl Page<'_> {
         if let Some(reference) = self.context.reference_c {
             let rms = |trace: &Trace| against_reference(trace, self.context.time_s, reference);
             let (before, after) = (rms(&self.diagnosis.base.trace), rms(&self.diagnosis.last.trace));
-            rows.push(("Inferred gas temperature less the reference, root mean square", "K", before, after));
+            rows.push((
+                "Inferred gas temperature less the reference on held-out blocks, root mean square",
+                "K",
+                before,
+                after,
+            ));
         }
-        let mut table = Table::new(["", "before", "after", "after / before"]);
+        let mut table =
+            Table::new(if self.changed { vec!["", "before", "after", "after / before"] } else { vec!["", "value"] });
         for (name, unit, before, after) in rows {
-            let ratio = after / before;
-            table = table.row([
-                name.into(),
-                with_unit(&rounded(before, 4), unit),
-                with_unit(&rounded(after, 4), unit),
-                rounded(ratio, 3),
-            ]);
+            let ratio = rounded(after / before, 3);
+            let cells = [with_unit(&rounded(before, 4), unit), with_unit(&rounded(after, 4), unit), ratio];
+            let shown = if self.changed { 3 } else { 1 };
+            table = table.row([name.to_owned()].into_iter().chain(cells.into_iter().take(shown)));
         }
-        document
+        let document = document
             .heading("Error before and after")
             .paragraph(
                 "Held-out blocks are parts of the record that took no part in choosing effects or in fitting them. In the \
                  first two rows, 1 is what noise alone makes.",
             )
-            .table(table)
+            .table(table);
+        if self.context.reference_c.is_none() {
+            return document;
+        }
+        document.paragraph(
+            "The diagnosis has not seen the reference. Against it counts as well what both sensors share, and which of \
+             them is right where they disagree about gain and offset: this no record of two sensors tells.",
+        )
     }
 
     fn tests(&self, document: Document) -> Document {
-        let (base, last) = (&self.diagnosis.base.tests, &self.diagnosis.last.tests);
+        let models = self.models();
         let mut names: Vec<&str> = Vec::new();
-        for test in base.iter().chain(last) {
+        for test in models.iter().flat_map(|m| &m.fit.tests) {
             if !names.contains(&test.test.as_str()) {
                 names.push(&test.test);
             }
@@ -399,23 +435,24 @@ impl Page<'_> {
         if names.is_empty() {
             return document.paragraph("No test could be made.");
         }
-        let mut table = Table::new(["test", "question", "before", "p-value", "after", "p-value"]);
+        let header = models.iter().flat_map(|m| [if self.changed { m.column } else { "statistic" }, "p-value"]);
+        let mut table = Table::new(["test", "question"].into_iter().chain(header));
         for name in names {
-            let of = |tests: &[twinlag_cross_relation::ResidualTest]| {
-                tests.iter().find(|t| t.test == name).map_or([ABSENT.to_owned(), ABSENT.to_owned()], |t| {
-                    let freedom = t.degrees_of_freedom.map_or(String::new(), |d| format!(" ({})", rounded(d, 3)));
+            let cells = models.iter().flat_map(|m| {
+                m.fit.tests.iter().find(|t| t.test == name).map_or([ABSENT.to_owned(), ABSENT.to_owned()], |t| {
+                    let whole = |d: f64| if d.fract() == 0.0 { format!("{d:.0}") } else { rounded(d, 3) };
+                    let freedom = t.degrees_of_freedom.map_or(String::new(), |d| format!(" ({})", whole(d)));
                     [format!("{}{freedom}", rounded(t.statistic, 3)), probability(t.p_value)]
                 })
-            };
-            let ([before, p_before], [after, p_after]) = (of(base), of(last));
-            table = table.row([words_of(name), question(name).into(), before, p_before, after, p_after]);
+            });
+            table = table.row([words_of(name), question(name).into()].into_iter().chain(cells));
         }
         document
             .paragraph(
                 "Each asks whether the residual is white noise of unit variance. The p-value is the probability of a \
                  statistic at least as extreme if it is: a small one speaks against the model.",
             )
-            .table(table.caption("Statistics, with their degrees of freedom where they have any."))
+            .table(table.caption("Statistics, in brackets their degrees of freedom where they have any."))
     }
 
     fn unexplained(&self, document: Document) -> Document {
@@ -439,24 +476,43 @@ impl Page<'_> {
     }
 
     fn unknowable(&self, document: Document) -> Document {
-        let mut items: Vec<String> = Vec::new();
-        if self.diagnosis.verdict != Verdict::Refused {
-            items.extend(self.diagnosis.not_testable.iter().map(|text| sentence(text)));
-        }
+        let mut items: Vec<String> = self.diagnosis.not_testable.iter().map(|text| sentence(text)).collect();
         let mut told: Vec<Identifier> = Vec::new();
         for found in &self.diagnosis.effects {
             if !told.contains(&found.effect) {
                 told.push(found.effect);
-                items.push(format!("{}: not seen is {}.", capital(&words(found.effect)), found.effect.about().unseen));
+                items.push(format!(
+                    "{}: what stays unseen is {}.",
+                    capital(&words(found.effect)),
+                    found.effect.about().unseen
+                ));
             }
         }
-        document
+        let mut limits = Table::new(["effect", "where", "parameter", "smallest size that would have been seen"]);
+        for limit in &self.diagnosis.limits {
+            limits = limits.row([
+                words(limit.effect),
+                self.place(limit.channel),
+                limit.parameter.replace('_', " "),
+                with_unit(&rounded(limit.size, 2), &limit.unit),
+            ]);
+        }
+        let document = document
             .heading("What this record cannot tell")
             .paragraph(
                 "The diagnosis sees the gas only through two sensors. What does the same to both leaves no trace in how \
                  they disagree, and is not among the effects even where it is large.",
             )
-            .list(items)
+            .list(items);
+        if limits.is_empty() {
+            return document;
+        }
+        document
+            .paragraph(
+                "Of the effects that were not found, no more is known than that they are small: below these sizes they \
+                 would not have been told from chance.",
+            )
+            .table(limits)
     }
 
     fn reproduction(&self, document: Document) -> Document {
@@ -473,12 +529,382 @@ impl Page<'_> {
     }
 }
 
-/// A chart, without series of which nothing can be drawn; `None` if none is left.
-fn chart(title: impl Into<String>, x: Axis, y: Axis, series: impl IntoIterator<Item = Series>) -> Option<Chart> {
-    let mut chart = None;
-    for one in series {
-        let with = chart.clone().unwrap_or_else(|| Chart::new("", x.clone(), y.clone())).series(one);
-        todo!()
+/// A chart of the series that there are; `None` if there is none.
+fn chart(
+    title: impl Into<String>,
+    [x, y]: [Axis; 2],
+    series: impl IntoIterator<Item = Option<Series>>,
+) -> Option<Chart> {
+    let mut series = series.into_iter().flatten().peekable();
+    series.peek()?;
+    Some(series.fold(Chart::new(title, x, y), Chart::series))
+}
+
+/// A trace, if it has a point that can be drawn. It has gaps where the record has.
+fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colour) -> Option<Series> {
+    let drawn = x.iter().zip(y).any(|(x, y)| x.is_finite() && y.is_finite());
+    let mut steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let longest = if steps.is_empty() { 0.0 } else { GAP * *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let (mut at, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
+    for (k, (x_k, y_k)) in x.iter().zip(y).enumerate() {
+        if k > 0 && x_k - x[k - 1] > longest {
+            at.push(*x_k);
+            values.push(f64::NAN);
+        }
+        at.push(*x_k);
+        values.push(*y_k);
     }
-    chart
+    drawn.then(|| Series::trace(name, at, values).colour(colour))
+}
+
+/// The residual of each model along the record, and its root mean square in parts of the record.
+fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
+    let largest: Vec<f64> = models
+        .iter()
+        .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
+        .collect();
+    // One scale for both, unless the smaller would then be a line.
+    let widest = largest.iter().copied().fold(0.0, f64::max);
+    let common = largest.iter().all(|l| 4.0 * l > widest);
+    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    let mut parts = Vec::new();
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut fewest = usize::MAX;
+    let mut any = false;
+    for (Model { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
+        let trace = &fit.trace;
+        let limit = 1.08 * if common { widest } else { *largest };
+        let axis = Axis::linear("residual");
+        let axis = if limit > 0.0 { axis.range(-limit, limit) } else { axis };
+        let lines = [self::trace("", &trace.time_s, &trace.residual, *colour)];
+        if let Some(chart) = chart(*name, [Axis::linear("time (s)"), axis], lines) {
+            figure = figure.panel(chart);
+            any = true;
+        }
+        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(PARTS).max(1);
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for (times, values) in trace.time_s.chunks(size).zip(trace.residual.chunks(size)) {
+            // A short last part would be outside the range of the others.
+            if values.len() == size {
+                x.push(times[0]);
+                y.push((values.iter().map(|r| r * r).sum::<f64>() / size as f64).sqrt());
+                ends = [ends[0].min(times[0]), ends[1].max(times[size - 1])];
+            }
+        }
+        // The last part is as long as the others.
+        if let (Some(end), Some(last)) = (trace.time_s.get((y.len() * size).saturating_sub(1)), y.last().copied()) {
+            x.push(*end);
+            y.push(last);
+        }
+        if y.iter().any(|v| v.is_finite() && *v > 0.0) {
+            fewest = fewest.min(size);
+            parts.push(Some(Series::steps(*name, x, y).colour(*colour)));
+        }
+    }
+    if !any {
+        return None;
+    }
+    if ends[0] < ends[1]
+        && let Some([low, high]) = white_noise(fewest as f64)
+    {
+        let band = Series::trace(NOISE, ends, [1.0, 1.0]).band([low.sqrt(); 2], [high.sqrt(); 2]).colour(Colour::Grey);
+        parts.insert(0, Some(band));
+    }
+    let axes = [Axis::linear("time (s)"), Axis::logarithmic("root mean square")];
+    if let Some(chart) = chart("In hundredths of the record", axes, parts) {
+        figure = figure.panel(chart);
+    }
+    Some(figure)
+}
+
+/// Power of the residual of each model against frequency.
+fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
+    let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
+    let mut series = Vec::new();
+    let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
+    let (mut x, mut low, mut high) = (Vec::new(), Vec::new(), Vec::new());
+    for band in bands {
+        if let Some(range) = white_noise(band[2]) {
+            x.push(band[0]);
+            low.push(range[0]);
+            high.push(range[1]);
+        }
+    }
+    if !x.is_empty() {
+        let ones = vec![1.0; x.len()];
+        series.push(Some(Series::trace(NOISE, x, ones).band(low, high).colour(Colour::Grey)));
+    }
+    for Model { name, fit, colour, .. } in models {
+        let (x, y): (Vec<f64>, Vec<f64>) = fit.trace.bands.iter().filter(shown).map(|b| (b[0], b[1])).unzip();
+        series.push((!x.is_empty()).then(|| Series::line(*name, x, y).colour(*colour)));
+    }
+    let axes = [Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("power (that of the noise is 1)")];
+    Some(Figure::new("").panel_size(WIDTH_PX, 360.0).panel(chart("Power of the residual", axes, series)?))
+}
+
+/// The range that holds the mean square of so many values of white noise of unit variance in 95 % of all cases.
+fn white_noise(dof: f64) -> Option<[f64; 2]> {
+    let chi_square = ChiSquared::new(dof).ok()?;
+    Some([0.025, 0.975].map(|p| chi_square.inverse_cdf(p) / dof))
+}
+
+/// Values of a trace from one instant to another.
+fn pairs<'a>(time_s: &'a [f64], values: &'a [f64], from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + 'a {
+    time_s.iter().copied().zip(values.iter().copied()).filter(move |(t, _)| (from..=to).contains(t))
+}
+
+/// The samples to be shown larger: where the readings have most variance.
+fn busiest(context: &ReportContext<'_>) -> Range<usize> {
+    let n = context.time_s.len();
+    let window = ((ZOOM * n as f64) as usize).max(ZOOM_SAMPLES).min(n);
+    // Sums up to each sample, of both channels: count, value, square.
+    let sums = [context.t1_c, context.t2_c].map(|readings| {
+        let finite = || readings.iter().copied().filter(|y| y.is_finite());
+        // Less their mean, or squares of 300 °C would swamp variances of 0.1 K².
+        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
+        let mut sums = vec![[0.0; 3]];
+        let mut sum = [0.0; 3];
+        for y in readings.iter().map(|y| y - mean) {
+            if y.is_finite() {
+                sum = [sum[0] + 1.0, sum[1] + y, sum[2] + y * y];
+            }
+            sums.push(sum);
+        }
+        sums
+    });
+    let variance = |start: usize| -> f64 {
+        sums.iter()
+            .map(|sums| {
+                let [count, sum, squares] = [0, 1, 2].map(|k| sums[start + window][k] - sums[start][k]);
+                let count = count.max(1.0);
+                squares / count - (sum / count).powi(2)
+            })
+            .sum()
+    };
+    let start = (0..=n - window).max_by(|a, b| variance(*a).total_cmp(&variance(*b))).unwrap_or(0);
+    start..start + window
+}
+
+/// Root mean square of the inferred gas temperature less a reference, on the blocks that judge.
+fn against_reference(trace: &Trace, time_s: &[f64], reference_c: &[f64]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for ((t, gas_c), _) in trace.time_s.iter().zip(&trace.gas_c).zip(&trace.is_judge).filter(|(_, judges)| **judges) {
+        // The nearest row: stamps may be off the grid by some of their jitter.
+        let after = time_s.partition_point(|u| u < t);
+        let distance = |row: &usize| (time_s[*row] - t).abs();
+        let rows = after.saturating_sub(1)..(after + 1).min(time_s.len());
+        let Some(row) = rows.min_by(|a, b| distance(a).total_cmp(&distance(b))) else { continue };
+        let error = gas_c - reference_c[row];
+        if error.is_finite() {
+            sum += error * error;
+            count += 1;
+        }
+    }
+    // None to be compared: not a number, which is shown as not determined.
+    (sum / count as f64).sqrt()
+}
+
+/// A name for scripts as words.
+fn words_of(name: &str) -> String {
+    name.replace('-', " ")
+}
+
+fn words(effect: Identifier) -> String {
+    words_of(effect.name())
+}
+
+fn identifiers(effects: &[Identifier]) -> String {
+    effects.iter().map(|e| words(*e)).collect::<Vec<_>>().join(", ")
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
+}
+
+/// With a capital and a full stop; nothing stays nothing.
+fn sentence(text: &str) -> String {
+    let text = text.trim();
+    if text.is_empty() || text.ends_with(['.', '!', '?']) { capital(text) } else { format!("{}.", capital(text)) }
+}
+
+/// A name that does not fill a legend.
+fn short(name: &str) -> String {
+    const MOST: usize = 28;
+    if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
+}
+
+/// A unit as it is printed: numbers without one have `1`.
+fn unit(unit: &str) -> &str {
+    if unit == "1" { "" } else { unit }
+}
+
+fn with_unit(number: &str, of: &str) -> String {
+    if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
+}
+
+fn parameter(value: &twinlag_diagnose::Value) -> String {
+    let number = plus_minus(value.value, value.standard_error);
+    format!("{} {}", value.name.replace('_', " "), with_unit(&number, &value.unit))
+}
+
+fn estimate(of: &TimeConstant) -> String {
+    of.value_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
+}
+
+fn interval(of: &TimeConstant) -> String {
+    of.interval_95_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
+}
+
+/// What a test asks, by its name.
+fn question(test: &str) -> &'static str {
+    match test {
+        "total-energy" => "Is its energy that of the noise?",
+        "band-energy" => "Has every band of frequencies its share of the energy?",
+        "whiteness" => "Are values a few samples apart unrelated?",
+        "coherence" => "Is it unrelated to the inferred gas temperature, at every frequency?",
+        "level" => "Is it unrelated to how high the gas temperature is?",
+        "rate" => "Is it unrelated to how fast the gas temperature changes?",
+        "time" => "Is its energy the same all along the record?",
+        "tails" => "Are its largest values those of Gaussian noise?",
+        _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ReportContext, report};
+    use twinlag_diagnose::{
+        BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Identifier, ModelFit, TimeConstant, Trace, Unexplained,
+        Value, Verdict,
+    };
+    use twinlag_optimise::{End, Evaluations, Fit};
+    use twinlag_report::ReportError;
+
+    const SECTIONS: [&str; 10] = [
+        "Verdict",
+        "Readings and gas temperature",
+        "What is left over, before and after",
+        "Evidence for each effect",
+        "Time constants and noise, before and after",
+        "Error before and after",
+        "Tests of what is left over",
+        "What is unexplained",
+        "What this record cannot tell",
+        "How to reproduce this",
+    ];
+
+    /// A diagnosis of which nothing is determined, as one that was refused has it.
+    fn nothing(verdict: Verdict) -> Diagnosis {
+        let none = TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None };
+        let fit = ModelFit {
+            time_constants: [none; 2],
+            difference: none,
+            fit: Fit {
+                optimiser: "none".into(),
+                start: Vec::new(),
+                x: Vec::new(),
+                value: f64::NAN,
+                end: End::LimitReached,
+                iterations: 0,
+                evaluations: Evaluations::default(),
+            },
+            noise_std_k: [f64::NAN; 2],
+            tests: Vec::new(),
+            chi2_per_dof: f64::NAN,
+            is_weighted_by_residual: false,
+            trace: Trace::default(),
+        };
+        let pair = BeforeAfter { before: f64::NAN, after: f64::INFINITY };
+        Diagnosis {
+            verdict,
+            effects: Vec::new(),
+            base: fit.clone(),
+            last: fit,
+            error: ErrorBudget { chi2_per_dof: pair, held_out_normalised_rms: pair, held_out_input_difference_k: pair },
+            unexplained: None,
+            not_testable: vec!["the record is too short".into()],
+            limits: Vec::new(),
+            remarks: vec!["the gas is a single tone".into()],
+        }
+    }
+
+    fn context<'a>(time_s: &'a [f64], t1_c: &'a [f64], t2_c: &'a [f64]) -> ReportContext<'a> {
+        ReportContext {
+            source: "a <b>.csv".into(),
+            channels: ["T\"1\"".into(), "T2 & more".into()],
+            time_s,
+            t1_c,
+            t2_c,
+            reference_c: None,
+            command: "twinlag diagnose 'a <b>.csv'".into(),
+            version: "0.0.0".into(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Whatever was not determined is said so, and every section is there, in its order.
+    #[test]
+    fn a_report_on_nothing_has_every_section_and_no_nan() {
+        let time_s: Vec<f64> = (0..200).map(f64::from).collect();
+        let gaps = vec![f64::NAN; 200];
+        let found = Found {
+            effect: Identifier::Delay,
+            channel: Some(1),
+            parameters: vec![Value {
+                name: "delay".into(),
+                value: f64::NAN,
+                standard_error: Some(f64::NAN),
+                interval_95: None,
+                unit: "s".into(),
+            }],
+            evidence: Some(Evidence {
+                statistic: f64::INFINITY,
+                dof: 1,
+                p_value: 0.0,
+                held_out_gain_nats: f64::NAN,
+                robust_statistic: None,
+            }),
+            alternatives: vec![Identifier::SecondOrder],
+            seen: None,
+        };
+        let left =
+            Unexplained { description: "something".into(), band_hz: None, energy_ratio: f64::NAN, worst_s: None };
+        for verdict in
+            [Verdict::Adequate, Verdict::Explained, Verdict::PartlyExplained, Verdict::Unexplained, Verdict::Refused]
+        {
+            for (effects, unexplained) in [(vec![], None), (vec![found.clone()], Some(left.clone()))] {
+                let diagnosis = Diagnosis { effects, unexplained, ..nothing(verdict) };
+                for (t, y) in [(&time_s, &gaps), (&time_s, &time_s), (&vec![], &vec![])] {
+                    let mut context = context(t, y, y);
+                    context.reference_c = Some(y);
+                    let page = report(&diagnosis, &context).expect("a report");
+                    assert!(!page.contains("NaN") && !page.contains("inf "), "{verdict:?}");
+                    assert!(page.contains("not determined") && page.contains("a &lt;b&gt;.csv"));
+                    let mut rest = page.as_str();
+                    for section in SECTIONS {
+                        let heading = format!("<h2>{section}</h2>");
+                        rest = rest.split_once(&heading).unwrap_or_else(|| panic!("{section} is out of place")).1;
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn readings_of_another_length_are_refused() {
+        let got = report(&nothing(Verdict::Refused), &context(&[0.0, 1.0], &[1.0, 2.0], &[1.0]));
+        let series = "T2 & more".into();
+        assert_eq!(got, Err(ReportError::LengthMismatch { series, quantity: "readings", expected: 2, got: 1 }));
+    }
 }

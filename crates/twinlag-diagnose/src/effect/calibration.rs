@@ -1,7 +1,8 @@
-//! Relative calibration: `y₂ = g T + o + κ (T − mean)²` in units of channel 1, with as many of the three as the data support.
+//! Relative calibration: `y₂ = g T + o` in units of channel 1, and a static curvature beside the straight line, with as many of the
+//! three as the data support.
 
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
-use crate::plant::Plant;
+use crate::plant::{Curvature, Plant};
 use std::sync::Arc;
 use twinlag_optimise::Variable;
 
@@ -26,7 +27,7 @@ enum Kind {
 struct Calibration {
     kind: Kind,
     parameters: Vec<Parameter>,
-    about_c: f64,
+    moments: [f64; 3],
     offset_k: f64,
     ratio: f64,
 }
@@ -52,9 +53,8 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
                 Kind::Both => vec![gain, offset],
                 Kind::Curved => vec![gain, offset, curvature],
             };
-            let about_c = 0.5 * (m1 + m2);
             let ratio = if m1.abs() > 1e-9 { (m2 / m1).clamp(0.5, 2.0) } else { 1.0 };
-            Arc::new(Calibration { kind, parameters, about_c, offset_k: m2 - m1, ratio }) as Shared
+            Arc::new(Calibration { kind, parameters, moments: context.moments, offset_k: m2 - m1, ratio }) as Shared
         })
         .collect()
 }
@@ -92,7 +92,7 @@ impl Effect for Calibration {
             }
         }
         if self.kind == Kind::Curved {
-            reading.curvature = Some([values[2], self.about_c]);
+            reading.curvature = Some(Curvature { per_k: values[2], moments: self.moments });
         }
     }
 
