@@ -4,7 +4,7 @@ use std::path::Path;
 
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
-use twinlag::{DiagnoseOptions, Diagnosis};
+use twinlag::{DiagnoseOptions, Diagnosis, ReportContext};
 
 use crate::arguments::{Diagnose, Talk};
 use crate::characterise::read;
@@ -29,7 +29,7 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     }
     if let Some(path) = &command.report {
         let line: Vec<String> = std::env::args().map(|a| quoted(&a)).collect();
-        let _ = (path, line); // WIRE REPORT
+        write(path, &report(&record, &answer, line.join(" "))?)?;
     }
     print::diagnosis(&answer, talk)?;
     Ok(exit_code(&answer))
@@ -44,6 +44,22 @@ pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -
 /// 0 for an answer; 4 where the data were read but do not give one.
 pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
     u8::from(answer.verdict == Verdict::Refused) * 4
+}
+
+fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String, Failure> {
+    let core = answer.core.as_deref().expect("it was made here, and not read from JSON");
+    let context = ReportContext {
+        source: record.source.clone(),
+        channels: record.channels.clone(),
+        time_s: &record.time_s,
+        t1_c: &record.t1_c,
+        t2_c: &record.t2_c,
+        reference_c: record.reference_c.as_deref(),
+        command,
+        version: answer.base.made_by.version.clone(),
+        notes: answer.base.notes.clone(),
+    };
+    Ok(twinlag::report(core, &context).map_err(twinlag::Error::from)?)
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {

@@ -12,6 +12,9 @@
 
 use crate::observations::Stretch;
 
+/// How many samples a delay may reach where they are uneven.
+pub(crate) const UNEVEN_REACH: usize = 3;
+
 /// The derivatives of each value with respect to the readings: row `k` belongs to the samples `start + k …`.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
@@ -231,11 +234,9 @@ impl Chain {
     }
 
     /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the spline's own
-    /// values between the samples. On uneven samples the mean and slope of each interval stand in.
+    /// values between the samples. On uneven samples straight lines stand in, and the reach is three.
     pub(crate) fn advance(&mut self, delay_s: f64, reach: usize) {
-        let Some(period_s) = self.period_s else {
-            return self.factor(&Along::Same(delay_s), None, None);
-        };
+        let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
         let shift = delay_s / period_s;
         let whole = shift.floor().clamp(-(reach as f64), reach as f64 - 1.0);
         let d = shift - whole;
@@ -257,6 +258,30 @@ impl Chain {
         self.rows = rows;
         self.value = new;
         self.time_s = self.time_s[reach + 1..reach + 1 + count].to_vec();
+    }
+
+    /// The mean of each interval at instants later by `delay_s`: on the straight lines between the samples.
+    fn advance_uneven(&mut self, delay_s: f64) {
+        let reach = UNEVEN_REACH;
+        let length = 2 * reach + 2;
+        let count = self.len() - length + 1;
+        let middle = |k: usize| 0.5 * (self.time_s[k + reach] + self.time_s[k + reach + 1]);
+        let mut data = vec![0.0; count * length];
+        for (k, taps) in data.chunks_exact_mut(length).enumerate() {
+            let at = middle(k) + delay_s;
+            let window = &self.time_s[k..k + length];
+            let j = window.partition_point(|t| *t <= at).clamp(1, length - 1) - 1;
+            let share = ((at - window[j]) / (window[j + 1] - window[j])).clamp(0.0, 1.0);
+            (taps[j], taps[j + 1]) = (1.0 - share, share);
+        }
+        let times = (0..count).map(middle).collect();
+        let new = data
+            .chunks_exact(length)
+            .enumerate()
+            .map(|(k, taps)| taps.iter().zip(&self.value[k..]).map(|(t, v)| t * v).sum())
+            .collect();
+        self.rows = self.rows.combine(count, length, &Taps::Each { length, data });
+        (self.value, self.time_s) = (new, times);
     }
 
     /// `v[k+1] − ρ v[k]`.

@@ -138,7 +138,12 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
             };
             (current, base) = (again(&current), again(&base));
         }
+        let is_noise = chosen.effect.is_noise();
         steps.push((chosen, ties));
+        if !is_noise && settings.known.is_empty() && is_unresolved(&current, &observations) {
+            // What imitates a time constant that is not resolved can be refined at will.
+            break;
+        }
         current = drop_needless(&search, current, &mut steps, &mut remarks);
     }
 
@@ -172,6 +177,13 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     };
     found.extend(steps.iter().enumerate().map(|(index, (tried, ties))| name(index, tried, ties, &last, &observations, &everything)));
     let left = what_is_left(&last, &last_fit, &observations, &everything, &levels);
+    if last_fit.time_constants.iter().all(|t| t.value_s.is_none()) && found.iter().any(|f| f.effect == Identifier::Delay) {
+        remarks.push(
+            "time constants and delay are not told apart: the difference is how much later channel 2 is as a whole, \
+             τ2 − τ1 + delay"
+                .into(),
+        );
+    }
     if is_refused {
         remarks.push(
             "the gas is a single tone: its amplitude and phase are two equations for two time constants, and whatever else is              missing hides in them without a trace. Take a record in which the gas changes at more than one rate"
@@ -333,6 +345,10 @@ fn drop_needless(
     remarks: &mut Vec<String>,
 ) -> Fitted {
     let mut index = 0;
+    if current.model.effects.iter().any(|e| e.is_noise()) {
+        // Weights that are those of the residual hide what made them.
+        return current;
+    }
     while steps.len() > 1 && index + 1 < steps.len() {
         let effect = &current.model.effects[index];
         if effect.is_noise() {
@@ -354,6 +370,11 @@ fn drop_needless(
         }
     }
     current
+}
+
+/// Whether a time constant is shorter than the samples tell.
+fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
+    (0..2).any(|i| !fitted.model.knows(i) && fitted.theta[i] < UNRESOLVED * observations.step_s())
 }
 
 /// Saturation and coarse converters, masked and named.
@@ -520,10 +541,18 @@ fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection
     };
     let theta = &fitted.theta;
     // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
-    let unresolved = (0..2).any(|i| !fitted.model.knows(i) && theta[i] < UNRESOLVED * observations.step_s());
+    let unresolved = is_unresolved(fitted, observations);
     let c = covariance.as_ref();
     let variance = |i: usize| c.map(|c| c[i][i]);
-    let difference = c.map(|c| c[0][0] + c[1][1] - 2.0 * c[0][1]);
+    // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
+    let delay = fitted.model.effects.iter().position(|e| e.identifier() == Identifier::Delay);
+    let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
+        Some(index) => vec![(0, -1.0), (1, 1.0), (fitted.model.range(index).start, 1.0)],
+        None => vec![(0, -1.0), (1, 1.0)],
+    };
+    let difference_value: f64 = lag.iter().map(|(i, s)| s * theta[*i]).sum();
+    let difference =
+        c.map(|c| lag.iter().map(|(i, s)| lag.iter().map(|(j, t)| s * t * c[*i][*j]).sum::<f64>()).sum::<f64>());
     let bands = Bands::of(&residual_runs);
     let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
     ModelFit {
@@ -531,7 +560,7 @@ fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection
             let out = time_constant(theta[i], variance(i), true);
             if unresolved && !fitted.model.knows(i) { TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None } } else { out }
         }),
-        difference: time_constant(theta[1] - theta[0], difference, false),
+        difference: time_constant(difference_value, difference, false),
         fit: fitted.report.clone(),
         noise_std_k: fitted.model.noise_std_k(),
         tests,

@@ -11,6 +11,7 @@ use crate::model::{Effort, Fitted, Model, Selection};
 use crate::observations::Observations;
 use crate::plant::Place;
 use crate::spectrum::{Bands, fit_noise, runs};
+use twinlag_optimise::End;
 
 /// Probability, over all candidates of a round, of taking one that is not there.
 pub(crate) const FALSE_ALARM: f64 = 1e-3;
@@ -22,6 +23,8 @@ const TIE: f64 = 10.0;
 const BESIDE_NOISE: f64 = 0.03;
 /// Energy of the residual per degree of freedom beyond which a model is far off.
 pub(crate) const FAR_OFF: f64 = 3.0;
+/// Share of the best candidate's score that a static disagreement must have to come first where none explains the record.
+const STATIC: f64 = 0.25;
 /// Energy per degree of freedom that the best of the candidates leaves, beyond which no single effect explains the record.
 const INCOMPLETE: f64 = 1.5;
 /// Candidates that are fitted to the end.
@@ -215,7 +218,10 @@ impl Search<'_> {
         let clashes = candidate.parameters().iter().any(|p| p.name == "offset" && has("offset"));
         let radiates = |id: Identifier| id == Identifier::Radiation || id == Identifier::Calibration;
         let twice = radiates(candidate.identifier()) && effects.iter().any(|e| radiates(e.identifier()));
-        !repeats && !clashes && !twice
+        // A share of the other channel is a gain and another time constant: both together are not told apart.
+        let scales = |id: Identifier| id == Identifier::Crosstalk || id == Identifier::Calibration;
+        let same = scales(candidate.identifier()) && effects.iter().any(|e| scales(e.identifier()));
+        !repeats && !clashes && !twice && !same
     }
 
     /// What a candidate would take off the energy if the residual were linear in everything, from the best of its starts.
@@ -377,7 +383,11 @@ impl Search<'_> {
             }
         }
         let count = tried.len().max(1) as f64;
-        let is_sound = |t: &Tried| t.fitted.end.is_usable() || matches!(t.fitted.end, twinlag_optimise::End::LimitReached);
+        // A time constant that is too short to be seen may lie on its bound: the effect is none the worse for it.
+        let is_sound = |t: &Tried| match &t.fitted.end {
+            End::OnBound(which) => which.iter().all(|i| *i < 2),
+            end => end.is_usable() || *end == End::LimitReached,
+        };
         let mut mean: Vec<Tried> = tried
             .iter()
             .filter(|t| !t.effect.is_noise() && is_sound(t) && Self::is_there(t))
@@ -422,7 +432,7 @@ impl Search<'_> {
                     .filter(|t| t.effect.identifier() == Identifier::Calibration)
                     .max_by(|a, b| a.score().total_cmp(&b.score()))
                     .filter(|t| {
-                        best - t.score() < TIE || (is_far_off && t.score() > 0.5 * best && t.robust_gain > 0.0)
+                        best - t.score() < TIE || (is_far_off && t.score() > STATIC * best && t.robust_gain > 0.0)
                     })
                     .cloned();
                 match (calibration, noise.first()) {

@@ -6,6 +6,8 @@ use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
 use twinlag_signal::SignalError;
 
+use twinlag_report::ReportError;
+
 /// Why a question could not be put to a record. A fit that ran is never an error: see [`crate::Status`].
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
@@ -21,6 +23,8 @@ pub enum Error {
     Noise(#[from] NoiseError),
     #[error(transparent)]
     Optimiser(#[from] ProblemError),
+    #[error(transparent)]
+    Report(#[from] ReportError),
     #[error(transparent)]
     Signal(#[from] SignalError),
     #[error("{option}: expected {expected}, got \"{got}\"")]

@@ -68,6 +68,7 @@ mod objective;
 mod options;
 mod profile;
 mod question;
+mod report;
 mod second_lag;
 mod starts;
 mod verdict;
@@ -85,6 +86,7 @@ pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
+pub use report::{ReportContext, report};
 
 pub use twinlag_bias as bias;
 pub use twinlag_cross_relation as cross_relation;

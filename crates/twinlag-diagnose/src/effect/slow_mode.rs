@@ -24,7 +24,7 @@ struct SlowMode {
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     (0..2)
         .map(|sensor| {
-            let share = Variable::linear("share", 0.01, -0.3, 0.9);
+            let share = Variable::linear("share", 0.01, -0.002, 0.9);
             let slow = Variable::logarithmic("slow time constant", context.step_s, context.span_s());
             let parameters =
                 vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];

@@ -1,0 +1,326 @@
+//! What scripts rely on in `twinlag diagnose` and in the models that it saves: the fields of schema `twinlag.diagnosis/1`, exit
+//! codes, and that no file is overwritten unasked.
+
+mod common;
+
+use common::{Answer, Bench, Gas, Trace, csv, estimates, interval, number, recovers};
+use serde_json::Value;
+
+/// 2 K on the second channel: forty times the standard error of the mean difference between the channels, and more.
+const OFFSET_K: f64 = 2.0;
+const VERDICTS: [&str; 5] = ["adequate", "explained", "partly-explained", "unexplained", "refused"];
+const EFFECTS: [&str; 15] = [
+    "calibration",
+    "second-order",
+    "slow-mode",
+    "delay",
+    "varying-time-constant",
+    "temperature-dependent-time-constant",
+    "radiation",
+    "drift",
+    "mains-pickup",
+    "coloured-noise",
+    "input-mismatch",
+    "spikes",
+    "quantisation",
+    "saturation",
+    "crosstalk",
+];
+
+fn with_offset(trace: Trace) -> String {
+    let mut rows = trace.rows();
+    rows.iter_mut().for_each(|row| row[2] += OFFSET_K);
+    csv(&rows)
+}
+
+/// A bench with a record of an offset as `run.csv` and one of the same sensors on another day as `later.csv`.
+fn offset(test: &str) -> Bench {
+    let bench = Bench::with(test, "run.csv", with_offset(Trace::GOOD));
+    bench.write("later.csv", with_offset(Trace { seed: 2, ..Trace::GOOD }));
+    bench
+}
+
+/// The object that `twinlag diagnose run.csv --json` prints; asserts that it ends with `code`.
+fn diagnosis(bench: &Bench, further: &[&str], code: i32) -> (Value, Answer) {
+    let answer = bench.run(&[&["diagnose", "run.csv", "--json"], further].concat());
+    assert_eq!(answer.code, code, "{answer:#?}");
+    // Fails for anything but one object, and for NaN and infinity in it.
+    (answer.json(), answer)
+}
+
+/// The field, which must be there even if it is null.
+fn field<'a>(value: &'a Value, name: &str) -> &'a Value {
+    value.get(name).unwrap_or_else(|| panic!("no field {name} in {value:#}"))
+}
+
+fn text<'a>(value: &'a Value, name: &str) -> &'a str {
+    field(value, name).as_str().unwrap_or_else(|| panic!("{name} is no text in {value:#}"))
+}
+
+fn list<'a>(value: &'a Value, name: &str) -> &'a [Value] {
+    field(value, name).as_array().unwrap_or_else(|| panic!("{name} is no list in {value:#}"))
+}
+
+/// The fields of a characterisation that a reader of both schemas needs.
+fn has_the_fields_of_a_characterisation(value: &Value) {
+    assert_eq!(value["schema"], "twinlag.characterisation/1", "{value:#}");
+    for name in ["record", "estimator", "optimiser", "time_constant_difference_s", "free", "residual", "status"] {
+        field(value, name);
+    }
+    assert_eq!(list(value, "sensors").len(), 2);
+    for sensor in list(value, "sensors") {
+        text(sensor, "channel");
+        for name in ["time_constant_s", "standard_error_s"] {
+            let number = field(sensor, name);
+            assert!(number.is_null() || number.as_f64().is_some_and(|n| n > 0.0), "{name}: {sensor}");
+        }
+        let both = field(sensor, "interval_95_s");
+        assert!(both.is_null() || interval(both)[0] > 0.0, "{sensor}");
+        assert!(number(field(sensor, "noise_std_K")) > 0.0, "{sensor}");
+    }
+    assert!(["ok", "at-bound", "not-identifiable", "model-rejected"].contains(&text(value, "status")));
+    list(value, "not_identifiable");
+    list(value, "warnings");
+    list(field(value, "residual"), "tests");
+}
+
+/// Every field of the example of schema `twinlag.diagnosis/1`, with its type.
+fn has_the_fields_of_a_diagnosis(value: &Value) {
+    assert_eq!(text(value, "schema"), "twinlag.diagnosis/1");
+    assert!(VERDICTS.contains(&text(value, "verdict")), "{value:#}");
+    has_the_fields_of_a_characterisation(field(value, "base"));
+    has_the_fields_of_a_characterisation(field(value, "final"));
+    for effect in list(value, "effects") {
+        assert!(EFFECTS.contains(&text(effect, "effect")), "{effect:#}");
+        assert!(field(effect, "channel").is_null() || ["T1", "T2"].contains(&text(effect, "channel")), "{effect:#}");
+        for parameter in list(effect, "parameters") {
+            text(parameter, "name");
+            text(parameter, "unit");
+            assert!(number(field(parameter, "value")).is_finite(), "{parameter}");
+            let error = field(parameter, "standard_error");
+            assert!(error.is_null() || number(error) > 0.0, "{parameter}");
+        }
+        let evidence = field(effect, "evidence");
+        if !evidence.is_null() {
+            assert!(number(field(evidence, "statistic")) > 0.0, "{evidence}");
+            assert!(field(evidence, "dof").as_u64().is_some_and(|dof| dof > 0), "{evidence}");
+            assert!((0.0..=1.0).contains(&number(field(evidence, "p_value"))), "{evidence}");
+            number(field(evidence, "held_out_gain_nats"));
+        }
+        for other in list(effect, "alternatives") {
+            assert!(EFFECTS.contains(&other.as_str().expect("a name")), "{effect:#}");
+        }
+    }
+    let error = field(value, "error");
+    for name in ["chi2_per_dof", "held_out_normalised_rms"] {
+        let both = field(error, name);
+        assert!(number(field(both, "before")) > 0.0 && number(field(both, "after")) > 0.0, "{name}: {both}");
+    }
+    field(error, "reference_rmse_K");
+    field(value, "unexplained");
+}
+
+#[test]
+fn an_offset_is_named_with_every_field_of_the_schema() {
+    let (value, answer) = diagnosis(&offset("fields"), &[], 0);
+    has_the_fields_of_a_diagnosis(&value);
+    assert_eq!(value["verdict"], "explained", "{answer:#?}");
+    let effect = &value["effects"][0];
+    assert_eq!(effect["effect"], "calibration", "{answer:#?}");
+    assert!(effect["evidence"].is_object(), "inferred, so there is evidence: {answer:#?}");
+    assert!(value["unexplained"].is_null() && value["error"]["reference_rmse_K"].is_null(), "{answer:#?}");
+    for name in ["chi2_per_dof", "held_out_normalised_rms"] {
+        let both = &value["error"][name];
+        assert!(number(&both["after"]) < number(&both["before"]), "{both}");
+    }
+    recovers(&value["final"], Trace::GOOD.tau_s);
+}
+
+/// The offset is that which was added, to four of the standard errors that are reported.
+#[test]
+fn the_offset_is_that_of_the_file() {
+    let (value, answer) = diagnosis(&offset("size"), &["--quiet"], 0);
+    let parameters = list(&value["effects"][0], "parameters");
+    let offset = parameters.iter().find(|p| p["name"] == "offset").expect("a calibration has one");
+    let (got, error) = (number(&offset["value"]), number(&offset["standard_error"]));
+    assert!((got - OFFSET_K).abs() <= 4.0 * error, "got {got}, want {OFFSET_K} ± 4 × {error}: {answer:#?}");
+    assert_eq!(answer.stderr, "", "--quiet");
+}
+
+#[test]
+fn a_record_of_two_lags_is_adequate() {
+    let bench = Bench::with("adequate", "run.csv", Trace::GOOD.csv());
+    let (value, answer) = diagnosis(&bench, &[], 0);
+    has_the_fields_of_a_diagnosis(&value);
+    assert_eq!(value["verdict"], "adequate", "{answer:#?}");
+    assert!(list(&value, "effects").is_empty() && value["unexplained"].is_null(), "{answer:#?}");
+    recovers(&value["final"], Trace::GOOD.tau_s);
+}
+
+#[test]
+fn a_single_sine_is_refused_with_its_json() {
+    let bench = Bench::with("sine", "run.csv", Trace { gas: Gas::Sine, ..Trace::GOOD }.csv());
+    let (value, answer) = diagnosis(&bench, &[], 4);
+    has_the_fields_of_a_diagnosis(&value);
+    assert_eq!(value["verdict"], "refused", "{answer:#?}");
+    assert!(list(&value, "effects").is_empty(), "{answer:#?}");
+    assert!(!list(&value, "remarks").is_empty(), "refused without a word of why: {answer:#?}");
+    assert_ne!(value["final"]["status"], "ok", "{answer:#?}");
+}
+
+/// The text says what the JSON says: verdict, effect, both time constants.
+#[test]
+fn the_text_names_verdict_and_effect() {
+    let answer = offset("text").run(&["diagnose", "run.csv"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    for word in ["explained", "calibration", "T1", "T2", "ms"] {
+        assert!(answer.stdout.contains(word), "no \"{word}\": {answer:#?}");
+    }
+    assert!(!answer.stdout.contains("NaN"), "{answer:#?}");
+}
+
+#[test]
+fn a_saved_model_characterises_a_later_record() {
+    let bench = offset("save");
+    diagnosis(&bench, &["--save", "model.json"], 0);
+    let model: Value = serde_json::from_slice(&bench.read("model.json")).expect("JSON");
+    assert_eq!(text(&model, "schema"), "twinlag.model/1");
+    assert_eq!(model["effects"][0]["effect"], "calibration", "{model:#}");
+    // Two lags alone do not explain the later record: what follows is the model's doing.
+    let plain = bench.characterise("later.csv", &[]).json();
+    assert_ne!(plain["status"], "ok", "{plain:#}");
+    let answer = bench.characterise("later.csv", &["--model", "model.json"]);
+    let value = answer.status(&["ok"]);
+    has_the_fields_of_a_characterisation(&value);
+    recovers(&value, Trace::GOOD.tau_s);
+}
+
+/// The record that made the model gives with it the time constants that the diagnosis gave. The effect is held where it was
+/// fitted along, which moves no minimum: they agree to a tenth of a standard error, which is where fits stop.
+#[test]
+fn a_saved_model_gives_its_own_record_the_same_time_constants() {
+    let bench = offset("same");
+    let (diagnosed, _) = diagnosis(&bench, &["--save", "model.json"], 0);
+    let with = bench.characterise("run.csv", &["--model", "model.json"]).status(&["ok"]);
+    for ((got, _), (want, error)) in estimates(&with).into_iter().zip(estimates(&diagnosed["final"])) {
+        assert!((got - want).abs() < 0.1 * error, "got {got}, want {want} ± 0.1 × {error}");
+    }
+}
+
+#[test]
+fn an_output_that_exists_is_kept() {
+    let bench = offset("kept");
+    for option in ["--save", "--report"] {
+        bench.write("out", "mine");
+        bench.refuses(2, &["diagnose", "run.csv", option, "out"], &["out", "exists", "--force"]);
+        assert_eq!(bench.read("out"), b"mine", "{option}");
+    }
+}
+
+#[test]
+fn an_output_that_exists_is_overwritten_by_force() {
+    let bench = offset("force");
+    bench.write("model.json", "mine");
+    diagnosis(&bench, &["--save", "model.json", "--force"], 0);
+    let model: Value = serde_json::from_slice(&bench.read("model.json")).expect("JSON");
+    assert_eq!(text(&model, "schema"), "twinlag.model/1");
+}
+
+#[test]
+fn a_model_that_cannot_be_written_is_said() {
+    let answer = offset("no_place").run(&["diagnose", "run.csv", "--save", "nowhere/model.json"]);
+    assert_eq!(answer.code, 1, "{answer:#?}");
+    answer.says(&["nowhere/model.json", "cannot be written"]);
+}
+
+#[test]
+fn an_unknown_effect_is_refused_with_the_list() {
+    let bench = offset("unknown");
+    bench.refuses(2, &["diagnose", "run.csv", "--without", "magic"], &[&["magic"], &EFFECTS[..]].concat());
+}
+
+/// Nothing else in the library imitates an offset of a tenth of the gas without a trace but drift and radiation, which
+/// `alternatives` or the verdict then say.
+#[test]
+fn an_effect_that_is_left_out_is_not_named() {
+    let (value, answer) = diagnosis(&offset("without"), &["--without", "calibration", "--without", "drift"], 0);
+    has_the_fields_of_a_diagnosis(&value);
+    for effect in list(&value, "effects") {
+        let names = [&[effect["effect"].clone()], list(effect, "alternatives")].concat();
+        assert!(!names.iter().any(|n| n == "calibration" || n == "drift"), "{answer:#?}");
+    }
+}
+
+#[test]
+fn a_model_that_cannot_be_read_is_refused() {
+    let bench = offset("bad_model");
+    let with = |model: &str, words: &[&str]| bench.refuses(3, &["characterise", "run.csv", "--model", model], words);
+    with("missing.json", &["missing.json", "cannot be read"]);
+    bench.write("text.json", "time constants: 1, 2\n");
+    with("text.json", &["text.json", "expected a model", "--save"]);
+    bench.write("other.json", r#"{"schema": "twinlag.model/1"}"#);
+    with("other.json", &["other.json", "expected a model"]);
+}
+
+/// As a program of another version would have written it.
+#[test]
+fn a_model_of_another_schema_or_effect_is_refused() {
+    let bench = offset("other_model");
+    diagnosis(&bench, &["--save", "model.json"], 0);
+    let model: Value = serde_json::from_slice(&bench.read("model.json")).expect("JSON");
+    let changed = |name: &str, change: &dyn Fn(&mut Value)| {
+        let mut model = model.clone();
+        change(&mut model);
+        bench.write(name, model.to_string());
+        bench.refuses(3, &["characterise", "run.csv", "--model", name], &[name]);
+    };
+    changed("schema.json", &|m| m["schema"] = "twinlag.model/99".into());
+    changed("effect.json", &|m| m["effects"][0]["effect"] = "magic".into());
+}
+
+/// The same for parameters that the effect does not have: the message names the effect.
+#[test]
+fn a_model_of_other_parameters_is_refused() {
+    let bench = offset("parameters");
+    diagnosis(&bench, &["--save", "model.json"], 0);
+    let mut model: Value = serde_json::from_slice(&bench.read("model.json")).expect("JSON");
+    for parameter in model["effects"][0]["parameters"].as_array_mut().expect("a list") {
+        parameter["name"] = "wrong".into();
+    }
+    bench.write("model.json", model.to_string());
+    bench.refuses(3, &["characterise", "run.csv", "--model", "model.json"], &["calibration", "version"]);
+}
+
+#[test]
+fn a_file_that_is_no_record_is_refused() {
+    Bench::with("empty", "run.csv", "").refuses(3, &["diagnose", "run.csv"], &["run.csv", "empty"]);
+    Bench::new("missing").refuses(3, &["diagnose", "run.csv"], &["run.csv", "cannot be read"]);
+}
+
+/// Standard input is as good as a file, and the numbers are the same to the last digit; so are they on one processor.
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_processors() {
+    let bench = offset("processors");
+    let (mut plain, _) = diagnosis(&bench, &[], 0);
+    let dir = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join("processors");
+    let program = env!("CARGO_BIN_EXE_twinlag");
+    let run = std::process::Command::new("taskset")
+        .args(["-c", "0", program, "diagnose", "run.csv", "--json", "--quiet"])
+        .current_dir(dir)
+        .output();
+    // A machine without `taskset`, or on which processor 0 is not ours, has nothing to compare with.
+    let Some(output) = run.ok().filter(|o| o.status.success()) else { return };
+    let mut one: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for value in [&mut plain, &mut one] {
+        ["base", "final"].iter().for_each(|part| forget_time(&mut value[*part]));
+    }
+    assert_eq!(plain, one);
+}
+
+/// Wall-clock times, the only numbers that may differ.
+fn forget_time(value: &mut Value) {
+    if let Some(fields) = value.as_object_mut() {
+        fields.retain(|name, _| !name.contains("wall") && !name.contains("elapsed") && name != "date");
+        fields.values_mut().for_each(forget_time);
+    }
+}

@@ -1,0 +1,164 @@
+//! What a diagnosis makes of records that are bad, hard or merely arranged differently: no panic, no name without cause, and
+//! the same answer for the same data.
+
+mod common;
+
+use common::{GAS_K, PERIOD_S, SAMPLES, SEED, estimate, even, found, readings, record, told, turbulence};
+use twinlag_diagnose::{DiagnoseError, Identifier, Observations, Settings, Stretch, Verdict, diagnose};
+use twinlag_signal::{Sensor, Signal, Tone};
+
+fn second_order(sensors: &mut [Sensor; 2]) {
+    sensors[1].second_time_constant_s = Some(0.018);
+}
+
+fn plain() -> [Vec<f64>; 2] {
+    let simulated = readings(SEED, turbulence(), |_| ());
+    [simulated.t1_c, simulated.t2_c]
+}
+
+fn asked(observations: &Observations) -> Result<twinlag_diagnose::Diagnosis, DiagnoseError> {
+    diagnose(observations, &Settings::default(), &|_, _, _| ())
+}
+
+/// One tone gives two equations, amplitude ratio and phase, for two time constants: no effect can be told.
+#[test]
+fn a_single_sine_is_refused_with_a_remark() {
+    let tone = Signal::Sine(Tone { amplitude_k: GAS_K, frequency_hz: 5.0, phase_rad: 0.0 });
+    let simulated = readings(SEED, tone, second_order);
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    assert_eq!(d.verdict, Verdict::Refused, "{}", told(&d));
+    assert!(d.effects.is_empty() && d.unexplained.is_none(), "{}", told(&d));
+    assert!(d.remarks.iter().any(|r| r.contains("single tone")), "{}", told(&d));
+    assert!(d.remarks.iter().all(|r| !r.contains("  ")), "a remark is one line of text: {:?}", d.remarks);
+}
+
+/// Bit by bit, while another diagnosis competes for the processors: no number may depend on which thread is first. (The same
+/// on one processor: `the_answer_does_not_depend_on_the_number_of_processors` of `twinlag-cli`.)
+#[test]
+fn the_same_record_has_the_same_diagnosis() {
+    let observations = record(SEED, second_order);
+    let (first, second) = std::thread::scope(|scope| {
+        let other = scope.spawn(|| found(&observations));
+        (found(&observations), other.join().expect("no panic"))
+    });
+    // `Debug` holds every number to the last digit, and NaN is equal to itself in it.
+    assert!(format!("{first:?}") == format!("{second:?}"), "{}\n{}", told(&first), told(&second));
+}
+
+/// Which sensor is called the first is nobody's business: the residual changes sign, and where it is whitened from. Fits stop
+/// where a step is small against the standard error: a tenth of that is far beyond.
+#[test]
+fn the_order_of_the_channels_does_not_matter() {
+    let simulated = readings(SEED, turbulence(), second_order);
+    let one = found(&even(simulated.t1_c.clone(), simulated.t2_c.clone()).expect("finite and long"));
+    let other = found(&even(simulated.t2_c, simulated.t1_c).expect("finite and long"));
+    assert_eq!(one.verdict, other.verdict, "{}\n{}", told(&one), told(&other));
+    let names = |flip: usize, d: &twinlag_diagnose::Diagnosis| -> Vec<(Identifier, Option<usize>)> {
+        d.effects.iter().map(|f| (f.effect, f.channel.map(|c| c ^ flip))).collect()
+    };
+    assert_eq!(names(0, &one), names(1, &other), "{}\n{}", told(&one), told(&other));
+    for i in 0..2 {
+        let ((a, error), (b, _)) =
+            (estimate(&one.last.time_constants[i]), estimate(&other.last.time_constants[1 - i]));
+        assert!((a - b).abs() < 0.1 * error, "got {a} and {b}, which differ by more than 0.1 × {error}");
+    }
+}
+
+/// 60 samples are what the documentation asks for.
+#[test]
+fn a_record_that_is_too_short_is_refused() {
+    let [t1_c, t2_c] = plain();
+    let part = |n: usize| even(t1_c[..n].to_vec(), t2_c[..n].to_vec());
+    assert_eq!(part(59), Err(DiagnoseError::TooShort { samples: 59, needed: 60 }));
+    assert_eq!(part(0), Err(DiagnoseError::TooShort { samples: 0, needed: 60 }));
+    // Enough to try: whatever comes is no panic, and no confident name for 60 samples of two lags.
+    if let Ok(d) = asked(&part(60).expect("as many as are needed")) {
+        assert!(d.verdict != Verdict::Explained, "{}", told(&d));
+    }
+}
+
+/// Stretches of fewer than 8 samples are left out, so that these are none at all.
+#[test]
+fn stretches_that_are_too_short_do_not_add_up() {
+    let [t1_c, t2_c] = plain();
+    let stretches = (0..100)
+        .map(|i| {
+            let range = 10 * i..10 * i + 7;
+            let time_s = range.clone().map(|k| k as f64 * PERIOD_S).collect();
+            Stretch::new(time_s, [t1_c[range.clone()].to_vec(), t2_c[range].to_vec()])
+        })
+        .collect();
+    let got = Observations::new(stretches, Some(PERIOD_S));
+    assert_eq!(got, Err(DiagnoseError::TooShort { samples: 0, needed: 60 }));
+}
+
+#[test]
+fn a_reading_that_is_no_number_is_refused() {
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for channel in 0..2 {
+            let mut readings = plain();
+            readings[channel][SAMPLES / 2] = wrong;
+            let [t1_c, t2_c] = readings;
+            assert_eq!(even(t1_c, t2_c), Err(DiagnoseError::NotFinite), "{wrong} in channel {channel}");
+        }
+    }
+}
+
+#[test]
+fn a_time_that_is_no_number_is_refused() {
+    let mut time_s: Vec<f64> = (0..SAMPLES).map(|k| k as f64 * PERIOD_S).collect();
+    time_s[SAMPLES / 2] = f64::NAN;
+    let got = Observations::new(vec![Stretch::new(time_s, plain())], None);
+    assert_eq!(got, Err(DiagnoseError::NotFinite));
+}
+
+#[test]
+fn a_channel_that_never_changes_is_refused_by_its_number() {
+    for channel in [1, 2] {
+        let mut readings = plain();
+        readings[channel - 1].fill(300.1);
+        let [t1_c, t2_c] = readings;
+        let got = asked(&even(t1_c, t2_c).expect("finite and long"));
+        assert!(matches!(got, Err(DiagnoseError::Constant { channel: c }) if c == channel), "{:?}", got.map(|d| told(&d)));
+    }
+}
+
+/// The same readings twice agree with any two time constants that are equal: there is no telling which, nor is there an effect.
+#[test]
+fn equal_channels_tell_no_time_constant_and_no_effect() {
+    let [t1_c, _] = plain();
+    let d = asked(&even(t1_c.clone(), t1_c).expect("finite and long")).expect("readings that change");
+    assert!(d.effects.is_empty() && d.verdict != Verdict::Explained, "{}", told(&d));
+    assert!(d.last.time_constants.iter().all(|t| t.value_s.is_none()), "{}", told(&d));
+}
+
+/// A record in two files is the record: the gap costs some samples, the answer stays what it was, which is nothing missing.
+#[test]
+fn a_gap_is_no_effect() {
+    let [t1_c, t2_c] = plain();
+    let stretch = |range: std::ops::Range<usize>| {
+        let time_s = range.clone().map(|k| k as f64 * PERIOD_S).collect();
+        Stretch::new(time_s, [t1_c[range.clone()].to_vec(), t2_c[range].to_vec()])
+    };
+    let stretches = vec![stretch(0..SAMPLES / 2), stretch(SAMPLES / 2 + 100..SAMPLES)];
+    let d = asked(&Observations::new(stretches, Some(PERIOD_S)).expect("finite and long")).expect("readings that change");
+    assert_eq!(d.verdict, Verdict::Adequate, "{}", told(&d));
+    common::recovers(&d.last, common::TAU_S, &told(&d));
+}
+
+/// Time has no origin.
+#[test]
+fn the_start_of_time_does_not_matter() {
+    let readings = plain();
+    let at = |start_s: f64| {
+        let time_s = (0..SAMPLES).map(|k| start_s + k as f64 * PERIOD_S).collect();
+        let stretch = Stretch::new(time_s, readings.clone());
+        found(&Observations::new(vec![stretch], Some(PERIOD_S)).expect("finite and long"))
+    };
+    let (early, late) = (at(0.0), at(1e6));
+    assert_eq!(early.verdict, late.verdict, "{}\n{}", told(&early), told(&late));
+    for (a, b) in early.last.time_constants.iter().zip(&late.last.time_constants) {
+        let ((a, error), (b, _)) = (estimate(a), estimate(b));
+        assert!((a - b).abs() < 0.1 * error, "got {a} and {b}, which differ by more than 0.1 × {error}");
+    }
+}
