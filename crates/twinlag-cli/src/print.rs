@@ -3,9 +3,9 @@
 use std::io::{Write, stdout};
 
 use serde::Serialize;
+use twinlag::diagnosis::Verdict;
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
-use twinlag::diagnosis::Verdict;
 use twinlag::{Characterisation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status};
 
 use crate::arguments::Talk;
@@ -149,7 +149,8 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     };
     let number = |x: f64| digits(x, 4);
     for i in 0..2 {
-        let tau = |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
+        let tau =
+            |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
         row(&format!("time constant {}", answer.base.sensors[i].channel), tau(&answer.base), tau(&answer.last));
         let error = |c: &Characterisation| {
             c.sensors[i].standard_error_s.map_or("-".into(), |t| format!("± {} s", digits(t, 2)))

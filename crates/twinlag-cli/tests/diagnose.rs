@@ -6,7 +6,7 @@ mod common;
 use common::{Answer, Bench, Gas, Trace, csv, estimates, interval, number, recovers};
 use serde_json::Value;
 
-/// 2 K on the second channel: forty times the standard error of the mean difference between the channels, and more.
+/// Of the second channel. Noise of 0.3 K lets 2000 samples tell 0.01 K.
 const OFFSET_K: f64 = 2.0;
 const VERDICTS: [&str; 5] = ["adequate", "explained", "partly-explained", "unexplained", "refused"];
 const EFFECTS: [&str; 15] = [
@@ -195,6 +195,31 @@ fn a_saved_model_characterises_a_later_record() {
     recovers(&value, Trace::GOOD.tau_s);
 }
 
+/// Which column is asked for as the first is the user's choice: an effect goes with the name of its channel.
+#[test]
+#[ignore = "bug: the effect goes with the place of the channel in the model, and lands on the other sensor"]
+fn a_saved_model_knows_its_channels_by_name() {
+    let bench = offset("swapped");
+    diagnosis(&bench, &["--save", "model.json"], 0);
+    let answer = bench.characterise("later.csv", &["--model", "model.json", "--t1", "T2", "--t2", "T1"]);
+    let [fast_s, slow_s] = Trace::GOOD.tau_s;
+    recovers(&answer.status(&["ok"]), [slow_s, fast_s]);
+}
+
+/// The same readings twice: neither time constant is determined, and both schemas say so by the same names.
+#[test]
+#[ignore = "bug: `not_identifiable` has \"T1 time constant\", elsewhere it is \"T1.time_constant_s\""]
+fn what_is_unknown_has_the_names_of_a_characterisation() {
+    let mut rows = Trace::GOOD.rows();
+    rows.iter_mut().for_each(|row| row[2] = row[1]);
+    let bench = Bench::with("unknown_names", "run.csv", csv(&rows));
+    let value = bench.run(&["diagnose", "run.csv", "--json"]).json();
+    for name in list(&value["final"], "not_identifiable") {
+        let name = name.as_str().expect("a text");
+        assert!(["T1.time_constant_s", "T2.time_constant_s"].contains(&name), "{name}");
+    }
+}
+
 /// The record that made the model gives with it the time constants that the diagnosis gave. The effect is held where it was
 /// fitted along, which moves no minimum: they agree to a tenth of a standard error, which is where fits stop.
 #[test]
@@ -297,7 +322,7 @@ fn a_file_that_is_no_record_is_refused() {
     Bench::new("missing").refuses(3, &["diagnose", "run.csv"], &["run.csv", "cannot be read"]);
 }
 
-/// Standard input is as good as a file, and the numbers are the same to the last digit; so are they on one processor.
+/// The numbers are the same to the last digit on one processor.
 #[test]
 fn the_answer_does_not_depend_on_the_number_of_processors() {
     let bench = offset("processors");

@@ -188,30 +188,27 @@ impl Chain {
         let times = self.times_after_factor();
         let even = self.period_s.map(|t| ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5 / t, 0.0, 0.5 / t]));
         // Weights of F and of G in value k.
-        let weights = |k: usize, j: usize| match even {
-            Some((mean, difference)) => (mean[j], difference[j]),
-            None => {
-                let step_s = self.time_s[k + 1] - self.time_s[k];
-                (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
+        let weights = |k: usize, j: usize| {
+            if let Some((mean, difference)) = even {
+                return (mean[j], difference[j]);
             }
+            let step_s = self.time_s[k + 1] - self.time_s[k];
+            (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
         };
-        let taps = match (tau_s, value, slope, even) {
-            (Along::Same(tau), None, None, Some((mean, difference))) => {
-                Taps::Same((0..3).map(|j| mean[j] + tau * difference[j]).collect())
-            }
-            _ => {
-                let mut data = Vec::with_capacity(count * length);
-                for k in 0..count {
-                    let tau = tau_s.at(k);
-                    for j in 0..length {
-                        let (mean, difference) = weights(k, j);
-                        let df = value.map_or(1.0, |f| f.derivative[k + j]);
-                        let dg = slope.map_or(1.0, |g| g.derivative[k + j]);
-                        data.push(mean * df + tau * difference * dg);
-                    }
+        let taps = if let (Along::Same(tau), None, None, Some((mean, difference))) = (tau_s, value, slope, even) {
+            Taps::Same((0..3).map(|j| mean[j] + tau * difference[j]).collect())
+        } else {
+            let mut data = Vec::with_capacity(count * length);
+            for k in 0..count {
+                let tau = tau_s.at(k);
+                for j in 0..length {
+                    let (mean, difference) = weights(k, j);
+                    let df = value.map_or(1.0, |f| f.derivative[k + j]);
+                    let dg = slope.map_or(1.0, |g| g.derivative[k + j]);
+                    data.push(mean * df + tau * difference * dg);
                 }
-                Taps::Each { length, data }
             }
+            Taps::Each { length, data }
         };
         let new = if value.is_none() && slope.is_none() {
             (0..count).map(|k| (0..length).map(|j| taps.at(k, j) * self.value[k + j]).sum()).collect()

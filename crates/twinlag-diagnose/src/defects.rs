@@ -176,17 +176,8 @@ pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[u
     }
 }
 
-/// Share of neighbours that are equal.
-pub(crate) fn repeated(observations: &Observations, channel: usize) -> f64 {
-    let (equal, all) = observations.stretches.iter().fold((0, 0), |(equal, all), s| {
-        let pairs = s.reading_c[channel].windows(2);
-        (equal + pairs.clone().filter(|w| w[0] == w[1]).count(), all + pairs.len())
-    });
-    equal as f64 / all.max(1) as f64
-}
-
 /// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
-pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Line> {
+pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<f64> {
     let Some(period_s) = observations.period_s else { return Vec::new() };
     // What does not count is zero; twice the length, so that no frequency is far from a bin.
     let Some(last) = evaluation.sample.iter().max() else { return Vec::new() };
@@ -223,13 +214,12 @@ pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds:
             }
         }
     }
-    let mut out: Vec<Line> = found
+    let mut out: Vec<(usize, f64)> = found
         .into_iter()
         .filter(|(bin, _)| !is_in_the_gas(evaluation, std::f64::consts::TAU * *bin as f64 / n as f64))
-        .map(|(bin, ratio)| Line { frequency_hz: bin as f64 / (n as f64 * period_s), ratio })
         .collect();
-    out.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
-    out
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
 }
 
 /// Whether both sensors see a line at `omega` radians per sample, as they do of the gas: what one of them alone sees is as large
@@ -246,12 +236,4 @@ fn is_in_the_gas(evaluation: &Evaluation, omega: f64) -> bool {
         re.hypot(im)
     };
     amplitude(&evaluation.disagreement_k) < 0.7 * amplitude(&evaluation.gas_c)
-}
-
-/// A line of the residual.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Line {
-    pub(crate) frequency_hz: f64,
-    /// Its power beside that of its neighbours.
-    pub(crate) ratio: f64,
 }

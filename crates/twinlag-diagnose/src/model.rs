@@ -238,10 +238,7 @@ impl Cost for Squares<'_> {
         Some(Derivatives {
             value: r.iter().map(|r| r * r).sum(),
             gradient: columns.iter().map(|c| 2.0 * dense::dot(c, &r)).collect(),
-            curvature: columns
-                .iter()
-                .map(|a| columns.iter().map(|b| 2.0 * dense::dot(a, b)).collect())
-                .collect(),
+            curvature: columns.iter().map(|a| columns.iter().map(|b| 2.0 * dense::dot(a, b)).collect()).collect(),
         })
     }
 }
@@ -287,12 +284,7 @@ impl Model {
     }
 
     /// Residual and its derivatives at a point, in units of the parameters, for the samples that count.
-    pub(crate) fn linearised(
-        &self,
-        theta: &[f64],
-        observations: &Observations,
-        selection: &Selection,
-    ) -> Linearised {
+    pub(crate) fn linearised(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> Linearised {
         let variables = self.variables(theta, observations);
         let cost = Squares { model: self, observations, selection, variables };
         let evaluation = self.evaluate(theta, observations);
@@ -317,7 +309,8 @@ impl Model {
         let products: Vec<Vec<f64>> =
             (0..p).map(|a| (0..p).map(|b| dense::dot(&lin.columns[a], &lin.columns[b])).collect()).collect();
         let scale = |i: usize| products[i][i].max(f64::MIN_POSITIVE).sqrt();
-        let slope = |lin: &Linearised| -> Vec<f64> { lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect() };
+        let slope =
+            |lin: &Linearised| -> Vec<f64> { lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect() };
         let mut second = vec![vec![0.0; p]; p];
         for i in 0..p {
             if variables[i].lower == variables[i].upper {

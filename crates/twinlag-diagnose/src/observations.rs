@@ -75,9 +75,10 @@ impl Observations {
     /// Mean time from sample to sample, s.
     pub(crate) fn step_s(&self) -> f64 {
         self.period_s.unwrap_or_else(|| {
-            let (sum, count) = self.stretches.iter().fold((0.0, 0), |(sum, count), s| {
-                (sum + s.time_s[s.len() - 1] - s.time_s[0], count + s.len() - 1)
-            });
+            let (sum, count) = self
+                .stretches
+                .iter()
+                .fold((0.0, 0), |(sum, count), s| (sum + s.time_s[s.len() - 1] - s.time_s[0], count + s.len() - 1));
             sum / count as f64
         })
     }

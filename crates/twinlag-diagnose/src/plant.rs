@@ -37,7 +37,15 @@ pub(crate) struct Reading {
 
 impl Default for Reading {
     fn default() -> Self {
-        Self { gain: 1.0, offset_k: 0.0, drift_k_per_s: 0.0, curvature: None, lines: Vec::new(), crosstalk: 0.0, crosstalk_about_c: 0.0 }
+        Self {
+            gain: 1.0,
+            offset_k: 0.0,
+            drift_k_per_s: 0.0,
+            curvature: None,
+            lines: Vec::new(),
+            crosstalk: 0.0,
+            crosstalk_about_c: 0.0,
+        }
     }
 }
 
@@ -139,8 +147,14 @@ pub(crate) struct Plant {
 impl Plant {
     /// Two first-order lags.
     pub(crate) fn new(observations: &Observations, tau_s: [f64; 2], noise_std_k: [f64; 2]) -> Self {
-        let sensor =
-            |tau_s| Sensor { reading: Reading::default(), tau_s, second_tau_s: None, slow: None, radiation: None, exponent: None };
+        let sensor = |tau_s| Sensor {
+            reading: Reading::default(),
+            tau_s,
+            second_tau_s: None,
+            slow: None,
+            radiation: None,
+            exponent: None,
+        };
         let [first_s, last_s] = observations.ends_s();
         Self {
             sensors: tau_s.map(sensor),
@@ -209,10 +223,8 @@ impl Plant {
     }
 
     fn correct(&self, chain: &mut Chain, reading: &Reading) {
-        let is_plain = reading.gain == 1.0
-            && reading.offset_k == 0.0
-            && reading.drift_k_per_s == 0.0
-            && reading.lines.is_empty();
+        let is_plain =
+            reading.gain == 1.0 && reading.offset_k == 0.0 && reading.drift_k_per_s == 0.0 && reading.lines.is_empty();
         if !is_plain {
             chain.affine(
                 |t| -reading.offset_k - reading.drift_k_per_s * (t - self.middle_s) - reading.lines_at(t),
@@ -251,10 +263,8 @@ impl Plant {
         let stretch = observations.stretches.iter().max_by_key(|s| s.len()).expect("not empty");
         let (middle, around) = (stretch.len() / 2, self.reach + 16);
         let (from, to) = (middle.saturating_sub(around), (middle + around).min(stretch.len()));
-        let cut = Stretch::new(
-            stretch.time_s[from..to].to_vec(),
-            [0, 1].map(|i| stretch.reading_c[i][from..to].to_vec()),
-        );
+        let cut =
+            Stretch::new(stretch.time_s[from..to].to_vec(), [0, 1].map(|i| stretch.reading_c[i][from..to].to_vec()));
         let Inverted { chains, gas } = self.invert(&cut, observations.period_s, true);
         let k = chains[0].len() / 2;
         let [one, two] = &chains;

@@ -3,10 +3,11 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::defects::lines;
+use crate::dense;
 use crate::diagnosis::Limit;
 use crate::effect::{Context, Identifier, Shared, candidates};
 use crate::held_out::held_out_gain;
-use crate::dense;
 use crate::model::{Effort, Fitted, Model, Selection};
 use crate::observations::Observations;
 use crate::plant::Place;
@@ -79,17 +80,24 @@ impl Search<'_> {
         Bands::of(&runs(&evaluation, |s| self.selection.holds(s)))
     }
 
+    /// What candidates are made from, as `current` shows it.
+    pub(crate) fn look(&mut self, current: &Fitted) {
+        self.context.tau_s = [current.theta[0], current.theta[1]];
+        let evaluation = current.model.evaluate(&current.theta, self.observations);
+        self.context.lines_hz = lines(self.observations, &evaluation, |s| self.selection.holds(s));
+    }
+
     fn robust(&self, fitted: &Fitted) -> f64 {
         self.bands(fitted).robust(|omega| self.selection.weighting.at(omega))
     }
 
     /// The best fit of the model without effects, from a grid of time constants.
     pub(crate) fn base(&self, model: &Model) -> Fitted {
-        self.from_grid(model, &[], 3)
+        self.over_grid(model, &[], 3)
     }
 
     /// The best fit with effect values as given, from the best points of a grid of time constants.
-    pub(crate) fn from_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
+    pub(crate) fn over_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
         let step_s = self.context.step_s;
         let span_s = self.context.span_s();
         let (low, high) = (1.5 * step_s, 0.1 * span_s);
@@ -151,12 +159,13 @@ impl Search<'_> {
     pub(crate) fn try_all(&self, current: &Fitted, thorough: bool) -> Vec<Tried> {
         let all: Vec<Shared> = candidates(&self.context)
             .into_iter()
-            .filter(|c| self.allowed.contains(&c.identifier()) && self.is_new(current, c))
+            .filter(|c| self.allowed.contains(&c.identifier()) && Self::is_new(current, c))
             .collect();
         let robust_before = self.robust(current);
         let promises = self.in_parallel(&all, |effect| {
             let is_line = effect.identifier() == Identifier::MainsPickup;
-            let promise = if effect.is_noise() || is_line || thorough { f64::INFINITY } else { self.promise(current, effect) };
+            let promise =
+                if effect.is_noise() || is_line || thorough { f64::INFINITY } else { self.promise(current, effect) };
             let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
             Some((promise > least).then_some(promise))
         });
@@ -181,12 +190,16 @@ impl Search<'_> {
             let fitted = model.fit(&tried.fitted.theta, self.observations, self.selection, Effort::Finish);
             let robust = self.robust(&fitted);
             let (gain, robust_gain) = self.gains(current, &fitted, &tried.effect, robust_before - robust);
-            Some(Tried { gain, robust_gain, fitted, ..tried.clone() })
+            Some(Tried { fitted, gain, robust_gain, ..tried.clone() })
         });
         finished.into_iter().flatten().chain(noise).collect()
     }
 
-    fn in_parallel<T: Sync, R: Send + Clone>(&self, items: &[T], work: impl Fn(&T) -> Option<R> + Sync) -> Vec<Option<R>> {
+    fn in_parallel<T: Sync, R: Send + Clone>(
+        &self,
+        items: &[T],
+        work: impl Fn(&T) -> Option<R> + Sync,
+    ) -> Vec<Option<R>> {
         let next = AtomicUsize::new(0);
         let done = AtomicUsize::new(0);
         let results: Mutex<Vec<Option<R>>> = Mutex::new(vec![None; items.len()]);
@@ -208,7 +221,7 @@ impl Search<'_> {
     }
 
     /// Whether the model lacks the candidate, and can take it.
-    fn is_new(&self, current: &Fitted, candidate: &Shared) -> bool {
+    fn is_new(current: &Fitted, candidate: &Shared) -> bool {
         let effects = &current.model.effects;
         let has = |name: &str| current.model.parameters().any(|p| p.name == name);
         let repeats = effects.iter().any(|e| {
@@ -237,7 +250,8 @@ impl Search<'_> {
                 lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect();
             let slope: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
             // Where it is singular, along the diagonal: less than it could take off, but no more than it can.
-            let taken = dense::inverse(&matrix).map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
+            let taken =
+                dense::inverse(&matrix).map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
             current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
         };
         let promise = effect.starts().iter().map(of).fold(0.0, f64::max);
@@ -252,7 +266,7 @@ impl Search<'_> {
     pub(crate) fn limits(&self, current: &Fitted) -> Vec<Limit> {
         let all: Vec<Shared> = candidates(&self.context)
             .into_iter()
-            .filter(|c| self.allowed.contains(&c.identifier()) && self.is_new(current, c) && !c.is_noise())
+            .filter(|c| self.allowed.contains(&c.identifier()) && Self::is_new(current, c) && !c.is_noise())
             .filter(|c| !c.neutral().is_empty())
             .collect();
         let count = all.len().max(1) as f64;
@@ -308,7 +322,7 @@ impl Search<'_> {
             theta.extend_from_slice(&rest);
             let mut fits = vec![model.fit(&theta, self.observations, self.selection, Effort::Look)];
             if thorough && effect.parameters().len() <= 3 {
-                fits.push(self.from_grid_quickly(&model, &rest));
+                fits.push(self.over_grid_quickly(&model, &rest));
             }
             for fit in fits {
                 if best.as_ref().is_none_or(|b| fit.chi2 < b.chi2) {
@@ -329,7 +343,7 @@ impl Search<'_> {
         }
     }
 
-    fn from_grid_quickly(&self, model: &Model, rest: &[f64]) -> Fitted {
+    fn over_grid_quickly(&self, model: &Model, rest: &[f64]) -> Fitted {
         let (excerpt, selection) = &self.excerpt;
         let (low, high) = (2.0 * self.context.step_s, 0.03 * self.context.span_s());
         let points = 5;
@@ -379,7 +393,18 @@ impl Search<'_> {
     pub(crate) fn choose(&self, current: &Fitted, tried: &[Tried]) -> Option<(Tried, Vec<Tried>)> {
         if std::env::var_os("TWINLAG_TRACE").is_some() {
             for t in tried {
-                eprintln!("   {:36} {:?} added {:2} gain {:10.1} robust {:9.1} chi2 {:9.4} end {:?} {:?} {:?}", t.effect.identifier().name(), t.effect.channel(), t.added, t.gain, t.robust_gain, t.fitted.mean_energy(), t.fitted.end, &t.fitted.theta[..2], &t.fitted.theta[t.fitted.theta.len() - t.added..][..t.added.min(3)]);
+                eprintln!(
+                    "   {:36} {:?} added {:2} gain {:10.1} robust {:9.1} chi2 {:9.4} end {:?} {:?} {:?}",
+                    t.effect.identifier().name(),
+                    t.effect.channel(),
+                    t.added,
+                    t.gain,
+                    t.robust_gain,
+                    t.fitted.mean_energy(),
+                    t.fitted.end,
+                    &t.fitted.theta[..2],
+                    &t.fitted.theta[t.fitted.theta.len() - t.added..][..t.added.min(3)]
+                );
             }
         }
         let count = tried.len().max(1) as f64;

@@ -9,8 +9,8 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 
-use crate::plant::{Evaluation, Extra, Place, Plant};
 use crate::observations::Observations;
+use crate::plant::{Evaluation, Extra, Place, Plant};
 
 /// Longest block, samples.
 const LONGEST_BLOCK: usize = 1024;
@@ -239,7 +239,8 @@ pub(crate) fn fit_noise(
     let [first, last] = observations.ends_s();
     let solve = |half: Half| -> (Vec<f64>, f64) {
         let cost = NoiseCost { bands, paths: &paths, base: &base, place, half };
-        let mut variables = vec![Variable::logarithmic("level 1", 0.2, 5.0), Variable::logarithmic("level 2", 0.2, 5.0)];
+        let mut variables =
+            vec![Variable::logarithmic("level 1", 0.2, 5.0), Variable::logarithmic("level 2", 0.2, 5.0)];
         let mut all = vec![vec![1.0, 1.0]];
         if place.is_some() {
             let swing = observations.swing_k();

@@ -16,8 +16,7 @@ impl Spline {
         coefficients.extend_from_slice(free);
         let mut out = Self { from_s, to_s, coefficients, mean: 0.0 };
         let points = 40 * out.coefficients.len();
-        let total: f64 =
-            (0..points).map(|i| out.at(from_s + (to_s - from_s) * (i as f64 + 0.5) / points as f64)).sum();
+        let total: f64 = (0..points).map(|i| out.at(from_s + (to_s - from_s) * (i as f64 + 0.5) / points as f64)).sum();
         out.mean = total / points as f64;
         out
     }

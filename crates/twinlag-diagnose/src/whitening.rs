@@ -70,8 +70,11 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
     let band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
     let stride = band + 1;
     let is_same = sources.iter().all(|s| s.rows.is_same() && s.variance.is_same());
-    let fixed: Vec<f64> =
-        if is_same && u.len() > band { (0..stride).map(|lag| covariance(sources, band, lag)).collect() } else { Vec::new() };
+    let fixed: Vec<f64> = if is_same && u.len() > band {
+        (0..stride).map(|lag| covariance(sources, band, lag)).collect()
+    } else {
+        Vec::new()
+    };
     let mut residual = Vec::with_capacity(u.len());
     let mut diagonal = Vec::with_capacity(u.len());
     let mut log_determinant = 0.0;
@@ -89,7 +92,8 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
                     let other = if lag == 0 { row[older] } else { recent[(lag - 1) * stride + older - lag] };
                     entry -= row[older] * other;
                 }
-                row[lag] = if lag == 0 { entry.max(f64::MIN_POSITIVE).sqrt() } else { entry / recent[(lag - 1) * stride] };
+                row[lag] =
+                    if lag == 0 { entry.max(f64::MIN_POSITIVE).sqrt() } else { entry / recent[(lag - 1) * stride] };
             }
             let agrees = !fixed.is_empty()
                 && k > band

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::Parameter;
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, Limit, ModelFit, Observations, Settings,
-    Stretch, TimeConstant, Unexplained, Value, Verdict,
+    BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, Limit, ModelFit,
+    Observations, Settings, Stretch, TimeConstant, Unexplained, Value, Verdict,
 };
 use twinlag_record::{Record, SamplingKind};
 
@@ -144,11 +144,7 @@ impl Diagnosis {
             effects: self
                 .effects
                 .iter()
-                .map(|e| ModelEffect {
-                    effect: e.effect,
-                    channel: e.channel.clone(),
-                    parameters: e.parameters.clone(),
-                })
+                .map(|e| ModelEffect { effect: e.effect, channel: e.channel.clone(), parameters: e.parameters.clone() })
                 .collect(),
             made_by: self.last.made_by.clone(),
         }

@@ -45,8 +45,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
             );
             let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.01, 0.2, 5.0));
             let bend = 0.3 / (4.0 * context.swing_k);
-            let curvature =
-                Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-3 * bend, -bend, bend));
+            let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-3 * bend, -bend, bend));
             let parameters = match kind {
                 Kind::Offset => vec![offset],
                 Kind::Gain => vec![gain],

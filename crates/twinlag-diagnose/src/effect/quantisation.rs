@@ -1,7 +1,6 @@
 //! A converter coarser than the noise: its steps are noise of `q/√12`, and the level is at least that.
 
-use crate::effect::{About, Effect, Identifier, Parameter};
-use crate::plant::Plant;
+use crate::effect::About;
 
 pub(crate) const ABOUT: About = About {
     name: "quantisation",
@@ -10,32 +9,3 @@ pub(crate) const ABOUT: About = About {
     confusable: &[],
     unseen: "changes smaller than a step that last shorter than the signal needs to cross one",
 };
-
-/// Rounding to coarse steps.
-pub(crate) struct Quantisation {
-    pub(crate) channel: usize,
-}
-
-impl Effect for Quantisation {
-    fn identifier(&self) -> Identifier {
-        Identifier::Quantisation
-    }
-
-    fn channel(&self) -> Option<usize> {
-        Some(self.channel)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &[]
-    }
-
-    fn starts(&self) -> Vec<Vec<f64>> {
-        vec![Vec::new()]
-    }
-
-    fn install(&self, _values: &[f64], _plant: &mut Plant) {}
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        Vec::new()
-    }
-}

@@ -23,11 +23,7 @@ struct SecondOrder {
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     (0..2)
         .map(|sensor| {
-            let variable = Variable::logarithmic(
-                "second time constant",
-                0.02 * context.step_s,
-                0.3 * context.span_s(),
-            );
+            let variable = Variable::logarithmic("second time constant", 0.02 * context.step_s, 0.3 * context.span_s());
             let parameters = vec![Parameter::new("second_time_constant", "s", variable)];
             let tau_s = context.tau_s[sensor].clamp(context.step_s, 0.1 * context.span_s());
             Arc::new(SecondOrder { sensor, parameters, tau_s, step_s: context.step_s }) as Shared

@@ -26,8 +26,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
         .map(|sensor| {
             let share = Variable::linear("share", 0.01, -0.002, 0.9);
             let slow = Variable::logarithmic("slow time constant", context.step_s, context.span_s());
-            let parameters =
-                vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];
+            let parameters = vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];
             let tau_s = context.tau_s[0].max(context.tau_s[1]).clamp(context.step_s, 0.03 * context.span_s());
             Arc::new(SlowMode { sensor, parameters, tau_s, span_s: context.span_s() }) as Shared
         })

@@ -1,0 +1,158 @@
+//! What is said of effects, of what is left over, and of what cannot be known.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use twinlag_cross_relation::ResidualTest;
+
+use crate::diagnosis::{Evidence, Found, ModelFit, Unexplained, Value};
+use crate::effect::{Effect, Identifier};
+use crate::model::{Effort, Fitted, Selection};
+use crate::observations::Observations;
+use crate::search::Tried;
+use crate::summary::{LEFT_OVER, Z_975, covariance};
+
+/// An effect with its numbers.
+pub(crate) fn name(
+    index: usize,
+    tried: &Tried,
+    ties: &[Tried],
+    last: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+) -> Found {
+    let effect: &dyn Effect = tried.effect.as_ref();
+    let covariance = if effect.is_noise() { None } else { covariance(last, observations, selection, false) };
+    let range = last.model.range(index);
+    let scale = last.mean_energy().max(1.0);
+    let mut parameters: Vec<Value> = effect
+        .parameters()
+        .iter()
+        .zip(range.clone())
+        .map(|(p, i)| {
+            let se = covariance.as_ref().map(|c| (c[i][i] * scale).sqrt()).filter(|s| *s > 0.0 && s.is_finite());
+            let value = last.theta[i];
+            Value {
+                name: p.name.into(),
+                value,
+                standard_error: se,
+                interval_95: se.map(|se| [value - Z_975 * se, value + Z_975 * se]),
+                unit: p.unit.into(),
+            }
+        })
+        .collect();
+    parameters.extend(effect.derived().into_iter().map(|d| Value {
+        name: d.name.into(),
+        value: (d.of)(&last.theta[range.clone()], effect),
+        standard_error: None,
+        interval_95: None,
+        unit: d.unit.into(),
+    }));
+    let mut alternatives: Vec<Identifier> = ties.iter().map(|t| t.effect.identifier()).collect();
+    alternatives.sort_unstable();
+    alternatives.dedup();
+    Found {
+        effect: effect.identifier(),
+        channel: effect.channel(),
+        parameters,
+        evidence: Some(Evidence {
+            statistic: tried.gain,
+            dof: tried.added,
+            p_value: tail(tried.added, tried.gain),
+            held_out_gain_nats: tried.held_out_nats,
+            robust_statistic: (!effect.is_noise()).then_some(tried.robust_gain),
+        }),
+        alternatives,
+        seen: None,
+    }
+}
+
+fn tail(dof: usize, statistic: f64) -> f64 {
+    ChiSquared::new(dof.max(1) as f64).map_or(1.0, |c| c.sf(statistic.max(0.0)))
+}
+
+/// Intervals of both time constants that hold whichever of the tied effects is the right one.
+pub(crate) fn widen(
+    fit: &mut ModelFit,
+    ties: &[Tried],
+    observations: &Observations,
+    selection: &Selection,
+    remarks: &mut Vec<String>,
+) {
+    let mut widened = Vec::new();
+    for tie in ties {
+        let other = tie.fitted.model.fit(&tie.fitted.theta, observations, selection, Effort::Finish);
+        let Some(covariance) = covariance(&other, observations, selection, false) else { continue };
+        for i in 0..2 {
+            let (value, se) = (other.theta[i], covariance[i][i].max(0.0).sqrt());
+            let Some([low, high]) = &mut fit.time_constants[i].interval_95_s else { continue };
+            if se > 0.0 && se < 0.5 * value {
+                let f = (Z_975 * se / value).exp();
+                if value / f < 0.999 * *low || value * f > 1.001 * *high {
+                    widened.push(tie.effect.identifier().name());
+                }
+                (*low, *high) = (low.min(value / f), high.max(value * f));
+            }
+        }
+    }
+    widened.sort_unstable();
+    widened.dedup();
+    if !widened.is_empty() {
+        remarks.push(format!(
+            "the intervals of the time constants hold for the alternatives as well ({}), which put them elsewhere",
+            widened.join(", ")
+        ));
+    }
+}
+
+/// What no record of two sensors tells, and what this one does not.
+pub(crate) fn not_testable(observations: &Observations) -> Vec<String> {
+    let mut out = vec![
+        "anything that both sensors share: gain, offset, drift, delay, a second lag, a slow mode, radiation".to_owned(),
+        "crosstalk that takes the place of a part of the reading: it is a wrong time constant and nothing else"
+            .to_owned(),
+        "which channel picks up a line that only one of them has".to_owned(),
+    ];
+    if observations.period_s.is_none() {
+        out.push("coloured noise, input mismatch and lines: these take evenly spaced samples".to_owned());
+    }
+    out
+}
+
+/// What is left, if more than noise is.
+pub(crate) fn what_is_left(fit: &ModelFit) -> Option<Unexplained> {
+    let fails: Vec<&ResidualTest> = fit.tests.iter().filter(|t| t.p_value < LEFT_OVER).collect();
+    if fails.is_empty() {
+        return None;
+    }
+    let worst_band = fit
+        .trace
+        .bands
+        .iter()
+        .max_by(|a, b| ((a[1] - 1.0) * a[2]).total_cmp(&((b[1] - 1.0) * b[2])))
+        .copied()
+        .unwrap_or([0.0, 1.0, 1.0]);
+    let n = fit.trace.residual.len();
+    let tenth = (n / 10).max(1);
+    let worst_time = fit
+        .trace
+        .residual
+        .chunks(tenth)
+        .enumerate()
+        .max_by(|a, b| energy(a.1).total_cmp(&energy(b.1)))
+        .map(|(i, chunk)| [fit.trace.time_s[i * tenth], fit.trace.time_s[i * tenth + chunk.len() - 1]]);
+    let names: Vec<&str> = fails.iter().map(|t| t.test.as_str()).collect();
+    Some(Unexplained {
+        description: format!(
+            "the residual is not noise ({}): most of what is too much lies around {:.4} Hz, {:.2} times the noise there",
+            names.join(", "),
+            worst_band[0],
+            worst_band[1]
+        ),
+        band_hz: Some([worst_band[0] / 1.19_f64.sqrt(), worst_band[0] * 1.19_f64.sqrt()]),
+        energy_ratio: worst_band[1],
+        worst_s: worst_time,
+    })
+}
+
+fn energy(chunk: &[f64]) -> f64 {
+    chunk.iter().map(|r| r * r).sum::<f64>() / chunk.len().max(1) as f64
+}

@@ -1,0 +1,201 @@
+//! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
+
+use crate::defects::{self, Levels};
+use crate::diagnosis::Found;
+use crate::effect::{Context, Identifier};
+use crate::error::DiagnoseError;
+use crate::model::{Effort, Fitted, Model, Selection};
+use crate::observations::Observations;
+use crate::plant::reach;
+use crate::search::Search;
+use crate::settings::{Settings, Watch};
+use crate::weighting::Weighting;
+
+/// Blocks along the record, of which every eighth is kept for the judgement at the end.
+const BLOCKS: usize = 80;
+/// Samples of an excerpt for a quick look.
+const EXCERPT: usize = 4000;
+/// Robust standard deviations beyond which a single reading is wrong, and where others are.
+const SPIKE: f64 = 6.0;
+const SPIKE_AMONG_OTHERS: f64 = 4.5;
+
+/// A record with its defects masked, and the two-lag model of it.
+pub(crate) struct Prepared {
+    pub(crate) observations: Observations,
+    pub(crate) levels: Levels,
+    pub(crate) context: Context,
+    /// Defects of the data.
+    pub(crate) found: Vec<Found>,
+    /// Residuals of the whole record.
+    pub(crate) everything: Selection,
+    /// Those without the blocks that judge.
+    pub(crate) searched: Selection,
+}
+
+impl Prepared {
+    /// The record with saturation and coarse steps dealt with.
+    pub(crate) fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
+        for i in 0..2 {
+            if observations.mean_and_std(i)[1] <= 0.0 {
+                return Err(DiagnoseError::Constant { channel: i + 1 });
+            }
+        }
+        let mut observations = observations.clone();
+        let samples = observations.samples();
+        let mut levels = defects::levels(&observations).ok_or(DiagnoseError::TooShort { samples, needed: 60 })?;
+        if let Some(std_k) = settings.noise_std_k {
+            levels.std_k = std_k;
+            levels.log_error = [0.0; 2];
+        }
+        let found = data_defects(&mut observations, &levels, &settings.effects);
+        let weighting = Weighting::of(&observations, levels.std_k);
+        Ok(Self {
+            everything: selection(&observations, false, &weighting),
+            searched: selection(&observations, true, &weighting),
+            context: context(&observations, &levels),
+            observations,
+            levels,
+            found,
+        })
+    }
+
+    /// The two-lag model, isolated wrong readings, which show once there is one, masked.
+    pub(crate) fn base(&mut self, settings: &Settings, watch: Watch<'_>) -> Fitted {
+        let model = Model::new(&settings.known, self.levels.std_k);
+        let mut base = self.search(settings, watch).base(&model);
+        if settings.effects.contains(&Identifier::Spikes) && self.mask_spikes(&base) {
+            base = self.search(settings, watch).base(&model);
+        }
+        if !self.found.is_empty() {
+            self.find_levels(&base, settings);
+            base = self.refit(&base);
+        }
+        base
+    }
+
+    fn mask_spikes(&mut self, base: &Fitted) -> bool {
+        let evaluation = base.model.plant(&base.theta, &self.observations).whitened(&self.observations, true);
+        let mut counts = [0; 2];
+        for far in [SPIKE, SPIKE_AMONG_OTHERS] {
+            let spikes = defects::spikes(&self.observations, &evaluation, far);
+            for i in 0..2 {
+                // Where there are some there are smaller ones.
+                if far == SPIKE || counts[i] > 0 {
+                    defects::mask(&mut self.observations, i, &spikes[i]);
+                    counts[i] += spikes[i].len();
+                }
+            }
+        }
+        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
+            self.found.push(defect(Identifier::Spikes, i, format!("{count} single readings")));
+        }
+        counts != [0; 2]
+    }
+
+    /// Levels again, without what is masked and without the lines of `fitted`, unless they were given.
+    pub(crate) fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
+        let found = defects::levels(&fitted.model.without_lines(&fitted.theta, &self.observations));
+        if let (None, Some(found)) = (settings.noise_std_k, found) {
+            self.levels = Levels { coarse_step_k: self.levels.coarse_step_k, ..found };
+        }
+    }
+
+    /// The same model with the levels that there are now.
+    pub(crate) fn refit(&self, fitted: &Fitted) -> Fitted {
+        let model = fitted.model.clone().with_noise(self.levels.std_k);
+        model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Finish)
+    }
+
+    pub(crate) fn search<'a>(&'a self, settings: &'a Settings, watch: Watch<'a>) -> Search<'a> {
+        let excerpt = self.observations.excerpt(EXCERPT, 8);
+        let whole = selection(&excerpt, false, &self.searched.weighting);
+        Search {
+            observations: &self.observations,
+            selection: &self.searched,
+            context: self.context.clone(),
+            allowed: &settings.effects,
+            watch,
+            excerpt: (excerpt, whole),
+        }
+    }
+
+    /// Whether a sample is of the blocks that judge.
+    pub(crate) fn judges(&self, sample: usize) -> bool {
+        self.everything.holds(sample) && is_judge(sample, self.observations.samples())
+    }
+}
+
+/// Saturation and coarse converters, masked and named.
+fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Identifier]) -> Vec<Found> {
+    let mut out = Vec::new();
+    if allowed.contains(&Identifier::Saturation) {
+        let counts = defects::mask_saturation(observations, levels.coarse_step_k);
+        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
+            out.push(defect(Identifier::Saturation, i, format!("{count} readings at an end of the range")));
+        }
+    }
+    if allowed.contains(&Identifier::Quantisation) {
+        for i in 0..2 {
+            if let Some(step_k) = levels.coarse_step_k[i] {
+                out.push(defect(Identifier::Quantisation, i, format!("steps of {step_k:.4} K")));
+            }
+        }
+    }
+    out
+}
+
+fn defect(effect: Identifier, channel: usize, seen: String) -> Found {
+    Found {
+        effect,
+        channel: Some(channel),
+        parameters: Vec::new(),
+        evidence: None,
+        alternatives: Vec::new(),
+        seen: Some(seen),
+    }
+}
+
+pub(crate) fn is_judge(sample: usize, samples: usize) -> bool {
+    (sample * BLOCKS / samples.max(1)) % 8 == 4
+}
+
+/// All residuals away from the ends; without the blocks that judge, and their surroundings, if these are to be kept.
+fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weighting) -> Selection {
+    let samples = observations.samples();
+    let margin = 8 + reach(samples) + weighting.half();
+    let gap = (samples / BLOCKS / 10).min(20);
+    let mut counts = vec![true; samples];
+    let mut first = 0;
+    for stretch in &observations.stretches {
+        let n = stretch.len();
+        // Every model of a stretch has residuals for these, whatever factors it needs.
+        let inside = if n > 4 * margin { margin..n - margin } else { n / 8 + 1..n - n / 8 - 1 };
+        for k in (0..n).filter(|k| !inside.contains(k)) {
+            counts[first + k] = false;
+        }
+        first += n;
+    }
+    if keeps_judges {
+        for (k, counts) in counts.iter_mut().enumerate() {
+            let near = [k.saturating_sub(gap), k, (k + gap).min(samples - 1)];
+            *counts &= !near.iter().any(|s| is_judge(*s, samples));
+        }
+    }
+    Selection { counts, weighting: weighting.clone() }
+}
+
+fn context(observations: &Observations, levels: &Levels) -> Context {
+    let step_s = observations.step_s();
+    Context {
+        ends_s: observations.ends_s(),
+        step_s,
+        is_even: observations.period_s.is_some(),
+        samples: observations.samples(),
+        mean_c: [0, 1].map(|i| observations.mean_and_std(i)[0]),
+        moments: observations.moments(),
+        swing_k: observations.swing_k(),
+        noise_std_k: levels.std_k,
+        tau_s: [10.0 * step_s; 2],
+        lines_hz: Vec::new(),
+    }
+}

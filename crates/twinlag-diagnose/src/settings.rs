@@ -1,0 +1,35 @@
+//! What a diagnosis may assume.
+
+use crate::effect::Identifier;
+use crate::model::KnownTimeConstant;
+
+/// What a diagnosis may assume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Noise of the channels, K; found from the data if left out.
+    pub noise_std_k: Option<[f64; 2]>,
+    /// What is known of the time constants.
+    pub known: Vec<KnownTimeConstant>,
+    /// Effects that may be named.
+    pub effects: Vec<Identifier>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { noise_std_k: None, known: Vec::new(), effects: Identifier::ALL.to_vec() }
+    }
+}
+
+/// An effect as it was found in another record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownEffect {
+    /// Which.
+    pub effect: Identifier,
+    /// Channel, 0 or 1; `None` where it is of both, or relative.
+    pub channel: Option<usize>,
+    /// Its parameters by name.
+    pub parameters: Vec<(String, f64)>,
+}
+
+/// Told how far a diagnosis has come: what it is doing, how much of that is done, of how much.
+pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
