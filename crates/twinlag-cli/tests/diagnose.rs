@@ -195,26 +195,31 @@ fn a_saved_model_characterises_a_later_record() {
     recovers(&value, Trace::GOOD.tau_s);
 }
 
-/// Which column is asked for as the first is the user's choice: an effect goes with the name of its channel.
+/// Which column is asked for as the first is the user's choice: an effect goes with the name of its channel. Where it cannot
+/// (a calibration is that of the second channel), the model is refused, not put on the other sensor.
 #[test]
 #[ignore = "bug: the effect goes with the place of the channel in the model, and lands on the other sensor"]
 fn a_saved_model_knows_its_channels_by_name() {
     let bench = offset("swapped");
     diagnosis(&bench, &["--save", "model.json"], 0);
     let answer = bench.characterise("later.csv", &["--model", "model.json", "--t1", "T2", "--t2", "T1"]);
+    if answer.code == 3 {
+        answer.says(&["model.json", "T2"]);
+        return;
+    }
     let [fast_s, slow_s] = Trace::GOOD.tau_s;
     recovers(&answer.status(&["ok"]), [slow_s, fast_s]);
 }
 
-/// The same readings twice: neither time constant is determined, and both schemas say so by the same names.
+/// Nothing but noise: neither time constant is determined, and both schemas say so by the same names.
 #[test]
 #[ignore = "bug: `not_identifiable` has \"T1 time constant\", elsewhere it is \"T1.time_constant_s\""]
 fn what_is_unknown_has_the_names_of_a_characterisation() {
-    let mut rows = Trace::GOOD.rows();
-    rows.iter_mut().for_each(|row| row[2] = row[1]);
-    let bench = Bench::with("unknown_names", "run.csv", csv(&rows));
+    let bench = Bench::with("unknown_names", "run.csv", Trace { gas: Gas::Still, ..Trace::GOOD }.csv());
     let value = bench.run(&["diagnose", "run.csv", "--json"]).json();
-    for name in list(&value["final"], "not_identifiable") {
+    let unknown = list(&value["final"], "not_identifiable");
+    assert!(!unknown.is_empty(), "{value:#}");
+    for name in unknown {
         let name = name.as_str().expect("a text");
         assert!(["T1.time_constant_s", "T2.time_constant_s"].contains(&name), "{name}");
     }

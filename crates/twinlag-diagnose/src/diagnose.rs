@@ -182,8 +182,8 @@ impl State {
     }
 }
 
-/// Both time constants of `observations` with `effects` as they are in the model; defects of the data are dealt with as in
-/// [`diagnose`].
+/// Both time constants of `observations` with `effects` as they are in the model; saturation and coarse steps are dealt with as
+/// in [`diagnose`], isolated wrong readings are not looked for.
 ///
 /// # Errors
 /// As [`diagnose`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.

@@ -1,6 +1,6 @@
 //! Judgement on blocks that a fit has not seen.
 //!
-//! A fit without one block is, to first order, `θ − (JᵀJ − J_bᵀJ_b)⁻¹ J_bᵀ r_b` away from the fit of all: one linearisation
+//! A fit without one block is, to first order, `θ + (JᵀJ − J_bᵀJ_b)⁻¹ J_bᵀ r_b`, seen from the fit of all: one linearisation
 //! gives the residual of every block as a fit without it would leave it. Residuals next to a block, which share readings with it,
 //! are in neither.
 

@@ -287,6 +287,8 @@ impl Plant {
                     variance: mask(variance, &stretch.masked[i], observations.swing_k()),
                 });
             }
+            // What the sensors imply, before the differences that whiten extra noise.
+            let inferred = chains.clone();
             // Innovations of the extra noise, before the difference that makes them of it.
             let mut extra_rows: Vec<Rows> = Vec::new();
             for (index, extra) in self.extra.iter().enumerate() {
@@ -339,14 +341,16 @@ impl Plant {
             out.begins.push(out.sample.len());
             out.sample.extend((0..count).map(|k| first_sample + start + k));
             out.time_s.extend_from_slice(&one.time_s);
-            out.gas_c.extend(one.value.iter().zip(&two.value).map(|(a, b)| 0.5 * (a + b)));
-            out.disagreement_k.extend_from_slice(&u);
+            let skipped = self.extra.len();
+            let [c1, c2] = [0, 1].map(|i| &inferred[i].value[skipped..skipped + count]);
+            out.gas_c.extend(c1.iter().zip(c2).map(|(a, b)| 0.5 * (a + b)));
+            out.disagreement_k.extend(c1.iter().zip(c2).map(|(a, b)| a - b));
             out.residual.extend_from_slice(&whitened.residual);
             let typical = median(&whitened.diagonal);
             out.is_informed.extend(whitened.diagonal.iter().map(|d| *d < UNINFORMED * typical));
             out.log_determinant += whitened.log_determinant;
             if keep {
-                out.parts.push(Part { sources, whitened, inferred_c: [one.value, two.value], first_sample });
+                out.parts.push(Part { sources, whitened, inferred, skipped, first_sample });
             }
             first_sample += stretch.len();
         }
@@ -426,7 +430,10 @@ pub(crate) struct Evaluation {
 pub(crate) struct Part {
     pub(crate) sources: Vec<Source>,
     pub(crate) whitened: Whitened,
-    pub(crate) inferred_c: [Vec<f64>; 2],
+    /// Both inferred inputs.
+    pub(crate) inferred: [Chain; 2],
+    /// Values of them that come before the first disagreement.
+    pub(crate) skipped: usize,
     pub(crate) first_sample: usize,
 }
 

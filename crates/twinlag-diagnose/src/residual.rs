@@ -70,17 +70,14 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
     let mut out = Vec::with_capacity(evaluation.residual.len());
     for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
         let noise = part.noise_of(channel, stretch.len());
-        let rows = &part.sources[channel].rows;
-        // Rows have the sign of the disagreement.
-        let sign = if channel == 0 { 1.0 } else { -1.0 };
-        let inferred: Vec<f64> = part.inferred_c[channel]
-            .iter()
-            .enumerate()
-            .map(|(k, f)| {
-                let first = rows.start + k;
-                let taken: f64 =
-                    rows.at(k).iter().enumerate().map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum();
-                f - sign * taken
+        let chain = &part.inferred[channel];
+        let inferred: Vec<f64> = (0..part.whitened.residual.len())
+            .map(|k| {
+                let k = k + part.skipped;
+                let first = chain.rows.start + k;
+                let taken = chain.rows.at(k).iter().enumerate();
+                let taken: f64 = taken.map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum();
+                chain.value[k] - taken
             })
             .collect();
         out.extend(filter.smooth(&inferred));

@@ -46,6 +46,8 @@ pub(crate) struct Tried {
     pub(crate) robust_gain: f64,
     /// Nats that it saves on blocks that were left out.
     pub(crate) held_out_nats: f64,
+    /// What the gains count beside those of the others: those of a line are of all frequencies, whatever weight these have.
+    share: f64,
 }
 
 impl Tried {
@@ -54,11 +56,11 @@ impl Tried {
     }
 
     fn score(&self) -> f64 {
-        self.gain - self.penalty()
+        self.share * self.gain - self.penalty()
     }
 
     fn robust_score(&self) -> f64 {
-        self.robust_gain - self.penalty()
+        self.share * self.robust_gain - self.penalty()
     }
 }
 
@@ -254,11 +256,7 @@ impl Search<'_> {
                 dense::inverse(&matrix).map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
             current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
         };
-        let promise = effect.starts().iter().map(of).fold(0.0, f64::max);
-        if std::env::var_os("TWINLAG_TRACE").is_some() {
-            eprintln!("   promise {} {:?} {promise:.1}", effect.identifier(), effect.channel());
-        }
-        promise
+        effect.starts().iter().map(of).fold(0.0, f64::max)
     }
 
     /// For each candidate that the model lacks, the smallest size that the search would have seen: the square root of the threshold
@@ -340,6 +338,7 @@ impl Search<'_> {
             effect: effect.clone(),
             fitted,
             held_out_nats: 0.0,
+            share: if effect.identifier() == Identifier::MainsPickup { self.selection.weighting.mean() } else { 1.0 },
         }
     }
 
@@ -386,27 +385,12 @@ impl Search<'_> {
             effect: effect.clone(),
             fitted,
             held_out_nats: 0.5 * (white.held_out - with.held_out),
+            share: 1.0,
         })
     }
 
     /// The candidate that explains the residual best, with those that do it as well; `None` where none is significant.
     pub(crate) fn choose(&self, current: &Fitted, tried: &[Tried]) -> Option<(Tried, Vec<Tried>)> {
-        if std::env::var_os("TWINLAG_TRACE").is_some() {
-            for t in tried {
-                eprintln!(
-                    "   {:36} {:?} added {:2} gain {:10.1} robust {:9.1} chi2 {:9.4} end {:?} {:?} {:?}",
-                    t.effect.identifier().name(),
-                    t.effect.channel(),
-                    t.added,
-                    t.gain,
-                    t.robust_gain,
-                    t.fitted.mean_energy(),
-                    t.fitted.end,
-                    &t.fitted.theta[..2],
-                    &t.fitted.theta[t.fitted.theta.len() - t.added..][..t.added.min(3)]
-                );
-            }
-        }
         let count = tried.len().max(1) as f64;
         // A time constant that is too short to be seen may lie on its bound: the effect is none the worse for it.
         let is_sound = |t: &Tried| match &t.fitted.end {
@@ -477,7 +461,8 @@ impl Search<'_> {
             if first.held_out_nats > 0.0 {
                 let ties = pool
                     .into_iter()
-                    .filter(|t| t.effect.identifier() != first.effect.identifier() && first.score() - t.score() < TIE)
+                    .filter(|t| t.effect.identifier() != first.effect.identifier())
+                    .filter(|t| t.effect.is_noise() == first.effect.is_noise() && first.score() - t.score() < TIE)
                     .collect();
                 return Some((first, ties));
             }

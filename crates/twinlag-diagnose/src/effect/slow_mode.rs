@@ -24,7 +24,8 @@ struct SlowMode {
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     (0..2)
         .map(|sensor| {
-            let share = Variable::linear("share", 0.01, -0.002, 0.9);
+            // More than half would make the slow path the sensor: with both lags at zero it imitates any pair of them.
+            let share = Variable::linear("share", 0.01, -0.002, 0.5);
             let slow = Variable::logarithmic("slow time constant", context.step_s, context.span_s());
             let parameters = vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];
             let tau_s = context.tau_s[0].max(context.tau_s[1]).clamp(context.step_s, 0.03 * context.span_s());
