@@ -18,7 +18,10 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
     let answer = match &command.model {
         Some(path) => {
             let _progress = Progress::start(talk, format!("characterising {} samples", record.len()));
-            twinlag::characterise_with(&record, &model(path)?, &options)?
+            twinlag::characterise_with(&record, &model(path)?, &options).map_err(|e| match e {
+                twinlag::Error::ModelChannels { .. } => Failure::File(format!("{}: {e}", path.display())),
+                e => e.into(),
+            })?
         }
         None => characterise(&record, &options, talk)?,
     };

@@ -13,7 +13,14 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
+    if command.report.is_some() && command.report == command.save {
+        return Err(Failure::Usage("--report and --save name the same file: each needs one of its own".into()));
+    }
     for path in [&command.report, &command.save].into_iter().flatten() {
+        let is_record = path.canonicalize().is_ok_and(|p| command.file.canonicalize().is_ok_and(|f| f == p));
+        if is_record {
+            return Err(Failure::Usage(format!("{} is the record itself: choose another name", path.display())));
+        }
         if path.exists() && !command.force {
             return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
         }

@@ -12,6 +12,8 @@ use crate::plant::{Evaluation, Part};
 const COARSE: f64 = 0.5;
 /// Readings at an extreme value that two in a row of which no noise explains.
 const FEWEST_AT_END: usize = 8;
+/// How much farther than others a reading must stick out of its neighbours that the residual hardly shows.
+const PLAIN: f64 = 1.7;
 /// More of the readings than this are no single ones.
 const MOST_SPIKES: f64 = 0.05;
 
@@ -69,6 +71,9 @@ pub(crate) fn mask_saturation(observations: &mut Observations, steps_k: [Option<
     for i in 0..2 {
         let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
         let highest = observations.channel(i).fold(f64::NEG_INFINITY, f64::max);
+        if lowest == highest {
+            continue;
+        }
         for end in [lowest, highest] {
             let at = |y: &f64| *y == end;
             let count = observations.channel(i).filter(|y| at(y)).count();
@@ -148,7 +153,11 @@ pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation, far: 
             slopes.sort_by(f64::total_cmp);
             for k in 0..n {
                 let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
-                if is_peak && scores[k].abs() > far && beside[k].abs() > far * scale && !stretch.masked[channel][k] {
+                let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
+                // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
+                let is_far = (scores[k].abs() > far && sticks_out > far)
+                    || (scores[k].abs() > 0.5 * far && sticks_out > PLAIN * far);
+                if is_peak && is_far && !stretch.masked[channel][k] {
                     found.push(part.first_sample + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
                 }

@@ -101,7 +101,16 @@ impl State {
         let to_the_end = |fitted: &Fitted| fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish);
         let last = to_the_end(&self.current);
         let summary = |fitted: &Fitted| summarise(fitted, observations, everything, &prepared.levels);
-        let base_fit = summary(&to_the_end(&self.base));
+        // Before is before everything: with the defects of the data in it.
+        let masks = prepared.found.iter().any(|f| f.effect != Identifier::Quantisation);
+        let base_fit = if masks {
+            let (raw, levels) = &prepared.raw;
+            let unmasked = prepared.unmasked(&self.base);
+            let fitted = unmasked.model.fit(&unmasked.theta, raw, everything, Effort::Finish);
+            summarise(&fitted, raw, everything, levels)
+        } else {
+            summary(&to_the_end(&self.base))
+        };
         let mut last_fit = summary(&last);
         if let [(_, ties)] = &self.steps[..] {
             widen(&mut last_fit, ties, observations, everything, &mut self.remarks);
@@ -165,15 +174,20 @@ impl State {
 
     /// Errors on the blocks that judge, of the fits that chose, which have not seen them.
     fn errors(&self, prepared: &Prepared, base: &ModelFit, last: &ModelFit) -> ErrorBudget {
-        let rms = |fitted: &Fitted| {
-            let evaluation = fitted.model.evaluate(&fitted.theta, &prepared.observations);
+        let rms = |fitted: &Fitted, observations: &Observations| {
+            let evaluation = fitted.model.evaluate(&fitted.theta, observations);
             [&evaluation.residual, &evaluation.disagreement_k].map(|values| {
                 let pairs = values.iter().zip(&evaluation.sample).filter(|(_, s)| prepared.judges(**s));
                 let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), (v, _)| (sum + v * v, n + 1.0));
                 (sum / count.max(1.0)).sqrt()
             })
         };
-        let ([r0, k0], [r1, k1]) = (rms(&self.base), rms(&self.current));
+        let before = if prepared.found.iter().any(|f| f.effect != Identifier::Quantisation) {
+            rms(&prepared.unmasked(&self.base), &prepared.raw.0)
+        } else {
+            rms(&self.base, &prepared.observations)
+        };
+        let ([r0, k0], [r1, k1]) = (before, rms(&self.current, &prepared.observations));
         ErrorBudget {
             chi2_per_dof: BeforeAfter { before: base.chi2_per_dof, after: last.chi2_per_dof },
             held_out_normalised_rms: BeforeAfter { before: r0, after: r1 },
@@ -182,8 +196,8 @@ impl State {
     }
 }
 
-/// Both time constants of `observations` with `effects` as they are in the model; saturation and coarse steps are dealt with as
-/// in [`diagnose`], isolated wrong readings are not looked for.
+/// Both time constants of `observations` with `effects` as they are in the model; defects of the data are dealt with as in
+/// [`diagnose`].
 ///
 /// # Errors
 /// As [`diagnose`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
@@ -216,8 +230,15 @@ pub fn fit_with(
         rest.extend(effect.parameters().iter().filter_map(|p| value(p.name)));
         model = model.with(effect);
     }
-    let mut search = prepared.search(settings, &|_, _, _| ());
-    search.selection = &prepared.everything;
-    let fitted = search.over_grid(&model, &rest, 3);
+    let fit = |prepared: &Prepared, model: &Model| {
+        let mut search = prepared.search(settings, &|_, _, _| ());
+        search.selection = &prepared.everything;
+        search.over_grid(model, &rest, 3)
+    };
+    let mut fitted = fit(&prepared, &model);
+    if settings.effects.contains(&Identifier::Spikes) && prepared.mask_spikes(&fitted) {
+        prepared.find_levels(&fitted, settings);
+        fitted = fit(&prepared, &model.with_noise(prepared.levels.std_k));
+    }
     Ok(summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels))
 }

@@ -51,7 +51,7 @@ pub(crate) fn name(
     alternatives.dedup();
     Found {
         effect: effect.identifier(),
-        channel: effect.channel(),
+        channel: effect.channel().filter(|_| !tried.is_of_either),
         parameters,
         evidence: Some(Evidence {
             statistic: tried.gain,

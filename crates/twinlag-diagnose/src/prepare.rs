@@ -26,6 +26,8 @@ pub(crate) struct Prepared {
     pub(crate) context: Context,
     /// Defects of the data.
     pub(crate) found: Vec<Found>,
+    /// The record as it came, and its noise.
+    pub(crate) raw: (Observations, Levels),
     /// Residuals of the whole record.
     pub(crate) everything: Selection,
     /// Those without the blocks that judge.
@@ -36,7 +38,8 @@ impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     pub(crate) fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
         for i in 0..2 {
-            if observations.mean_and_std(i)[1] <= 0.0 {
+            let first = observations.channel(i).next();
+            if observations.channel(i).all(|y| Some(y) == first) {
                 return Err(DiagnoseError::Constant { channel: i + 1 });
             }
         }
@@ -47,6 +50,7 @@ impl Prepared {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];
         }
+        let raw = (observations.clone(), levels);
         let found = data_defects(&mut observations, &levels, &settings.effects);
         let weighting = Weighting::of(&observations, levels.std_k);
         Ok(Self {
@@ -56,6 +60,7 @@ impl Prepared {
             observations,
             levels,
             found,
+            raw,
         })
     }
 
@@ -73,7 +78,14 @@ impl Prepared {
         base
     }
 
-    fn mask_spikes(&mut self, base: &Fitted) -> bool {
+    /// The two-lag model of the record as it came, where `base` is that of the record with defects masked.
+    pub(crate) fn unmasked(&self, base: &Fitted) -> Fitted {
+        let (observations, levels) = &self.raw;
+        let model = base.model.clone().with_noise(levels.std_k);
+        model.fit(&base.theta, observations, &self.searched, Effort::Finish)
+    }
+
+    pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
         let evaluation = base.model.plant(&base.theta, &self.observations).whitened(&self.observations, true);
         let mut counts = [0; 2];
         for far in [SPIKE, SPIKE_AMONG_OTHERS] {

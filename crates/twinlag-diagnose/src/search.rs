@@ -48,6 +48,8 @@ pub(crate) struct Tried {
     pub(crate) held_out_nats: f64,
     /// What the gains count beside those of the others: those of a line are of all frequencies, whatever weight these have.
     share: f64,
+    /// Whether the same effect in the other channel explains the record as well.
+    pub(crate) is_of_either: bool,
 }
 
 impl Tried {
@@ -339,6 +341,7 @@ impl Search<'_> {
             fitted,
             held_out_nats: 0.0,
             share: if effect.identifier() == Identifier::MainsPickup { self.selection.weighting.mean() } else { 1.0 },
+            is_of_either: false,
         }
     }
 
@@ -386,6 +389,7 @@ impl Search<'_> {
             fitted,
             held_out_nats: 0.5 * (white.held_out - with.held_out),
             share: 1.0,
+            is_of_either: false,
         })
     }
 
@@ -459,6 +463,11 @@ impl Search<'_> {
                 first.held_out_nats = held_out_gain(self.observations, self.selection, current, &first.fitted);
             }
             if first.held_out_nats > 0.0 {
+                first.is_of_either = pool.iter().any(|t| {
+                    t.effect.identifier() == first.effect.identifier()
+                        && t.effect.channel() != first.effect.channel()
+                        && first.score() - t.score() < TIE
+                });
                 let ties = pool
                     .into_iter()
                     .filter(|t| t.effect.identifier() != first.effect.identifier())

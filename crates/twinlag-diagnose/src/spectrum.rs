@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 
+use crate::effect::coloured_noise::LONGEST;
 use crate::observations::Observations;
 use crate::plant::{Evaluation, Extra, Place, Plant};
 
@@ -248,7 +249,7 @@ pub(crate) fn fit_noise(
             variables.push(Variable::logarithmic(
                 "correlation time",
                 0.3 * observations.step_s(),
-                0.3 * (last - first),
+                LONGEST * (last - first),
             ));
             all = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
         }

@@ -15,7 +15,7 @@ use crate::characterisation::{
 use crate::characterise::characterise;
 use crate::error::Error;
 use crate::estimate::IntervalBasis;
-use crate::options::Options;
+use crate::options::{Known, Options};
 
 /// Samples of a stretch below which it is left out.
 const SHORTEST: usize = 8;
@@ -160,6 +160,9 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
     let observations = observations(record)?;
     let settings =
         Settings { noise_std_k: options.noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
+    if model.channels != record.channels {
+        return Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() });
+    }
     let effects: Vec<KnownEffect> = model
         .effects
         .iter()
@@ -337,10 +340,8 @@ fn of_fit(
             ..base.sensors[i].clone()
         }
     };
-    let not_identifiable = (0..2)
-        .filter(|&i| fit.time_constants[i].value_s.is_none())
-        .map(|i| format!("{} time constant", base.sensors[i].channel))
-        .collect();
+    let not_identifiable =
+        (0..2).filter(|&i| fit.time_constants[i].value_s.is_none()).map(|i| Known::NAMES[i].to_owned()).collect();
     Characterisation {
         schema: Characterisation::SCHEMA.into(),
         record: RecordSummary { ..base.record.clone() },

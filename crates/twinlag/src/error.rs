@@ -34,6 +34,11 @@ pub enum Error {
     #[error("{what} has no part in {estimator}, which is in closed form: leave it out, or take another estimator")]
     NotInClosedForm { what: &'static str, estimator: String },
     #[error(
+        "the model is of the channels {} and {}, in this order, and the record has {} and {}: gain, offset and delay are those of \
+         the second against the first. Choose the same with --t1 and --t2", model[0], model[1], record[0], record[1]
+    )]
+    ModelChannels { model: [String; 2], record: [String; 2] },
+    #[error(
         "--quiet-segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
          {needed} samples or more in unbroken stretches there"
     )]

@@ -9,7 +9,7 @@ pub(crate) const ABOUT: About = About {
     name: "coloured-noise",
     explanation: "one channel has noise that lasts from sample to sample: an amplifier, a filter, electromagnetic interference",
     advice: "nothing is wrong with the sensors; the weights and intervals take it into account. A better amplifier lowers it",
-    confusable: &[Identifier::InputMismatch],
+    confusable: &[Identifier::InputMismatch, Identifier::Drift],
     unseen: "which channel slow noise belongs to, where both sensors follow it",
 };
 
@@ -20,6 +20,9 @@ struct ColouredNoise {
     noise_std_k: f64,
 }
 
+/// Longest correlation, of the record: what lasts longer is a drift.
+pub(crate) const LONGEST: f64 = 0.05;
+
 /// Parameters of extra noise: its standard deviation, how long it lasts.
 pub(crate) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
     vec![
@@ -27,7 +30,7 @@ pub(crate) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
         Parameter::new(
             "correlation_time",
             "s",
-            Variable::logarithmic("correlation time", 0.3 * context.step_s, 0.3 * context.span_s()),
+            Variable::logarithmic("correlation time", 0.3 * context.step_s, LONGEST * context.span_s()),
         ),
     ]
 }

@@ -10,7 +10,7 @@ pub(crate) const ABOUT: About = About {
     explanation: "the offset between the channels changes evenly along the record: a reference junction or an amplifier that \
                   warms up, a wire that ages",
     advice: "let the electronics warm up, hold the reference junction at one temperature",
-    confusable: &[Identifier::Calibration, Identifier::SlowMode],
+    confusable: &[Identifier::Calibration, Identifier::SlowMode, Identifier::ColouredNoise, Identifier::InputMismatch],
     unseen: "drift that both channels share",
 };
 

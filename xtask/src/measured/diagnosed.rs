@@ -1,0 +1,136 @@
+//! The closed loop on measured records: what it must find, and what it must not claim.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use twinlag::diagnosis::{Identifier, Verdict};
+use twinlag::record::{ColumnRef, Record, Selection};
+use twinlag::{DiagnoseOptions, Diagnosis, Options, Status, diagnose};
+
+/// One record, what is known of it beforehand, and what must come out.
+struct Case {
+    file: &'static str,
+    channels: [&'static str; 2],
+    known: &'static str,
+    check: fn(&Diagnosis) -> Result<()>,
+}
+
+const CASES: &[Case] = &[
+    case("block100/run_004.csv", ["ref_C", "dut_C"], "", |answer| {
+        calibration(answer, 0.9955, -0.169)?;
+        parameter(answer, Identifier::Calibration, "curvature").map(|_| ())
+    }),
+    case("block100/run_010_DS18B20_ORG.csv", ["ref_C", "dut_C"], "", |answer| {
+        calibration(answer, 0.9950, -0.221)?;
+        parameter(answer, Identifier::Calibration, "curvature").map(|_| ())
+    }),
+    case("block100/run_012b.csv", ["ref2_C", "dut_C"], "", |answer| calibration(answer, 0.9907, 0.056)),
+    case("seaexplorer_sea046/dive12_1hz.csv", ["T1_gpctd_C", "T2_arod_C"], "", rejected),
+    case("seaexplorer_sea046/dive12_1hz.csv", ["T1_gpctd_C", "T2_arod_C"], "T1.time_constant_s=0.5", rejected),
+    case("seaglider_sg542/dive305.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "", rejected),
+    case("seaglider_sg542/dive305.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "T1.time_constant_s=0.6", |answer| {
+        let share = parameter(answer, Identifier::SlowMode, "share")?;
+        let tau_s = parameter(answer, Identifier::SlowMode, "slow_time_constant")?;
+        ensure!((0.02..0.06).contains(&share), "the slow mode has a share of {share}");
+        ensure!((450.0..800.0).contains(&tau_s), "the slow mode has {tau_s} s");
+        Ok(())
+    }),
+    case("seaglider_sg542/dive306.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "", rejected),
+    case("seaglider_sg542/dive306.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "T1.time_constant_s=0.6", |answer| {
+        parameter(answer, Identifier::SlowMode, "share").map(|_| ())
+    }),
+    case("ctd911/g01mcan03c.csv", ["T1_t090_C", "T2_t190_C"], "", |answer| {
+        let claimed = answer.last.sensors.iter().any(|s| s.time_constant_s.is_some());
+        ensure!(!claimed, "an absolute time constant is reported");
+        let [low, high] = answer.last.time_constant_difference_s.interval_95_s.context("no difference")?;
+        ensure!(low > 0.05 && high < 0.15, "later by [{low}, {high}] s: the casts of this pair have 0.05 to 0.15 s");
+        Ok(())
+    }),
+    case("sp_column_fire/Diesel_1p1.csv", ["tc025_3m_C", "pt_3m_C"], "", |answer| {
+        let exponent = parameter(answer, Identifier::TemperatureDependentTimeConstant, "exponent")?;
+        ensure!(exponent < 0.0, "the plate's time constant grows with temperature: {exponent}");
+        Ok(())
+    }),
+    case("sp_column_fire/Diesel_1p1.csv", ["tc025_3m_C", "tc050_3m_C"], "", |answer| {
+        ensure!(answer.last.status == Status::NotIdentifiable, "status {:?}", answer.last.status);
+        Ok(())
+    }),
+];
+
+const fn case(
+    file: &'static str,
+    channels: [&'static str; 2],
+    known: &'static str,
+    check: fn(&Diagnosis) -> Result<()>,
+) -> Case {
+    Case { file, channels, known, check }
+}
+
+/// Two first-order lags are known not to be the whole story.
+fn rejected(answer: &Diagnosis) -> Result<()> {
+    ensure!(answer.verdict != Verdict::Adequate, "two first-order lags are said to be adequate");
+    ensure!(answer.base.status != Status::Ok, "the two-lag model has status ok");
+    Ok(())
+}
+
+fn parameter(answer: &Diagnosis, effect: Identifier, name: &str) -> Result<f64> {
+    let of_effect = answer.effects.iter().filter(|e| e.effect == effect).flat_map(|e| &e.parameters);
+    let value = of_effect.into_iter().find(|p| p.name == name).map(|p| p.value);
+    value.with_context(|| format!("no {effect} with a {name}"))
+}
+
+fn calibration(answer: &Diagnosis, gain: f64, offset_k: f64) -> Result<()> {
+    let got = parameter(answer, Identifier::Calibration, "gain")?;
+    ensure!((got - gain).abs() <= 0.003, "gain {got}, the plateaus have {gain} ± 0.003");
+    let got = parameter(answer, Identifier::Calibration, "offset")?;
+    ensure!((got - offset_k).abs() <= 0.1, "offset {got} K, the plateaus have {offset_k} ± 0.1 K");
+    Ok(())
+}
+
+/// Runs all cases; what failed, and how many there were.
+pub(super) fn run(dir: &Path) -> (Vec<String>, usize) {
+    let mut failures = Vec::new();
+    for case in CASES {
+        let outcome = one(dir, case);
+        if let Err(error) = outcome {
+            failures.push(format!("{} {:?} known '{}', diagnosed: {error:#}", case.file, case.channels, case.known));
+        }
+    }
+    (failures, CASES.len())
+}
+
+fn one(dir: &Path, case: &Case) -> Result<()> {
+    let selection = Selection {
+        t1: Some(ColumnRef::Name(case.channels[0].into())),
+        t2: Some(ColumnRef::Name(case.channels[1].into())),
+        ..Selection::default()
+    };
+    let record = Record::read(dir.join(case.file), &selection)?;
+    let mut options = Options::default();
+    if !case.known.is_empty() {
+        options.known.push(case.known.parse()?);
+    }
+    let answer = diagnose(&record, &DiagnoseOptions { characterise: options, without: Vec::new() }, &|_, _, _| ())?;
+    let effects: Vec<String> = answer
+        .effects
+        .iter()
+        .map(|e| {
+            let numbers: Vec<String> =
+                e.parameters.iter().take(3).map(|p| format!("{} {:.4}", p.name, p.value)).collect();
+            let channel = e.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
+            format!("{}{channel} ({})", e.effect, numbers.join(", "))
+        })
+        .collect();
+    let rms = answer.error.held_out_normalised_rms;
+    println!(
+        "{:38} {:24} {:24} {:?}: {}; held-out rms {:.2} before, {:.2} after",
+        case.file,
+        case.channels.join(" "),
+        case.known,
+        answer.verdict,
+        if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") },
+        rms.before,
+        rms.after
+    );
+    (case.check)(&answer)
+}
