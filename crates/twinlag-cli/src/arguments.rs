@@ -64,7 +64,7 @@ pub(crate) enum Command {
     /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
     #[command(subcommand)]
     Study(Study),
-    /// Simulates an embedded rig and characterises it: no file needed.
+    /// Simulates an embedded rig with an effect that the estimator is not told of, and diagnoses it: no file needed.
     Demo(Demo),
 }
 
@@ -345,7 +345,7 @@ pub(crate) struct Simulate {
 
 /// The embedded rig.
 #[derive(Debug, Args)]
-#[command(after_help = "Exit codes: 0 status ok, 4 any other status, 1 anything else.")]
+#[command(after_help = "Exit codes: 0 diagnosed, 4 refused, 1 anything else.")]
 pub(crate) struct Demo {
     /// Seed of all random numbers, in place of the rig's own.
     #[arg(long, value_name = "N")]

@@ -1,11 +1,11 @@
-//! `twinlag demo`: a record of an embedded rig, and what can be told of it.
+//! `twinlag demo`: a record of an embedded rig with an effect that the estimator is not told of, and what it finds.
 
-use twinlag::Options;
+use twinlag::DiagnoseOptions;
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Rig;
 
 use crate::arguments::{Demo, Talk};
-use crate::characterise::{characterise, exit_code};
+use crate::diagnose::{diagnose, exit_code};
 use crate::failure::Failure;
 use crate::print;
 
@@ -30,18 +30,21 @@ pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
         eprintln!("# the rig: two thermocouples in an engine's exhaust; the estimator is told none of this");
         RIG.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).for_each(|l| eprintln!("#   {l}"));
     }
-    let answer = characterise(&record, &Options::default(), talk)?;
-    print::characterisation(&answer, talk)?;
+    let answer = diagnose(&record, &DiagnoseOptions::default(), talk)?;
+    print::diagnosis(&answer, talk)?;
     if !talk.json {
         println!();
-        for (sensor, truth) in answer.sensors.iter().zip(rig.sensors()) {
+        for (sensor, truth) in answer.last.sensors.iter().zip(rig.sensors()) {
             let inside = match sensor.interval_95_s {
                 Some([low, high]) if (low..=high).contains(&truth.time_constant_s) => "inside the interval",
                 Some(_) => "outside the interval, as one in twenty is",
                 None => "not determined",
             };
             println!("truth: {} {} s, {inside}", sensor.channel, truth.time_constant_s);
+            if let Some(second_s) = truth.second_time_constant_s {
+                println!("truth: {} has a second lag of {second_s} s", sensor.channel);
+            }
         }
     }
-    Ok(exit_code(answer.status))
+    Ok(exit_code(&answer))
 }

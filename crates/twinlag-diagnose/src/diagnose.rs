@@ -11,6 +11,7 @@ use crate::prepare::Prepared;
 use crate::search::{FALSE_ALARM, FAR_OFF, Search, Tried, threshold};
 use crate::settings::{KnownEffect, Settings, Watch};
 use crate::summary::{LEFT_OVER, is_unresolved, summarise};
+use crate::weighting::Weighting;
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 4;
@@ -176,7 +177,16 @@ impl State {
     fn errors(&self, prepared: &Prepared, base: &ModelFit, last: &ModelFit) -> ErrorBudget {
         let rms = |fitted: &Fitted, observations: &Observations| {
             let evaluation = fitted.model.evaluate(&fitted.theta, observations);
-            [&evaluation.residual, &evaluation.disagreement_k].map(|values| {
+            // Without the frequencies in which there is only noise, which each factor of the inverse makes larger.
+            let filter = Weighting::of_disagreement(observations, fitted.model.noise_std_k());
+            let ends = evaluation.begins.iter().skip(1).copied().chain([evaluation.disagreement_k.len()]);
+            let apart: Vec<f64> = evaluation
+                .begins
+                .iter()
+                .zip(ends)
+                .flat_map(|(from, to)| filter.smooth(&evaluation.disagreement_k[*from..to]))
+                .collect();
+            [&evaluation.residual, &apart].map(|values| {
                 let pairs = values.iter().zip(&evaluation.sample).filter(|(_, s)| prepared.judges(**s));
                 let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), (v, _)| (sum + v * v, n + 1.0));
                 (sum / count.max(1.0)).sqrt()

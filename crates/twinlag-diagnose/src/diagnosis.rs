@@ -58,8 +58,10 @@ pub struct Evidence {
 pub struct Found {
     /// Which.
     pub effect: Identifier,
-    /// Channel that it sits in, 0 or 1; `None` where it is of both.
+    /// Channel that it sits in, 0 or 1; `None` where it is of both, or where the record does not tell.
     pub channel: Option<usize>,
+    /// Channel that the parameters are meant in, 0 or 1; `None` where it is of both.
+    pub fitted_in: Option<usize>,
     /// Its parameters.
     pub parameters: Vec<Value>,
     /// Why it was added; `None` for defects of the data, which are seen, not inferred.
@@ -97,7 +99,8 @@ pub struct ErrorBudget {
     pub chi2_per_dof: BeforeAfter<f64>,
     /// Root mean square of the whitened residual.
     pub held_out_normalised_rms: BeforeAfter<f64>,
-    /// Root mean square of the difference between the two inferred gas temperatures, as the operators smooth it, K.
+    /// Root mean square of the difference between the two inferred gas temperatures, without the frequencies in which there is
+    /// only noise, K.
     #[serde(rename = "held_out_input_difference_K")]
     pub held_out_input_difference_k: BeforeAfter<f64>,
 }

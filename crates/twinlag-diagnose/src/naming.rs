@@ -52,6 +52,7 @@ pub(crate) fn name(
     Found {
         effect: effect.identifier(),
         channel: effect.channel().filter(|_| !tried.is_of_either),
+        fitted_in: effect.channel(),
         parameters,
         evidence: Some(Evidence {
             statistic: tried.gain,

@@ -160,6 +160,7 @@ fn defect(effect: Identifier, channel: usize, seen: String) -> Found {
     Found {
         effect,
         channel: Some(channel),
+        fitted_in: Some(channel),
         parameters: Vec::new(),
         evidence: None,
         alternatives: Vec::new(),

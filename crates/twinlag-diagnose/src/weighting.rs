@@ -38,6 +38,14 @@ impl Weighting {
         Self::by(observations, noise_std_k, |[a, b]| (a + b) / (1.0 + a + b))
     }
 
+    /// For the difference of the inferred inputs: only where both sensors see the gas well, `(SNR/(1 + SNR))²` of the disagreement.
+    pub(crate) fn of_disagreement(observations: &Observations, noise_std_k: [f64; 2]) -> Self {
+        Self::by(observations, noise_std_k, |[a, b]| {
+            let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
+            (snr / (1.0 + snr)).powi(2)
+        })
+    }
+
     fn by(observations: &Observations, noise_std_k: [f64; 2], gain: impl Fn([f64; 2]) -> f64) -> Self {
         if observations.period_s.is_none() || observations.samples() < 8 * POINTS {
             return Self::default();

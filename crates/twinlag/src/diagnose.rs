@@ -34,8 +34,10 @@ pub struct DiagnoseOptions {
 pub struct NamedEffect {
     /// Which.
     pub effect: Identifier,
-    /// Name of the channel that it sits in; `None` where it is of both.
+    /// Name of the channel that it sits in; `None` where it is of both, or where the record does not tell.
     pub channel: Option<String>,
+    /// Name of the channel that the parameters are meant in; `None` where it is of both.
+    pub fitted_in: Option<String>,
     /// Its parameters.
     pub parameters: Vec<Value>,
     /// Why it was added; `None` for defects of the data, which are seen, not inferred.
@@ -219,6 +221,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         .map(|f| NamedEffect {
             effect: f.effect,
             channel: f.channel.map(|i| record.channels[i].clone()),
+            fitted_in: f.fitted_in.map(|i| record.channels[i].clone()),
             parameters: f.parameters.clone(),
             evidence: f.evidence,
             alternatives: f.alternatives.clone(),
