@@ -1,5 +1,6 @@
 //! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
 
+mod loops;
 mod surface;
 
 use std::fs;
@@ -69,6 +70,9 @@ pub(crate) struct Run {
     /// Runs again and names the first cell that differs from the stored table; writes nothing.
     #[arg(long, conflicts_with_all = ["trials", "seed", "out", "shard"])]
     check: bool,
+    /// A few cells alone: that it runs, not what it says.
+    #[arg(skip)]
+    quick: bool,
 }
 
 const FOLDER: &str = "docs/src/experiments";
@@ -115,6 +119,7 @@ pub(crate) fn quick(out: &Path) -> Result<()> {
         resume: false,
         shard: None,
         check: false,
+        quick: true,
     };
     self::run(Task::Run(run))
 }
@@ -149,12 +154,15 @@ fn plan(name: &str) -> Result<Plan> {
 }
 
 fn title(name: &str) -> Result<String> {
+    if let Some(plan) = loops::Plan::read(&text(name)?) {
+        return Ok(plan?.title);
+    }
     if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
 }
 
 fn draw(name: &str) -> Result<()> {
-    if name == surface::NAME {
-        println!("{name}: its picture is drawn by running it");
+    if name == surface::NAME || loops::Plan::read(&text(name)?).is_some() {
+        println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
     let (plan, folder) = (plan(name)?, root()?.join(FOLDER).join(name));
@@ -171,6 +179,9 @@ fn one(name: &str, run: &Run) -> Result<()> {
     let folder = root()?.join(FOLDER).join(name);
     if name == surface::NAME {
         return surface::run(&surface::Plan::read(&text(name)?)?, run.out.as_deref().unwrap_or(&folder), run.check);
+    }
+    if let Some(plan) = loops::Plan::read(&text(name)?) {
+        return closed_loop(plan?, &folder, run);
     }
     let mut plan = plan(name)?;
     ensure!(
@@ -225,7 +236,7 @@ fn one(name: &str, run: &Run) -> Result<()> {
         return Ok(());
     }
     write(&plan, &table, &out)?;
-    provenance(&plan, &out, seconds, options.threads.get())?;
+    provenance(&plan.name, plan.seed, plan.trials, &out, seconds, options.threads.get())?;
     if plan.timed {
         fs::write(out.join("times.md"), times(&plan)?)?;
     }
@@ -233,6 +244,36 @@ fn one(name: &str, run: &Run) -> Result<()> {
         fs::remove_file(part)?;
     }
     println!("{name}: {} trials in {seconds:.0} s, {}", plan.trials * plan.cells().len() as u64, out.display());
+    Ok(())
+}
+
+/// An experiment of the closed loop.
+fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
+    ensure!(
+        run.out.is_some() || (run.trials.is_none() && run.seed.is_none()),
+        "other records or another seed than the plan's need --out DIR: the stored results are those of the plan"
+    );
+    plan.records = run.trials.unwrap_or(plan.records);
+    if run.quick {
+        plan.shorten();
+    }
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    let out = run.out.clone().unwrap_or(folder.to_owned());
+    fs::create_dir_all(&out)?;
+    let checkpoint = (!run.check).then(|| out.join("checkpoint.json"));
+    let options = Options {
+        threads: run.threads.unwrap_or(Options::default().threads),
+        shard: run.shard.unwrap_or(Shard::WHOLE),
+        checkpoint: checkpoint.clone(),
+        resume: run.resume,
+        ..Options::default()
+    };
+    ensure!(run.shard.is_none(), "{}: shards are for the experiments of estimators", plan.name);
+    let seconds = loops::run(&plan, &out, run.check, &options)?;
+    if let Some(checkpoint) = checkpoint {
+        fs::remove_file(checkpoint)?;
+        provenance(&plan.name, plan.seed, plan.records, &out, seconds, options.threads.get())?;
+    }
     Ok(())
 }
 
@@ -276,7 +317,7 @@ fn times(plan: &Plan) -> Result<String> {
 }
 
 /// What made the results: everything that may change from run to run, kept apart from the table that may not.
-fn provenance(plan: &Plan, out: &Path, seconds: f64, threads: usize) -> Result<()> {
+fn provenance(name: &str, seed: u64, trials: u64, out: &Path, seconds: f64, threads: usize) -> Result<()> {
     let first_line = |program: &str, arguments: &[&str]| {
         let output = Command::new(program).args(arguments).current_dir(root().ok()?).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
@@ -288,7 +329,7 @@ fn provenance(plan: &Plan, out: &Path, seconds: f64, threads: usize) -> Result<(
         Some(line.split(':').nth(1)?.trim().to_owned())
     });
     let value = json!({
-        "experiment": plan.name, "seed": plan.seed, "trials": plan.trials, "version": env!("CARGO_PKG_VERSION"),
+        "experiment": name, "seed": seed, "trials": trials, "version": env!("CARGO_PKG_VERSION"),
         "commit": commit, "sources_as_committed": is_clean, "rustc": first_line("rustc", &["--version"]),
         "processor": cpu, "threads": threads, "seconds": (10.0 * seconds).round() / 10.0,
     });

@@ -26,6 +26,9 @@ enum Task {
     Measured {
         /// The folder. It is no part of the repository.
         dir: PathBuf,
+        /// Writes the table of the book's chapter on them as well.
+        #[arg(long)]
+        write: bool,
     },
     /// The Monte-Carlo experiments: list, run, check, merge.
     #[command(subcommand)]
@@ -37,7 +40,7 @@ enum Task {
 fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Ci => ci::run(),
-        Task::Measured { dir } => measured::run(&dir),
+        Task::Measured { dir, write } => measured::run(&dir, write),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };

@@ -7,6 +7,7 @@ mod diagnosed;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::root;
 use anyhow::{Context, Result, bail, ensure};
 use twinlag::record::{ColumnRef, Record, Selection};
 use twinlag::{Characterisation, Options, Status, characterise};
@@ -87,7 +88,7 @@ fn contains(name: &str, interval: Option<[f64; 2]>, truth: f64) -> Result<()> {
 }
 
 /// Runs all cases, then every other file with guessed columns.
-pub(crate) fn run(dir: &Path) -> Result<()> {
+pub(crate) fn run(dir: &Path, write: bool) -> Result<()> {
     ensure!(dir.is_dir(), "{}: no such folder: name the folder of the measured data", dir.display());
     let mut failures = Vec::new();
     println!("{:38} {:24} {:12} {:16} answer", "file", "channels", "free", "status");
@@ -118,9 +119,12 @@ pub(crate) fn run(dir: &Path) -> Result<()> {
             Err(error) => println!("{name}, guessed columns: refused: {error:#}"),
         }
     }
-    let (failed, diagnosed) = diagnosed::run(dir);
-    failures.extend(failed);
-    let questions = CASES.len() + diagnosed;
+    let diagnosed = diagnosed::run(dir);
+    failures.extend(diagnosed.failures);
+    let questions = CASES.len() + diagnosed.questions;
+    if write {
+        fs::write(root()?.join("docs/src/measured-table.md"), &diagnosed.table)?;
+    }
     if failures.is_empty() {
         println!("{questions} questions to measured records answered as known, 0 failed");
         Ok(())

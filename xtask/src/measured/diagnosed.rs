@@ -87,19 +87,34 @@ fn calibration(answer: &Diagnosis, gain: f64, offset_k: f64) -> Result<()> {
     Ok(())
 }
 
-/// Runs all cases; what failed, and how many there were.
-pub(super) fn run(dir: &Path) -> (Vec<String>, usize) {
+/// What came of all cases.
+pub(super) struct Diagnosed {
+    pub(super) failures: Vec<String>,
+    pub(super) questions: usize,
+    /// For the book.
+    pub(super) table: String,
+}
+
+pub(super) fn run(dir: &Path) -> Diagnosed {
+    let mut table = String::from(
+        "| record | channels | known | verdict | effects | held-out rms before | after |\n|---|---|---|---|---|---|---|\n",
+    );
     let mut failures = Vec::new();
     for case in CASES {
-        let outcome = one(dir, case);
+        let outcome = one(dir, case, &mut table);
         if let Err(error) = outcome {
             failures.push(format!("{} {:?} known '{}', diagnosed: {error:#}", case.file, case.channels, case.known));
         }
     }
-    (failures, CASES.len())
+    Diagnosed { failures, questions: CASES.len(), table }
 }
 
-fn one(dir: &Path, case: &Case) -> Result<()> {
+/// Four digits, with an exponent where it is small.
+fn number(x: f64) -> String {
+    if x.abs() < 1e-3 { format!("{x:.1e}") } else { format!("{x:.4}") }
+}
+
+fn one(dir: &Path, case: &Case, table: &mut String) -> Result<()> {
     let selection = Selection {
         t1: Some(ColumnRef::Name(case.channels[0].into())),
         t2: Some(ColumnRef::Name(case.channels[1].into())),
@@ -116,21 +131,27 @@ fn one(dir: &Path, case: &Case) -> Result<()> {
         .iter()
         .map(|e| {
             let numbers: Vec<String> =
-                e.parameters.iter().take(3).map(|p| format!("{} {:.4}", p.name, p.value)).collect();
+                e.parameters.iter().take(3).map(|p| format!("{} {}", p.name.replace('_', " "), number(p.value))).collect();
             let channel = e.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
-            format!("{}{channel} ({})", e.effect, numbers.join(", "))
+            let numbers = if numbers.is_empty() { String::new() } else { format!(" ({})", numbers.join(", ")) };
+            format!("{}{channel}{numbers}", e.effect)
         })
         .collect();
     let rms = answer.error.held_out_normalised_rms;
-    println!(
-        "{:38} {:24} {:24} {:?}: {}; held-out rms {:.2} before, {:.2} after",
+    let effects = if effects.is_empty() { "none".to_owned() } else { effects.join(", ") };
+    let verdict = serde_json::to_value(answer.verdict)?;
+    let row = format!(
+        "| `{}` | {}, {} | {} | {} | {effects} | {:.2} | {:.2} |",
         case.file,
-        case.channels.join(" "),
+        case.channels[0],
+        case.channels[1],
         case.known,
-        answer.verdict,
-        if effects.is_empty() { "no effect".to_owned() } else { effects.join(", ") },
+        verdict.as_str().unwrap_or("?"),
         rms.before,
         rms.after
     );
+    println!("{row}");
+    table.push_str(&row);
+    table.push('\n');
     (case.check)(&answer)
 }
