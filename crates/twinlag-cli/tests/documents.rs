@@ -1,6 +1,9 @@
-//! The sessions shown in the README and in the guide, run as a reader would run them.
+//! The sessions shown in the README, the guide and the chapter on the closed loop, run as a reader would run them.
 
 #[test]
 fn documents_show_what_the_program_prints() {
-    trycmd::TestCases::new().case("../../README.md").case("../../docs/src/guide.md");
+    trycmd::TestCases::new()
+        .case("../../README.md")
+        .case("../../docs/src/guide.md")
+        .case("../../docs/src/closed-loop.md");
 }
