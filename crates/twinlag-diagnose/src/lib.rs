@@ -1,4 +1,32 @@
-//! What a two-sensor model leaves over, and which physical effect it lacks.
+//! The closed loop: what a two-sensor model leaves over, which physical effect it lacks, and how much better it is with it.
+//!
+//! Two first-order lags seldom are the whole truth of a measured record. [`diagnose()`] looks at the disagreement of the two gas
+//! temperatures that the sensors imply, finds the effect that accounts for it among [`Identifier::ALL`], adds it, looks again,
+//! and reports errors before and after on blocks of the record that neither chose nor were fitted; or it says that nothing
+//! is missing, or that something is and no known effect accounts for it. [`fit_with`] puts effects that are known already
+//! into the model.
+//!
+//! The crate takes readings, not files, and knows no file format: for logger files, characterisations and reports take
+//! `twinlag`; for the two-lag model alone, and other costs, `twinlag-cross-relation`; for sensor models `twinlag-sensor`.
+//!
+//! ```
+//! use twinlag_diagnose::{Identifier, Observations, Settings, Stretch, Verdict, diagnose};
+//! use twinlag_signal::undeclared::{GasKind, Kind, undeclared};
+//!
+//! // A random rig in which one channel reads some kelvin off. Nobody says so.
+//! let rig = undeclared(&[Kind::Offset], 1.0, Some(GasKind::Turbulence), 1)?;
+//! let record = rig.simulate()?;
+//! let period_s = record.time_s[1] - record.time_s[0];
+//! let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+//! let observations = Observations::new(vec![stretch], Some(period_s))?;
+//!
+//! let answer = diagnose(&observations, &Settings::default(), &|_, _, _| ())?;
+//! assert_eq!(answer.verdict, Verdict::Explained);
+//! assert_eq!(answer.effects[0].effect, Identifier::Calibration);
+//! let error = answer.error.held_out_normalised_rms;
+//! assert!(error.after < 1.1 && error.after < error.before);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod chain;
 mod defects;
