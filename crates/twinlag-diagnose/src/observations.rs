@@ -110,18 +110,17 @@ impl Observations {
         self.swing_k
     }
 
-    /// Pieces spread over the record, about `samples` in all, where it is longer than that: for a quick look.
-    pub(crate) fn excerpt(&self, samples: usize, pieces: usize) -> Self {
-        let total = self.samples();
-        if total <= 2 * samples {
-            return self.clone();
-        }
-        let length = samples / pieces;
+    /// Pieces of `length` samples from each of `starts` on, counted through the stretches; those that would reach over the end of a
+    /// stretch are left out.
+    pub(crate) fn excerpt(&self, starts: impl Iterator<Item = usize>, length: usize) -> Self {
         let mut stretches = Vec::new();
-        for piece in 0..pieces {
-            let mut from = piece * (total - length) / (pieces - 1).max(1);
+        for mut from in starts {
             for stretch in &self.stretches {
                 let n = stretch.len();
+                if from >= n {
+                    from -= n;
+                    continue;
+                }
                 if from + length <= n {
                     let cut = from..from + length;
                     stretches.push(Stretch {
@@ -129,9 +128,8 @@ impl Observations {
                         reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
                         masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
                     });
-                    break;
                 }
-                from = from.saturating_sub(n);
+                break;
             }
         }
         if stretches.is_empty() { self.clone() } else { Self { stretches, ..self.clone() } }

@@ -13,8 +13,9 @@ use crate::weighting::Weighting;
 
 /// Blocks along the record, of which every eighth is kept for the judgement at the end.
 const BLOCKS: usize = 80;
-/// Samples of an excerpt for a quick look.
-const EXCERPT: usize = 4000;
+/// Samples of a record that is looked at through excerpts first, and of each of these.
+const LONG: usize = 7000;
+const EXCERPT: usize = 500;
 /// Robust standard deviations beyond which a single reading is wrong, and where others are.
 const SPIKE: f64 = 6.0;
 const SPIKE_AMONG_OTHERS: f64 = 4.5;
@@ -119,15 +120,23 @@ impl Prepared {
     }
 
     pub(crate) fn search<'a>(&'a self, settings: &'a Settings, watch: Watch<'a>) -> Search<'a> {
-        let excerpt = self.observations.excerpt(EXCERPT, 8);
-        let whole = selection(&excerpt, false, &self.searched.weighting);
+        let samples = self.observations.samples();
+        let excerpt = if samples < LONG {
+            (self.observations.clone(), self.searched.clone())
+        } else {
+            // After each block that judges.
+            let starts = (0..BLOCKS).step_by(8).map(|block| (block + 5) * samples / BLOCKS + 20);
+            let excerpt = self.observations.excerpt(starts, EXCERPT);
+            let whole = selection(&excerpt, false, &self.searched.weighting);
+            (excerpt, whole)
+        };
         Search {
             observations: &self.observations,
             selection: &self.searched,
             context: self.context.clone(),
             allowed: &settings.effects,
             watch,
-            excerpt: (excerpt, whole),
+            excerpt,
         }
     }
 

@@ -29,7 +29,7 @@ const STATIC: f64 = 0.25;
 /// Energy per degree of freedom that the best of the candidates leaves, beyond which no single effect explains the record.
 const INCOMPLETE: f64 = 1.5;
 /// Candidates that are fitted to the end.
-const MOST_FITTED: usize = 8;
+const MOST_FITTED: usize = 10;
 /// The same up to which they are the same model in two guises.
 const EQUAL: f64 = 2.0;
 
@@ -312,17 +312,18 @@ impl Search<'_> {
         chosen
     }
 
+    /// A candidate with its best fit; of a quick look where `thorough`, which tries more.
     fn try_one(&self, current: &Fitted, effect: &Shared, robust_before: f64, thorough: bool) -> Tried {
         let model = current.model.with(effect.clone());
+        let (observations, selection) =
+            if thorough { (&self.excerpt.0, &self.excerpt.1) } else { (self.observations, self.selection) };
         let mut best: Option<Fitted> = None;
         for start in effect.starts() {
-            let mut rest = current.theta[2..].to_vec();
-            rest.extend_from_slice(&start);
-            let mut theta = current.theta[..2].to_vec();
-            theta.extend_from_slice(&rest);
-            let mut fits = vec![model.fit(&theta, self.observations, self.selection, Effort::Look)];
+            let mut theta = current.theta.clone();
+            theta.extend_from_slice(&start);
+            let mut fits = vec![model.fit(&theta, observations, selection, Effort::Look)];
             if thorough && effect.parameters().len() <= 3 {
-                fits.push(self.over_grid_quickly(&model, &rest));
+                fits.push(self.over_grid_quickly(&model, &theta[2..]));
             }
             for fit in fits {
                 if best.as_ref().is_none_or(|b| fit.chi2 < b.chi2) {
@@ -331,8 +332,14 @@ impl Search<'_> {
             }
         }
         let fitted = best.expect("every effect has a start");
-        let robust = self.robust(&fitted);
-        let (gain, robust_gain) = self.gains(current, &fitted, effect, robust_before - robust);
+        let (gain, robust_gain) = if thorough {
+            // How it compares with the others; what it is worth is found when it is fitted to the end.
+            let before = current.model.energy(&current.theta, observations, selection);
+            let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
+            (gain, gain)
+        } else {
+            self.gains(current, &fitted, effect, robust_before - self.robust(&fitted))
+        };
         Tried {
             gain,
             robust_gain,
@@ -361,8 +368,7 @@ impl Search<'_> {
                 }
             }
         }
-        let near = model.fit(&best.1, excerpt, selection, Effort::Look);
-        model.fit(&near.theta, self.observations, self.selection, Effort::Look)
+        model.fit(&best.1, excerpt, selection, Effort::Look)
     }
 
     fn try_noise(&self, current: &Fitted, effect: &Shared) -> Option<Tried> {

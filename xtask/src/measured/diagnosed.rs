@@ -130,8 +130,12 @@ fn one(dir: &Path, case: &Case, table: &mut String) -> Result<()> {
         .effects
         .iter()
         .map(|e| {
-            let numbers: Vec<String> =
-                e.parameters.iter().take(3).map(|p| format!("{} {}", p.name.replace('_', " "), number(p.value))).collect();
+            let numbers: Vec<String> = e
+                .parameters
+                .iter()
+                .take(3)
+                .map(|p| format!("{} {}", p.name.replace('_', " "), number(p.value)))
+                .collect();
             let channel = e.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
             let numbers = if numbers.is_empty() { String::new() } else { format!(" ({})", numbers.join(", ")) };
             format!("{}{channel}{numbers}", e.effect)
