@@ -296,3 +296,69 @@ impl Chain {
         Rows { data: rows.data[first * rows.width..].to_vec(), ..rows.clone() }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chain(value: impl Fn(f64) -> f64, time_s: Vec<f64>, period_s: Option<f64>) -> Chain {
+        let reading: Vec<f64> = time_s.iter().map(|t| value(*t)).collect();
+        Chain::of(&Stretch::new(time_s, [reading.clone(), reading]), 0, period_s)
+    }
+
+    /// `y = sin ωt` through `1 + τ s` has amplitude `√(1 + ω²τ²)`; the operators smooth by `(2 + cos ωT)/3` and differ from the
+    /// derivative by `(ωT)⁴/180`: 1e-7 of the slope at `ωT = 0.06`.
+    #[test]
+    fn a_factor_inverts_a_lag() {
+        let (omega, tau_s) = (0.06, 10.0);
+        let times: Vec<f64> = (0..400).map(f64::from).collect();
+        let mut got = chain(|t| (omega * t).sin(), times, Some(1.0));
+        got.factor(&Along::Same(tau_s), None, None);
+        let smooth = (2.0 + omega.cos()) / 3.0;
+        for (v, t) in got.value.iter().zip(&got.time_s) {
+            let want = smooth * ((omega * t).sin() + omega * tau_s * (omega * t).cos());
+            assert!((v - want).abs() < 2e-7, "at {t}: got {v}, want {want}");
+        }
+    }
+
+    /// A straight line is the same line later, whatever part of a sample that is; on uneven samples as well.
+    #[test]
+    fn a_line_is_advanced_exactly() {
+        let uneven: Vec<f64> = (0..60).map(|k| f64::from(k) + 0.2 * f64::from(k % 3)).collect();
+        for (times, period_s) in [((0..60).map(f64::from).collect::<Vec<_>>(), Some(1.0)), (uneven, None)] {
+            for delay_s in [-2.4, -1.0, 0.0, 0.3, 1.0, 2.49] {
+                let mut got = chain(|t| 3.0 - 0.5 * t, times.clone(), period_s);
+                got.advance(delay_s, 4);
+                for (v, t) in got.value.iter().zip(&got.time_s) {
+                    let want = 3.0 - 0.5 * (t + delay_s);
+                    assert!((v - want).abs() < 1e-12, "{period_s:?}, {delay_s} at {t}: got {v}, want {want}");
+                }
+            }
+        }
+    }
+
+    /// Rows are the derivatives of the values: moving one reading moves the values by them.
+    #[test]
+    fn rows_are_derivatives() {
+        let times: Vec<f64> = (0..30).map(f64::from).collect();
+        let value = |t: f64| (0.4 * t).sin() + 0.1 * t;
+        let through = |moved: Option<usize>| {
+            let mut chain = chain(value, times.clone(), Some(1.0));
+            if let Some(k) = moved {
+                chain.value[k] += 1e-6;
+            }
+            chain.map(|v| (v + 0.05 * v * v, 1.0 + 0.1 * v));
+            chain.factor(&Along::Each((0..28).map(|k| 2.0 + 0.1 * f64::from(k)).collect()), None, None);
+            chain.advance(0.3, 2);
+            chain
+        };
+        let (still, moved) = (through(None), through(Some(14)));
+        for k in 0..still.len() {
+            let row = still.rows.at(k);
+            let want = 14usize.checked_sub(still.rows.start + k).and_then(|j| row.get(j)).copied().unwrap_or(0.0);
+            let got = (moved.value[k] - still.value[k]) / 1e-6;
+            // Second derivatives of size one times the step.
+            assert!((got - want).abs() < 1e-5, "value {k}: got {got}, want {want}");
+        }
+    }
+}

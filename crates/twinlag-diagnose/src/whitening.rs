@@ -130,3 +130,62 @@ impl Whitened {
         w
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chain::Chain;
+    use crate::dense;
+    use crate::observations::Stretch;
+
+    /// Rows of two lags on 40 samples, one reading masked, one more source: `rᵀr` is `uᵀ V⁻¹ u` with the dense matrix, and the
+    /// determinant that of its factor. Both are sums of 38 terms of size one: rounding leaves 1e-9.
+    #[test]
+    fn the_banded_factor_is_that_of_the_dense_matrix() {
+        let n = 40;
+        let time_s: Vec<f64> = (0..n).map(|k| k as f64).collect();
+        let reading: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() + 0.01 * (k * k % 7) as f64).collect();
+        let stretch = Stretch::new(time_s, [reading.clone(), reading]);
+        let chain = |tau_s: f64| {
+            let mut chain = Chain::of(&stretch, 0, Some(1.0));
+            chain.factor(&crate::chain::Along::Same(tau_s), None, None);
+            chain
+        };
+        let (one, two) = (chain(3.0), chain(9.0));
+        let mut variance = vec![0.04; n];
+        variance[17] = 1e3;
+        let sources = [
+            Source { rows: one.rows.clone(), variance: Variance::Same(0.01) },
+            Source { rows: two.rows.clone(), variance: Variance::Each(variance.clone()) },
+        ];
+        let u: Vec<f64> = one.value.iter().zip(&two.value).map(|(a, b)| a - b).collect();
+        let got = whiten(&u, &sources, true);
+
+        let m = u.len();
+        let dense_rows = |rows: &Rows| -> Vec<Vec<f64>> {
+            (0..m)
+                .map(|k| {
+                    let mut row = vec![0.0; n];
+                    rows.at(k).iter().enumerate().for_each(|(j, c)| row[rows.start + k + j] = *c);
+                    row
+                })
+                .collect()
+        };
+        let (a, b) = (dense_rows(&one.rows), dense_rows(&two.rows));
+        let matrix: Vec<Vec<f64>> = (0..m)
+            .map(|i| {
+                (0..m)
+                    .map(|j| (0..n).map(|k| 0.01 * a[i][k] * a[j][k] + variance[k] * b[i][k] * b[j][k]).sum())
+                    .collect()
+            })
+            .collect();
+        let inverse = dense::inverse(&matrix).expect("positive definite");
+        let want = dense::dot(&u, &dense::times(&inverse, &u));
+        let energy = dense::dot(&got.residual, &got.residual);
+        assert!((energy - want).abs() < 1e-9 * want, "got {energy}, want {want}");
+        let weighted = got.weighted();
+        for (got, want) in weighted.iter().zip(dense::times(&inverse, &u)) {
+            assert!((got - want).abs() < 1e-8 * (1.0 + want.abs()), "got {got}, want {want}");
+        }
+    }
+}
