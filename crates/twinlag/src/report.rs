@@ -861,6 +861,7 @@ mod tests {
         let found = Found {
             effect: Identifier::Delay,
             channel: Some(1),
+            fitted_in: Some(1),
             parameters: vec![Value {
                 name: "delay".into(),
                 value: f64::NAN,
