@@ -67,8 +67,24 @@ impl State {
             // What imitates a time constant that is not resolved can be refined at will.
             return false;
         }
-        self.drop_needless(&prepared.search(settings, watch));
+        let search = prepared.search(settings, watch);
+        self.drop_needless(&search);
+        self.grow(&search);
         true
+    }
+
+    /// Gives each effect the parameters that the data support, now that more is known.
+    fn grow(&mut self, search: &Search<'_>) {
+        let mut index = 0;
+        while index < self.steps.len() {
+            match search.grown(&self.current, index, &self.steps[index].0) {
+                Some(tried) => {
+                    self.current = tried.fitted.clone();
+                    self.steps[index].0 = tried;
+                }
+                None => index += 1,
+            }
+        }
     }
 
     /// Takes out earlier effects that the later ones made needless.

@@ -187,6 +187,12 @@ pub(crate) trait Effect: Send + Sync {
         Vec::new()
     }
 
+    /// The same effect with one parameter more, and where its fit starts from `values` of this one: looked at whenever more is
+    /// known, since what is small hides behind what is large.
+    fn grown(&self, _values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+        None
+    }
+
     /// Values to be reported beside the fitted ones: name, unit, function of the parameters.
     fn derived(&self) -> Vec<Derived> {
         Vec::new()

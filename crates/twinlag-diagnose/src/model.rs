@@ -72,6 +72,13 @@ impl Model {
         out
     }
 
+    /// With another form of effect `index`.
+    pub(crate) fn replaced(&self, index: usize, effect: Shared) -> Self {
+        let mut out = self.clone();
+        out.effects[index] = effect;
+        out
+    }
+
     pub(crate) fn with_noise(mut self, noise_std_k: [f64; 2]) -> Self {
         self.noise_std_k = noise_std_k;
         self

@@ -312,6 +312,30 @@ impl Search<'_> {
         chosen
     }
 
+    /// Effect `index` of `current` with one parameter more, where the data support that.
+    pub(crate) fn grown(&self, current: &Fitted, index: usize, tried: &Tried) -> Option<Tried> {
+        let range = current.model.range(index);
+        let (effect, start) = tried.effect.grown(&current.theta[range.clone()])?;
+        let added = start.len() - range.len();
+        let mut theta = current.theta.clone();
+        theta.splice(range, start);
+        let model = current.model.replaced(index, effect.clone());
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        let gain = Self::gain(current, &fitted);
+        let robust_gain = self.robust(current) - self.robust(&fitted);
+        let is_supported = gain.min(robust_gain) > threshold(added, FALSE_ALARM).max(added as f64 * fitted.count.ln());
+        let held_out_nats = held_out_gain(self.observations, self.selection, current, &fitted);
+        (is_supported && held_out_nats > 0.0 && fitted.end.is_usable()).then(|| Tried {
+            gain: tried.gain + gain,
+            robust_gain: tried.robust_gain + robust_gain,
+            held_out_nats: tried.held_out_nats + held_out_nats,
+            added: tried.added + added,
+            effect,
+            fitted,
+            ..tried.clone()
+        })
+    }
+
     /// A candidate with its best fit; of a quick look where `thorough`, which tries more.
     fn try_one(&self, current: &Fitted, effect: &Shared, robust_before: f64, thorough: bool) -> Tried {
         let model = current.model.with(effect.clone());

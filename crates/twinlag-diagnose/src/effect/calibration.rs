@@ -27,35 +27,28 @@ enum Kind {
 struct Calibration {
     kind: Kind,
     parameters: Vec<Parameter>,
-    moments: [f64; 3],
-    offset_k: f64,
-    ratio: f64,
+    context: Context,
 }
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
+    [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved].into_iter().map(|kind| of_kind(kind, context)).collect()
+}
+
+fn of_kind(kind: Kind, context: &Context) -> Shared {
     let [m1, m2] = context.mean_c;
-    [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved]
-        .into_iter()
-        .map(|kind| {
-            let widest = 10.0 * context.swing_k + (m1 - m2).abs() + m1.abs().max(m2.abs());
-            let offset = Parameter::new(
-                "offset",
-                "K",
-                Variable::linear("offset", context.noise_std_k[1].max(1e-9), -widest, widest),
-            );
-            let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.01, 0.2, 5.0));
-            let bend = 0.3 / (4.0 * context.swing_k);
-            let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-3 * bend, -bend, bend));
-            let parameters = match kind {
-                Kind::Offset => vec![offset],
-                Kind::Gain => vec![gain],
-                Kind::Both => vec![gain, offset],
-                Kind::Curved => vec![gain, offset, curvature],
-            };
-            let ratio = if m1.abs() > 1e-9 { (m2 / m1).clamp(0.5, 2.0) } else { 1.0 };
-            Arc::new(Calibration { kind, parameters, moments: context.moments, offset_k: m2 - m1, ratio }) as Shared
-        })
-        .collect()
+    let widest = 10.0 * context.swing_k + (m1 - m2).abs() + m1.abs().max(m2.abs());
+    let noise_k = context.noise_std_k[1].max(1e-9);
+    let offset = Parameter::new("offset", "K", Variable::linear("offset", noise_k, -widest, widest));
+    let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.01, 0.2, 5.0));
+    let bend = 0.3 / (4.0 * context.swing_k);
+    let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-3 * bend, -bend, bend));
+    let parameters = match kind {
+        Kind::Offset => vec![offset],
+        Kind::Gain => vec![gain],
+        Kind::Both => vec![gain, offset],
+        Kind::Curved => vec![gain, offset, curvature],
+    };
+    Arc::new(Calibration { kind, parameters, context: context.clone() })
 }
 
 impl Effect for Calibration {
@@ -72,12 +65,24 @@ impl Effect for Calibration {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
+        let [m1, m2] = self.context.mean_c;
+        let ratio = if m1.abs() > 1e-9 { (m2 / m1).clamp(0.5, 2.0) } else { 1.0 };
         match self.kind {
-            Kind::Offset => vec![vec![self.offset_k]],
-            Kind::Gain => vec![vec![self.ratio]],
-            Kind::Both => vec![vec![1.0, self.offset_k]],
-            Kind::Curved => vec![vec![1.0, self.offset_k, 0.0]],
+            Kind::Offset => vec![vec![m2 - m1]],
+            Kind::Gain => vec![vec![ratio]],
+            Kind::Both => vec![vec![1.0, m2 - m1]],
+            Kind::Curved => vec![vec![1.0, m2 - m1, 0.0]],
         }
+    }
+
+    fn grown(&self, values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+        let (kind, start) = match self.kind {
+            Kind::Offset => (Kind::Both, vec![1.0, values[0]]),
+            Kind::Gain => (Kind::Both, vec![values[0], 0.0]),
+            Kind::Both => (Kind::Curved, vec![values[0], values[1], 0.0]),
+            Kind::Curved => return None,
+        };
+        Some((of_kind(kind, &self.context), start))
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
@@ -91,7 +96,7 @@ impl Effect for Calibration {
             }
         }
         if self.kind == Kind::Curved {
-            reading.curvature = Some(Curvature { per_k: values[2], moments: self.moments });
+            reading.curvature = Some(Curvature { per_k: values[2], moments: self.context.moments });
         }
     }
 
