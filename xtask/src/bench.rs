@@ -8,9 +8,13 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use twinlag::signal::Rig;
+use twinlag::signal::undeclared::{Kind, undeclared};
+use twinlag::{DiagnoseOptions, diagnose};
 use twinlag_experiment::{Experiment, Plan};
 use twinlag_study::Options;
 
+use crate::experiment::record_of;
 use crate::root;
 
 const NOISE_STD_K: f64 = 0.583_363_094_478_901_8;
@@ -27,11 +31,17 @@ pub(crate) struct Bench {
     /// Trials of that study, in place of a million.
     #[arg(long, requires = "million")]
     trials: Option<u64>,
+    /// Times the closed loop on a record of 20 000 samples of every kind in place of the fits.
+    #[arg(long, conflicts_with = "million")]
+    diagnose: bool,
 }
 
 pub(crate) fn run(arguments: &Bench) -> Result<()> {
     if arguments.million {
         return million(arguments.trials);
+    }
+    if arguments.diagnose {
+        return closed_loop();
     }
     let status = Command::new("cargo")
         .args(["bench", "--package", "xtask", "--bench", "fits", "--", "--noplot", "--quiet"])
@@ -123,6 +133,43 @@ fn million(trials: Option<u64>) -> Result<()> {
         plan.samples[0],
         1e6 * seconds * threads.get() as f64 / trials as f64,
         memory().map_or("unknown".into(), |m| format!("{m:.1} MB"))
+    );
+    Ok(())
+}
+
+/// Samples of the records of which the closed loop is timed.
+const LONG: usize = 20_000;
+
+/// How long a diagnosis of all effects takes, for each kind of record.
+fn closed_loop() -> Result<()> {
+    let mut slowest = (0.0, "none");
+    for kind in Kind::ALL {
+        let drawn = undeclared(&[kind], 1.0, None, 1)?;
+        let mut sampled = drawn.rig.record().clone();
+        sampled.samples = LONG;
+        let mut rig = Rig::new(drawn.rig.seed(), sampled, drawn.rig.gas().clone(), drawn.rig.sensors().clone())?;
+        if let Some(flow) = drawn.rig.flow() {
+            rig = rig.with_flow(flow.clone())?;
+        }
+        if let Some(mismatch) = drawn.rig.mismatch() {
+            rig = rig.with_mismatch(mismatch.clone())?;
+        }
+        let record = record_of(rig.simulate()?)?;
+        let start = Instant::now();
+        let answer = diagnose(&record, &DiagnoseOptions::default(), &|_, _, _| ())?;
+        let seconds = start.elapsed().as_secs_f64();
+        let named: Vec<&str> = answer.effects.iter().map(|e| e.effect.name()).collect();
+        println!("{:36} {seconds:6.2} s   {}", kind.name(), named.join(", "));
+        if seconds > slowest.0 {
+            slowest = (seconds, kind.name());
+        }
+    }
+    println!(
+        "the slowest of {} records of {LONG} samples takes {:.2} s ({}), on {} processors",
+        Kind::ALL.len(),
+        slowest.0,
+        slowest.1,
+        Options::default().threads
     );
     Ok(())
 }

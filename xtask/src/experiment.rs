@@ -19,6 +19,7 @@ use twinlag_experiment::{Experiment, Method, Plan, Table, write};
 use twinlag_study::{Options, Outcome, Shard, Study as _};
 
 use crate::root;
+pub(crate) use loops::record_of;
 
 /// What to do with the experiments.
 #[derive(Subcommand)]

@@ -231,7 +231,7 @@ impl Chain {
     }
 
     /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the spline's own
-    /// values between the samples. On uneven samples straight lines stand in, and the reach is three.
+    /// values between the samples. On uneven samples other cubics stand in, and the reach is three.
     pub(crate) fn advance(&mut self, delay_s: f64, reach: usize) {
         let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
         let shift = delay_s / period_s;
@@ -257,19 +257,28 @@ impl Chain {
         self.time_s = self.time_s[reach + 1..reach + 1 + count].to_vec();
     }
 
-    /// The mean of each interval at instants later by `delay_s`: on the straight lines between the samples.
+    /// The values in the middle of each interval, later by `delay_s`: on cubics with the slopes of Catmull and Rom between the
+    /// samples, so that they change smoothly with the delay.
     fn advance_uneven(&mut self, delay_s: f64) {
         let reach = UNEVEN_REACH;
-        let length = 2 * reach + 2;
+        let length = 2 * reach + 4;
         let count = self.len() - length + 1;
-        let middle = |k: usize| 0.5 * (self.time_s[k + reach] + self.time_s[k + reach + 1]);
+        let middle = |k: usize| 0.5 * (self.time_s[k + reach + 1] + self.time_s[k + reach + 2]);
         let mut data = vec![0.0; count * length];
         for (k, taps) in data.chunks_exact_mut(length).enumerate() {
-            let at = middle(k) + delay_s;
             let window = &self.time_s[k..k + length];
-            let j = window.partition_point(|t| *t <= at).clamp(1, length - 1) - 1;
-            let share = ((at - window[j]) / (window[j + 1] - window[j])).clamp(0.0, 1.0);
-            (taps[j], taps[j + 1]) = (1.0 - share, share);
+            let at = middle(k) + delay_s;
+            let j = window.partition_point(|t| *t <= at).clamp(2, length - 2) - 1;
+            let step_s = window[j + 1] - window[j];
+            let u = ((at - window[j]) / step_s).clamp(0.0, 1.0);
+            taps[j] += (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u);
+            taps[j + 1] += (3.0 - 2.0 * u) * u * u;
+            // The slope at a sample is that from the one before it to the one after it.
+            for (i, weight) in [(j, u * (1.0 - u) * (1.0 - u)), (j + 1, -u * u * (1.0 - u))] {
+                let per_k = weight * step_s / (window[i + 1] - window[i - 1]);
+                taps[i + 1] += per_k;
+                taps[i - 1] -= per_k;
+            }
         }
         let times = (0..count).map(middle).collect();
         let new = data

@@ -3,8 +3,20 @@
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 
+/// `Σ a b`, in four sums side by side.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    const LANES: usize = 4;
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let done = n - n % LANES;
+    let rest: f64 = a[done..].iter().zip(&b[done..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without

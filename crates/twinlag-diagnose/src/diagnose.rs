@@ -30,8 +30,11 @@ pub fn diagnose(
     let is_refused = tones(observations) == Some(1);
     let mut prepared = Prepared::new(observations, settings)?;
     let base = prepared.base(settings, watch);
-    let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new() };
-    while state.steps.len() < MOST_EFFECTS && !is_refused && state.step(&mut prepared, settings, watch) {}
+    let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new(), is_reweighed: false };
+    while state.steps.len() < MOST_EFFECTS
+        && !is_refused
+        && (state.step(&mut prepared, settings, watch) || state.reweigh(&mut prepared))
+    {}
     let limits = prepared.search(settings, watch).limits(&state.current);
     Ok(Diagnosis { limits, ..state.conclude(&prepared, is_refused) })
 }
@@ -45,6 +48,8 @@ struct State {
     /// What was added, each with those that explain the record as well.
     steps: Vec<(Tried, Vec<Tried>)>,
     remarks: Vec<String>,
+    /// Whether frequencies are weighted by the spectrum of what is left over.
+    is_reweighed: bool,
 }
 
 impl State {
@@ -70,6 +75,19 @@ impl State {
         let search = prepared.search(settings, watch);
         self.drop_needless(&search);
         self.grow(&search);
+        true
+    }
+
+    /// Where nothing explains what is left over and that is far more than noise: weights frequencies by its own spectrum from here
+    /// on, once. Whether to look again.
+    fn reweigh(&mut self, prepared: &mut Prepared) -> bool {
+        let is_noise = self.current.model.effects.iter().any(|e| e.is_noise());
+        if self.is_reweighed || is_noise || self.current.mean_energy() < FAR_OFF {
+            return false;
+        }
+        self.is_reweighed = true;
+        prepared.weigh_by(&self.current);
+        (self.current, self.base) = (prepared.refit(&self.current), prepared.refit(&self.base));
         true
     }
 
@@ -135,10 +153,7 @@ impl State {
         let error = self.errors(prepared, &base_fit, &last_fit);
         let mut found = prepared.found.clone();
         found.extend(
-            self.steps
-                .iter()
-                .enumerate()
-                .map(|(index, (tried, ties))| name(index, tried, ties, &last, observations, everything)),
+            self.steps.iter().enumerate().map(|(index, (tried, ties))| name(index, tried, ties, &last, &last_fit)),
         );
         let left = what_is_left(&last_fit);
         let has = |effects: &[Identifier]| found.iter().any(|f| effects.contains(&f.effect));

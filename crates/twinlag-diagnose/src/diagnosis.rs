@@ -172,6 +172,8 @@ pub struct ModelFit {
     pub is_weighted_by_residual: bool,
     /// For pictures.
     pub trace: Trace,
+    /// Covariance of the parameters, where there is one.
+    pub(crate) covariance: Option<Vec<Vec<f64>>>,
 }
 
 /// The whole answer.

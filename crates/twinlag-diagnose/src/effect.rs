@@ -214,6 +214,8 @@ pub(crate) struct Context {
     pub(crate) step_s: f64,
     pub(crate) is_even: bool,
     pub(crate) samples: usize,
+    /// Samples that a delay may reach.
+    pub(crate) reach: usize,
     /// Mean of each channel, °C.
     pub(crate) mean_c: [f64; 2],
     /// Mean in °C, variance in K², and third moment over variance in K of both channels together.
@@ -222,6 +224,8 @@ pub(crate) struct Context {
     pub(crate) swing_k: f64,
     /// White noise of the channels, K.
     pub(crate) noise_std_k: [f64; 2],
+    /// Channels whose converter is coarse beside the noise.
+    pub(crate) is_coarse: [bool; 2],
     /// Time constants of the model so far, s.
     pub(crate) tau_s: [f64; 2],
     /// Lines that stick out of the residual, Hz.

@@ -8,6 +8,9 @@ use crate::observations::Observations;
 use crate::plant::{Evaluation, Plant};
 use crate::weighting::Weighting;
 
+/// Parameters whose second derivatives are taken.
+const MOST_EXACT: usize = 7;
+
 /// Something known of a time constant beforehand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownTimeConstant {
@@ -209,8 +212,9 @@ impl Squares<'_> {
         out
     }
 
-    fn columns(&self, theta: &[f64], base: &[f64]) -> Vec<Vec<f64>> {
-        (0..theta.len())
+    /// Columns of the derivative, from the parameter `first` on.
+    fn columns(&self, theta: &[f64], base: &[f64], first: usize) -> Vec<Vec<f64>> {
+        (first..theta.len())
             .map(|i| {
                 let variable = &self.variables[i];
                 if variable.lower == variable.upper {
@@ -241,7 +245,7 @@ impl Cost for Squares<'_> {
 
     fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
         let r = self.residual(theta);
-        let columns = self.columns(theta, &r);
+        let columns = self.columns(theta, &r, 0);
         Some(Derivatives {
             value: r.iter().map(|r| r * r).sum(),
             gradient: columns.iter().map(|c| 2.0 * dense::dot(c, &r)).collect(),
@@ -292,12 +296,26 @@ impl Model {
 
     /// Residual and its derivatives at a point, in units of the parameters, for the samples that count.
     pub(crate) fn linearised(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> Linearised {
+        self.linearised_beside(theta, observations, selection, None)
+    }
+
+    /// The same; the columns of the parameters that this model has more than that of `known` alone where both have the same
+    /// residuals, `known`'s for the others: what an effect of no size does not change.
+    pub(crate) fn linearised_beside(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        known: Option<&Linearised>,
+    ) -> Linearised {
         let variables = self.variables(theta, observations);
         let cost = Squares { model: self, observations, selection, variables };
         let evaluation = self.evaluate(theta, observations);
         let samples: Vec<usize> = evaluation.sample.into_iter().filter(|s| selection.holds(*s)).collect();
         let residual = cost.residual(theta);
-        let columns = cost.columns(theta, &residual);
+        let known = known.filter(|k| k.samples == samples);
+        let mut columns = known.map_or_else(Vec::new, |k| k.columns.clone());
+        columns.extend(cost.columns(theta, &residual, columns.len()));
         Linearised { samples, residual, columns }
     }
 }
@@ -318,9 +336,12 @@ impl Model {
         let scale = |i: usize| products[i][i].max(f64::MIN_POSITIVE).sqrt();
         let slope =
             |lin: &Linearised| -> Vec<f64> { lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect() };
-        let mut second = vec![vec![0.0; p]; p];
-        for i in 0..p {
+        // Those of many, all of one effect, by first derivatives: what the second ones add is of the time constants.
+        let exact = p.min(MOST_EXACT);
+        let mut second = products.clone();
+        for i in 0..exact {
             if variables[i].lower == variables[i].upper {
+                second[i].fill(0.0);
                 continue;
             }
             // A step of about a third of a standard error either way.
@@ -335,8 +356,12 @@ impl Model {
                 second[i][j] = (above[j] - below[j]) / (up - down);
             }
         }
-        let symmetric: Vec<Vec<f64>> =
-            (0..p).map(|i| (0..p).map(|j| 0.5 * (second[i][j] + second[j][i])).collect()).collect();
+        let between = |i: usize, j: usize| match (i < exact, j < exact) {
+            (true, false) => second[i][j],
+            (false, true) => second[j][i],
+            _ => 0.5 * (second[i][j] + second[j][i]),
+        };
+        let symmetric: Vec<Vec<f64>> = (0..p).map(|i| (0..p).map(|j| between(i, j)).collect()).collect();
         dense::inverse(&symmetric).or_else(|| dense::inverse(&products))
     }
 }

@@ -10,25 +10,17 @@ use crate::observations::Observations;
 use crate::search::Tried;
 use crate::summary::{LEFT_OVER, Z_975, covariance};
 
-/// An effect with its numbers.
-pub(crate) fn name(
-    index: usize,
-    tried: &Tried,
-    ties: &[Tried],
-    last: &Fitted,
-    observations: &Observations,
-    selection: &Selection,
-) -> Found {
+/// Effect `index` of the model `last` with its numbers, of which `fit` tells how certain they are.
+pub(crate) fn name(index: usize, tried: &Tried, ties: &[Tried], last: &Fitted, fit: &ModelFit) -> Found {
     let effect: &dyn Effect = tried.effect.as_ref();
-    let covariance = if effect.is_noise() { None } else { covariance(last, observations, selection, false) };
+    let covariance = fit.covariance.as_ref().filter(|_| !effect.is_noise());
     let range = last.model.range(index);
-    let scale = last.mean_energy().max(1.0);
     let mut parameters: Vec<Value> = effect
         .parameters()
         .iter()
         .zip(range.clone())
         .map(|(p, i)| {
-            let se = covariance.as_ref().map(|c| (c[i][i] * scale).sqrt()).filter(|s| *s > 0.0 && s.is_finite());
+            let se = covariance.map(|c| c[i][i].sqrt()).filter(|s| *s > 0.0 && s.is_finite());
             let value = last.theta[i];
             Value {
                 name: p.name.into(),

@@ -3,7 +3,7 @@
 //! A [`Plant`] is the two-lag model with every effect in its place; an effect that is absent has its neutral value. Each
 //! effect's file says which of these numbers are its parameters, nothing more, so any of them can be in the model together.
 
-use crate::chain::{Along, Chain, Pointwise, Rows};
+use crate::chain::{Along, Chain, Pointwise, Rows, UNEVEN_REACH};
 use crate::observations::{Observations, Stretch};
 use crate::spline::Spline;
 use crate::whitening::{Source, Variance, Whitened, whiten};
@@ -13,6 +13,8 @@ pub(crate) const ZERO_CELSIUS_K: f64 = 273.15;
 
 /// Noise of a masked reading beside the swing: far beyond what it could say, not so far that rounding is lost to it.
 const BOUNDLESS: f64 = 20.0;
+/// Fewest disagreements of a stretch: one of fewer is left out.
+const LEAST_LEFT: usize = 4;
 /// A disagreement that is this many times less certain than most says nothing: it rests on a masked reading.
 const UNINFORMED: f64 = 10.0;
 
@@ -160,7 +162,7 @@ impl Plant {
             sensors: tau_s.map(sensor),
             noise_std_k,
             delay_s: None,
-            reach: reach(observations.samples()),
+            reach: reach(observations),
             modulation: None,
             extra: Vec::new(),
             middle_s: 0.5 * (first_s + last_s),
@@ -195,8 +197,12 @@ impl Plant {
                 pass(&mut gas, 0.0);
             }
         }
+        let change = self.modulation.as_ref().map(|spline| -> Vec<f64> {
+            // Both chains have the same instants here.
+            chains[0].times_after_factor().iter().map(|t| spline.at(*t)).collect()
+        });
         for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
-            self.lag(chain, sensor);
+            Self::lag(chain, sensor, change.as_deref());
         }
         pass(&mut gas, 0.0);
         for i in 0..2 {
@@ -207,6 +213,14 @@ impl Plant {
             }
         }
         Inverted { chains, gas }
+    }
+
+    /// Values of a stretch that have no disagreement: each operator takes some at the ends.
+    pub(crate) fn consumed(&self, is_even: bool) -> usize {
+        let factors: usize =
+            self.sensors.iter().map(|s| usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some())).sum();
+        let (each, delay) = if is_even { (2, 2 * self.reach + 3) } else { (1, 2 * UNEVEN_REACH + 3) };
+        each * (1 + factors) + if self.delay_s.is_some() { delay } else { 0 } + self.extra.len()
     }
 
     /// `y₁ − ε (y₂ − about)`.
@@ -236,13 +250,11 @@ impl Plant {
         }
     }
 
-    fn lag(&self, chain: &mut Chain, sensor: &Sensor) {
-        let tau_s = match &self.modulation {
+    /// - `change`: relative change of the time constants at each value, where they change along the record
+    fn lag(chain: &mut Chain, sensor: &Sensor, change: Option<&[f64]>) {
+        let tau_s = match change {
             None => Along::Same(sensor.tau_s),
-            Some(spline) => {
-                let times = chain.times_after_factor();
-                Along::Each(times.iter().map(|t| sensor.tau_s * (1.0 + spline.at(*t)).max(0.02)).collect())
-            }
+            Some(change) => Along::Each(change.iter().map(|m| sensor.tau_s * (1.0 + m).max(0.02)).collect()),
         };
         let value = sensor.radiation.map(|radiation| pointwise(&chain.value, |v| radiation.add_to(v)));
         let slope = sensor.exponent.map(|[p, reference_k]| {
@@ -266,10 +278,23 @@ impl Plant {
         let cut =
             Stretch::new(stretch.time_s[from..to].to_vec(), [0, 1].map(|i| stretch.reading_c[i][from..to].to_vec()));
         let Inverted { chains, gas } = self.invert(&cut, observations.period_s, true);
-        let k = chains[0].len() / 2;
-        let [one, two] = &chains;
+        let count = chains[0].len().min(chains[1].len());
+        let k = count / 2;
+        let [one, two] = self.into_disagreement(&chains, count);
         let gas = gas.expect("asked for");
-        [one.rows.at(k).to_vec(), two.rows.at(k).to_vec(), gas.rows.at(k).to_vec()]
+        [one.at(k).to_vec(), two.at(k).to_vec(), gas.rows.at(k).to_vec()]
+    }
+
+    /// The rows by which noise of either reading enters `x₁ − x₂`: through its own chain, and through crosstalk as well.
+    fn into_disagreement(&self, chains: &[Chain; 2], count: usize) -> [Rows; 2] {
+        let [one, two] = chains;
+        let mut minus_two = two.rows.clone();
+        minus_two.scale(-1.0);
+        let [e1, e2] = [0, 1].map(|i| self.sensors[i].reading.crosstalk);
+        [
+            if e2 == 0.0 { one.rows.clone() } else { one.rows.plus(&minus_two, -e2, count) },
+            if e1 == 0.0 { minus_two.clone() } else { minus_two.plus(&one.rows, -e1, count) },
+        ]
     }
 
     /// The whitened disagreement along the record.
@@ -277,6 +302,11 @@ impl Plant {
         let mut out = Evaluation::default();
         let mut first_sample = 0;
         for stretch in &observations.stretches {
+            if stretch.len() < self.consumed(observations.period_s.is_some()) + LEAST_LEFT {
+                out.begins.push(out.sample.len());
+                first_sample += stretch.len();
+                continue;
+            }
             let has_gas = self.extra.iter().any(|e| e.place == Place::Gas);
             let Inverted { mut chains, gas } = self.invert(stretch, observations.period_s, has_gas);
             let mut sources = Vec::new();
@@ -294,7 +324,11 @@ impl Plant {
             for (index, extra) in self.extra.iter().enumerate() {
                 let rho = (-observations.step_s() / extra.correlation_s).exp();
                 let mut rows = match extra.place {
-                    Place::Reading(i) => chains[i].rows.clone(),
+                    Place::Reading(i) => {
+                        let count = chains[0].len().min(chains[1].len());
+                        let [one, two] = self.into_disagreement(&chains, count);
+                        if i == 0 { one } else { two }
+                    }
                     Place::Gas => gas.as_ref().expect("made for it").rows.clone(),
                 };
                 // Those before have had their differences; the gas chain has not.
@@ -319,17 +353,12 @@ impl Plant {
                 extra_rows.push(rows);
                 chains.iter_mut().for_each(|c| c.difference(rho));
             }
+            let count = chains[0].len().min(chains[1].len());
+            for (source, rows) in sources.iter_mut().zip(self.into_disagreement(&chains, count)) {
+                source.rows = rows;
+            }
             let [one, two] = chains;
-            let count = one.len().min(two.len());
             let u: Vec<f64> = one.value.iter().zip(&two.value).map(|(a, b)| a - b).collect();
-            let minus_two = {
-                let mut rows = two.rows.clone();
-                rows.scale(-1.0);
-                rows
-            };
-            let [e1, e2] = [0, 1].map(|i| self.sensors[i].reading.crosstalk);
-            sources[0].rows = if e2 == 0.0 { one.rows.clone() } else { one.rows.plus(&minus_two, -e2, count) };
-            sources[1].rows = if e1 == 0.0 { minus_two.clone() } else { minus_two.plus(&one.rows, -e1, count) };
             for (rows, extra) in extra_rows.into_iter().zip(&self.extra) {
                 let rho = (-observations.step_s() / extra.correlation_s).exp();
                 let variance = extra.std_k * extra.std_k * (1.0 - rho * rho);
@@ -373,9 +402,17 @@ fn pointwise(values: &[f64], f: impl Fn(f64) -> (f64, f64)) -> Pointwise {
     Pointwise { value, derivative }
 }
 
-/// How many samples a delay may reach in a record of so many.
-pub(crate) fn reach(samples: usize) -> usize {
-    (samples / 50).clamp(2, 64)
+/// How many samples a delay may reach: not so many that stretches with a tenth of the record or more are lost to it.
+pub(crate) fn reach(observations: &Observations) -> usize {
+    let samples = observations.samples();
+    let mut lengths: Vec<usize> = observations.stretches.iter().map(Stretch::len).collect();
+    lengths.sort_unstable();
+    let mut shorter = 0;
+    let typical = lengths.into_iter().find(|n| {
+        shorter += n;
+        10 * shorter >= samples
+    });
+    (samples / 50).min(typical.unwrap_or(0) / 10).clamp(2, 64)
 }
 
 /// Variance of each sample: boundless, to all purposes, where it is masked.

@@ -9,6 +9,7 @@ use crate::observations::Observations;
 use crate::plant::reach;
 use crate::search::Search;
 use crate::settings::{Settings, Watch};
+use crate::spectrum::runs;
 use crate::weighting::Weighting;
 
 /// Blocks along the record, of which every eighth is kept for the judgement at the end.
@@ -113,6 +114,14 @@ impl Prepared {
         }
     }
 
+    /// From here on frequencies count by the spectrum of what `fitted` leaves over.
+    pub(crate) fn weigh_by(&mut self, fitted: &Fitted) {
+        let evaluation = fitted.model.evaluate(&fitted.theta, &self.observations);
+        let left = runs(&evaluation, |s| self.searched.holds(s));
+        self.searched.weighting = self.searched.weighting.by_residual(&left);
+        self.everything.weighting = self.searched.weighting.clone();
+    }
+
     /// The same model with the levels that there are now.
     pub(crate) fn refit(&self, fitted: &Fitted) -> Fitted {
         let model = fitted.model.clone().with_noise(self.levels.std_k);
@@ -184,7 +193,7 @@ pub(crate) fn is_judge(sample: usize, samples: usize) -> bool {
 /// All residuals away from the ends; without the blocks that judge, and their surroundings, if these are to be kept.
 fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weighting) -> Selection {
     let samples = observations.samples();
-    let margin = 8 + reach(samples) + weighting.half();
+    let margin = 8 + reach(observations) + weighting.half();
     let gap = (samples / BLOCKS / 10).min(20);
     let mut counts = vec![true; samples];
     let mut first = 0;
@@ -213,10 +222,12 @@ fn context(observations: &Observations, levels: &Levels) -> Context {
         step_s,
         is_even: observations.period_s.is_some(),
         samples: observations.samples(),
+        reach: reach(observations),
         mean_c: [0, 1].map(|i| observations.mean_and_std(i)[0]),
         moments: observations.moments(),
         swing_k: observations.swing_k(),
         noise_std_k: levels.std_k,
+        is_coarse: levels.coarse_step_k.map(|q| q.is_some()),
         tau_s: [10.0 * step_s; 2],
         lines_hz: Vec::new(),
     }

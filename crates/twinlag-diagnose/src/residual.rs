@@ -5,7 +5,7 @@
 //! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
 use realfft::RealFftPlanner;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use twinlag_cross_relation::ResidualTest;
 
 use crate::dense;
@@ -16,12 +16,16 @@ use crate::weighting::Weighting;
 
 /// Points of a segment for the coherence.
 const SEGMENT: usize = 256;
+/// Power over that of the noise from which on a frequency is the gas's.
+const STANDS_OUT: f64 = 3.0;
 /// Parts of the record whose energies are compared.
 const PARTS: usize = 20;
 
 /// Residual and estimated input where they count, in unbroken runs.
 struct Pairs {
     runs: Vec<(Vec<f64>, Vec<f64>)>,
+    /// White noise of the reading that stands for the input, K.
+    noise_std_k: f64,
 }
 
 impl Pairs {
@@ -49,7 +53,7 @@ impl Pairs {
                 run.1.push(cleaned[*sample]);
             }
         }
-        Self { runs }
+        Self { runs, noise_std_k: plant.noise_std_k[channel] }
     }
 
     fn residual(&self) -> impl Iterator<Item = f64> + '_ {
@@ -85,7 +89,7 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
     out
 }
 
-/// Coherence with the estimated input, dependence on its level and rate, on time, and tails.
+/// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
 pub(crate) fn tests(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Vec<ResidualTest> {
     let pairs = Pairs::of(fitted, observations, selection);
     let r: Vec<f64> = pairs.residual().collect();
@@ -98,6 +102,8 @@ pub(crate) fn tests(fitted: &Fitted, observations: &Observations, selection: &Se
     out.push(rate(&pairs, &r));
     out.push(time(&r));
     out.push(tails(&r));
+    out.extend(lines(&pairs));
+    out.extend(repeated_values(observations, fitted.model.noise_std_k()));
     out
 }
 
@@ -109,8 +115,9 @@ fn two_sided(deviate: f64) -> f64 {
     2.0 * Normal::new(0.0, 1.0).expect("the standard normal exists").sf(deviate.abs())
 }
 
-/// Largest coherence of all frequencies: under a right model that of `L` independent segments exceeds `c` with probability
-/// `(1 − c)^(L − 1)`.
+/// Largest coherence of the frequencies in which the gas stands out of the noise: under a right model that of `L` independent
+/// segments exceeds `c` with probability `(1 − c)^(L − 1)`. Elsewhere the estimated input is noise, and a level that is a little off
+/// leaves some of the residual's in it.
 fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     let mut planner = RealFftPlanner::<f64>::new();
     let plan = planner.plan_fft_forward(SEGMENT);
@@ -155,9 +162,12 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     if independent < 4.0 {
         return None;
     }
-    let largest = (0..bins).map(|j| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300)).fold(0.0, f64::max);
+    let noise = STANDS_OUT * pairs.noise_std_k.powi(2) * dense::dot(&window, &window) * count;
+    let coherence = |j: usize| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300);
+    let of_gas: Vec<f64> = (0..bins).filter(|j| of_x[*j] > noise).map(coherence).collect();
+    let largest = of_gas.iter().copied().reduce(f64::max)?;
     let of_one = (1.0 - largest).max(0.0).powf(independent - 1.0);
-    let p = -((bins as f64) * (-of_one).ln_1p()).exp_m1();
+    let p = -((of_gas.len() as f64) * (-of_one).ln_1p()).exp_m1();
     Some(test("coherence", largest, Some(independent), p))
 }
 
@@ -223,6 +233,64 @@ fn time(r: &[f64]) -> ResidualTest {
         .sum();
     let dof = (PARTS - 1) as f64;
     test("time", statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
+}
+
+/// Largest power of a single frequency over the mean of its neighbours', in the longest run: among `m` neighbours of the same
+/// expectation it exceeds `x` times their mean with probability `(1 + x/m)^−m`.
+fn lines(pairs: &Pairs) -> Option<ResidualTest> {
+    const NEIGHBOURS: usize = 30;
+    let run = pairs.runs.iter().map(|r| &r.0).max_by_key(|r| r.len())?;
+    if run.len() < 4 * NEIGHBOURS {
+        return None;
+    }
+    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(run.len());
+    let mut spectrum = plan.make_output_vec();
+    plan.process(&mut run.clone(), &mut spectrum).expect("lengths agree");
+    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(|x| x.norm_sqr()).collect();
+    let half = NEIGHBOURS / 2;
+    let bins = half + 1..power.len().saturating_sub(half + 1);
+    let ratio = |j: usize| {
+        // A line between two frequencies is in both.
+        let below: f64 = power[j - half - 1..j - 1].iter().sum();
+        let above: f64 = power[j + 2..j + 2 + half].iter().sum();
+        power[j] / ((below + above) / NEIGHBOURS as f64).max(f64::MIN_POSITIVE)
+    };
+    let count = bins.len();
+    let largest = bins.filter(|j| j + 2 + half <= power.len()).map(ratio).fold(0.0, f64::max);
+    let of_one = (1.0 + largest / NEIGHBOURS as f64).powi(-(NEIGHBOURS as i32));
+    let p = -((count as f64) * (-of_one).ln_1p()).exp_m1();
+    Some(test("lines", largest, Some(NEIGHBOURS as f64), p))
+}
+
+/// Readings that equal the one before them, more often than noise `σ` on a grid of step `q` makes them, `q/(2 √π σ)`: a logger that
+/// repeats what it last read. None where the grid is coarser than the noise.
+fn repeated_values(observations: &Observations, noise_std_k: [f64; 2]) -> Option<ResidualTest> {
+    let of_channel = |i: usize| -> Option<(f64, f64)> {
+        let mut values: Vec<f64> = observations.channel(i).collect();
+        values.sort_by(f64::total_cmp);
+        let apart = values.windows(2).map(|w| w[1] - w[0]);
+        let step_k = apart.filter(|d| *d > 1e-9 * observations.swing_k()).fold(f64::INFINITY, f64::min);
+        if step_k > noise_std_k[i] {
+            return None;
+        }
+        let share = step_k / (2.0 * std::f64::consts::PI.sqrt() * noise_std_k[i]);
+        let pairs = || {
+            observations.stretches.iter().flat_map(|s| {
+                let masked = &s.masked[i];
+                s.reading_c[i].windows(2).enumerate().filter(|(k, _)| !masked[*k] && !masked[k + 1]).map(|(_, w)| w)
+            })
+        };
+        let count = pairs().count() as u64;
+        let equal = pairs().filter(|w| w[0] == w[1]).count() as u64;
+        if equal == 0 {
+            return Some((0.0, 1.0));
+        }
+        // As many or more.
+        let p = Binomial::new(share, count).ok()?.sf(equal - 1);
+        Some((equal as f64 / count as f64, p))
+    };
+    let found = (0..2).filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(test("repeated-values", found.0, None, 2.0 * found.1))
 }
 
 /// Kurtosis: Gaussian noise has 3 with standard error `√(24/n)`.

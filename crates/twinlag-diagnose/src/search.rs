@@ -6,13 +6,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::defects::lines;
 use crate::dense;
 use crate::diagnosis::Limit;
-use crate::effect::{Context, Identifier, Shared, candidates};
+use crate::effect::{Context, Identifier, Parameter, Shared, candidates};
 use crate::held_out::held_out_gain;
-use crate::model::{Effort, Fitted, Model, Selection};
-use crate::observations::Observations;
+use crate::model::{Effort, Fitted, Linearised, Model, Selection};
+use crate::observations::{Observations, Stretch};
 use crate::plant::Place;
 use crate::spectrum::{Bands, fit_noise, runs};
-use twinlag_optimise::End;
+use twinlag_optimise::{End, Scale, Variable};
 
 /// Probability, over all candidates of a round, of taking one that is not there.
 pub(crate) const FALSE_ALARM: f64 = 1e-3;
@@ -30,6 +30,8 @@ const STATIC: f64 = 0.25;
 const INCOMPLETE: f64 = 1.5;
 /// Candidates that are fitted to the end.
 const MOST_FITTED: usize = 10;
+/// Share of the residuals that must be left with an effect in the model.
+const KEPT: f64 = 0.8;
 /// The same up to which they are the same model in two guises.
 const EQUAL: f64 = 2.0;
 
@@ -166,10 +168,14 @@ impl Search<'_> {
             .filter(|c| self.allowed.contains(&c.identifier()) && Self::is_new(current, c))
             .collect();
         let robust_before = self.robust(current);
+        let now = (!thorough).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
         let promises = self.in_parallel(&all, |effect| {
             let is_line = effect.identifier() == Identifier::MainsPickup;
-            let promise =
-                if effect.is_noise() || is_line || thorough { f64::INFINITY } else { self.promise(current, effect) };
+            let promise = if effect.is_noise() || is_line || thorough {
+                f64::INFINITY
+            } else {
+                self.promise(current, effect, now.as_ref())
+            };
             let least = threshold(effect.parameters().len(), 0.01) * current.mean_energy().max(1.0);
             Some((promise > least).then_some(promise))
         });
@@ -244,12 +250,14 @@ impl Search<'_> {
     /// What a candidate would take off the energy if the residual were linear in everything, from the best of its starts.
     ///
     /// The residual is that of the candidate's own model: another number of factors is another whitening of the same disagreement.
-    fn promise(&self, current: &Fitted, effect: &Shared) -> f64 {
+    ///
+    /// - `now`: the current model, linearised
+    fn promise(&self, current: &Fitted, effect: &Shared, now: Option<&Linearised>) -> f64 {
         let model = current.model.with(effect.clone());
         let of = |start: &Vec<f64>| -> f64 {
             let mut theta = current.theta.clone();
             theta.extend_from_slice(start);
-            let lin = model.linearised(&theta, self.observations, self.selection);
+            let lin = model.linearised_beside(&theta, self.observations, self.selection, now);
             let matrix: Vec<Vec<f64>> =
                 lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect();
             let slope: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
@@ -270,12 +278,13 @@ impl Search<'_> {
             .filter(|c| !c.neutral().is_empty())
             .collect();
         let count = all.len().max(1) as f64;
+        let now = current.model.linearised(&current.theta, self.observations, self.selection);
         let found = self.in_parallel(&all, |effect| {
             let &(main, _) = effect.neutral().first()?;
             let model = current.model.with(effect.clone());
             let mut theta = current.theta.clone();
             theta.extend_from_slice(effect.starts().first()?);
-            let lin = model.linearised(&theta, self.observations, self.selection);
+            let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(&now));
             let matrix: Vec<Vec<f64>> =
                 lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect();
             let inverse = dense::inverse(&matrix)?;
@@ -304,6 +313,11 @@ impl Search<'_> {
     /// The chosen candidate in the size that the data support.
     fn sized(&self, current: &Fitted, mut chosen: Tried, robust_before: f64) -> Tried {
         for effect in chosen.effect.sizes() {
+            // More of it where something is left, three standard errors of the energy.
+            let left = 1.0 + 3.0 * (2.0 / chosen.fitted.count).sqrt();
+            if effect.parameters().len() > chosen.added && chosen.fitted.mean_energy() < left {
+                continue;
+            }
             let other = self.try_one(current, &effect, robust_before, false);
             if other.score() > chosen.score() {
                 chosen = other;
@@ -397,14 +411,18 @@ impl Search<'_> {
 
     fn try_noise(&self, current: &Fitted, effect: &Shared) -> Option<Tried> {
         let plant = current.model.plant(&current.theta, self.observations);
+        let longest = self.observations.stretches.iter().map(Stretch::len).max()?;
+        if longest < plant.consumed(true) + 20 {
+            return None;
+        }
         let bands = self.bands(current);
         let place = match effect.channel() {
             Some(i) => Place::Reading(i),
             None => Place::Gas,
         };
         let starts: Vec<[f64; 2]> = effect.starts().iter().map(|s| [s[0], s[1]]).collect();
-        let white = fit_noise(&plant, self.observations, &bands, None, &[]);
-        let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts);
+        let white = fit_noise(&plant, self.observations, &bands, None, &[], self.context.is_coarse);
+        let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts, self.context.is_coarse);
         let extra = with.extra?;
         let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
         let mut theta = current.theta.clone();
@@ -426,10 +444,14 @@ impl Search<'_> {
     /// The candidate that explains the residual best, with those that do it as well; `None` where none is significant.
     pub(crate) fn choose(&self, current: &Fitted, tried: &[Tried]) -> Option<(Tried, Vec<Tried>)> {
         let count = tried.len().max(1) as f64;
-        // A time constant that is too short to be seen may lie on its bound: the effect is none the worse for it.
-        let is_sound = |t: &Tried| match &t.fitted.end {
-            End::OnBound(which) => which.iter().all(|i| *i < 2),
-            end => end.is_usable() || *end == End::LimitReached,
+        // A time constant that is too short to be seen may lie on its bound: the effect is none the worse for it. One that takes
+        // most of the stretches away explains nothing.
+        let is_sound = |t: &Tried| {
+            let has_ended = match &t.fitted.end {
+                End::OnBound(which) => which.iter().all(|i| *i < 2),
+                end => end.is_usable() || *end == End::LimitReached,
+            };
+            has_ended && t.fitted.count > KEPT * current.count
         };
         let mut mean: Vec<Tried> = tried
             .iter()
@@ -509,13 +531,19 @@ impl Search<'_> {
         None
     }
 
-    /// Whether the effect's size is clear of nothing, or of a bound that means nothing.
+    /// Whether the effect's parameters are clear of nothing, or of a bound that means nothing, and leave those of the others there.
     fn is_there(t: &Tried) -> bool {
-        let range = t.fitted.model.range(t.fitted.model.effects.len() - 1);
-        t.effect.parameters().iter().zip(&t.fitted.theta[range]).all(|(p, x)| {
-            let width = p.variable.upper - p.variable.lower;
-            x.is_finite() && (*x - p.variable.lower) > 1e-9 * width && (p.variable.upper - *x) > 1e-9 * width
-        })
+        let model = &t.fitted.model;
+        let is_clear = |(p, x): (&Parameter, &f64)| {
+            let Variable { lower, upper, scale, .. } = p.variable;
+            let [margin, low, high] = match scale {
+                Scale::Logarithmic => [1e-3, (x / lower).ln(), (upper / x).ln()],
+                Scale::Linear { .. } => [1e-9 * (upper - lower), x - lower, upper - x],
+            };
+            x.is_finite() && low > margin && high > margin
+        };
+        let mean = model.effects.iter().enumerate().filter(|(_, e)| !e.is_noise());
+        mean.flat_map(|(i, e)| e.parameters().iter().zip(&t.fitted.theta[model.range(i)])).all(is_clear)
     }
 }
 

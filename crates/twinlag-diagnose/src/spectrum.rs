@@ -191,8 +191,10 @@ pub(crate) struct NoiseFit {
     pub(crate) held_out: f64,
 }
 
-/// Standard deviation of the logarithm of levels from third differences, where noise may be coloured.
+/// Standard deviations of the logarithm of levels from third differences: below, since these see coloured noise and what is left
+/// of the gas as well; above, where nothing but scatter is.
 const LEVELS_LOOSE: f64 = 0.3;
+const LEVELS_TIGHT: f64 = 0.03;
 
 struct NoiseCost<'a> {
     bands: &'a Bands,
@@ -201,6 +203,8 @@ struct NoiseCost<'a> {
     base: &'a [f64],
     place: Option<Place>,
     half: Half,
+    /// Channels whose converter is coarse: third differences may say anything.
+    is_coarse: [bool; 2],
 }
 
 impl NoiseCost<'_> {
@@ -221,25 +225,32 @@ impl NoiseCost<'_> {
 
 impl Cost for NoiseCost<'_> {
     fn value(&self, x: &[f64]) -> f64 {
-        let prior: f64 = x[..2].iter().map(|f| (f.ln() / LEVELS_LOOSE).powi(2)).sum();
-        self.likelihood(x, self.half) + prior
+        let prior = |(factor, is_coarse): (&f64, &bool)| {
+            let above = if *is_coarse { LEVELS_LOOSE } else { LEVELS_TIGHT };
+            let scatter = if *factor > 1.0 { above } else { LEVELS_LOOSE };
+            (factor.ln() / scatter).powi(2)
+        };
+        self.likelihood(x, self.half) + x[..2].iter().zip(&self.is_coarse).map(prior).sum::<f64>()
     }
 }
 
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
+///
+/// - `is_coarse`: channels whose levels third differences do not tell
 pub(crate) fn fit_noise(
     plant: &Plant,
     observations: &Observations,
     bands: &Bands,
     place: Option<Place>,
     starts: &[[f64; 2]],
+    is_coarse: [bool; 2],
 ) -> NoiseFit {
     let paths = Paths::of(plant, observations);
     let base: Vec<f64> =
         bands.0.iter().map(|b| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE)).collect();
     let [first, last] = observations.ends_s();
     let solve = |half: Half| -> (Vec<f64>, f64) {
-        let cost = NoiseCost { bands, paths: &paths, base: &base, place, half };
+        let cost = NoiseCost { bands, paths: &paths, base: &base, place, half, is_coarse };
         let mut variables =
             vec![Variable::logarithmic("level 1", 0.2, 5.0), Variable::logarithmic("level 2", 0.2, 5.0)];
         let mut all = vec![vec![1.0, 1.0]];
@@ -265,7 +276,7 @@ pub(crate) fn fit_noise(
             .expect("at least one start")
     };
     let (x, _) = solve(Half::Both);
-    let cost = NoiseCost { bands, paths: &paths, base: &base, place, half: Half::Both };
+    let cost = NoiseCost { bands, paths: &paths, base: &base, place, half: Half::Both, is_coarse };
     let (even, odd) = (solve(Half::Even).0, solve(Half::Odd).0);
     let held_out = cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even);
     NoiseFit {

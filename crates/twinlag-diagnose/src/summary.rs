@@ -146,6 +146,7 @@ pub(crate) fn summarise(
         tests,
         chi2_per_dof,
         is_weighted_by_residual: rejects,
+        covariance,
         trace: Trace {
             time_s: evaluation.time_s,
             residual: evaluation.residual,

@@ -9,6 +9,7 @@
 use num_complex::Complex64;
 use realfft::RealFftPlanner;
 
+use crate::dense;
 use crate::observations::Observations;
 
 /// Points of the spectra.
@@ -17,11 +18,15 @@ const POINTS: usize = 256;
 const LEAST: f64 = 0.02;
 /// Taps on either side of the filter's middle.
 const HALF: usize = 24;
+/// Most coefficients of the autoregressive model of a residual.
+const ORDER: usize = 8;
 
 /// A filter of zero phase for the whitened residual, its squared gain the weight; or none.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Weighting {
     taps: Vec<f64>,
+    /// Prediction error of an autoregressive model of what is left over, where that is not noise: the filter that whitens it.
+    prediction: Vec<f64>,
 }
 
 impl Weighting {
@@ -78,7 +83,35 @@ impl Weighting {
                 response[lag] / POINTS as f64 * window
             })
             .collect();
-        Self { taps }
+        Self { taps, prediction: Vec::new() }
+    }
+
+    /// The same, and frequencies weighted by the spectrum of the residual itself, whose unbroken stretches are `runs`: what is left
+    /// over is larger than the noise, and says as little about the parameters as it is large.
+    ///
+    /// The filter is the prediction error of the autoregressive model that the autocorrelation gives (Yule and Walker), scaled to
+    /// unit variance.
+    pub(crate) fn by_residual(&self, runs: &[Vec<f64>]) -> Self {
+        let filtered: Vec<Vec<f64>> = runs.iter().map(|run| self.apply(run)).collect();
+        let count: usize = filtered.iter().map(Vec::len).sum();
+        let order = ORDER.min(count / 50);
+        let correlation: Vec<f64> = (0..=order)
+            .map(|lag| {
+                let products = filtered.iter().map(|run| dense::dot(&run[lag.min(run.len())..], run));
+                products.sum::<f64>() / count.max(1) as f64
+            })
+            .collect();
+        let matrix: Vec<Vec<f64>> =
+            (0..order).map(|a| (0..order).map(|b| correlation[a.abs_diff(b)]).collect()).collect();
+        let Some(inverse) = dense::inverse(&matrix) else { return self.clone() };
+        let coefficients = dense::times(&inverse, &correlation[1..]);
+        let left = correlation[0] - dense::dot(&coefficients, &correlation[1..]);
+        let scale = (self.mean() / left).sqrt();
+        if !scale.is_finite() {
+            return self.clone();
+        }
+        let prediction = [1.0].into_iter().chain(coefficients.iter().map(|a| -a)).map(|a| a * scale).collect();
+        Self { taps: self.taps.clone(), prediction }
     }
 
     /// How many residuals at either end have no filtered value.
@@ -122,14 +155,24 @@ impl Weighting {
     /// The filtered values, zero where the filter reaches past an end.
     pub(crate) fn apply(&self, values: &[f64]) -> Vec<f64> {
         let width = self.taps.len();
-        if width == 0 {
-            return values.to_vec();
-        }
         let mut out = vec![0.0; values.len()];
-        for (k, window) in values.windows(width).enumerate() {
-            out[k + width / 2] = self.taps.iter().zip(window).map(|(t, v)| t * v).sum();
+        if width == 0 {
+            out.copy_from_slice(values);
+        } else {
+            for (k, window) in values.windows(width).enumerate() {
+                out[k + width / 2] = dense::dot(&self.taps, window);
+            }
         }
-        out
+        if self.prediction.is_empty() {
+            return out;
+        }
+        (0..out.len())
+            .map(|k| {
+                let is_inside = k + 1 >= self.prediction.len();
+                let sum = |k: usize| self.prediction.iter().enumerate().map(|(lag, c)| c * out[k - lag]).sum();
+                if is_inside { sum(k) } else { 0.0 }
+            })
+            .collect()
     }
 }
 

@@ -79,7 +79,7 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
     let mut diagonal = Vec::with_capacity(u.len());
     let mut log_determinant = 0.0;
     let mut kept = Vec::with_capacity(if keep { u.len() * stride } else { 0 });
-    // The last rows of L, newest first.
+    // The last rows of L: row k in place k mod stride.
     let mut recent = vec![0.0; stride * stride];
     let mut row = vec![0.0; stride];
     let mut agreeing = 0;
@@ -89,18 +89,20 @@ pub(crate) fn whiten(u: &[f64], sources: &[Source], keep: bool) -> Whitened {
             for lag in (0..=reach).rev() {
                 let mut entry = if fixed.is_empty() { covariance(sources, k, lag) } else { fixed[lag] };
                 for older in lag + 1..=reach {
-                    let other = if lag == 0 { row[older] } else { recent[(lag - 1) * stride + older - lag] };
+                    let other = if lag == 0 { row[older] } else { recent[(k - lag) % stride * stride + older - lag] };
                     entry -= row[older] * other;
                 }
-                row[lag] =
-                    if lag == 0 { entry.max(f64::MIN_POSITIVE).sqrt() } else { entry / recent[(lag - 1) * stride] };
+                row[lag] = if lag == 0 {
+                    entry.max(f64::MIN_POSITIVE).sqrt()
+                } else {
+                    entry / recent[(k - lag) % stride * stride]
+                };
             }
             let agrees = !fixed.is_empty()
                 && k > band
-                && row.iter().zip(&recent[..stride]).all(|(a, b)| (a - b).abs() <= SAME * row[0]);
+                && row.iter().zip(&recent[(k - 1) % stride * stride..]).all(|(a, b)| (a - b).abs() <= SAME * row[0]);
             agreeing = if agrees { agreeing + 1 } else { 0 };
-            recent.rotate_right(stride);
-            recent[..stride].copy_from_slice(&row);
+            recent[k % stride * stride..][..stride].copy_from_slice(&row);
         }
         let mut r = u[k];
         for lag in 1..=reach {

@@ -2,7 +2,8 @@
 //!
 //! The rigs integrate physics in continuous time and share no code with the effects that explain them.
 
-use std::fmt::Write as _;
+mod tables;
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -12,9 +13,10 @@ use anyhow::{Context, Result, bail};
 use serde::{Deserialize, Serialize};
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{Channels, Record, SamplingChoice};
+use twinlag::signal::Simulated;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
-use twinlag_study::{Failure, Options, Outcome, Quantity, Results, Study, Tally};
+use twinlag_study::{Failure, Options, Outcome, Quantity, Study};
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,9 +32,9 @@ pub(super) struct Plan {
     /// What sizes are multiplied with.
     size_factors: Vec<f64>,
     gases: Vec<GasKind>,
-    /// Effects that the library is to be without.
+    /// Whether the library is to be without the effects that a record has.
     #[serde(default)]
-    without: Vec<Identifier>,
+    without_own: bool,
 }
 
 impl Plan {
@@ -53,15 +55,25 @@ impl Plan {
     }
 }
 
+/// Quantities of a record, in order; those of sensors are two.
 const RIGHT: usize = 0;
 const STATED: usize = 1;
-const EXPLAINED: usize = 2;
-const ALL_FOUND: usize = 3;
+const ALL_FOUND: usize = 2;
+const WRONG: usize = 3;
 const COVERED: usize = 4;
-const ERROR: usize = 6;
-const RATIO: usize = 8;
-const HELD_OUT: usize = 10;
-const FIRST: usize = 11;
+const VERDICT: usize = 6;
+const ERROR: usize = VERDICT + VERDICTS.len();
+const RATIO: usize = ERROR + 2;
+const BOUND: usize = RATIO + 2;
+const HELD_OUT: usize = BOUND + 2;
+const FIRST: usize = HELD_OUT + 1;
+
+const VERDICTS: [(Verdict, &str); 4] = [
+    (Verdict::Adequate, "adequate"),
+    (Verdict::Explained, "explained"),
+    (Verdict::PartlyExplained, "partly-explained"),
+    (Verdict::Unexplained, "unexplained"),
+];
 
 impl Study for Plan {
     type Scratch = ();
@@ -83,12 +95,13 @@ impl Study for Plan {
     }
 
     fn quantities(&self, _cell: usize) -> Vec<Quantity> {
-        let mut out: Vec<Quantity> =
-            ["right first", "right or stated", "explained", "all found"].into_iter().map(Quantity::event).collect();
-        out.extend(["covered 1", "covered 2"].into_iter().map(Quantity::event));
-        let values = ["relative error 1", "relative error 2", "error over its standard error 1"];
-        out.extend(values.into_iter().map(Quantity::value));
-        out.extend(["error over its standard error 2", "held-out rms after"].into_iter().map(Quantity::value));
+        let events = ["right first", "right or stated", "all found", "wrong name", "covered 1", "covered 2"];
+        let mut out: Vec<Quantity> = events.into_iter().map(Quantity::event).collect();
+        out.extend(VERDICTS.iter().map(|(_, name)| Quantity::event(*name)));
+        for name in ["relative error", "error over its standard error", "error over that of the right effect"] {
+            out.extend((1..3).map(|sensor| Quantity::value(format!("{name} {sensor}"))));
+        }
+        out.push(Quantity::value("held-out rms after"));
         out.extend(Identifier::ALL.iter().map(|e| Quantity::event(format!("first: {e}"))));
         out.push(Quantity::event("first: none"));
         out
@@ -105,21 +118,13 @@ impl Study for Plan {
         let rig = undeclared(kinds, size, Some(gas), self.seed + 100_000 * cell as u64 + index)?;
         let simulated = rig.simulate()?;
         let truth_s = truth_s(&rig, &simulated.time_s, &simulated.gas_c);
-        let record = Record::from_channels(
-            Channels {
-                source: "a rig".into(),
-                names: simulated.channels,
-                time_s: simulated.time_s,
-                t1_c: simulated.t1_c,
-                t2_c: simulated.t2_c,
-                reference_c: Some(simulated.gas_c),
-            },
-            SamplingChoice::Auto,
-        )?;
-        let options = DiagnoseOptions { without: self.without.clone(), ..DiagnoseOptions::default() };
-        let answer = diagnose(&record, &options, &|_, _, _| ())?;
-
+        let record = record_of(simulated)?;
         let wanted = rig.effects();
+        let own = || Identifier::ALL.into_iter().filter(|e| wanted.contains(&e.name()));
+        let options = |without: Vec<Identifier>| DiagnoseOptions { without, ..DiagnoseOptions::default() };
+        let without = if self.without_own { own().collect() } else { Vec::new() };
+        let answer = diagnose(&record, &options(without), &|_, _, _| ())?;
+
         let is_alien = kinds.iter().any(|k| k.effect().is_none());
         let named = |e: &twinlag::NamedEffect, name: &str| e.effect.name() == name;
         let stated =
@@ -135,7 +140,18 @@ impl Study for Plan {
             let all = wanted.iter().all(|w| answer.effects.iter().any(|e| stated(e, w)));
             outcome.event(ALL_FOUND, all && answer.effects.len() >= wanted.len());
         }
-        outcome.event(EXPLAINED, matches!(answer.verdict, Verdict::Explained | Verdict::Adequate));
+        for (i, (verdict, _)) in VERDICTS.iter().enumerate() {
+            outcome.event(VERDICT + i, answer.verdict == *verdict);
+        }
+        // With full confidence, and none of those that look like it.
+        let looks_like =
+            |e: &twinlag::NamedEffect| own().any(|o| o == e.effect || o.about().confusable.contains(&e.effect));
+        let is_confident = answer.verdict == Verdict::Explained;
+        outcome.event(WRONG, is_confident && first.is_some_and(|e| e.alternatives.is_empty() && !looks_like(e)));
+        // The scatter that is due: that of the same estimator where it is told which effects there are.
+        let others = || Identifier::ALL.into_iter().filter(|e| !wanted.contains(&e.name())).collect();
+        let told = if is_alien { None } else { Some(diagnose(&record, &options(others()), &|_, _, _| ())?) };
+        let told = told.filter(|t| own().all(|o| t.effects.iter().any(|e| e.effect == o)));
         for i in 0..2 {
             let sensor = &answer.last.sensors[i];
             if let (Some(tau_s), Some([low, high])) = (sensor.time_constant_s, sensor.interval_95_s) {
@@ -143,6 +159,9 @@ impl Study for Plan {
                 outcome.value(ERROR + i, (tau_s / truth_s[i] - 1.0).abs());
                 if let Some(se) = sensor.standard_error_s {
                     outcome.value(RATIO + i, (tau_s - truth_s[i]).abs() / se);
+                }
+                if let Some(se) = told.as_ref().and_then(|t| t.last.sensors[i].standard_error_s) {
+                    outcome.value(BOUND + i, (tau_s - truth_s[i]).abs() / se);
                 }
             }
         }
@@ -153,6 +172,14 @@ impl Study for Plan {
         outcome.event(FIRST + Identifier::ALL.len(), first.is_none());
         Ok(())
     }
+}
+
+/// What a logger would have of it.
+pub(crate) fn record_of(simulated: Simulated) -> Result<Record, twinlag::record::RecordError> {
+    let Simulated { channels, time_s, t1_c, t2_c, gas_c, .. } = simulated;
+    let source = "a rig".into();
+    let channels = Channels { source, names: channels, time_s, t1_c, t2_c, reference_c: Some(gas_c) };
+    Record::from_channels(channels, SamplingChoice::Auto)
 }
 
 /// Both time constants as an answer means them: means over the record where the flow changes, those at the record's mean
@@ -197,8 +224,7 @@ pub(super) fn run(plan: &Plan, out: &Path, check: bool, options: &Options) -> Re
     }
     fs::create_dir_all(out)?;
     fs::write(path, results.to_json())?;
-    fs::write(out.join("found.md"), found(plan, &results))?;
-    fs::write(out.join("confusion.md"), confusion(plan, &results))?;
+    tables::write(plan, &results, out)?;
     println!(
         "{}: {} records in {seconds:.0} s, {}",
         plan.name,
@@ -206,72 +232,4 @@ pub(super) fn run(plan: &Plan, out: &Path, check: bool, options: &Options) -> Re
         out.display()
     );
     Ok(seconds)
-}
-
-fn cell_name(kinds: &[Kind], size: f64, sizes: usize) -> String {
-    let names: Vec<&str> = kinds.iter().map(|k| k.name()).collect();
-    let names = if names.is_empty() { "none".to_owned() } else { names.join(" + ") };
-    if sizes > 1 { format!("{names}, × {size}") } else { names }
-}
-
-fn percent(tally: &Tally, name: &str) -> String {
-    tally.rate(name).and_then(twinlag_study::Rate::rate).map_or("-".into(), |r| format!("{:.0}", 100.0 * r))
-}
-
-fn median(tally: &Tally, name: &str, scale: f64) -> String {
-    tally.values(name).and_then(|v| v.quantile(0.5)).map_or("-".into(), |q| format!("{:.2}", scale * q))
-}
-
-fn found(plan: &Plan, results: &Results) -> String {
-    let mut text = String::from(
-        "| effects | right first (%) | right or stated (%) | all found (%) | explained (%) | covered (%) | median error (%) | \
-         median error / standard error | held-out rms |\n|---|---|---|---|---|---|---|---|---|\n",
-    );
-    for ((kinds, size), tally) in Plan::cells(plan).into_iter().zip(results.cells()) {
-        let both = |name: &str, of: fn(&Tally, &str) -> String| {
-            format!("{} / {}", of(tally, &format!("{name} 1")), of(tally, &format!("{name} 2")))
-        };
-        let _ = writeln!(
-            text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
-            cell_name(kinds, size, plan.size_factors.len()),
-            percent(tally, "right first"),
-            percent(tally, "right or stated"),
-            percent(tally, "all found"),
-            percent(tally, "explained"),
-            both("covered", percent),
-            both("relative error", |t, n| median(t, n, 100.0)),
-            both("error over its standard error", |t, n| median(t, n, 1.0)),
-            median(tally, "held-out rms after", 1.0),
-        );
-    }
-    text
-}
-
-/// Which effect is named first, in per cent; those that never are are left out.
-fn confusion(plan: &Plan, results: &Results) -> String {
-    let names: Vec<String> = Identifier::ALL.iter().map(|e| e.name().to_owned()).chain(["none".into()]).collect();
-    let used: Vec<&String> = names
-        .iter()
-        .filter(|n| {
-            let rate = |t: &Tally| t.rate(&format!("first: {n}")).is_some_and(|r| r.hits() > 0);
-            results.cells().iter().any(rate)
-        })
-        .collect();
-    let mut text = format!(
-        "| effects | {} |\n|---|{}\n",
-        used.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(" | "),
-        "---|".repeat(used.len())
-    );
-    for ((kinds, size), tally) in Plan::cells(plan).into_iter().zip(results.cells()) {
-        let row: Vec<String> = used
-            .iter()
-            .map(|n| match tally.rate(&format!("first: {n}")).and_then(twinlag_study::Rate::rate) {
-                Some(rate) if rate > 0.0 => format!("{:.0}", 100.0 * rate),
-                _ => String::new(),
-            })
-            .collect();
-        let _ = writeln!(text, "| {} | {} |", cell_name(kinds, size, plan.size_factors.len()), row.join(" | "));
-    }
-    text
 }

@@ -14,6 +14,9 @@ pub(crate) const ABOUT: About = About {
     unseen: "the same share through the same support in both sensors",
 };
 
+/// Longest slow time constant beside the length of the record.
+const LONGEST: f64 = 0.25;
+
 struct SlowMode {
     sensor: usize,
     parameters: Vec<Parameter>,
@@ -26,7 +29,8 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
         .map(|sensor| {
             // More than half would make the slow path the sensor: with both lags at zero it imitates any pair of them.
             let share = Variable::linear("share", 0.01, -0.002, 0.5);
-            let slow = Variable::logarithmic("slow time constant", context.step_s, context.span_s());
+            // One that settles as long as the record lasts is a drift.
+            let slow = Variable::logarithmic("slow time constant", context.step_s, LONGEST * context.span_s());
             let parameters = vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];
             let tau_s = context.tau_s[0].max(context.tau_s[1]).clamp(context.step_s, 0.03 * context.span_s());
             Arc::new(SlowMode { sensor, parameters, tau_s, span_s: context.span_s() }) as Shared
@@ -48,7 +52,7 @@ impl Effect for SlowMode {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        [3.0, 15.0].into_iter().map(|times| vec![0.05, (times * self.tau_s).min(0.3 * self.span_s)]).collect()
+        [3.0, 15.0].into_iter().map(|times| vec![0.05, (times * self.tau_s).min(0.5 * LONGEST * self.span_s)]).collect()
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {

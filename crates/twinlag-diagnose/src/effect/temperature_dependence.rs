@@ -14,6 +14,9 @@ pub(crate) const ABOUT: About = About {
     unseen: "a dependence of both on the gas temperature that leaves their disagreement alone",
 };
 
+/// Largest exponent.
+const STEEPEST: f64 = 12.0;
+
 struct TemperatureDependence {
     sensors: [bool; 2],
     parameters: Vec<Parameter>,
@@ -22,8 +25,8 @@ struct TemperatureDependence {
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let reference_k = (0.5 * (context.mean_c[0] + context.mean_c[1]) + ZERO_CELSIUS_K).max(1.0);
-    // A factor of three over the swing, either way.
-    let widest = (1.1 * reference_k / context.swing_k).max(8.0);
+    // A factor of three over the swing, either way, where that is physics: radiation has −3, viscosity of liquids up to −8.
+    let widest = (1.1 * reference_k / context.swing_k).clamp(8.0, STEEPEST);
     let variable = Variable::linear("exponent", 0.01 * widest, -widest, widest);
     [[true, true], [true, false], [false, true]]
         .into_iter()

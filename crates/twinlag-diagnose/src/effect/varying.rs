@@ -16,9 +16,9 @@ pub(crate) const ABOUT: About = About {
 };
 
 /// Coefficients that it is looked for with.
-const FIRST: usize = 9;
+const FIRST: usize = 12;
 /// Those that are tried once it is found.
-const SIZES: [usize; 4] = [4, 6, 14, 21];
+const SIZES: [usize; 4] = [3, 5, 8, 19];
 
 struct Varying {
     ends_s: [f64; 2],
@@ -27,12 +27,12 @@ struct Varying {
 }
 
 fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
-    const NAMES: [&str; 21] = [
+    const NAMES: [&str; 19] = [
         "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
-        "m18", "m19", "m20", "m21",
+        "m18", "m19",
     ];
     let parameters =
-        NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -3.0, 3.0))).collect();
+        NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, 3.0))).collect();
     (60 * size <= samples).then(|| Arc::new(Varying { ends_s, samples, parameters }) as Shared)
 }
 
