@@ -1,4 +1,5 @@
-//! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask bench`.
+//! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
+//! `cargo xtask bench`.
 
 mod bench;
 mod ci;
@@ -6,9 +7,9 @@ mod experiment;
 mod measured;
 
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
-use anyhow::Result;
+use anyhow::{Context, Result, ensure};
 use clap::{Parser, Subcommand};
 
 /// Tasks of the repository.
@@ -26,9 +27,18 @@ enum Task {
     Measured {
         /// The folder. It is no part of the repository.
         dir: PathBuf,
-        /// Writes the table of the book's chapter on them as well.
+        /// Writes the table and the pictures of the book's chapter on them as well.
         #[arg(long)]
         write: bool,
+    },
+    /// Fetches the measured records that source distributions of Python packages carry, for `measured`; needs Python with NumPy
+    /// and SciPy.
+    Data {
+        /// Where they go.
+        dir: PathBuf,
+        /// Overwrites what is there.
+        #[arg(long)]
+        force: bool,
     },
     /// The Monte-Carlo experiments: list, run, check, merge.
     #[command(subcommand)]
@@ -41,6 +51,7 @@ fn main() -> ExitCode {
     let result = match Arguments::parse().task {
         Task::Ci => ci::run(),
         Task::Measured { dir, write } => measured::run(&dir, write),
+        Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };
@@ -51,6 +62,17 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn data(dir: &Path, force: bool) -> Result<()> {
+    let status = Command::new("python3")
+        .arg(root()?.join("xtask/data/fetch.py"))
+        .arg(dir)
+        .args(force.then_some("--force"))
+        .status()
+        .context("python3 could not be started: the script needs Python with NumPy and SciPy")?;
+    ensure!(status.success(), "the records were not fetched");
+    Ok(())
 }
 
 /// The top of the repository.

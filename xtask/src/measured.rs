@@ -3,6 +3,7 @@
 //! The data are not part of the repository. What is known of them rests on plateaus and data sheets, not on lag fits.
 
 mod diagnosed;
+mod page;
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -123,7 +124,14 @@ pub(crate) fn run(dir: &Path, write: bool) -> Result<()> {
     failures.extend(diagnosed.failures);
     let questions = CASES.len() + diagnosed.questions;
     if write {
-        fs::write(root()?.join("docs/src/measured-table.md"), &diagnosed.table)?;
+        let book = root()?.join("docs/src");
+        fs::write(book.join("measured-table.md"), &diagnosed.page.table)?;
+        fs::write(book.join("measured-records.md"), &diagnosed.page.sections)?;
+        let images = book.join("images/measured");
+        fs::create_dir_all(&images)?;
+        for (name, svg) in &diagnosed.page.pictures {
+            fs::write(images.join(name), svg)?;
+        }
     }
     if failures.is_empty() {
         println!("{questions} questions to measured records answered as known, 0 failed");

@@ -149,6 +149,9 @@ pub(crate) struct Columns {
     /// A trusted temperature, for scoring only: no estimate uses it.
     #[arg(long, value_name = "COL")]
     reference: Option<ColumnRef>,
+    /// A flow velocity or density, in any unit: `diagnose` tries time constants that go with a power of it.
+    #[arg(long, value_name = "COL")]
+    flow: Option<ColumnRef>,
     /// Time from row to row, for files without a time column; a guessed time column is then not used.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
@@ -173,6 +176,7 @@ impl Columns {
             t1: self.t1.clone(),
             t2: self.t2.clone(),
             reference: self.reference.clone(),
+            flow: self.flow.clone(),
             period_s: self.period,
             sampling: self.sampling,
         }

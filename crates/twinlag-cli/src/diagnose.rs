@@ -25,6 +25,12 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
             return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
         }
     }
+    for path in [&command.report, &command.save].into_iter().flatten() {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|f| !f.is_dir()) {
+            return Err(Failure::Usage(format!("{}: there is no folder {}", path.display(), folder.display())));
+        }
+    }
     let options = DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() };
     let record = read(&command.file, &command.columns.selection())?;
     print::notes(&record, talk);

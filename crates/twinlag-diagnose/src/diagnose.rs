@@ -59,7 +59,7 @@ impl State {
         search.look(&self.current);
         let tried = search.try_all(&self.current, self.current.mean_energy() > FAR_OFF);
         let Some((chosen, ties)) = search.choose(&self.current, &tried) else { return false };
-        self.current = chosen.fitted.clone();
+        self.current = chosen.fitted.clone().larger_lag_first();
         let effect = chosen.effect.clone();
         self.steps.push((chosen, ties));
         if effect.identifier() == Identifier::MainsPickup {
@@ -133,7 +133,9 @@ impl State {
 
     fn conclude(mut self, prepared: &Prepared, is_refused: bool) -> Diagnosis {
         let (observations, everything) = (&prepared.observations, &prepared.everything);
-        let to_the_end = |fitted: &Fitted| fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish);
+        let to_the_end = |fitted: &Fitted| {
+            fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).larger_lag_first()
+        };
         let last = to_the_end(&self.current);
         let summary = |fitted: &Fitted| summarise(fitted, observations, everything, &prepared.levels);
         // Before is before everything: with the defects of the data in it.

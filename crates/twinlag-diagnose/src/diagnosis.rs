@@ -172,8 +172,8 @@ pub struct ModelFit {
     pub is_weighted_by_residual: bool,
     /// For pictures.
     pub trace: Trace,
-    /// Covariance of the parameters, where there is one.
-    pub(crate) covariance: Option<Vec<Vec<f64>>>,
+    /// Covariance of the parameters, in their units, where there is one; the time constants come first.
+    pub covariance: Option<Vec<Vec<f64>>>,
 }
 
 /// The whole answer.

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 use twinlag_optimise::Variable;
 
 use crate::error::DiagnoseError;
+use crate::flow::Flow;
 use crate::plant::Plant;
 
 /// The effects, by the names that scripts use.
@@ -228,6 +229,8 @@ pub(crate) struct Context {
     pub(crate) is_coarse: [bool; 2],
     /// Time constants of the model so far, s.
     pub(crate) tau_s: [f64; 2],
+    /// Flow, where it was measured.
+    pub(crate) flow: Option<Arc<Flow>>,
     /// Lines that stick out of the residual, Hz.
     pub(crate) lines_hz: Vec<f64>,
 }

@@ -11,6 +11,8 @@ pub enum DiagnoseError {
     TooShort { samples: usize, needed: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,
+    #[error("expected a positive flow at every sample, as many as there are readings")]
+    Flow,
     #[error("channel {channel} never changes: there is no dynamics to see in it")]
     Constant { channel: usize },
     #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]

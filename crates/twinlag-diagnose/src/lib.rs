@@ -36,6 +36,7 @@ mod diagnosis;
 mod effect;
 mod error;
 mod excitation;
+mod flow;
 mod held_out;
 mod model;
 mod naming;

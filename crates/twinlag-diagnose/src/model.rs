@@ -3,7 +3,7 @@
 use twinlag_optimise::{Budget, Cost, Derivatives, End, Fit, Minimiser, Optimiser, Problem, Scale, Variable};
 
 use crate::dense;
-use crate::effect::{Parameter, Shared};
+use crate::effect::{Identifier, Parameter, Shared};
 use crate::observations::Observations;
 use crate::plant::{Evaluation, Plant};
 use crate::weighting::Weighting;
@@ -187,6 +187,18 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
+    /// The same with the larger lag of a sensor that has two as its time constant: the product does not tell them apart.
+    pub(crate) fn larger_lag_first(mut self) -> Self {
+        for (index, effect) in self.model.effects.iter().enumerate() {
+            let (Identifier::SecondOrder, Some(sensor)) = (effect.identifier(), effect.channel()) else { continue };
+            let at = self.model.range(index).start;
+            if self.theta[at] > self.theta[sensor] && self.model.known.iter().all(|k| k.sensor != sensor) {
+                self.theta.swap(at, sensor);
+            }
+        }
+        self
+    }
+
     /// Energy per residual that counts.
     pub(crate) fn mean_energy(&self) -> f64 {
         self.chi2 / self.count.max(1.0)

@@ -1,6 +1,9 @@
 //! The two channels as the diagnosis takes them: absolute temperatures in unbroken stretches.
 
+use std::sync::Arc;
+
 use crate::error::DiagnoseError;
+use crate::flow::Flow;
 
 /// Fewest samples of a stretch that is used.
 const SHORTEST: usize = 8;
@@ -16,13 +19,21 @@ pub struct Stretch {
     pub reading_c: [Vec<f64>; 2],
     /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
     pub(crate) masked: [Vec<bool>; 2],
+    /// Flow velocity or density, in any unit.
+    flow: Option<Vec<f64>>,
 }
 
 impl Stretch {
     /// A stretch of which every sample counts.
     pub fn new(time_s: Vec<f64>, reading_c: [Vec<f64>; 2]) -> Self {
         let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
-        Self { time_s, reading_c, masked }
+        Self { time_s, reading_c, masked, flow: None }
+    }
+
+    /// The same with a measured flow velocity or density at each sample, in any unit, positive.
+    #[must_use]
+    pub fn with_flow(self, flow: Vec<f64>) -> Self {
+        Self { flow: Some(flow), ..self }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -37,6 +48,8 @@ pub struct Observations {
     pub(crate) period_s: Option<f64>,
     /// Standard deviation of the more lively channel, K.
     swing_k: f64,
+    /// Flow, where it was measured.
+    flow: Option<Arc<Flow>>,
 }
 
 impl Observations {
@@ -44,7 +57,8 @@ impl Observations {
     /// - `period_s`: the sample period where samples are evenly spaced within each stretch, s
     ///
     /// # Errors
-    /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`].
+    /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`]; [`DiagnoseError::Flow`] for a flow that is
+    /// not positive everywhere, or of another length.
     pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, DiagnoseError> {
         stretches.retain(|s| s.len() >= SHORTEST);
         let samples: usize = stretches.iter().map(Stretch::len).sum();
@@ -55,7 +69,10 @@ impl Observations {
         if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {
             return Err(DiagnoseError::NotFinite);
         }
-        let mut out = Self { stretches, period_s, swing_k: 0.0 };
+        let flows: Option<Vec<(&[f64], &[f64])>> =
+            stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s[..], &flow[..]))).collect();
+        let flow = flows.map(|flows| Flow::new(&flows).map(Arc::new)).transpose()?;
+        let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
         out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);
         Ok(out)
     }
@@ -105,6 +122,11 @@ impl Observations {
         [mean, second, if second > 0.0 { third / second } else { 0.0 }]
     }
 
+    /// Flow, where it was measured in all stretches.
+    pub(crate) fn flow(&self) -> Option<&Arc<Flow>> {
+        self.flow.as_ref()
+    }
+
     /// The standard deviation of the more lively channel, K.
     pub(crate) fn swing_k(&self) -> f64 {
         self.swing_k
@@ -127,6 +149,7 @@ impl Observations {
                         time_s: stretch.time_s[cut.clone()].to_vec(),
                         reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
                         masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
+                        flow: None,
                     });
                 }
                 break;

@@ -3,7 +3,10 @@
 //! A [`Plant`] is the two-lag model with every effect in its place; an effect that is absent has its neutral value. Each
 //! effect's file says which of these numbers are its parameters, nothing more, so any of them can be in the model together.
 
+use std::sync::Arc;
+
 use crate::chain::{Along, Chain, Pointwise, Rows, UNEVEN_REACH};
+use crate::flow::Flow;
 use crate::observations::{Observations, Stretch};
 use crate::spline::Spline;
 use crate::whitening::{Source, Variance, Whitened, whiten};
@@ -120,6 +123,24 @@ pub(crate) struct Extra {
     pub(crate) correlation_s: f64,
 }
 
+/// Relative change of both time constants along the record.
+#[derive(Clone, Debug)]
+pub(crate) enum Modulation {
+    /// A smooth function of time.
+    Spline(Spline),
+    /// `(v/v_mean)^exponent − 1` of a measured flow.
+    Flow { exponent: f64, of: Arc<Flow> },
+}
+
+impl Modulation {
+    fn at(&self, time_s: f64) -> f64 {
+        match self {
+            Self::Spline(spline) => spline.at(time_s),
+            Self::Flow { exponent, of } => (exponent * of.log_ratio_at(time_s)).exp_m1(),
+        }
+    }
+}
+
 /// Where extra noise enters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
@@ -140,7 +161,7 @@ pub(crate) struct Plant {
     /// How many samples a delay may reach.
     pub(crate) reach: usize,
     /// Relative change of both time constants along the record.
-    pub(crate) modulation: Option<Spline>,
+    pub(crate) modulation: Option<Modulation>,
     pub(crate) extra: Vec<Extra>,
     /// The middle of the record, s.
     pub(crate) middle_s: f64,
@@ -197,9 +218,9 @@ impl Plant {
                 pass(&mut gas, 0.0);
             }
         }
-        let change = self.modulation.as_ref().map(|spline| -> Vec<f64> {
+        let change = self.modulation.as_ref().map(|modulation| -> Vec<f64> {
             // Both chains have the same instants here.
-            chains[0].times_after_factor().iter().map(|t| spline.at(*t)).collect()
+            chains[0].times_after_factor().iter().map(|t| modulation.at(*t)).collect()
         });
         for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
             Self::lag(chain, sensor, change.as_deref());
@@ -280,13 +301,13 @@ impl Plant {
         let Inverted { chains, gas } = self.invert(&cut, observations.period_s, true);
         let count = chains[0].len().min(chains[1].len());
         let k = count / 2;
-        let [one, two] = self.into_disagreement(&chains, count);
+        let [one, two] = self.disagreement_rows(&chains, count);
         let gas = gas.expect("asked for");
         [one.at(k).to_vec(), two.at(k).to_vec(), gas.rows.at(k).to_vec()]
     }
 
     /// The rows by which noise of either reading enters `x₁ − x₂`: through its own chain, and through crosstalk as well.
-    fn into_disagreement(&self, chains: &[Chain; 2], count: usize) -> [Rows; 2] {
+    fn disagreement_rows(&self, chains: &[Chain; 2], count: usize) -> [Rows; 2] {
         let [one, two] = chains;
         let mut minus_two = two.rows.clone();
         minus_two.scale(-1.0);
@@ -326,7 +347,7 @@ impl Plant {
                 let mut rows = match extra.place {
                     Place::Reading(i) => {
                         let count = chains[0].len().min(chains[1].len());
-                        let [one, two] = self.into_disagreement(&chains, count);
+                        let [one, two] = self.disagreement_rows(&chains, count);
                         if i == 0 { one } else { two }
                     }
                     Place::Gas => gas.as_ref().expect("made for it").rows.clone(),
@@ -354,7 +375,7 @@ impl Plant {
                 chains.iter_mut().for_each(|c| c.difference(rho));
             }
             let count = chains[0].len().min(chains[1].len());
-            for (source, rows) in sources.iter_mut().zip(self.into_disagreement(&chains, count)) {
+            for (source, rows) in sources.iter_mut().zip(self.disagreement_rows(&chains, count)) {
                 source.rows = rows;
             }
             let [one, two] = chains;

@@ -246,7 +246,7 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     let plan = RealFftPlanner::<f64>::new().plan_fft_forward(run.len());
     let mut spectrum = plan.make_output_vec();
     plan.process(&mut run.clone(), &mut spectrum).expect("lengths agree");
-    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(|x| x.norm_sqr()).collect();
+    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(num_complex::Complex::norm_sqr).collect();
     let half = NEIGHBOURS / 2;
     let bins = half + 1..power.len().saturating_sub(half + 1);
     let ratio = |j: usize| {

@@ -16,6 +16,7 @@ pub(crate) struct Chosen {
     pub(crate) time: Option<TimeColumns>,
     pub(crate) channels: [usize; 2],
     pub(crate) reference: Option<usize>,
+    pub(crate) flow: Option<usize>,
 }
 
 const TIME: [&str; 17] = [
@@ -140,8 +141,8 @@ fn first_word(column: &Column) -> String {
 pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>) -> Result<Chosen, RecordError> {
     let find = |wanted: &Option<_>| wanted.as_ref().map(|wanted| table.find(wanted)).transpose();
     let (named_time, named) = (find(&selection.time)?, [find(&selection.t1)?, find(&selection.t2)?]);
-    let reference = find(&selection.reference)?;
-    let taken: Vec<usize> = [named_time, named[0], named[1], reference].into_iter().flatten().collect();
+    let (reference, flow) = (find(&selection.reference)?, find(&selection.flow)?);
+    let taken: Vec<usize> = [named_time, named[0], named[1], reference, flow].into_iter().flatten().collect();
     if let Some((_, &twice)) = taken.iter().enumerate().find(|(at, index)| taken[..*at].contains(index)) {
         return Err(RecordError::SameColumn { file: table.source().to_owned(), column: table.title(twice) });
     }
@@ -162,10 +163,10 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
     let channels = match named {
         [Some(t1), Some(t2)] => [t1, t2],
-        _ => guess_channels(table, named, time, reference, notes)?,
+        _ => guess_channels(table, named, time, [reference, flow], notes)?,
     };
     if selection.period_s.is_some() {
-        return Ok(Chosen { time: None, channels, reference });
+        return Ok(Chosen { time: None, channels, reference, flow });
     }
     let Some(time) = time else {
         return Err(RecordError::NoTime { file: table.source().to_owned(), columns: table.listing() });
@@ -173,7 +174,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     if let Some(index) = guessed_time {
         notes.insert(0, Note::Guessed { role: "time", column: table.title(index) });
     }
-    Ok(Chosen { time: Some(time), channels, reference })
+    Ok(Chosen { time: Some(time), channels, reference, flow })
 }
 
 fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
@@ -214,7 +215,7 @@ fn guess_channels(
     table: &Table,
     named: [Option<usize>; 2],
     time: Option<TimeColumns>,
-    reference: Option<usize>,
+    [reference, flow]: [Option<usize>; 2],
     notes: &mut Vec<Note>,
 ) -> Result<[usize; 2], RecordError> {
     let columns = table.columns();
@@ -224,7 +225,7 @@ fn guess_channels(
             Some(TimeColumns::DateAndTime { date, time }) => date == index || time == index,
             None => false,
         };
-        !of_time && reference != Some(index) && !named.contains(&Some(index))
+        !of_time && reference != Some(index) && flow != Some(index) && !named.contains(&Some(index))
     };
     let has_names = columns.iter().any(|column| !column.name().is_empty());
     let free: Vec<usize> = (0..columns.len()).filter(|&index| is_free(index)).collect();

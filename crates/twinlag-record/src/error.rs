@@ -89,10 +89,17 @@ pub enum RecordError {
     TextColumn { file: String, line: usize, column: String, cell: String },
     #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example --t1 2")]
     UnknownColumn { file: String, wanted: String, columns: String },
+    #[error(
+        "{file}: {at}, column {column}: expected a positive flow velocity or density in every row that is used, found {value}; \
+         leave out --flow, or mend the column"
+    )]
+    BadFlow { file: String, at: Place, column: String, value: f64 },
+    #[error("{file}: column {column}: expected a flow that changes, found {value} throughout; leave out --flow")]
+    ConstantFlow { file: String, column: String, value: f64 },
     #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example --t1 {first}", first = numbers[0])]
     AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
     #[error(
-        "{file}: column {column} would be used twice; --time, --t1, --t2 and --reference must be different columns (a \
+        "{file}: column {column} would be used twice; --time, --t1, --t2, --reference and --flow must be different columns (a \
          sensor cannot be its own reference)"
     )]
     SameColumn { file: String, column: String },

@@ -59,6 +59,8 @@ pub struct Record {
     pub t2_c: Vec<f64>,
     /// A trusted temperature, if one was chosen; NaN where missing.
     pub reference_c: Option<Vec<f64>>,
+    /// A flow velocity or density in the unit of its column, if one was chosen; positive in every row that is used.
+    pub flow: Option<Vec<f64>>,
     /// Rows in which T1 or T2 is missing.
     pub missing: usize,
     /// How the stamps lie in time.
@@ -156,7 +158,36 @@ impl Record {
         };
         let mut all = table.notes().to_vec();
         all.append(&mut notes);
-        Self::build(channels, selection.sampling, unit_s, all, &origin)
+        let record = Self::build(channels, selection.sampling, unit_s, all, &origin)?;
+        let Some(index) = chosen.flow else { return Ok(record) };
+        let at = |row: usize| Place::Line(table.line_of(row));
+        record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at)
+    }
+
+    /// The same record with a flow velocity or density, in any unit, one value for each row.
+    ///
+    /// # Errors
+    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::ConstantFlow`].
+    pub fn with_flow(self, flow: Vec<f64>) -> Result<Self, RecordError> {
+        self.flowing(flow, "flow", |row| Place::Sample(row + 1))
+    }
+
+    fn flowing(mut self, flow: Vec<f64>, column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
+        let (file, expected) = (self.source.clone(), self.len());
+        if flow.len() != expected {
+            let (name, like) = (column.to_owned(), "time_s".to_owned());
+            return Err(RecordError::LengthMismatch { file, name, found: flow.len(), like, expected });
+        }
+        let mut used = self.segments.iter().cloned().flatten();
+        if let Some(row) = used.find(|&row| !(flow[row].is_finite() && flow[row] > 0.0)) {
+            return Err(RecordError::BadFlow { file, at: at(row), column: column.to_owned(), value: flow[row] });
+        }
+        let mut values = self.segments.iter().cloned().flatten().map(|row| flow[row]);
+        if let Some(value) = values.next().filter(|first| values.all(|value| value == *first)) {
+            return Err(RecordError::ConstantFlow { file, column: column.to_owned(), value });
+        }
+        self.flow = Some(flow);
+        Ok(self)
     }
 
     /// Makes a record of vectors, checked in the same way as a file.
@@ -242,7 +273,19 @@ impl Record {
             return Err(RecordError::Identical { file: file(), first, second });
         }
         notes.push(Note::Sampling { sampling, chosen: choice != SamplingChoice::Auto });
-        Ok(Self { source, channels: names, time_s, t1_c, t2_c, reference_c, missing, sampling, segments, notes })
+        Ok(Self {
+            source,
+            channels: names,
+            time_s,
+            t1_c,
+            t2_c,
+            reference_c,
+            flow: None,
+            missing,
+            sampling,
+            segments,
+            notes,
+        })
     }
 
     /// Number of rows, missing ones counted.

@@ -59,6 +59,8 @@ pub struct Selection {
     pub t2: Option<ColumnRef>,
     /// A trusted temperature, if wanted.
     pub reference: Option<ColumnRef>,
+    /// A flow velocity or density, in any unit, if there is one: time constants may go with it.
+    pub flow: Option<ColumnRef>,
     /// Time from one row to the next; then no time column is used.
     pub period_s: Option<f64>,
     /// How the stamps are to be understood.

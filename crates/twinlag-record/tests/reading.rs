@@ -219,6 +219,16 @@ fn columns_are_chosen_by_name_number_and_name_without_unit() {
 }
 
 #[test]
+fn a_flow_is_read_as_it_stands_and_is_never_a_sensor() {
+    let text =
+        rows("time_s,a [°C],b [°C],t_density [°C]", |row, t, a, b| format!("{t},{a},{b},{}", 1.0 + f64::from(row)));
+    let flow = Some("t_density".parse::<ColumnRef>().unwrap());
+    let got = record_with(text.as_bytes(), &Selection { flow, ..Selection::default() }).unwrap();
+    assert_is_the_rig(&got, 0.0);
+    assert_eq!(got.flow.as_ref().unwrap()[..3], [1.0, 2.0, 3.0]);
+}
+
+#[test]
 fn t1_and_t2_go_before_other_temperatures_and_a_reference_is_never_one() {
     let text = rows("time_s,Tref,T2_b_C,depth_m,T1_a_C,ambient_C", |_, t, a, b| format!("{t},9,{b},1,{a},8"));
     let got = record(&text);

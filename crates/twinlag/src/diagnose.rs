@@ -266,7 +266,12 @@ fn observations(record: &Record) -> Result<Observations, Error> {
                 }
                 None => record.time_s[rows.clone()].to_vec(),
             };
-            Stretch::new(time_s, [record.t1_c[rows.clone()].to_vec(), record.t2_c[rows.clone()].to_vec()])
+            let stretch =
+                Stretch::new(time_s, [record.t1_c[rows.clone()].to_vec(), record.t2_c[rows.clone()].to_vec()]);
+            match &record.flow {
+                Some(flow) => stretch.with_flow(flow[rows.clone()].to_vec()),
+                None => stretch,
+            }
         })
         .collect();
     Ok(Observations::new(stretches, period_s)?)

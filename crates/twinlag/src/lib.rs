@@ -86,7 +86,7 @@ pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
-pub use report::{ReportContext, report};
+pub use report::{ReportContext, report, residual_picture};
 
 pub use twinlag_bias as bias;
 pub use twinlag_cross_relation as cross_relation;

@@ -1,25 +1,26 @@
 //! A diagnosis as a page: what was found, how well it is shown, what it changes, and what stays open, with pictures.
 
+mod figures;
+mod words;
+
 use std::ops::Range;
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twinlag_diagnose::{Diagnosis, Found, Identifier, ModelFit, TimeConstant, Trace, Verdict};
 use twinlag_report::{
     Axis, Chart, Colour, Document, Figure, ReportError, Series, Table, between, plus_minus, probability, rounded,
 };
 
-const ABSENT: &str = "not determined";
 const BEFORE: &str = "two first-order lags";
 const AFTER: &str = "with the effects";
-const NOISE: &str = "95 % of white noise";
-const WIDTH_PX: f64 = 900.0;
-/// Parts of the record whose mean energies are shown.
-const PARTS: usize = 100;
 /// The part of the record that is shown larger, and the fewest samples that it may have.
 const ZOOM: f64 = 0.05;
 const ZOOM_SAMPLES: usize = 60;
-/// A step so many times the usual one is a gap.
-const GAP: f64 = 10.0;
+
+use figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
+use words::{
+    ABSENT, capital, estimate, identifiers, interval, listed, parameter, question, sentence, short, unit, with_unit,
+    words, words_of,
+};
 
 /// What a report needs beside the diagnosis.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,6 +71,21 @@ pub fn report(diagnosis: &Diagnosis, context: &ReportContext<'_>) -> Result<Stri
     document = page.unexplained(document);
     document = page.unknowable(document);
     Ok(page.reproduction(document).to_html())
+}
+
+/// Power of the residual against frequency, before and after, as SVG; none where there is no residual.
+///
+/// # Errors
+/// [`ReportError`] if it cannot be drawn.
+pub fn residual_picture(diagnosis: &Diagnosis) -> Result<Option<String>, ReportError> {
+    figures::frequency_figure(&models(diagnosis)).map(|figure| figure.to_svg()).transpose()
+}
+
+/// The models to be shown: one, if no effect was added.
+fn models(diagnosis: &Diagnosis) -> Vec<Model<'_>> {
+    let before = Model { name: BEFORE, column: "before", fit: &diagnosis.base, colour: Colour::Vermilion };
+    let after = Model { name: AFTER, column: "after", fit: &diagnosis.last, colour: Colour::Blue };
+    if diagnosis.effects.is_empty() { vec![Model { column: "value", ..before }] } else { vec![before, after] }
 }
 
 struct Page<'a> {
@@ -218,21 +234,13 @@ impl Page<'_> {
         chart(title, [Axis::linear("time (s)"), Axis::linear("temperature (°C)")], series)
     }
 
-    /// The models to be shown: one, if no effect was added.
-    fn models(&self) -> Vec<Model<'_>> {
-        let (base, last) = (&self.diagnosis.base, &self.diagnosis.last);
-        let before = Model { name: BEFORE, column: "before", fit: base, colour: Colour::Vermilion };
-        let after = Model { name: AFTER, column: "after", fit: last, colour: Colour::Blue };
-        if self.changed { vec![before, after] } else { vec![Model { column: "value", ..before }] }
-    }
-
     fn residual(&self, document: Document) -> Result<Document, ReportError> {
         let document = document.heading("What is left over, before and after").paragraph(
             "The residual is how far the two inferred gas temperatures disagree, in units of what the noise of both \
              sensors makes of it, and with the memory that the filters give it taken off. If the model is right, it is \
              white noise of unit variance.",
         );
-        let models = self.models();
+        let models = models(self.diagnosis);
         let Some(figure) = time_figure(&models) else {
             return Ok(document.note("There is no residual to show."));
         };
@@ -321,7 +329,7 @@ impl Page<'_> {
     }
 
     fn numbers(&self, document: Document) -> Result<Document, ReportError> {
-        let models = self.models();
+        let models = models(self.diagnosis);
         let [first, second] = &self.context.channels;
         let interval_95 = || "95 % interval".to_owned();
         let header = models.iter().flat_map(|m| [m.column.to_owned(), interval_95()]);
@@ -352,7 +360,7 @@ impl Page<'_> {
     }
 
     fn time_constant_figure(&self) -> Option<Figure> {
-        let models = self.models();
+        let models = models(self.diagnosis);
         let mut figure = None;
         for k in 0..2 {
             let of: Vec<&TimeConstant> = models.iter().map(|m| &m.fit.time_constants[k]).collect();
@@ -424,7 +432,7 @@ impl Page<'_> {
     }
 
     fn tests(&self, document: Document) -> Document {
-        let models = self.models();
+        let models = models(self.diagnosis);
         let mut names: Vec<&str> = Vec::new();
         for test in models.iter().flat_map(|m| &m.fit.tests) {
             if !names.contains(&test.test.as_str()) {
@@ -529,131 +537,6 @@ impl Page<'_> {
     }
 }
 
-/// A chart of the series that there are; `None` if there is none.
-fn chart(
-    title: impl Into<String>,
-    [x, y]: [Axis; 2],
-    series: impl IntoIterator<Item = Option<Series>>,
-) -> Option<Chart> {
-    let mut series = series.into_iter().flatten().peekable();
-    series.peek()?;
-    Some(series.fold(Chart::new(title, x, y), Chart::series))
-}
-
-/// A trace, if it has a point that can be drawn. It has gaps where the record has.
-fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colour) -> Option<Series> {
-    let drawn = x.iter().zip(y).any(|(x, y)| x.is_finite() && y.is_finite());
-    let mut steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = steps.len() / 2;
-    let longest = if steps.is_empty() { 0.0 } else { GAP * *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
-    let (mut at, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
-    for (k, (x_k, y_k)) in x.iter().zip(y).enumerate() {
-        if k > 0 && x_k - x[k - 1] > longest {
-            at.push(*x_k);
-            values.push(f64::NAN);
-        }
-        at.push(*x_k);
-        values.push(*y_k);
-    }
-    drawn.then(|| Series::trace(name, at, values).colour(colour))
-}
-
-/// The residual of each model along the record, and its root mean square in parts of the record.
-fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
-    let largest: Vec<f64> = models
-        .iter()
-        .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
-        .collect();
-    // One scale for both, unless the smaller would then be a line.
-    let widest = largest.iter().copied().fold(0.0, f64::max);
-    let common = largest.iter().all(|l| 4.0 * l > widest);
-    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
-    let mut parts = Vec::new();
-    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
-    let mut fewest = usize::MAX;
-    let mut any = false;
-    for (Model { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
-        let trace = &fit.trace;
-        let limit = 1.08 * if common { widest } else { *largest };
-        let axis = Axis::linear("residual");
-        let axis = if limit > 0.0 { axis.range(-limit, limit) } else { axis };
-        let lines = [self::trace("", &trace.time_s, &trace.residual, *colour)];
-        if let Some(chart) = chart(*name, [Axis::linear("time (s)"), axis], lines) {
-            figure = figure.panel(chart);
-            any = true;
-        }
-        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(PARTS).max(1);
-        let (mut x, mut y) = (Vec::new(), Vec::new());
-        for (times, values) in trace.time_s.chunks(size).zip(trace.residual.chunks(size)) {
-            // A short last part would be outside the range of the others.
-            if values.len() == size {
-                x.push(times[0]);
-                y.push((values.iter().map(|r| r * r).sum::<f64>() / size as f64).sqrt());
-                ends = [ends[0].min(times[0]), ends[1].max(times[size - 1])];
-            }
-        }
-        // The last part is as long as the others.
-        if let (Some(end), Some(last)) = (trace.time_s.get((y.len() * size).saturating_sub(1)), y.last().copied()) {
-            x.push(*end);
-            y.push(last);
-        }
-        if y.iter().any(|v| v.is_finite() && *v > 0.0) {
-            fewest = fewest.min(size);
-            parts.push(Some(Series::steps(*name, x, y).colour(*colour)));
-        }
-    }
-    if !any {
-        return None;
-    }
-    if ends[0] < ends[1]
-        && let Some([low, high]) = white_noise(fewest as f64)
-    {
-        let band = Series::trace(NOISE, ends, [1.0, 1.0]).band([low.sqrt(); 2], [high.sqrt(); 2]).colour(Colour::Grey);
-        parts.insert(0, Some(band));
-    }
-    let axes = [Axis::linear("time (s)"), Axis::logarithmic("root mean square")];
-    if let Some(chart) = chart("In hundredths of the record", axes, parts) {
-        figure = figure.panel(chart);
-    }
-    Some(figure)
-}
-
-/// Power of the residual of each model against frequency.
-fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
-    let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
-    let mut series = Vec::new();
-    let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
-    let (mut x, mut low, mut high) = (Vec::new(), Vec::new(), Vec::new());
-    for band in bands {
-        if let Some(range) = white_noise(band[2]) {
-            x.push(band[0]);
-            low.push(range[0]);
-            high.push(range[1]);
-        }
-    }
-    if !x.is_empty() {
-        let ones = vec![1.0; x.len()];
-        series.push(Some(Series::trace(NOISE, x, ones).band(low, high).colour(Colour::Grey)));
-    }
-    for Model { name, fit, colour, .. } in models {
-        let (x, y): (Vec<f64>, Vec<f64>) = fit.trace.bands.iter().filter(shown).map(|b| (b[0], b[1])).unzip();
-        series.push((!x.is_empty()).then(|| Series::line(*name, x, y).colour(*colour)));
-    }
-    let axes = [Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("power (that of the noise is 1)")];
-    Some(Figure::new("").panel_size(WIDTH_PX, 360.0).panel(chart("Power of the residual", axes, series)?))
-}
-
-/// The range that holds the mean square of so many values of white noise of unit variance in 95 % of all cases.
-fn white_noise(dof: f64) -> Option<[f64; 2]> {
-    let chi_square = ChiSquared::new(dof).ok()?;
-    Some([0.025, 0.975].map(|p| chi_square.inverse_cdf(p) / dof))
-}
-
-/// Values of a trace from one instant to another.
-fn pairs<'a>(time_s: &'a [f64], values: &'a [f64], from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> + 'a {
-    time_s.iter().copied().zip(values.iter().copied()).filter(move |(t, _)| (from..=to).contains(t))
-}
-
 /// The samples to be shown larger: where the readings have most variance.
 fn busiest(context: &ReportContext<'_>) -> Range<usize> {
     let n = context.time_s.len();
@@ -705,82 +588,6 @@ fn against_reference(trace: &Trace, time_s: &[f64], reference_c: &[f64]) -> f64 
     (sum / count as f64).sqrt()
 }
 
-/// A name for scripts as words.
-fn words_of(name: &str) -> String {
-    name.replace('-', " ")
-}
-
-fn words(effect: Identifier) -> String {
-    words_of(effect.name())
-}
-
-fn identifiers(effects: &[Identifier]) -> String {
-    effects.iter().map(|e| words(*e)).collect::<Vec<_>>().join(", ")
-}
-
-/// `a`, `a and b`, `a, b and c`.
-fn listed(items: &[String]) -> String {
-    match items {
-        [] => String::new(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
-}
-
-/// With a capital and a full stop; nothing stays nothing.
-fn sentence(text: &str) -> String {
-    let text = text.trim();
-    if text.is_empty() || text.ends_with(['.', '!', '?']) { capital(text) } else { format!("{}.", capital(text)) }
-}
-
-/// A name that does not fill a legend.
-fn short(name: &str) -> String {
-    const MOST: usize = 28;
-    if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
-}
-
-/// A unit as it is printed: numbers without one have `1`.
-fn unit(unit: &str) -> &str {
-    if unit == "1" { "" } else { unit }
-}
-
-fn with_unit(number: &str, of: &str) -> String {
-    if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
-}
-
-fn parameter(value: &twinlag_diagnose::Value) -> String {
-    let number = plus_minus(value.value, value.standard_error);
-    format!("{} {}", value.name.replace('_', " "), with_unit(&number, &value.unit))
-}
-
-fn estimate(of: &TimeConstant) -> String {
-    of.value_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
-}
-
-fn interval(of: &TimeConstant) -> String {
-    of.interval_95_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
-}
-
-/// What a test asks, by its name.
-fn question(test: &str) -> &'static str {
-    match test {
-        "total-energy" => "Is its energy that of the noise?",
-        "band-energy" => "Has every band of frequencies its share of the energy?",
-        "whiteness" => "Are values a few samples apart unrelated?",
-        "coherence" => "Is it unrelated to the inferred gas temperature, at every frequency?",
-        "level" => "Is it unrelated to how high the gas temperature is?",
-        "rate" => "Is it unrelated to how fast the gas temperature changes?",
-        "time" => "Is its energy the same all along the record?",
-        "tails" => "Are its largest values those of Gaussian noise?",
-        _ => "",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::{ReportContext, report};
@@ -823,6 +630,7 @@ mod tests {
             tests: Vec::new(),
             chi2_per_dof: f64::NAN,
             is_weighted_by_residual: false,
+            covariance: None,
             trace: Trace::default(),
         };
         let pair = BeforeAfter { before: f64::NAN, after: f64::INFINITY };

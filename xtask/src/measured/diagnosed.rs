@@ -7,6 +7,8 @@ use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{ColumnRef, Record, Selection};
 use twinlag::{DiagnoseOptions, Diagnosis, Options, Status, diagnose};
 
+use super::page::Page;
+
 /// One record, what is known of it beforehand, and what must come out.
 struct Case {
     file: &'static str,
@@ -92,29 +94,22 @@ pub(super) struct Diagnosed {
     pub(super) failures: Vec<String>,
     pub(super) questions: usize,
     /// For the book.
-    pub(super) table: String,
+    pub(super) page: Page,
 }
 
 pub(super) fn run(dir: &Path) -> Diagnosed {
-    let mut table = String::from(
-        "| record | channels | known | verdict | effects | held-out rms before | after |\n|---|---|---|---|---|---|---|\n",
-    );
+    let mut page = Page::new();
     let mut failures = Vec::new();
     for case in CASES {
-        let outcome = one(dir, case, &mut table);
+        let outcome = one(dir, case, &mut page);
         if let Err(error) = outcome {
             failures.push(format!("{} {:?} known '{}', diagnosed: {error:#}", case.file, case.channels, case.known));
         }
     }
-    Diagnosed { failures, questions: CASES.len(), table }
+    Diagnosed { failures, questions: CASES.len(), page }
 }
 
-/// Four digits, with an exponent where it is small.
-fn number(x: f64) -> String {
-    if x.abs() < 1e-3 { format!("{x:.1e}") } else { format!("{x:.4}") }
-}
-
-fn one(dir: &Path, case: &Case, table: &mut String) -> Result<()> {
+fn one(dir: &Path, case: &Case, page: &mut Page) -> Result<()> {
     let selection = Selection {
         t1: Some(ColumnRef::Name(case.channels[0].into())),
         t2: Some(ColumnRef::Name(case.channels[1].into())),
@@ -126,36 +121,6 @@ fn one(dir: &Path, case: &Case, table: &mut String) -> Result<()> {
         options.known.push(case.known.parse()?);
     }
     let answer = diagnose(&record, &DiagnoseOptions { characterise: options, without: Vec::new() }, &|_, _, _| ())?;
-    let effects: Vec<String> = answer
-        .effects
-        .iter()
-        .map(|e| {
-            let numbers: Vec<String> = e
-                .parameters
-                .iter()
-                .take(3)
-                .map(|p| format!("{} {}", p.name.replace('_', " "), number(p.value)))
-                .collect();
-            let channel = e.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
-            let numbers = if numbers.is_empty() { String::new() } else { format!(" ({})", numbers.join(", ")) };
-            format!("{}{channel}{numbers}", e.effect)
-        })
-        .collect();
-    let rms = answer.error.held_out_normalised_rms;
-    let effects = if effects.is_empty() { "none".to_owned() } else { effects.join(", ") };
-    let verdict = serde_json::to_value(answer.verdict)?;
-    let row = format!(
-        "| `{}` | {}, {} | {} | {} | {effects} | {:.2} | {:.2} |",
-        case.file,
-        case.channels[0],
-        case.channels[1],
-        case.known,
-        verdict.as_str().unwrap_or("?"),
-        rms.before,
-        rms.after
-    );
-    println!("{row}");
-    table.push_str(&row);
-    table.push('\n');
+    println!("{}", page.add(case.file, case.channels, case.known, &answer)?);
     (case.check)(&answer)
 }

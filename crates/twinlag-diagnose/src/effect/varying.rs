@@ -1,8 +1,10 @@
 //! Time constants that change along the record by the same share: `τᵢ(t) = τᵢ (1 + m(t))`, as they do when the flow changes. `m`
-//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record.
+//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_mean)^p`
+//! with the geometric mean of its velocity or density, at which `τᵢ` is then what is found.
 
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
-use crate::plant::Plant;
+use crate::flow::Flow;
+use crate::plant::{Modulation, Plant};
 use crate::spline::Spline;
 use std::sync::Arc;
 use twinlag_optimise::Variable;
@@ -37,7 +39,11 @@ fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
 }
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
-    of_size(FIRST, context.ends_s, context.samples).into_iter().collect()
+    let of_flow = context.flow.as_ref().map(|of| {
+        let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.01, -3.0, 3.0))];
+        Arc::new(WithFlow { of: of.clone(), parameters }) as Shared
+    });
+    of_size(FIRST, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
 
 impl Effect for Varying {
@@ -58,7 +64,7 @@ impl Effect for Varying {
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.modulation = Some(Spline::new(self.ends_s[0], self.ends_s[1], values));
+        plant.modulation = Some(Modulation::Spline(Spline::new(self.ends_s[0], self.ends_s[1], values)));
     }
 
     fn sizes(&self) -> Vec<Shared> {
@@ -67,5 +73,36 @@ impl Effect for Varying {
 
     fn neutral(&self) -> Vec<(usize, f64)> {
         Vec::new()
+    }
+}
+
+struct WithFlow {
+    of: Arc<Flow>,
+    parameters: Vec<Parameter>,
+}
+
+impl Effect for WithFlow {
+    fn identifier(&self) -> Identifier {
+        Identifier::VaryingTimeConstant
+    }
+
+    fn channel(&self) -> Option<usize> {
+        None
+    }
+
+    fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        vec![vec![0.0]]
+    }
+
+    fn install(&self, values: &[f64], plant: &mut Plant) {
+        plant.modulation = Some(Modulation::Flow { exponent: values[0], of: self.of.clone() });
+    }
+
+    fn neutral(&self) -> Vec<(usize, f64)> {
+        vec![(0, 0.0)]
     }
 }

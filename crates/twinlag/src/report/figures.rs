@@ -1,0 +1,143 @@
+//! Pictures of the residual before and after.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use twinlag_report::{Axis, Chart, Colour, Figure, Series};
+
+use super::Model;
+
+const NOISE: &str = "95 % of white noise";
+pub(super) const WIDTH_PX: f64 = 900.0;
+/// Parts of the record whose mean energies are shown.
+const PARTS: usize = 100;
+/// A step so many times the usual one is a gap.
+const GAP: f64 = 10.0;
+
+/// A chart of the series that there are; `None` if there is none.
+pub(super) fn chart(
+    title: impl Into<String>,
+    [x, y]: [Axis; 2],
+    series: impl IntoIterator<Item = Option<Series>>,
+) -> Option<Chart> {
+    let mut series = series.into_iter().flatten().peekable();
+    series.peek()?;
+    Some(series.fold(Chart::new(title, x, y), Chart::series))
+}
+
+/// A trace, if it has a point that can be drawn. It has gaps where the record has.
+pub(super) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colour) -> Option<Series> {
+    let drawn = x.iter().zip(y).any(|(x, y)| x.is_finite() && y.is_finite());
+    let mut steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    let longest = if steps.is_empty() { 0.0 } else { GAP * *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let (mut at, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
+    for (k, (x_k, y_k)) in x.iter().zip(y).enumerate() {
+        if k > 0 && x_k - x[k - 1] > longest {
+            at.push(*x_k);
+            values.push(f64::NAN);
+        }
+        at.push(*x_k);
+        values.push(*y_k);
+    }
+    drawn.then(|| Series::trace(name, at, values).colour(colour))
+}
+
+/// The residual of each model along the record, and its root mean square in parts of the record.
+pub(super) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
+    let largest: Vec<f64> = models
+        .iter()
+        .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
+        .collect();
+    // One scale for both, unless the smaller would then be a line.
+    let widest = largest.iter().copied().fold(0.0, f64::max);
+    let common = largest.iter().all(|l| 4.0 * l > widest);
+    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    let mut parts = Vec::new();
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut fewest = usize::MAX;
+    let mut any = false;
+    for (Model { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
+        let trace = &fit.trace;
+        let limit = 1.08 * if common { widest } else { *largest };
+        let axis = Axis::linear("residual");
+        let axis = if limit > 0.0 { axis.range(-limit, limit) } else { axis };
+        let lines = [self::trace("", &trace.time_s, &trace.residual, *colour)];
+        if let Some(chart) = chart(*name, [Axis::linear("time (s)"), axis], lines) {
+            figure = figure.panel(chart);
+            any = true;
+        }
+        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(PARTS).max(1);
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for (times, values) in trace.time_s.chunks(size).zip(trace.residual.chunks(size)) {
+            // A short last part would be outside the range of the others.
+            if values.len() == size {
+                x.push(times[0]);
+                y.push((values.iter().map(|r| r * r).sum::<f64>() / size as f64).sqrt());
+                ends = [ends[0].min(times[0]), ends[1].max(times[size - 1])];
+            }
+        }
+        // The last part is as long as the others.
+        if let (Some(end), Some(last)) = (trace.time_s.get((y.len() * size).saturating_sub(1)), y.last().copied()) {
+            x.push(*end);
+            y.push(last);
+        }
+        if y.iter().any(|v| v.is_finite() && *v > 0.0) {
+            fewest = fewest.min(size);
+            parts.push(Some(Series::steps(*name, x, y).colour(*colour)));
+        }
+    }
+    if !any {
+        return None;
+    }
+    if ends[0] < ends[1]
+        && let Some([low, high]) = white_noise(fewest as f64)
+    {
+        let band = Series::trace(NOISE, ends, [1.0, 1.0]).band([low.sqrt(); 2], [high.sqrt(); 2]).colour(Colour::Grey);
+        parts.insert(0, Some(band));
+    }
+    let axes = [Axis::linear("time (s)"), Axis::logarithmic("root mean square")];
+    if let Some(chart) = chart("In hundredths of the record", axes, parts) {
+        figure = figure.panel(chart);
+    }
+    Some(figure)
+}
+
+/// Power of the residual of each model against frequency.
+pub(super) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
+    let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
+    let mut series = Vec::new();
+    let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
+    let (mut x, mut low, mut high) = (Vec::new(), Vec::new(), Vec::new());
+    for band in bands {
+        if let Some(range) = white_noise(band[2]) {
+            x.push(band[0]);
+            low.push(range[0]);
+            high.push(range[1]);
+        }
+    }
+    if !x.is_empty() {
+        let ones = vec![1.0; x.len()];
+        series.push(Some(Series::trace(NOISE, x, ones).band(low, high).colour(Colour::Grey)));
+    }
+    for Model { name, fit, colour, .. } in models {
+        let (x, y): (Vec<f64>, Vec<f64>) = fit.trace.bands.iter().filter(shown).map(|b| (b[0], b[1])).unzip();
+        series.push((!x.is_empty()).then(|| Series::line(*name, x, y).colour(*colour)));
+    }
+    let axes = [Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("power (that of the noise is 1)")];
+    Some(Figure::new("").panel_size(WIDTH_PX, 360.0).panel(chart("Power of the residual", axes, series)?))
+}
+
+/// The range that holds the mean square of so many values of white noise of unit variance in 95 % of all cases.
+pub(super) fn white_noise(dof: f64) -> Option<[f64; 2]> {
+    let chi_square = ChiSquared::new(dof).ok()?;
+    Some([0.025, 0.975].map(|p| chi_square.inverse_cdf(p) / dof))
+}
+
+/// Values of a trace from one instant to another.
+pub(super) fn pairs<'a>(
+    time_s: &'a [f64],
+    values: &'a [f64],
+    from: f64,
+    to: f64,
+) -> impl Iterator<Item = (f64, f64)> + 'a {
+    time_s.iter().copied().zip(values.iter().copied()).filter(move |(t, _)| (from..=to).contains(t))
+}
