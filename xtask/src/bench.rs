@@ -149,7 +149,7 @@ fn closed_loop() -> Result<()> {
         sampled.samples = LONG;
         let mut rig = Rig::new(drawn.rig.seed(), sampled, drawn.rig.gas().clone(), drawn.rig.sensors().clone())?;
         if let Some(flow) = drawn.rig.flow() {
-            rig = rig.with_flow(flow.clone())?;
+            rig = rig.with_flow(*flow)?;
         }
         if let Some(mismatch) = drawn.rig.mismatch() {
             rig = rig.with_mismatch(mismatch.clone())?;

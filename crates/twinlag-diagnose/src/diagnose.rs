@@ -27,7 +27,8 @@ pub fn diagnose(
     settings: &Settings,
     watch: Watch<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
-    let is_refused = tones(observations) == Some(1);
+    let tones = tones(observations);
+    let is_refused = tones == Some(1);
     let mut prepared = Prepared::new(observations, settings)?;
     let base = prepared.base(settings, watch);
     let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new(), is_reweighed: false };
@@ -36,7 +37,7 @@ pub fn diagnose(
         && (state.step(&mut prepared, settings, watch) || state.reweigh(&mut prepared))
     {}
     let limits = prepared.search(settings, watch).limits(&state.current);
-    Ok(Diagnosis { limits, ..state.conclude(&prepared, is_refused) })
+    Ok(Diagnosis { limits, not_testable: not_testable(observations, tones), ..state.conclude(&prepared, is_refused) })
 }
 
 /// How far the loop has come.
@@ -200,7 +201,7 @@ impl State {
             last: last_fit,
             error,
             unexplained: left.filter(|_| !is_refused),
-            not_testable: not_testable(observations),
+            not_testable: Vec::new(),
             limits: Vec::new(),
             remarks: self.remarks,
         }

@@ -10,6 +10,9 @@ use crate::observations::Observations;
 use crate::search::Tried;
 use crate::summary::{LEFT_OVER, Z_975, covariance};
 
+/// Tones of the gas up to which equations are counted.
+const FEW_TONES: usize = 4;
+
 /// Effect `index` of the model `last` with its numbers, of which `fit` tells how certain they are.
 pub(crate) fn name(index: usize, tried: &Tried, ties: &[Tried], last: &Fitted, fit: &ModelFit) -> Found {
     let effect: &dyn Effect = tried.effect.as_ref();
@@ -97,13 +100,22 @@ pub(crate) fn widen(
 }
 
 /// What no record of two sensors tells, and what this one does not.
-pub(crate) fn not_testable(observations: &Observations) -> Vec<String> {
+///
+/// - `tones`: separate tones of the gas, where it has few
+pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>) -> Vec<String> {
     let mut out = vec![
         "anything that both sensors share: gain, offset, drift, delay, a second lag, a slow mode, radiation".to_owned(),
         "crosstalk that takes the place of a part of the reading: it is a wrong time constant and nothing else"
             .to_owned(),
         "which channel picks up a line that only one of them has".to_owned(),
     ];
+    if let Some(tones) = tones.filter(|t| (2..=FEW_TONES).contains(t)) {
+        let (equations, left) = (2 * tones, 2 * tones - 2);
+        out.push(format!(
+            "more than {left} numbers beside the time constants: the gas has {tones} tones, an amplitude and a phase each, which \
+             are {equations} equations, and two of them go to the time constants"
+        ));
+    }
     if observations.period_s.is_none() {
         out.push("coloured noise, input mismatch and lines: these take evenly spaced samples".to_owned());
     }
@@ -133,13 +145,19 @@ pub(crate) fn what_is_left(fit: &ModelFit) -> Option<Unexplained> {
         .max_by(|a, b| energy(a.1).total_cmp(&energy(b.1)))
         .map(|(i, chunk)| [fit.trace.time_s[i * tenth], fit.trace.time_s[i * tenth + chunk.len() - 1]]);
     let names: Vec<&str> = fails.iter().map(|t| t.test.as_str()).collect();
+    let [hz, ratio, _] = worst_band;
+    let place = match hz {
+        0.0 => "at the lowest frequencies".to_owned(),
+        hz if hz < 1e-3 => format!("around {hz:.1e} Hz"),
+        hz => format!("around {hz:.4} Hz"),
+    };
+    let where_most = if ratio > 1.0 {
+        format!(": most of what is too much lies {place}, {ratio:.2} times the noise there")
+    } else {
+        String::new()
+    };
     Some(Unexplained {
-        description: format!(
-            "the residual is not noise ({}): most of what is too much lies around {:.4} Hz, {:.2} times the noise there",
-            names.join(", "),
-            worst_band[0],
-            worst_band[1]
-        ),
+        description: format!("the residual is not noise ({}){where_most}", names.join(", ")),
         band_hz: Some([worst_band[0] / 1.19_f64.sqrt(), worst_band[0] * 1.19_f64.sqrt()]),
         energy_ratio: worst_band[1],
         worst_s: worst_time,

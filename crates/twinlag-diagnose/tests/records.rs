@@ -9,7 +9,7 @@ use common::{
 use twinlag_diagnose::{
     DiagnoseError, Diagnosis, Identifier, Observations, Settings, Stretch, Verdict, diagnose, fit_with,
 };
-use twinlag_signal::{Sensor, Signal, Tone};
+use twinlag_signal::{MultiTone, Sensor, Signal, Tone};
 
 fn second_order(sensors: &mut [Sensor; 2]) {
     sensors[1].second_time_constant_s = Some(0.018);
@@ -35,6 +35,21 @@ fn a_single_sine_is_refused_with_a_remark() {
     assert!(d.remarks.iter().any(|r| r.contains("single tone")), "{}", told(&d));
     // Failed: a line break of the source was in it, as thirteen spaces.
     assert!(d.remarks.iter().all(|r| !r.contains("  ")), "a remark is running text: {:?}", d.remarks);
+}
+
+/// Two tones are four equations, two of which the time constants take.
+#[test]
+fn what_few_tones_can_tell_is_counted() {
+    let tones = vec![
+        Tone { amplitude_k: GAS_K, frequency_hz: 3.0, phase_rad: 0.0 },
+        Tone { amplitude_k: GAS_K, frequency_hz: 17.0, phase_rad: 1.0 },
+    ];
+    let simulated = readings(SEED, Signal::MultiTone(MultiTone { tones }), |_| ());
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    let counted = |t: &String| t.contains("more than 2 numbers") && t.contains("2 tones") && t.contains("4 equations");
+    assert!(d.not_testable.iter().any(counted), "{:?}", d.not_testable);
+    let broad = found(&record(SEED, |_| ()));
+    assert!(broad.not_testable.iter().all(|t| !t.contains("tones")), "{:?}", broad.not_testable);
 }
 
 /// Bit by bit, while another diagnosis competes for the processors: no number may depend on which thread is first. (The same

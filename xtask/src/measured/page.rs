@@ -1,5 +1,7 @@
 //! What the book's chapter says of a diagnosed record: a row of the table, a section, a picture.
 
+use std::fmt::Write as _;
+
 use anyhow::Result;
 use twinlag::diagnosis::Value;
 use twinlag::{Diagnosis, residual_picture};
@@ -31,10 +33,11 @@ impl Page {
         let verdict = verdict.as_str().unwrap_or("?");
         let rms = answer.error.held_out_normalised_rms;
         let from = self.table.len();
-        self.table.push_str(&format!(
-            "| `{file}` | {}, {} | {known} | {verdict} | {effects} | {:.2} | {:.2} |\n",
+        let _ = writeln!(
+            self.table,
+            "| `{file}` | {}, {} | {known} | {verdict} | {effects} | {:.2} | {:.2} |",
             channels[0], channels[1], rms.before, rms.after
-        ));
+        );
         self.section(file, channels, known, verdict, answer)?;
         Ok(self.table[from..].trim_end())
     }
@@ -107,7 +110,10 @@ fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
     let parameter = |p: &Value| {
         let name = p.name.replace('_', " ");
         match p.interval_95.filter(|_| whole) {
-            Some([low, high]) => format!("{name} {} [{}, {}] {}", number(p.value), number(low), number(high), p.unit),
+            Some([low, high]) => {
+                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+                format!("{name} {} [{}, {}]{unit}", number(p.value), number(low), number(high))
+            }
             None => format!("{name} {}", number(p.value)),
         }
     };
