@@ -94,8 +94,11 @@ pub(crate) fn run(task: Task) -> Result<()> {
         Task::Draw { name } if name == "all" => names()?.iter().try_for_each(|name| draw(name)),
         Task::Draw { name } => draw(&name),
         Task::Merge { name, parts, out } => {
-            let plan = plan(&name)?;
             let results = twinlag_study::merge(&parts)?;
+            if let Some(plan) = loops::Plan::read(&text(&name)?) {
+                return loops::write(&plan?, &results, &out);
+            }
+            let plan = plan(&name)?;
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
             let plan = with_trials_of(plan, &results);
             ensure!(
@@ -261,7 +264,11 @@ fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
     plan.seed = run.seed.unwrap_or(plan.seed);
     let out = run.out.clone().unwrap_or(folder.to_owned());
     fs::create_dir_all(&out)?;
-    let checkpoint = (!run.check).then(|| out.join("checkpoint.json"));
+    let checkpoint = match (run.check, run.shard) {
+        (true, _) => None,
+        (_, Some(shard)) => Some(out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()))),
+        _ => Some(out.join("checkpoint.json")),
+    };
     let options = Options {
         threads: run.threads.unwrap_or(Options::default().threads),
         shard: run.shard.unwrap_or(Shard::WHOLE),
@@ -269,9 +276,8 @@ fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
         resume: run.resume,
         ..Options::default()
     };
-    ensure!(run.shard.is_none(), "{}: shards are for the experiments of estimators", plan.name);
     let seconds = loops::run(&plan, &out, run.check, &options)?;
-    if let Some(checkpoint) = checkpoint {
+    if let (Some(checkpoint), None) = (checkpoint, run.shard) {
         fs::remove_file(checkpoint)?;
         provenance(&plan.name, plan.seed, plan.records, &out, seconds, options.threads.get())?;
     }

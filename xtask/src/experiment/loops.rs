@@ -9,14 +9,15 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Simulated;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
-use twinlag_study::{Failure, Options, Outcome, Quantity, Study};
+use twinlag_study::{Failure, Options, Outcome, Quantity, Results, Study};
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -201,7 +202,7 @@ fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
     })
 }
 
-/// Runs the plan, writes results and tables to `out`; or holds it against what is there.
+/// Runs the plan, writes results and tables to `out`; or holds it against what is there. Of a shard only its part is written.
 pub(super) fn run(plan: &Plan, out: &Path, check: bool, options: &Options) -> Result<f64> {
     let start = Instant::now();
     let bar = super::bar(&plan.name);
@@ -212,24 +213,57 @@ pub(super) fn run(plan: &Plan, out: &Path, check: bool, options: &Options) -> Re
     })?;
     bar.finish_and_clear();
     let seconds = start.elapsed().as_secs_f64();
+    if options.shard.of() > 1 {
+        println!("{}: part {} in {seconds:.0} s", plan.name, options.shard);
+        return Ok(seconds);
+    }
     let results = finished.into_results()?;
-    let path = out.join("results.json");
     if check {
-        let stored = fs::read_to_string(&path).context("there is no stored table")?;
-        if stored != results.to_json() {
-            bail!("{}: the stored results are others", plan.name);
+        let stored = fs::read_to_string(out.join("results.json")).context("there is no stored table")?;
+        if let Some(cell) = first_difference(plan, &results, &stored)? {
+            bail!("{}: {cell}", plan.name);
         }
         println!("{}: the stored results hold, to the byte; {seconds:.0} s", plan.name);
         return Ok(seconds);
     }
-    fs::create_dir_all(out)?;
-    fs::write(path, results.to_json())?;
-    tables::write(plan, &results, out)?;
-    println!(
-        "{}: {} records in {seconds:.0} s, {}",
-        plan.name,
-        plan.records * Plan::cells(plan).len() as u64,
-        out.display()
-    );
+    write(plan, &results, out)?;
+    println!("{}: {} records in {seconds:.0} s", plan.name, plan.records * Plan::cells(plan).len() as u64);
     Ok(seconds)
+}
+
+/// Results, tables and pictures.
+pub(super) fn write(plan: &Plan, results: &Results, out: &Path) -> Result<()> {
+    let mut plan = plan.clone();
+    plan.records = results.header().trials();
+    ensure!(
+        results.header().plan() == Study::plan(&plan),
+        "the results are of another plan than {}, or of another version of it",
+        plan.name
+    );
+    fs::create_dir_all(out)?;
+    fs::write(out.join("results.json"), results.to_json())?;
+    tables::write(&plan, results, out)?;
+    println!("{}: {}", plan.name, out.display());
+    Ok(())
+}
+
+/// The first cell whose numbers are not those that are stored.
+fn first_difference(plan: &Plan, results: &Results, stored: &str) -> Result<Option<String>> {
+    let now = results.to_json();
+    if now == stored {
+        return Ok(None);
+    }
+    let cells = |text: &str| -> Result<Vec<Value>> {
+        let value: Value = serde_json::from_str(text).context("the stored results cannot be read")?;
+        Ok(value["cells"].as_array().cloned().unwrap_or_default())
+    };
+    let (now, stored) = (cells(&now)?, cells(stored)?);
+    let differs = now.iter().zip(&stored).position(|(a, b)| a != b);
+    Ok(Some(match differs.and_then(|i| plan.cells().get(i).map(|(kinds, size)| (*kinds, *size))) {
+        Some((kinds, size)) => {
+            let name = tables::cell_name(kinds, size, plan.size_factors.len());
+            format!("the first cell that differs from the stored results is {name}")
+        }
+        None => "the stored results are of another plan".to_owned(),
+    }))
 }

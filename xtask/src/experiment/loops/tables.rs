@@ -29,7 +29,7 @@ fn set_name(kinds: &[Kind]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
 }
 
-fn cell_name(kinds: &[Kind], size: f64, sizes: usize) -> String {
+pub(super) fn cell_name(kinds: &[Kind], size: f64, sizes: usize) -> String {
     if sizes > 1 { format!("{}, × {size}", set_name(kinds)) } else { set_name(kinds) }
 }
 
