@@ -1,6 +1,6 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
@@ -13,24 +13,7 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
-    if command.report.is_some() && command.report == command.save {
-        return Err(Failure::Usage("--report and --save name the same file: each needs one of its own".into()));
-    }
-    for path in [&command.report, &command.save].into_iter().flatten() {
-        let is_record = path.canonicalize().is_ok_and(|p| command.file.canonicalize().is_ok_and(|f| f == p));
-        if is_record {
-            return Err(Failure::Usage(format!("{} is the record itself: choose another name", path.display())));
-        }
-        if path.exists() && !command.force {
-            return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
-        }
-    }
-    for path in [&command.report, &command.save].into_iter().flatten() {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-        if let Some(folder) = folder.filter(|f| !f.is_dir()) {
-            return Err(Failure::Usage(format!("{}: there is no folder {}", path.display(), folder.display())));
-        }
-    }
+    check_outputs(command)?;
     let options = DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() };
     let record = read(&command.file, &command.columns.selection())?;
     print::notes(&record, talk);
@@ -46,6 +29,36 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     }
     print::diagnosis(&answer, talk)?;
     Ok(exit_code(&answer))
+}
+
+/// What would fail after minutes of work, or lose something, is refused before.
+fn check_outputs(command: &Diagnose) -> Result<(), Failure> {
+    let usage = |text: String| Err(Failure::Usage(text));
+    let mut seen: Vec<PathBuf> = Vec::new();
+    for path in [&command.report, &command.save].into_iter().flatten() {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let Ok(folder) = folder.canonicalize() else {
+            return usage(format!("{}: there is no folder {}", path.display(), folder.display()));
+        };
+        let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
+            return usage(format!("{} is a folder: name a file in it", path.display()));
+        };
+        if path.as_os_str() == "-" {
+            return usage("standard output is for the answer: name a file for --report and --save".into());
+        }
+        let whole = folder.join(name);
+        if command.file.canonicalize().is_ok_and(|record| whole.canonicalize().is_ok_and(|out| out == record)) {
+            return usage(format!("{} is the record itself: choose another name", path.display()));
+        }
+        if seen.contains(&whole) {
+            return usage("--report and --save name the same file: each needs one of its own".into());
+        }
+        seen.push(whole);
+        if path.exists() && !command.force {
+            return usage(format!("{} exists: choose another name, or add --force", path.display()));
+        }
+    }
+    Ok(())
 }
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -> Result<Diagnosis, Failure> {

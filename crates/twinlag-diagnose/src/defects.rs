@@ -131,7 +131,8 @@ pub(crate) fn spikes(observations: &Observations, evaluation: &Evaluation, far: 
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
         let mut ranks = Vec::new();
-        for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+        for part in &evaluation.parts {
+            let stretch = &observations.stretches[part.stretch];
             let n = stretch.len();
             if n < 16 {
                 continue;

@@ -8,7 +8,7 @@ use crate::model::{Effort, Fitted, Model};
 use crate::naming::{name, not_testable, what_is_left, widen};
 use crate::observations::Observations;
 use crate::prepare::Prepared;
-use crate::search::{FALSE_ALARM, FAR_OFF, Search, Tried, threshold};
+use crate::search::{FALSE_ALARM, FAR_OFF, Search, TIE, Tried, threshold};
 use crate::settings::{KnownEffect, Settings, Watch};
 use crate::summary::{LEFT_OVER, is_unresolved, summarise};
 use crate::weighting::Weighting;
@@ -76,7 +76,62 @@ impl State {
         let search = prepared.search(settings, watch);
         self.drop_needless(&search);
         self.grow(&search);
+        self.think_again(&search);
+        self.doubt_noise(prepared, &search);
         true
+    }
+
+    /// Puts the look-alikes of every effect in its place, now that more is known: one that is better takes it, those that are as
+    /// good are its ties.
+    fn think_again(&mut self, search: &Search<'_>) {
+        if self.steps.len() < 2 {
+            return;
+        }
+        for index in 0..self.steps.len() {
+            let alike = search.look_alikes(&self.current, index, &self.steps[index].0);
+            let is_static = |t: &Tried| t.effect.identifier() == Identifier::Calibration;
+            let is_imitator =
+                matches!(self.steps[index].0.effect.identifier(), Identifier::Radiation | Identifier::Drift);
+            // A static disagreement before its subtler imitators.
+            let better =
+                alike.iter().find(|t| t.advantage > TIE || (is_imitator && is_static(t) && t.advantage > -TIE));
+            if let Some(better) = better.cloned() {
+                self.current = better.fitted.clone().larger_lag_first();
+                let before = std::mem::replace(&mut self.steps[index].0, better);
+                self.remarks.push(format!(
+                    "{} was taken up first and replaced once more was known: {} explains more",
+                    before.effect.identifier(),
+                    self.steps[index].0.effect.identifier()
+                ));
+                self.steps[index].1.clear();
+                self.drop_needless(search);
+                self.grow(search);
+                return;
+            }
+            if !self.steps[index].0.effect.is_noise() {
+                self.steps[index].1 = alike.into_iter().filter(|t| t.advantage > -TIE).collect();
+            }
+        }
+    }
+
+    /// Takes noise out that came before the effects that explain it: model error, seen from afar, looks like noise.
+    fn doubt_noise(&mut self, prepared: &Prepared, search: &Search<'_>) {
+        let Some(index) = self.current.model.effects.iter().position(|e| e.is_noise()) else { return };
+        if index + 1 == self.steps.len() {
+            return;
+        }
+        let mut theta = self.current.theta.clone();
+        theta.drain(self.current.model.range(index));
+        let model = self.current.model.without(index).with_noise(prepared.levels.std_k);
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
+        if search.needs_noise(&without, &self.steps[index].0.effect) {
+            return;
+        }
+        let effect = self.current.model.effects[index].identifier();
+        self.remarks.push(format!("{effect} was taken up first and found needless once more was known"));
+        self.current = without;
+        self.steps.remove(index);
+        self.drop_needless(search);
     }
 
     /// Where nothing explains what is left over and that is far more than noise: weights frequencies by its own spectrum from here
@@ -150,9 +205,10 @@ impl State {
             summary(&to_the_end(&self.base))
         };
         let mut last_fit = summary(&last);
-        if let [(_, ties)] = &self.steps[..] {
-            widen(&mut last_fit, ties, observations, everything, &mut self.remarks);
-        }
+        // Those of the whole model: ties of a time when less was known have been looked at again.
+        let is_whole = |t: &&Tried| t.fitted.model.effects.len() == last.model.effects.len();
+        let ties = self.steps.iter().flat_map(|s| &s.1).filter(|t| !t.effect.is_noise()).filter(is_whole);
+        widen(&mut last_fit, ties, observations, everything, &mut self.remarks);
         let error = self.errors(prepared, &base_fit, &last_fit);
         let mut found = prepared.found.clone();
         found.extend(
@@ -253,6 +309,7 @@ pub fn fit_with(
     let mut prepared = Prepared::new(observations, settings)?;
     let mut model = Model::new(&settings.known, prepared.levels.std_k);
     model.is_frozen = true;
+    let own = prepared.context.clone();
     let mut rest = Vec::new();
     for known in effects {
         let is_defect = [Identifier::Saturation, Identifier::Quantisation, Identifier::Spikes].contains(&known.effect);
@@ -261,6 +318,18 @@ pub fn fit_with(
         }
         let value = |name: &str| known.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
         prepared.context.lines_hz = value("frequency").into_iter().collect();
+        // Numbers are about the temperatures of the record that they were found in.
+        let [mean_c, variance_k2, skew_k] = own.moments;
+        prepared.context.moments = [
+            value("curvature_about").unwrap_or(mean_c),
+            value("curvature_variance").unwrap_or(variance_k2),
+            value("curvature_skew").unwrap_or(skew_k),
+        ];
+        let about_c = value("mean_temperature").or(value("neutral_temperature"));
+        prepared.context.mean_c = about_c.map_or(own.mean_c, |about_c| [about_c; 2]);
+        if known.effect == Identifier::VaryingTimeConstant && value("exponent").is_some() && own.flow.is_none() {
+            return Err(DiagnoseError::NeedsFlow);
+        }
         let fits = |e: &Shared| {
             e.identifier() == known.effect
                 && e.channel() == known.channel
@@ -271,7 +340,11 @@ pub fn fit_with(
         // Of those whose parameters are all given the one with the most of them.
         let effect = all.into_iter().chain(sizes).filter(fits).max_by_key(|e| e.parameters().len());
         let effect = effect.ok_or_else(|| DiagnoseError::Model { effect: known.effect.name() })?;
-        rest.extend(effect.parameters().iter().filter_map(|p| value(p.name)));
+        if effect.is_of_the_record() {
+            rest.extend(effect.starts().into_iter().next().unwrap_or_default());
+        } else {
+            rest.extend(effect.parameters().iter().filter_map(|p| value(p.name)));
+        }
         model = model.with(effect);
     }
     let fit = |prepared: &Prepared, model: &Model| {

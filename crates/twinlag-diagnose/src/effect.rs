@@ -194,17 +194,26 @@ pub(crate) trait Effect: Send + Sync {
         None
     }
 
+    /// Whether parameters belong to a record, not to the rig: the phase of a line, a function of time. They are fitted again where
+    /// the effect is known from another record.
+    fn is_of_the_record(&self) -> bool {
+        false
+    }
+
     /// Values to be reported beside the fitted ones: name, unit, function of the parameters.
     fn derived(&self) -> Vec<Derived> {
         Vec::new()
     }
 }
 
+/// A function of an effect's parameters.
+pub(crate) type OfParameters = Box<dyn Fn(&[f64]) -> f64>;
+
 /// A number that follows from the parameters.
 pub(crate) struct Derived {
     pub(crate) name: &'static str,
     pub(crate) unit: &'static str,
-    pub(crate) of: fn(&[f64], &dyn Effect) -> f64,
+    pub(crate) of: OfParameters,
 }
 
 /// What candidates are made from.
@@ -236,6 +245,11 @@ pub(crate) struct Context {
 }
 
 impl Context {
+    /// A temperature that a step of a solver may change, K: not so small that a large offset is far away.
+    pub(crate) fn typical_k(&self, channel: usize) -> f64 {
+        (0.1 * self.swing_k).max(self.noise_std_k[channel]).max(1e-9)
+    }
+
     pub(crate) fn span_s(&self) -> f64 {
         self.ends_s[1] - self.ends_s[0]
     }

@@ -15,6 +15,8 @@ pub enum DiagnoseError {
     Flow,
     #[error("channel {channel} never changes: there is no dynamics to see in it")]
     Constant { channel: usize },
+    #[error("the model has time constants that go with a measured flow: name its column (--flow COL)")]
+    NeedsFlow,
     #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]
     Model { effect: &'static str },
     #[error("there is no effect called \"{name}\"; there are {known}")]

@@ -7,6 +7,8 @@ use crate::observations::Observations;
 
 /// A bin counts if it has this many times the power of the noise.
 const CLEAR: f64 = 30.0;
+/// Samples below which tones are not told apart.
+const SHORTEST: usize = 200;
 /// Bins of one tone under the window.
 const WIDTH: usize = 12;
 
@@ -18,6 +20,9 @@ pub(crate) fn tones(observations: &Observations) -> Option<usize> {
     let stretch = observations.stretches.iter().max_by_key(|s| s.len())?;
     let y = &stretch.reading_c[channel];
     let n = y.len() & !1;
+    if n < SHORTEST {
+        return None;
+    }
     let noise_k = levels(observations)?.std_k[channel];
     let mean = y[..n].iter().sum::<f64>() / n as f64;
     // Blackman and Harris: side lobes of a millionth of a millionth part of the power.

@@ -8,6 +8,8 @@ use crate::observations::Observations;
 use crate::plant::{Evaluation, Plant};
 use crate::weighting::Weighting;
 
+/// Longest time constant beside the length of the record: of a longer one there is no more than a drift in it.
+pub(crate) const LONGEST: f64 = 1.0;
 /// Parameters whose second derivatives are taken.
 const MOST_EXACT: usize = 7;
 
@@ -116,6 +118,15 @@ impl Model {
         self.len() - self.known.iter().filter(|k| k.std_s.is_none()).count()
     }
 
+    /// Whether each parameter belongs to the record.
+    fn is_of_the_record(&self) -> Vec<bool> {
+        let mut out = vec![true; 2];
+        for effect in &self.effects {
+            out.extend(effect.parameters().iter().map(|_| effect.is_of_the_record()));
+        }
+        out
+    }
+
     /// Whether each parameter is one of noise.
     fn is_noise(&self) -> Vec<bool> {
         let mut out = vec![false; 2];
@@ -156,7 +167,7 @@ impl Model {
         let [first, last] = observations.ends_s();
         let tau = |i: usize| {
             let name = ["tau 1", "tau 2"][i];
-            let variable = Variable::logarithmic(name, 0.1 * observations.step_s(), 10.0 * (last - first));
+            let variable = Variable::logarithmic(name, 0.1 * observations.step_s(), LONGEST * (last - first));
             match self.known.iter().find(|k| k.sensor == i) {
                 Some(known) if known.std_s.is_none() => variable.held_at(known.value_s),
                 _ => variable,
@@ -164,8 +175,8 @@ impl Model {
         };
         let mut out = vec![tau(0), tau(1)];
         out.extend(self.parameters().map(|p| p.variable.clone()));
-        for (i, is_noise) in self.is_noise().into_iter().enumerate() {
-            if is_noise || (self.is_frozen && i >= 2) {
+        for (i, (is_noise, is_of_the_record)) in self.is_noise().into_iter().zip(self.is_of_the_record()).enumerate() {
+            if is_noise || (self.is_frozen && !is_of_the_record) {
                 out[i] = out[i].clone().held_at(theta[i]);
             }
         }

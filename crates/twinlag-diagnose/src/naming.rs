@@ -36,17 +36,19 @@ pub(crate) fn name(index: usize, tried: &Tried, ties: &[Tried], last: &Fitted, f
         .collect();
     parameters.extend(effect.derived().into_iter().map(|d| Value {
         name: d.name.into(),
-        value: (d.of)(&last.theta[range.clone()], effect),
+        value: (d.of)(&last.theta[range.clone()]),
         standard_error: None,
         interval_95: None,
         unit: d.unit.into(),
     }));
     let mut alternatives: Vec<Identifier> = ties.iter().map(|t| t.effect.identifier()).collect();
+    let is_of_either = alternatives.contains(&effect.identifier());
+    alternatives.retain(|other| *other != effect.identifier());
     alternatives.sort_unstable();
     alternatives.dedup();
     Found {
         effect: effect.identifier(),
-        channel: effect.channel().filter(|_| !tried.is_of_either),
+        channel: effect.channel().filter(|_| !is_of_either),
         fitted_in: effect.channel(),
         parameters,
         evidence: Some(Evidence {
@@ -66,9 +68,9 @@ fn tail(dof: usize, statistic: f64) -> f64 {
 }
 
 /// Intervals of both time constants that hold whichever of the tied effects is the right one.
-pub(crate) fn widen(
+pub(crate) fn widen<'a>(
     fit: &mut ModelFit,
-    ties: &[Tried],
+    ties: impl Iterator<Item = &'a Tried>,
     observations: &Observations,
     selection: &Selection,
     remarks: &mut Vec<String>,
@@ -124,7 +126,9 @@ pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>) ->
 
 /// What is left, if more than noise is.
 pub(crate) fn what_is_left(fit: &ModelFit) -> Option<Unexplained> {
-    let fails: Vec<&ResidualTest> = fit.tests.iter().filter(|t| t.p_value < LEFT_OVER).collect();
+    // Less than noise is no effect: the level of the noise is overestimated.
+    let is_less = |t: &ResidualTest| t.test == "total-energy" && t.statistic < 1.0;
+    let fails: Vec<&ResidualTest> = fit.tests.iter().filter(|t| t.p_value < LEFT_OVER && !is_less(t)).collect();
     if fails.is_empty() {
         return None;
     }

@@ -322,7 +322,7 @@ impl Plant {
     pub(crate) fn whitened(&self, observations: &Observations, keep: bool) -> Evaluation {
         let mut out = Evaluation::default();
         let mut first_sample = 0;
-        for stretch in &observations.stretches {
+        for (index, stretch) in observations.stretches.iter().enumerate() {
             if stretch.len() < self.consumed(observations.period_s.is_some()) + LEAST_LEFT {
                 out.begins.push(out.sample.len());
                 first_sample += stretch.len();
@@ -400,7 +400,7 @@ impl Plant {
             out.is_informed.extend(whitened.diagonal.iter().map(|d| *d < UNINFORMED * typical));
             out.log_determinant += whitened.log_determinant;
             if keep {
-                out.parts.push(Part { sources, whitened, inferred, skipped, first_sample });
+                out.parts.push(Part { stretch: index, sources, whitened, inferred, skipped, first_sample });
             }
             first_sample += stretch.len();
         }
@@ -486,6 +486,8 @@ pub(crate) struct Evaluation {
 /// One stretch with its factor.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
+    /// Which of the stretches: those that are too short have none.
+    pub(crate) stretch: usize,
     pub(crate) sources: Vec<Source>,
     pub(crate) whitened: Whitened,
     /// Both inferred inputs.

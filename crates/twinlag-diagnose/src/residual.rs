@@ -35,10 +35,13 @@ impl Pairs {
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s < plant.sensors[0].tau_s));
-        let mut cleaned = Vec::with_capacity(observations.samples());
-        for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+        let mut cleaned = vec![f64::NAN; observations.samples()];
+        for part in &evaluation.parts {
+            let stretch = &observations.stretches[part.stretch];
             let noise = part.noise_of(channel, stretch.len());
-            cleaned.extend(stretch.reading_c[channel].iter().zip(noise).map(|(y, n)| y - n));
+            for (k, (y, n)) in stretch.reading_c[channel].iter().zip(noise).enumerate() {
+                cleaned[part.first_sample + k] = y - n;
+            }
         }
         let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         let mut last = None;
@@ -72,7 +75,8 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
     let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
     let mut out = Vec::with_capacity(evaluation.residual.len());
-    for (part, stretch) in evaluation.parts.iter().zip(&observations.stretches) {
+    for part in &evaluation.parts {
+        let stretch = &observations.stretches[part.stretch];
         let noise = part.noise_of(channel, stretch.len());
         let chain = &part.inferred[channel];
         let inferred: Vec<f64> = (0..part.whitened.residual.len())
@@ -90,7 +94,14 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
 }
 
 /// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
-pub(crate) fn tests(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Vec<ResidualTest> {
+///
+/// - `is_coarse`: whether a converter is, whose rounding has no tails
+pub(crate) fn tests(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    is_coarse: bool,
+) -> Vec<ResidualTest> {
     let pairs = Pairs::of(fitted, observations, selection);
     let r: Vec<f64> = pairs.residual().collect();
     if r.len() < 100 {
@@ -101,7 +112,9 @@ pub(crate) fn tests(fitted: &Fitted, observations: &Observations, selection: &Se
     out.extend(level(&pairs, &r));
     out.push(rate(&pairs, &r));
     out.push(time(&r));
-    out.push(tails(&r));
+    if !is_coarse {
+        out.push(tails(&r));
+    }
     out.extend(lines(&pairs));
     out.extend(repeated_values(observations, fitted.model.noise_std_k()));
     out

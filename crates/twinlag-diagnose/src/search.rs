@@ -17,7 +17,7 @@ use twinlag_optimise::{End, Scale, Variable};
 /// Probability, over all candidates of a round, of taking one that is not there.
 pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
-const TIE: f64 = 10.0;
+pub(crate) const TIE: f64 = 10.0;
 
 /// Share of what noise of another colour explains that an effect must explain whatever the noise, to come before it, unless it
 /// takes off half as much energy.
@@ -48,10 +48,10 @@ pub(crate) struct Tried {
     pub(crate) robust_gain: f64,
     /// Nats that it saves on blocks that were left out.
     pub(crate) held_out_nats: f64,
+    /// Of a look-alike: how much better its score is than that of what it would replace.
+    pub(crate) advantage: f64,
     /// What the gains count beside those of the others: those of a line are of all frequencies, whatever weight these have.
     share: f64,
-    /// Whether the same effect in the other channel explains the record as well.
-    pub(crate) is_of_either: bool,
 }
 
 impl Tried {
@@ -232,8 +232,12 @@ impl Search<'_> {
 
     /// Whether the model lacks the candidate, and can take it.
     fn is_new(current: &Fitted, candidate: &Shared) -> bool {
-        let effects = &current.model.effects;
-        let has = |name: &str| current.model.parameters().any(|p| p.name == name);
+        Self::fits(&current.model, candidate)
+    }
+
+    fn fits(model: &Model, candidate: &Shared) -> bool {
+        let effects = &model.effects;
+        let has = |name: &str| model.parameters().any(|p| p.name == name);
         let repeats = effects.iter().any(|e| {
             e.identifier() == candidate.identifier()
                 && (e.channel() == candidate.channel() || candidate.identifier() != Identifier::MainsPickup)
@@ -350,6 +354,56 @@ impl Search<'_> {
         })
     }
 
+    /// Effects that look like effect `index` of `current`, in its place, best first, with what they gain.
+    pub(crate) fn look_alikes(&self, current: &Fitted, index: usize, tried: &Tried) -> Vec<Tried> {
+        let effect = &tried.effect;
+        let (id, rest) = (effect.identifier(), current.model.without(index));
+        if effect.is_noise() {
+            return Vec::new();
+        }
+        let is_alike = |c: &Shared| {
+            let other = c.identifier();
+            let confusable = id.about().confusable.contains(&other) || other.about().confusable.contains(&id);
+            confusable || (other == id && c.channel() != effect.channel())
+        };
+        let all: Vec<Shared> = candidates(&self.context)
+            .into_iter()
+            .filter(|c| self.allowed.contains(&c.identifier()) && !c.is_noise() && is_alike(c) && Self::fits(&rest, c))
+            .collect();
+        let range = current.model.range(index);
+        let replaced = self.in_parallel(&all, |other| {
+            let model = current.model.replaced(index, other.clone());
+            let look = |start: Vec<f64>| {
+                let mut theta = current.theta.clone();
+                theta.splice(range.clone(), start);
+                model.fit(&theta, self.observations, self.selection, Effort::Look)
+            };
+            let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+            let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);
+            let more = other.parameters().len() as f64 - range.len() as f64;
+            let gain = Self::gain(current, &fitted);
+            let robust_gain = self.robust(current) - self.robust(&fitted);
+            Some(Tried {
+                effect: other.clone(),
+                gain: tried.gain + gain,
+                robust_gain: tried.robust_gain + robust_gain,
+                added: other.parameters().len(),
+                advantage: gain.min(robust_gain) - more * fitted.count.max(2.0).ln(),
+                fitted,
+                ..tried.clone()
+            })
+        });
+        let mut alike: Vec<Tried> = replaced.into_iter().flatten().filter(Self::is_there).collect();
+        alike.sort_by(|a, b| b.advantage.total_cmp(&a.advantage));
+        alike
+    }
+
+    /// Whether the noise that is left over at `without` is of this colour.
+    pub(crate) fn needs_noise(&self, without: &Fitted, effect: &Shared) -> bool {
+        let tried = self.try_noise(without, effect);
+        tried.is_some_and(|t| t.gain > threshold(t.added, FALSE_ALARM) && t.score() > 0.0 && t.held_out_nats > 0.0)
+    }
+
     /// A candidate with its best fit; of a quick look where `thorough`, which tries more.
     fn try_one(&self, current: &Fitted, effect: &Shared, robust_before: f64, thorough: bool) -> Tried {
         let model = current.model.with(effect.clone());
@@ -385,8 +439,8 @@ impl Search<'_> {
             effect: effect.clone(),
             fitted,
             held_out_nats: 0.0,
+            advantage: 0.0,
             share: if effect.identifier() == Identifier::MainsPickup { self.selection.weighting.mean() } else { 1.0 },
-            is_of_either: false,
         }
     }
 
@@ -436,8 +490,8 @@ impl Search<'_> {
             effect: effect.clone(),
             fitted,
             held_out_nats: 0.5 * (white.held_out - with.held_out),
+            advantage: 0.0,
             share: 1.0,
-            is_of_either: false,
         })
     }
 
@@ -515,15 +569,14 @@ impl Search<'_> {
                 first.held_out_nats = held_out_gain(self.observations, self.selection, current, &first.fitted);
             }
             if first.held_out_nats > 0.0 {
-                first.is_of_either = pool.iter().any(|t| {
-                    t.effect.identifier() == first.effect.identifier()
-                        && t.effect.channel() != first.effect.channel()
-                        && first.score() - t.score() < TIE
-                });
+                let is_other = |t: &Tried| {
+                    t.effect.identifier() != first.effect.identifier() || t.effect.channel() != first.effect.channel()
+                };
                 let ties = pool
-                    .into_iter()
-                    .filter(|t| t.effect.identifier() != first.effect.identifier())
-                    .filter(|t| t.effect.is_noise() == first.effect.is_noise() && first.score() - t.score() < TIE)
+                    .iter()
+                    .filter(|t| is_other(t) && first.score() - t.score() < TIE)
+                    .filter(|t| t.effect.is_noise() == first.effect.is_noise())
+                    .cloned()
                     .collect();
                 return Some((first, ties));
             }

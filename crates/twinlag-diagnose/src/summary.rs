@@ -6,7 +6,7 @@ use crate::defects::Levels;
 use crate::dense;
 use crate::diagnosis::{ModelFit, TimeConstant, Trace};
 use crate::effect::Identifier;
-use crate::model::{Fitted, Selection};
+use crate::model::{Fitted, LONGEST, Selection};
 use crate::observations::Observations;
 use crate::prepare::is_judge;
 use crate::spectrum::{Bands, runs};
@@ -20,9 +20,11 @@ const VAGUE: f64 = 0.5;
 /// Below this p-value of any test something is left over.
 pub(crate) const LEFT_OVER: f64 = 1e-4;
 
-/// Whether a time constant is shorter than the samples tell.
+/// Whether a time constant is shorter than the samples tell, or as long as the record.
 pub(crate) fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
-    (0..2).any(|i| !fitted.model.knows(i) && fitted.theta[i] < UNRESOLVED * observations.step_s())
+    let [first, last] = observations.ends_s();
+    let seen = UNRESOLVED * observations.step_s()..0.9 * LONGEST * (last - first);
+    (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
 }
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
@@ -90,7 +92,8 @@ pub(crate) fn summarise(
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
     let mut tests = residual_tests(&residual_runs, fitted.model.fitted(), level_std);
-    tests.extend(crate::residual::tests(fitted, observations, selection));
+    let is_coarse = levels.coarse_step_k.iter().any(Option::is_some);
+    tests.extend(crate::residual::tests(fitted, observations, selection, is_coarse));
     let count: usize = residual_runs.iter().map(Vec::len).sum();
     let dof = count.saturating_sub(fitted.model.fitted()).max(1);
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;

@@ -14,7 +14,7 @@ fn record(column: impl Fn(f64) -> f64) -> Result<Observations, DiagnoseError> {
     });
     let flow = flow();
     let rig = Rig::new(SEED, Record::new(SAMPLES, PERIOD_S), Gas::new(300.0, turbulence()), sensors).expect("valid");
-    let simulated = rig.with_flow(flow.clone()).expect("valid").simulate().expect("finite");
+    let simulated = rig.with_flow(flow).expect("valid").simulate().expect("finite");
     let velocity = simulated.time_s.iter().map(|t| column(flow.factor(*t))).collect();
     let stretch = Stretch::new(simulated.time_s, [simulated.t1_c, simulated.t2_c]).with_flow(velocity);
     Observations::new(vec![stretch], Some(PERIOD_S))

@@ -84,7 +84,7 @@ pub enum RecordError {
     NotANumber { file: String, line: usize, column: String, cell: String },
     #[error(
         "{file}: line {line}, column {column}: expected numbers, found mostly text (first '{cell}'); \
-         choose another column with --t1, --t2, --reference or --time (NAME or number)"
+         choose another column with --t1, --t2, --reference, --flow or --time (NAME or number)"
     )]
     TextColumn { file: String, line: usize, column: String, cell: String },
     #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example --t1 2")]

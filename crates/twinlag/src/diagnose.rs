@@ -146,7 +146,11 @@ impl Diagnosis {
             effects: self
                 .effects
                 .iter()
-                .map(|e| ModelEffect { effect: e.effect, channel: e.channel.clone(), parameters: e.parameters.clone() })
+                .map(|e| ModelEffect {
+                    effect: e.effect,
+                    channel: e.fitted_in.clone(),
+                    parameters: e.parameters.clone(),
+                })
                 .collect(),
             made_by: self.last.made_by.clone(),
         }
@@ -160,8 +164,11 @@ impl Diagnosis {
 pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
     let base = characterise(record, options)?;
     let observations = observations(record)?;
-    let settings =
-        Settings { noise_std_k: options.noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
+    // Coloured noise was found beside white noise of these levels: third differences see both.
+    let has_noise =
+        model.effects.iter().any(|e| [Identifier::ColouredNoise, Identifier::InputMismatch].contains(&e.effect));
+    let noise_std_k = options.noise_std_k.or(has_noise.then_some(model.noise_std_k));
+    let settings = Settings { noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
     if model.channels != record.channels {
         return Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() });
     }
@@ -189,6 +196,20 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
     } else {
         format!("with the effects of the model as they are there: {}", names.join(", "))
     });
+    let of_the_record = |e: &&ModelEffect| {
+        let is_spline =
+            e.effect == Identifier::VaryingTimeConstant && e.parameters.iter().all(|p| p.name != "exponent");
+        is_spline || e.effect == Identifier::MainsPickup
+    };
+    let again: Vec<&str> = model.effects.iter().filter(of_the_record).map(|e| e.effect.name()).collect();
+    if !again.is_empty() {
+        out.warnings
+            .push(format!("fitted again, since they belong to a record and not to the rig: {}", again.join(", ")));
+    }
+    if options.free_gain || options.free_offset || options.second_order != [false; 2] {
+        out.warnings
+            .push("gain, offset and second lags that were to be fitted are not: the model says what is fitted".into());
+    }
     Ok(out)
 }
 
@@ -230,6 +251,13 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
             advice: f.effect.about().advice.into(),
         })
         .collect();
+    let mut remarks = core.remarks.clone();
+    if options.characterise.known.iter().any(|k| !matches!(k.parameter, Parameter::Tau1 | Parameter::Tau2)) {
+        remarks.push(
+            "of what is known beforehand the loop uses the time constants alone; the rest is in the two lags of `base`"
+                .into(),
+        );
+    }
     let last = if core.verdict == Verdict::Adequate { base.clone() } else { with_effects(&base, &core, options) };
     Ok(Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
@@ -241,40 +269,103 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         unexplained: core.unexplained.clone(),
         not_testable: core.not_testable.clone(),
         limits: core.limits.clone(),
-        remarks: core.remarks.clone(),
+        remarks,
         core: Some(Box::new(core)),
     })
 }
 
-/// Stretches that a diagnosis uses, as rows of the record.
-fn rows(record: &Record) -> Vec<usize> {
-    record.segments.iter().filter(|s| s.len() >= SHORTEST).flat_map(Clone::clone).collect()
+/// Longest run of missing samples that is bridged, as readings that say nothing.
+const LONGEST_BRIDGE: usize = 20;
+/// Departure from a grid, in steps, up to which stamps are on it, and the share of its samples that must be there.
+const ON_GRID: f64 = 0.02;
+const LEAST_OF_GRID: f64 = 0.5;
+
+/// The sample period, where rows lie on an even grid, with or without some missing.
+fn grid_s(record: &Record) -> Option<f64> {
+    if record.sampling.kind != SamplingKind::Irregular {
+        return Some(record.sampling.period_s);
+    }
+    let steps = || record.segments.iter().flat_map(|s| record.time_s[s.clone()].windows(2).map(|t| t[1] - t[0]));
+    let period_s = steps().reduce(f64::min)?;
+    let is_on_grid = |step: f64| {
+        let ratio = step / period_s;
+        (ratio - ratio.round()).abs() <= ON_GRID
+    };
+    let (sum, count) = steps().fold((0.0, 0.0), |(sum, count), step| (sum + step / period_s, count + 1.0));
+    (steps().all(is_on_grid) && count > LEAST_OF_GRID * sum).then_some(period_s)
+}
+
+/// The rows of a diagnosis in stretches: of an even grid with missing samples in their places.
+fn stretches(record: &Record, period_s: Option<f64>) -> Vec<Vec<Option<usize>>> {
+    let mut out: Vec<Vec<Option<usize>>> = Vec::new();
+    for segment in &record.segments {
+        let Some(period_s) = period_s else {
+            out.push(segment.clone().map(Some).collect());
+            continue;
+        };
+        for row in segment.clone() {
+            let last = out.last().and_then(|s| s.last().copied().flatten());
+            let apart =
+                last.map(|last| ((record.time_s[row] - record.time_s[last]) / period_s).round().max(1.0) as usize);
+            match (apart, out.last_mut()) {
+                // Neighbours of one segment, whatever the jitter of their stamps.
+                (Some(_), Some(stretch)) if row > segment.start && record.sampling.kind != SamplingKind::Irregular => {
+                    stretch.push(Some(row));
+                }
+                (Some(apart), Some(stretch)) if apart <= LONGEST_BRIDGE + 1 => {
+                    stretch.extend(std::iter::repeat_n(None, apart - 1));
+                    stretch.push(Some(row));
+                }
+                _ => out.push(vec![Some(row)]),
+            }
+        }
+    }
+    out.retain(|s| s.len() >= SHORTEST);
+    out
+}
+
+/// The row of each sample that a diagnosis uses; `None` for those that are missing.
+fn rows(record: &Record) -> Vec<Option<usize>> {
+    stretches(record, grid_s(record)).into_iter().flatten().collect()
 }
 
 fn observations(record: &Record) -> Result<Observations, Error> {
-    let period_s = (record.sampling.kind != SamplingKind::Irregular).then_some(record.sampling.period_s);
-    let stretches = record
-        .segments
-        .iter()
-        .filter(|s| s.len() >= SHORTEST)
+    let period_s = grid_s(record);
+    let stretches = stretches(record, period_s)
+        .into_iter()
         .map(|rows| {
-            let time_s = match period_s {
+            let first_s = rows.first().copied().flatten().map_or(0.0, |row| record.time_s[row]);
+            let time_s: Vec<f64> = match period_s {
                 // Evenly spaced, whatever the stamps say of each.
-                Some(period_s) => {
-                    let first_s = record.time_s[rows.start];
-                    (0..rows.len()).map(|k| first_s + k as f64 * period_s).collect()
-                }
-                None => record.time_s[rows.clone()].to_vec(),
+                Some(period_s) => (0..rows.len()).map(|k| first_s + k as f64 * period_s).collect(),
+                None => rows.iter().flatten().map(|&row| record.time_s[row]).collect(),
             };
-            let stretch =
-                Stretch::new(time_s, [record.t1_c[rows.clone()].to_vec(), record.t2_c[rows.clone()].to_vec()]);
+            let missing: Vec<bool> = rows.iter().map(Option::is_none).collect();
+            let [t1_c, t2_c] = [&record.t1_c, &record.t2_c].map(|values| bridged(&rows, values));
+            let stretch = Stretch::new(time_s, [t1_c, t2_c]).with_missing([missing.clone(), missing]);
             match &record.flow {
-                Some(flow) => stretch.with_flow(flow[rows.clone()].to_vec()),
+                Some(flow) => stretch.with_flow(bridged(&rows, flow)),
                 None => stretch,
             }
         })
         .collect();
     Ok(Observations::new(stretches, period_s)?)
+}
+
+/// Values of rows, with straight lines over those that are missing.
+fn bridged(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; rows.len()];
+    let mut before: Option<(usize, f64)> = None;
+    for (k, row) in rows.iter().enumerate() {
+        let Some(row) = row else { continue };
+        let (from, first) = before.unwrap_or((k, values[*row]));
+        for (j, value) in out[from..=k].iter_mut().enumerate() {
+            let share = if k > from { j as f64 / (k - from) as f64 } else { 1.0 };
+            *value = first + share * (values[*row] - first);
+        }
+        before = Some((k, values[*row]));
+    }
+    out
 }
 
 fn known(options: &Options) -> Vec<KnownTimeConstant> {
@@ -293,13 +384,13 @@ fn known(options: &Options) -> Vec<KnownTimeConstant> {
 }
 
 /// Errors of the estimated gas temperature against the reference on the blocks that judge.
-fn reference_rmse(record: &Record, rows: &[usize], core: &Core) -> Option<BeforeAfter<f64>> {
+fn reference_rmse(record: &Record, rows: &[Option<usize>], core: &Core) -> Option<BeforeAfter<f64>> {
     let reference = record.reference_c.as_ref()?;
     let rmse = |fit: &ModelFit| {
         let trace = &fit.trace;
         let errors: Vec<f64> = (0..trace.sample.len())
             .filter(|&k| trace.is_judge[k])
-            .map(|k| trace.gas_c[k] - reference[rows[trace.sample[k]]])
+            .filter_map(|k| Some(trace.gas_c[k] - reference[rows[trace.sample[k]]?]))
             .filter(|e| e.is_finite())
             .collect();
         (!errors.is_empty()).then(|| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())

@@ -1,7 +1,7 @@
 //! Relative calibration: `y₂ = g T + o` in units of channel 1, and a static curvature beside the straight line, with as many of the
 //! three as the data support.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
+use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Shared};
 use crate::plant::{Curvature, Plant};
 use std::sync::Arc;
 use twinlag_optimise::Variable;
@@ -37,11 +37,12 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
 fn of_kind(kind: Kind, context: &Context) -> Shared {
     let [m1, m2] = context.mean_c;
     let widest = 10.0 * context.swing_k + (m1 - m2).abs() + m1.abs().max(m2.abs());
-    let noise_k = context.noise_std_k[1].max(1e-9);
-    let offset = Parameter::new("offset", "K", Variable::linear("offset", noise_k, -widest, widest));
-    let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.01, 0.2, 5.0));
+    // Solvers take steps of a few of these: an offset at 0 °C goes far where the gain changes a little.
+    let typical_k = context.typical_k(1);
+    let offset = Parameter::new("offset", "K", Variable::linear("offset", typical_k, -widest, widest));
+    let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.03, 0.2, 5.0));
     let bend = 0.3 / (4.0 * context.swing_k);
-    let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-3 * bend, -bend, bend));
+    let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-2 * bend, -bend, bend));
     let parameters = match kind {
         Kind::Offset => vec![offset],
         Kind::Gain => vec![gain],
@@ -97,6 +98,19 @@ impl Effect for Calibration {
         }
         if self.kind == Kind::Curved {
             reading.curvature = Some(Curvature { per_k: values[2], moments: self.context.moments });
+        }
+    }
+
+    fn derived(&self) -> Vec<Derived> {
+        let [mean_c, variance_k2, skew_k] = self.context.moments;
+        let about = |name, unit, value| Derived { name, unit, of: Box::new(move |_| value) };
+        match self.kind {
+            Kind::Curved => vec![
+                about("curvature_about", "°C", mean_c),
+                about("curvature_variance", "K²", variance_k2),
+                about("curvature_skew", "K", skew_k),
+            ],
+            _ => Vec::new(),
         }
     }
 

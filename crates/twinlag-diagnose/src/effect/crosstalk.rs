@@ -5,7 +5,7 @@
 //! tells it from a gain of `1 + ε` and another `τ₂`. If the share takes the place of a part of the reading, so that the static gain
 //! stays 1, it is a wrong `τ₂` and nothing else, and cannot be seen at all.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
+use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Shared};
 use crate::plant::Plant;
 use std::sync::Arc;
 use twinlag_optimise::Variable;
@@ -28,7 +28,7 @@ struct Crosstalk {
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let mut out = Vec::new();
     for channel in 0..2 {
-        let share = Parameter::new("share", "1", Variable::linear("share", 0.01, -0.45, 0.45));
+        let share = Parameter::new("share", "1", Variable::linear("share", 0.03, -0.45, 0.45));
         for about_c in [0.0, context.mean_c[1 - channel]] {
             out.push(Arc::new(Crosstalk { channel, about_c, parameters: vec![share.clone()] }) as Shared);
         }
@@ -56,6 +56,11 @@ impl Effect for Crosstalk {
     fn install(&self, values: &[f64], plant: &mut Plant) {
         let reading = &mut plant.sensors[self.channel].reading;
         (reading.crosstalk, reading.crosstalk_about_c) = (values[0], self.about_c);
+    }
+
+    fn derived(&self) -> Vec<Derived> {
+        let about_c = self.about_c;
+        vec![Derived { name: "neutral_temperature", unit: "°C", of: Box::new(move |_| about_c) }]
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {

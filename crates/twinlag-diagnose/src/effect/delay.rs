@@ -24,7 +24,7 @@ struct Delay {
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 } * context.step_s;
-    let variable = Variable::linear("delay", 0.1 * context.step_s, -longest, longest);
+    let variable = Variable::linear("delay", 0.5 * context.step_s, -longest, longest);
     vec![Arc::new(Delay { parameters: vec![Parameter::new("delay", "s", variable)], step_s: context.step_s })]
 }
 

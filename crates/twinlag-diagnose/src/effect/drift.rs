@@ -21,13 +21,13 @@ struct Drift {
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let widest = 10.0 * context.swing_k + context.mean_c[0].abs() + context.mean_c[1].abs();
-    let small = context.noise_std_k[1].max(1e-9);
+    let typical_k = context.typical_k(1);
     let rate = Parameter::new(
         "drift",
         "K/s",
-        Variable::linear("drift", small / context.span_s(), -widest / context.span_s(), widest / context.span_s()),
+        Variable::linear("drift", typical_k / context.span_s(), -widest / context.span_s(), widest / context.span_s()),
     );
-    let offset = Parameter::new("offset", "K", Variable::linear("offset", small, -widest, widest));
+    let offset = Parameter::new("offset", "K", Variable::linear("offset", typical_k, -widest, widest));
     let offset_k = context.mean_c[1] - context.mean_c[0];
     let make = |parameters| Arc::new(Drift { parameters, offset_k }) as Shared;
     vec![make(vec![rate.clone()]), make(vec![rate, offset])]

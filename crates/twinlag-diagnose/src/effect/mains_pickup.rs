@@ -29,9 +29,9 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
         let channel = 0;
         {
             let width = 1.0 / context.span_s();
-            let small = context.noise_std_k[channel].max(1e-9);
             let widest = 3.0 * context.swing_k;
-            let amplitude = |name| Parameter::new(name, "K", Variable::linear(name, 0.1 * small, -widest, widest));
+            let amplitude =
+                |name| Parameter::new(name, "K", Variable::linear(name, context.typical_k(channel), -widest, widest));
             let frequency = Variable::linear(
                 "frequency",
                 0.01 * width,
@@ -70,11 +70,15 @@ impl Effect for MainsPickup {
         plant.sensors[self.channel].reading.lines.push([values[0], values[1], values[2]]);
     }
 
+    fn is_of_the_record(&self) -> bool {
+        true
+    }
+
     fn neutral(&self) -> Vec<(usize, f64)> {
         vec![(1, 0.0), (2, 0.0)]
     }
 
     fn derived(&self) -> Vec<Derived> {
-        vec![Derived { name: "amplitude", unit: "K", of: |values, _| values[1].hypot(values[2]) }]
+        vec![Derived { name: "amplitude", unit: "K", of: Box::new(|values| values[1].hypot(values[2])) }]
     }
 }

@@ -30,12 +30,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
         .map(|sensor| {
             let mean_k = (context.mean_c[sensor] + ZERO_CELSIUS_K).max(1.0);
             let slope = Variable::logarithmic("radiative conductance", 1e-5, 10.0);
-            let loss = Variable::linear(
-                "radiative loss",
-                context.noise_std_k[sensor].max(1e-9),
-                -10.0 * mean_k,
-                10.0 * mean_k,
-            );
+            let loss = Variable::linear("radiative loss", context.typical_k(sensor), -10.0 * mean_k, 10.0 * mean_k);
             let parameters =
                 vec![Parameter::new("radiative_conductance", "1", slope), Parameter::new("radiative_loss", "K", loss)];
             let loss_k = context.mean_c[1 - sensor] - context.mean_c[sensor];
@@ -74,6 +69,7 @@ impl Effect for Radiation {
     }
 
     fn derived(&self) -> Vec<Derived> {
-        vec![]
+        let mean_c = self.mean_k - ZERO_CELSIUS_K;
+        vec![Derived { name: "mean_temperature", unit: "°C", of: Box::new(move |_| mean_c) }]
     }
 }

@@ -28,7 +28,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     (0..2)
         .map(|sensor| {
             // More than half would make the slow path the sensor: with both lags at zero it imitates any pair of them.
-            let share = Variable::linear("share", 0.01, -0.002, 0.5);
+            let share = Variable::linear("share", 0.03, -0.002, 0.5);
             // One that settles as long as the record lasts is a drift.
             let slow = Variable::logarithmic("slow time constant", context.step_s, LONGEST * context.span_s());
             let parameters = vec![Parameter::new("share", "1", share), Parameter::new("slow_time_constant", "s", slow)];

@@ -1,7 +1,7 @@
 //! Time constants that change with the sensor's own temperature: `τᵢ(T) = τᵢ (T/T_mean)^p` in kelvin, one exponent for both
 //! sensors or for one of them.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
+use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Shared};
 use crate::plant::{Plant, ZERO_CELSIUS_K};
 use std::sync::Arc;
 use twinlag_optimise::Variable;
@@ -27,7 +27,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let reference_k = (0.5 * (context.mean_c[0] + context.mean_c[1]) + ZERO_CELSIUS_K).max(1.0);
     // A factor of three over the swing, either way, where that is physics: radiation has −3, viscosity of liquids up to −8.
     let widest = (1.1 * reference_k / context.swing_k).clamp(8.0, STEEPEST);
-    let variable = Variable::linear("exponent", 0.01 * widest, -widest, widest);
+    let variable = Variable::linear("exponent", 0.05 * widest, -widest, widest);
     [[true, true], [true, false], [false, true]]
         .into_iter()
         .map(|sensors| {
@@ -62,6 +62,11 @@ impl Effect for TemperatureDependence {
         for (sensor, has) in plant.sensors.iter_mut().zip(self.sensors) {
             sensor.exponent = has.then_some([values[0], self.reference_k]);
         }
+    }
+
+    fn derived(&self) -> Vec<Derived> {
+        let mean_c = self.reference_k - ZERO_CELSIUS_K;
+        vec![Derived { name: "mean_temperature", unit: "°C", of: Box::new(move |_| mean_c) }]
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {

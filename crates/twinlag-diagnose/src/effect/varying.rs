@@ -40,7 +40,7 @@ fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let of_flow = context.flow.as_ref().map(|of| {
-        let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.01, -3.0, 3.0))];
+        let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0))];
         Arc::new(WithFlow { of: of.clone(), parameters }) as Shared
     });
     of_size(FIRST, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
@@ -65,6 +65,10 @@ impl Effect for Varying {
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
         plant.modulation = Some(Modulation::Spline(Spline::new(self.ends_s[0], self.ends_s[1], values)));
+    }
+
+    fn is_of_the_record(&self) -> bool {
+        true
     }
 
     fn sizes(&self) -> Vec<Shared> {
