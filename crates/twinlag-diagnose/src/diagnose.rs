@@ -269,12 +269,14 @@ impl State {
             let evaluation = fitted.model.evaluate(&fitted.theta, observations);
             // Without the frequencies in which there is only noise, which each factor of the inverse makes larger.
             let filter = Weighting::of_disagreement(observations, fitted.model.noise_std_k());
+            // Or, where no spectrum tells, changes within the faster time constant are left out.
+            let half = (fitted.theta[0].min(fitted.theta[1]) / observations.step_s()).clamp(1.0, 50.0) as usize;
             let ends = evaluation.begins.iter().skip(1).copied().chain([evaluation.disagreement_k.len()]);
             let apart: Vec<f64> = evaluation
                 .begins
                 .iter()
                 .zip(ends)
-                .flat_map(|(from, to)| filter.smooth(&evaluation.disagreement_k[*from..to]))
+                .flat_map(|(from, to)| filter.smooth_or_mean(&evaluation.disagreement_k[*from..to], half))
                 .collect();
             [&evaluation.residual, &apart].map(|values| {
                 let pairs = values.iter().zip(&evaluation.sample).filter(|(_, s)| prepared.judges(**s));

@@ -84,6 +84,13 @@ impl Model {
         out
     }
 
+    /// With a time constant held.
+    pub(crate) fn holding(mut self, sensor: usize, value_s: f64) -> Self {
+        self.known.retain(|k| k.sensor != sensor);
+        self.known.push(KnownTimeConstant { sensor, value_s, std_s: None });
+        self
+    }
+
     pub(crate) fn with_noise(mut self, noise_std_k: [f64; 2]) -> Self {
         self.noise_std_k = noise_std_k;
         self

@@ -6,7 +6,7 @@ use crate::defects::Levels;
 use crate::dense;
 use crate::diagnosis::{ModelFit, TimeConstant, Trace};
 use crate::effect::Identifier;
-use crate::model::{Fitted, LONGEST, Selection};
+use crate::model::{Effort, Fitted, LONGEST, Selection};
 use crate::observations::Observations;
 use crate::prepare::is_judge;
 use crate::spectrum::{Bands, runs};
@@ -17,6 +17,10 @@ pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
 const UNRESOLVED: f64 = 0.2;
 /// A time constant whose logarithm is less certain than this is none either: its interval spans a factor of seven.
 const VAGUE: f64 = 0.5;
+/// Relative standard error up to which a time constant is not doubted.
+const CERTAIN: f64 = 0.03;
+/// 95 % point of chi-square with one degree of freedom.
+const CHI2_95: f64 = 3.841_458_820_694_124;
 /// Below this p-value of any test something is left over.
 pub(crate) const LEFT_OVER: f64 = 1e-4;
 
@@ -25,6 +29,28 @@ pub(crate) fn is_unresolved(fitted: &Fitted, observations: &Observations) -> boo
     let [first, last] = observations.ends_s();
     let seen = UNRESOLVED * observations.step_s()..0.9 * LONGEST * (last - first);
     (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
+}
+
+/// Whether half or twice a time constant fits as well, the other parameters free: then it is not determined, whatever the curvature
+/// at the minimum says, as with two equal sensors. A curvature that is certain to a few per cent is believed.
+fn is_flat(fitted: &Fitted, observations: &Observations, selection: &Selection, variance: Option<f64>) -> bool {
+    // One that is known ties the other down.
+    if (0..2).any(|i| fitted.model.knows(i)) {
+        return false;
+    }
+    let tau_s = fitted.theta[0];
+    if variance.is_some_and(|v| v.sqrt() < CERTAIN * tau_s) {
+        return false;
+    }
+    [0.5, 2.0].into_iter().any(|factor| {
+        let model = fitted.model.clone().holding(0, factor * tau_s);
+        let mut theta = fitted.theta.clone();
+        // Along the ridge of equal sensors.
+        theta[0] = factor * tau_s;
+        theta[1] = (fitted.theta[1] + (factor - 1.0) * tau_s).max(0.5 * observations.step_s());
+        let other = model.fit(&theta, observations, selection, Effort::Finish);
+        other.chi2 - fitted.chi2 < CHI2_95 * fitted.mean_energy().max(1.0)
+    })
 }
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
@@ -120,9 +146,9 @@ pub(crate) fn summarise(
     };
     let theta = &fitted.theta;
     // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
-    let unresolved = is_unresolved(fitted, observations);
     let c = covariance.as_ref();
     let variance = |i: usize| c.map(|c| c[i][i]);
+    let unresolved = is_unresolved(fitted, observations) || is_flat(fitted, observations, selection, variance(0));
     // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
     let delay = fitted.model.effects.iter().position(|e| e.identifier() == Identifier::Delay);
     let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {

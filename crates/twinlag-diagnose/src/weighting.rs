@@ -135,6 +135,23 @@ impl Weighting {
         gain * gain
     }
 
+    /// Means over `half` values either way, fewer at the ends, where there is no filter.
+    pub(crate) fn smooth_or_mean(&self, values: &[f64], half: usize) -> Vec<f64> {
+        if !self.taps.is_empty() {
+            return self.smooth(values);
+        }
+        let mut sums = vec![0.0];
+        for v in values {
+            sums.push(sums[sums.len() - 1] + v);
+        }
+        (0..values.len())
+            .map(|k| {
+                let (from, to) = (k.saturating_sub(half), (k + half + 1).min(values.len()));
+                (sums[to] - sums[from]) / (to - from) as f64
+            })
+            .collect()
+    }
+
     /// Smoothed values: the filter on what departs from the nearest end where it reaches past one, with unit gain at rest.
     pub(crate) fn smooth(&self, values: &[f64]) -> Vec<f64> {
         let width = self.taps.len();

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::Parameter;
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, Limit, ModelFit,
-    Observations, Settings, Stretch, TimeConstant, Unexplained, Value, Verdict,
+    BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, ModelFit, Observations,
+    Settings, Stretch, TimeConstant, Unexplained, Value, Verdict,
 };
 use twinlag_record::{Record, SamplingKind};
 
@@ -52,6 +52,21 @@ pub struct NamedEffect {
     pub advice: String,
 }
 
+/// What the search would have seen of an effect that it did not find.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedLimit {
+    /// Which.
+    pub effect: Identifier,
+    /// Name of the channel; `None` where it is of both, or relative.
+    pub channel: Option<String>,
+    /// Its main parameter.
+    pub parameter: String,
+    /// The smallest size that would have been taken for more than chance.
+    pub size: f64,
+    /// Unit of the size.
+    pub unit: String,
+}
+
 /// Errors before and after, none of them on data that chose the effects, but for the first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorBeforeAfter {
@@ -88,7 +103,7 @@ pub struct Diagnosis {
     /// What no record of two sensors, or not this one, can tell.
     pub not_testable: Vec<String>,
     /// What would have been seen of the effects that were not found.
-    pub limits: Vec<Limit>,
+    pub limits: Vec<NamedLimit>,
     /// What to know before using the numbers.
     pub remarks: Vec<String>,
     /// Pictures' numbers; not part of the JSON.
@@ -163,15 +178,20 @@ impl Diagnosis {
 /// As [`diagnose`]; an effect whose parameters are none of this version's.
 pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
     let base = characterise(record, options)?;
+    if model.channels != record.channels {
+        return Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() });
+    }
+    if model.effects.is_empty() {
+        let mut out = base;
+        out.warnings.push("the model has no effects: two first-order lags".into());
+        return Ok(out);
+    }
     let observations = observations(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let has_noise =
         model.effects.iter().any(|e| [Identifier::ColouredNoise, Identifier::InputMismatch].contains(&e.effect));
     let noise_std_k = options.noise_std_k.or(has_noise.then_some(model.noise_std_k));
     let settings = Settings { noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
-    if model.channels != record.channels {
-        return Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() });
-    }
     let effects: Vec<KnownEffect> = model
         .effects
         .iter()
@@ -191,11 +211,7 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
     };
     let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
     let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
-    out.warnings.push(if names.is_empty() {
-        "the model has no effects: two first-order lags".to_owned()
-    } else {
-        format!("with the effects of the model as they are there: {}", names.join(", "))
-    });
+    out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
     let of_the_record = |e: &&ModelEffect| {
         let is_spline =
             e.effect == Identifier::VaryingTimeConstant && e.parameters.iter().all(|p| p.name != "exponent");
@@ -268,7 +284,17 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         last,
         unexplained: core.unexplained.clone(),
         not_testable: core.not_testable.clone(),
-        limits: core.limits.clone(),
+        limits: core
+            .limits
+            .iter()
+            .map(|l| NamedLimit {
+                effect: l.effect,
+                channel: l.channel.map(|i| record.channels[i].clone()),
+                parameter: l.parameter.clone(),
+                size: l.size,
+                unit: l.unit.clone(),
+            })
+            .collect(),
         remarks,
         core: Some(Box::new(core)),
     })

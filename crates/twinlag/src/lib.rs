@@ -79,8 +79,8 @@ pub use characterisation::{
 };
 pub use characterise::{characterise, characterise_watched, readings};
 pub use diagnose::{
-    DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, characterise_with,
-    diagnose,
+    DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, NamedLimit,
+    characterise_with, diagnose,
 };
 pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};

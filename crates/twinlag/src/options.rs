@@ -175,7 +175,10 @@ impl FromStr for Known {
     fn from_str(text: &str) -> Result<Self, Error> {
         let wrong = || Error::Option {
             option: "--known",
-            expected: format!("NAME=VALUE or NAME=VALUE+-SD, NAME one of {}", Self::NAMES.join(", ")),
+            expected: format!(
+                "NAME=VALUE or NAME=VALUE+-SD, VALUE and SD positive (an offset may be negative), NAME one of {}",
+                Self::NAMES.join(", ")
+            ),
             got: text.into(),
         };
         let (name, value) = text.split_once('=').ok_or_else(wrong)?;

@@ -45,10 +45,11 @@ impl Plan {
         is_one.then(|| toml::from_str(text).context("the plan of the closed loop"))
     }
 
-    /// One record of the first two sets.
+    /// One record of the first set, of the two largest sizes.
     pub(super) fn shorten(&mut self) {
         self.records = 1;
-        self.sets.truncate(2);
+        self.sets.truncate(1);
+        self.size_factors.drain(..self.size_factors.len().saturating_sub(2));
     }
 
     fn cells(&self) -> Vec<(&[Kind], f64)> {
