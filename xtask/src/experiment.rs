@@ -16,7 +16,7 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use twinlag_experiment::{Experiment, Method, Plan, Table, write};
-use twinlag_study::{Options, Outcome, Shard, Study as _};
+use twinlag_study::{Options, Outcome, Part, Shard, Study};
 
 use crate::root;
 pub(crate) use loops::record_of;
@@ -188,43 +188,11 @@ fn one(name: &str, run: &Run) -> Result<()> {
         return closed_loop(plan?, &folder, run);
     }
     let mut plan = plan(name)?;
-    ensure!(
-        run.out.is_some() || (run.trials.is_none() && run.seed.is_none()),
-        "other trials or another seed than the plan's need --out DIR: the stored results are those of the plan"
-    );
     plan.trials = run.trials.unwrap_or(plan.trials);
     plan.seed = run.seed.unwrap_or(plan.seed);
-    let out = run.out.clone().unwrap_or(folder.clone());
-    ensure!(
-        run.out.is_none() || run.shard.is_some() || !out.join("results.json").exists(),
-        "{}: holds results already; name another folder, or remove them",
-        out.display()
-    );
-    let shard = run.shard.unwrap_or(Shard::WHOLE);
-    let part = match (run.check, run.shard) {
-        (true, _) => None,
-        (_, Some(shard)) => Some(out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()))),
-        _ => Some(out.join("checkpoint.json")),
-    };
-    if part.is_some() {
-        fs::create_dir_all(&out)?;
-    }
-    let options = Options {
-        threads: run.threads.unwrap_or(Options::default().threads),
-        shard,
-        checkpoint: part.clone(),
-        resume: run.resume,
-        ..Options::default()
-    };
-    let start = Instant::now();
-    let bar = bar(name);
-    let finished = twinlag_study::run(&Experiment::new(&plan)?, &options, |p| {
-        bar.set_length(p.total);
-        bar.set_position(p.done);
-        ControlFlow::Continue(())
-    })?;
-    bar.finish_and_clear();
-    let seconds = start.elapsed().as_secs_f64();
+    let out = place(run, &folder)?;
+    let options = options(run, &out)?;
+    let (finished, seconds) = observed(&Experiment::new(&plan)?, name, &options)?;
     if let Some(shard) = run.shard {
         println!("{name}: part {shard} in {seconds:.0} s");
         return Ok(());
@@ -244,42 +212,84 @@ fn one(name: &str, run: &Run) -> Result<()> {
     if plan.timed {
         fs::write(out.join("times.md"), times(&plan)?)?;
     }
-    if let Some(part) = part {
+    if let Some(part) = options.checkpoint {
         fs::remove_file(part)?;
     }
     println!("{name}: {} trials in {seconds:.0} s, {}", plan.trials * plan.cells().len() as u64, out.display());
     Ok(())
 }
 
-/// An experiment of the closed loop.
-fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
+/// Where results go: those that are stored are not overwritten by others.
+fn place(run: &Run, folder: &Path) -> Result<PathBuf> {
     ensure!(
         run.out.is_some() || (run.trials.is_none() && run.seed.is_none()),
-        "other records or another seed than the plan's need --out DIR: the stored results are those of the plan"
+        "other trials or another seed than the plan's need --out DIR: the stored results are those of the plan"
     );
-    plan.records = run.trials.unwrap_or(plan.records);
-    if run.quick {
-        plan.shorten();
-    }
-    plan.seed = run.seed.unwrap_or(plan.seed);
     let out = run.out.clone().unwrap_or(folder.to_owned());
-    fs::create_dir_all(&out)?;
+    ensure!(
+        run.out.is_none() || run.shard.is_some() || !out.join("results.json").exists(),
+        "{}: holds results already; name another folder, or remove them",
+        out.display()
+    );
+    Ok(out)
+}
+
+/// How to run, with a checkpoint in `out` unless nothing is to be written.
+fn options(run: &Run, out: &Path) -> Result<Options> {
     let checkpoint = match (run.check, run.shard) {
         (true, _) => None,
         (_, Some(shard)) => Some(out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()))),
         _ => Some(out.join("checkpoint.json")),
     };
-    let options = Options {
+    if checkpoint.is_some() {
+        fs::create_dir_all(out)?;
+    }
+    Ok(Options {
         threads: run.threads.unwrap_or(Options::default().threads),
         shard: run.shard.unwrap_or(Shard::WHOLE),
-        checkpoint: checkpoint.clone(),
+        checkpoint,
         resume: run.resume,
         ..Options::default()
-    };
-    let seconds = loops::run(&plan, &out, run.check, &options)?;
-    if let (Some(checkpoint), None) = (checkpoint, run.shard) {
-        fs::remove_file(checkpoint)?;
-        provenance(&plan.name, plan.seed, plan.records, &out, seconds, options.threads.get())?;
+    })
+}
+
+/// Runs a study under a progress bar; how long it took, s.
+fn observed<S: Study>(study: &S, name: &str, options: &Options) -> Result<(Part, f64)> {
+    let start = Instant::now();
+    let bar = bar(name);
+    let finished = twinlag_study::run(study, options, |p| {
+        bar.set_length(p.total);
+        bar.set_position(p.done);
+        ControlFlow::Continue(())
+    })?;
+    bar.finish_and_clear();
+    Ok((finished, start.elapsed().as_secs_f64()))
+}
+
+/// An experiment of the closed loop.
+fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
+    plan.records = run.trials.unwrap_or(plan.records);
+    if run.quick {
+        plan.shorten();
+    }
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    let out = place(run, folder)?;
+    let options = options(run, &out)?;
+    let (finished, seconds) = observed(&plan, &plan.name, &options)?;
+    if let Some(shard) = run.shard {
+        println!("{}: part {shard} in {seconds:.0} s", plan.name);
+        return Ok(());
+    }
+    let results = finished.into_results()?;
+    if run.check {
+        loops::check(&plan, &results, folder)?;
+        println!("{}: the stored results hold, to the byte; {seconds:.0} s", plan.name);
+        return Ok(());
+    }
+    loops::write(&plan, &results, &out)?;
+    provenance(&plan.name, plan.seed, plan.records, &out, seconds, options.threads.get())?;
+    if let Some(part) = options.checkpoint {
+        fs::remove_file(part)?;
     }
     Ok(())
 }

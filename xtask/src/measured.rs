@@ -13,15 +13,31 @@ use anyhow::{Context, Result, bail, ensure};
 use twinlag::record::{ColumnRef, Record, Selection};
 use twinlag::{Characterisation, Options, Status, characterise};
 
-/// One question to one file: its columns, what is freed, and what must come out.
-struct Case {
+/// One question to one file: its columns, what is freed or known, and what must come out.
+struct Case<A> {
     file: &'static str,
     channels: [&'static str; 2],
-    free: &'static str,
-    check: fn(&Characterisation) -> Result<()>,
+    with: &'static str,
+    check: fn(&A) -> Result<()>,
 }
 
-const CASES: &[Case] = &[
+const fn case<A>(
+    file: &'static str,
+    channels: [&'static str; 2],
+    with: &'static str,
+    check: fn(&A) -> Result<()>,
+) -> Case<A> {
+    Case { file, channels, with, check }
+}
+
+impl<A> Case<A> {
+    fn selection(&self) -> Selection {
+        let [t1, t2] = self.channels.map(|name| Some(ColumnRef::Name(name.into())));
+        Selection { t1, t2, ..Selection::default() }
+    }
+}
+
+const CASES: &[Case<Characterisation>] = &[
     case("block100/run_012b.csv", ["ref2_C", "dut_C"], "gain,offset", |answer| {
         calibration(answer, 0.9907, 0.003, 0.056, 0.1)?;
         contains("ref2_C", answer.sensors[0].interval_95_s, 69.0)?;
@@ -59,15 +75,6 @@ const CASES: &[Case] = &[
     case("sp_column_fire/Diesel_1p1.csv", ["tc025_1m_C", "pt_1m_C"], "", not_ok),
 ];
 
-const fn case(
-    file: &'static str,
-    channels: [&'static str; 2],
-    free: &'static str,
-    check: fn(&Characterisation) -> Result<()>,
-) -> Case {
-    Case { file, channels, free, check }
-}
-
 /// Two first-order lags are known not to be the whole story: an answer without a warning would be a trap.
 fn not_ok(answer: &Characterisation) -> Result<()> {
     ensure!(answer.status != Status::Ok, "status ok on a record that two first-order lags are known not to explain");
@@ -94,18 +101,13 @@ pub(crate) fn run(dir: &Path, write: bool) -> Result<()> {
     let mut failures = Vec::new();
     println!("{:38} {:24} {:12} {:16} answer", "file", "channels", "free", "status");
     for case in CASES {
-        let selection = Selection {
-            t1: Some(ColumnRef::Name(case.channels[0].into())),
-            t2: Some(ColumnRef::Name(case.channels[1].into())),
-            ..Selection::default()
-        };
-        let answer = ask(&dir.join(case.file), &selection, case.free).and_then(|answer| {
+        let answer = ask(&dir.join(case.file), &case.selection(), case.with).and_then(|answer| {
             row(case, &answer);
             whole(&answer)?;
             (case.check)(&answer)
         });
         if let Err(error) = answer {
-            failures.push(format!("{} {:?} free '{}': {error:#}", case.file, case.channels, case.free));
+            failures.push(format!("{} {:?} free '{}': {error:#}", case.file, case.channels, case.with));
         }
     }
     for path in files(dir)? {
@@ -157,7 +159,7 @@ fn whole(answer: &Characterisation) -> Result<()> {
     Ok(())
 }
 
-fn row(case: &Case, answer: &Characterisation) {
+fn row(case: &Case<Characterisation>, answer: &Characterisation) {
     let seconds = |i: usize| match (answer.sensors[i].time_constant_s, answer.sensors[i].interval_95_s) {
         (Some(tau), Some([low, high])) => format!("{tau:.4} [{low:.4}, {high:.4}] s"),
         _ => "-".into(),
@@ -172,7 +174,7 @@ fn row(case: &Case, answer: &Characterisation) {
         "{:38} {:24} {:12} {:16} {}, {}, difference {difference}{calibration}, chi2/dof {:.3}",
         case.file,
         case.channels.join(" "),
-        case.free,
+        case.with,
         format!("{:?}", answer.status),
         seconds(0),
         seconds(1),

@@ -37,9 +37,7 @@ fn check_outputs(command: &Diagnose) -> Result<(), Failure> {
     let mut seen: Vec<PathBuf> = Vec::new();
     for path in [&command.report, &command.save].into_iter().flatten() {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let Ok(folder) = folder.canonicalize() else {
-            return usage(format!("{}: there is no folder {}", path.display(), folder.display()));
-        };
+        let folder = folder.canonicalize().map_err(|e| cannot_be_written(path, &e))?;
         let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
             return usage(format!("{} is a folder: name a file in it", path.display()));
         };
@@ -89,7 +87,11 @@ fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String
 }
 
 fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::Other(format!("{}: cannot be written: {e}", path.display())))
+    std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
+}
+
+fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Other(format!("{}: cannot be written: {error}", path.display()))
 }
 
 /// An argument as a shell takes it.

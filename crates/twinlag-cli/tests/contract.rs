@@ -426,6 +426,22 @@ fn the_demo_needs_no_file_and_finds_the_effect_that_it_is_not_told_of() {
     assert_eq!(bench.run(&["demo", "--quiet"]).stderr, "");
 }
 
+/// Twenty seeds: each interval misses one in twenty times, both are in 90 % of the demos or more often; fewer than 14 of 20
+/// then have a chance of 1 in 400.
+#[test]
+fn the_demo_holds_for_other_seeds() {
+    let bench = Bench::new("demo_seeds");
+    let inside = (0..20).filter(|seed: &u32| {
+        let value = bench.run(&["demo", "--json", "--seed", &seed.to_string()]).json();
+        (0..2).all(|i| {
+            let [low, high] = interval(&value["final"]["sensors"][i]["interval_95_s"]);
+            (low..=high).contains(&TRUTH_S[i])
+        })
+    });
+    let inside = inside.count();
+    assert!(inside >= 14, "the truth is inside both intervals for {inside} of 20 seeds");
+}
+
 #[test]
 fn help_goes_to_standard_output_and_names_every_command_and_option() {
     let bench = Bench::new("help");

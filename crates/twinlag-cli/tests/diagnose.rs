@@ -257,8 +257,8 @@ fn an_output_that_exists_is_overwritten_by_force() {
 #[test]
 fn a_model_that_cannot_be_written_is_said() {
     let answer = offset("no_place").run(&["diagnose", "run.csv", "--save", "nowhere/model.json"]);
-    assert_eq!(answer.code, 2, "{answer:#?}");
-    answer.says(&["nowhere/model.json", "there is no folder nowhere"]);
+    assert_eq!(answer.code, 1, "{answer:#?}");
+    answer.says(&["nowhere/model.json", "cannot be written"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by what has seen none of it.
 
-use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, ModelFit, Verdict};
+use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, KnownFit, Limit, ModelFit, Verdict};
 use crate::effect::{Identifier, Shared, candidates};
 use crate::error::DiagnoseError;
 use crate::excitation::tones;
@@ -15,8 +15,8 @@ use crate::weighting::Weighting;
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 4;
-/// Effects that are noise.
-const NOISE: [Identifier; 2] = [Identifier::ColouredNoise, Identifier::InputMismatch];
+/// Tones of a gas of which nothing but two time constants can be told.
+const SINGLE: usize = 1;
 
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
 ///
@@ -28,7 +28,7 @@ pub fn diagnose(
     watch: Watch<'_>,
 ) -> Result<Diagnosis, DiagnoseError> {
     let tones = tones(observations);
-    let is_refused = tones == Some(1);
+    let is_refused = tones == Some(SINGLE);
     let mut prepared = Prepared::new(observations, settings)?;
     let base = prepared.base(settings, watch);
     let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new(), is_reweighed: false };
@@ -37,7 +37,7 @@ pub fn diagnose(
         && (state.step(&mut prepared, settings, watch) || state.reweigh(&mut prepared))
     {}
     let limits = prepared.search(settings, watch).limits(&state.current);
-    Ok(Diagnosis { limits, not_testable: not_testable(observations, tones), ..state.conclude(&prepared, is_refused) })
+    Ok(state.conclude(&prepared, tones, limits))
 }
 
 /// How far the loop has come.
@@ -116,29 +116,33 @@ impl State {
 
     /// Takes noise out that came before the effects that explain it: model error, seen from afar, looks like noise.
     fn doubt_noise(&mut self, prepared: &Prepared, search: &Search<'_>) {
-        let Some(index) = self.current.model.effects.iter().position(|e| e.is_noise()) else { return };
+        let Some(index) = self.current.model.noise() else { return };
         if index + 1 == self.steps.len() {
             return;
         }
-        let mut theta = self.current.theta.clone();
-        theta.drain(self.current.model.range(index));
-        let model = self.current.model.without(index).with_noise(prepared.levels.std_k);
+        let (model, theta) = self.current.without(index);
+        let model = model.with_noise(prepared.levels.std_k);
         let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
         if search.needs_noise(&without, &self.steps[index].0.effect) {
             return;
         }
+        self.take_out(index, without);
+        self.drop_needless(search);
+    }
+
+    /// Goes on with `without`, the fit without effect `index`.
+    fn take_out(&mut self, index: usize, without: Fitted) {
         let effect = self.current.model.effects[index].identifier();
         self.remarks.push(format!("{effect} was taken up first and found needless once more was known"));
         self.current = without;
         self.steps.remove(index);
-        self.drop_needless(search);
     }
 
     /// Where nothing explains what is left over and that is far more than noise: weights frequencies by its own spectrum from here
     /// on, once. Whether to look again.
     fn reweigh(&mut self, prepared: &mut Prepared) -> bool {
-        let is_noise = self.current.model.effects.iter().any(|e| e.is_noise());
-        if self.is_reweighed || is_noise || self.current.mean_energy() < FAR_OFF {
+        let has_noise = self.current.model.noise().is_some();
+        if self.is_reweighed || has_noise || self.current.mean_energy() < FAR_OFF {
             return false;
         }
         self.is_reweighed = true;
@@ -163,31 +167,27 @@ impl State {
 
     /// Takes out earlier effects that the later ones made needless.
     fn drop_needless(&mut self, search: &Search<'_>) {
-        if self.current.model.effects.iter().any(|e| e.is_noise()) {
+        if self.current.model.noise().is_some() {
             // Weights that are those of the residual hide what made them.
             return;
         }
         let mut index = 0;
         while index + 1 < self.steps.len() {
-            let effect = self.current.model.effects[index].identifier();
-            let range = self.current.model.range(index);
-            let mut theta = self.current.theta.clone();
-            theta.drain(range.clone());
-            let model = self.current.model.without(index);
+            let (model, theta) = self.current.without(index);
             let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
-            let n = self.current.count;
+            let (n, parameters) = (self.current.count, self.current.model.range(index).len());
             let loss = n * (without.mean_energy() / self.current.mean_energy()).ln();
-            if loss < threshold(range.len(), FALSE_ALARM).max(range.len() as f64 * n.ln()) {
-                self.remarks.push(format!("{effect} was taken up first and found needless once more was known"));
-                self.current = without;
-                self.steps.remove(index);
+            if loss < threshold(parameters, FALSE_ALARM).max(parameters as f64 * n.ln()) {
+                self.take_out(index, without);
             } else {
                 index += 1;
             }
         }
     }
 
-    fn conclude(mut self, prepared: &Prepared, is_refused: bool) -> Diagnosis {
+    /// - `tones`: of the gas, where its power is in tones
+    fn conclude(mut self, prepared: &Prepared, tones: Option<usize>, limits: Vec<Limit>) -> Diagnosis {
+        let is_refused = tones == Some(SINGLE);
         let (observations, everything) = (&prepared.observations, &prepared.everything);
         let to_the_end = |fitted: &Fitted| {
             fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).larger_lag_first()
@@ -195,10 +195,9 @@ impl State {
         let last = to_the_end(&self.current);
         let summary = |fitted: &Fitted| summarise(fitted, observations, everything, &prepared.levels);
         // Before is before everything: with the defects of the data in it.
-        let masks = prepared.found.iter().any(|f| f.effect != Identifier::Quantisation);
-        let base_fit = if masks {
+        let unmasked = prepared.unmasked(&self.base);
+        let base_fit = if let Some(unmasked) = &unmasked {
             let (raw, levels) = &prepared.raw;
-            let unmasked = prepared.unmasked(&self.base);
             let fitted = unmasked.model.fit(&unmasked.theta, raw, everything, Effort::Finish);
             summarise(&fitted, raw, everything, levels)
         } else {
@@ -209,15 +208,16 @@ impl State {
         let is_whole = |t: &&Tried| t.fitted.model.effects.len() == last.model.effects.len();
         let ties = self.steps.iter().flat_map(|s| &s.1).filter(|t| !t.effect.is_noise()).filter(is_whole);
         widen(&mut last_fit, ties, observations, everything, &mut self.remarks);
-        let error = self.errors(prepared, &base_fit, &last_fit);
+        let before = unmasked.as_ref().map_or((&self.base, observations), |unmasked| (unmasked, &prepared.raw.0));
+        let error = self.errors(prepared, before, [&base_fit, &last_fit]);
         let mut found = prepared.found.clone();
         found.extend(
             self.steps.iter().enumerate().map(|(index, (tried, ties))| name(index, tried, ties, &last, &last_fit)),
         );
         let left = what_is_left(&last_fit);
-        let has = |effects: &[Identifier]| found.iter().any(|f| effects.contains(&f.effect));
+        let has = |is_one: fn(Identifier) -> bool| found.iter().any(|f| is_one(f.effect));
         let is_blind = last_fit.time_constants.iter().all(|t| t.value_s.is_none());
-        if is_blind && has(&[Identifier::Delay]) {
+        if is_blind && has(|effect| effect == Identifier::Delay) {
             self.remarks.push(
                 "time constants and delay are not told apart: the difference is how much later channel 2 is as a whole, \
                  τ2 − τ1 + delay"
@@ -232,9 +232,9 @@ impl State {
             );
         }
         let is_coherent = last_fit.tests.iter().any(|t| t.test == "coherence" && t.p_value < LEFT_OVER);
-        if is_coherent && has(&NOISE) {
+        if is_coherent && has(Identifier::is_noise) {
             // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the same.
-            found.retain(|f| !NOISE.contains(&f.effect));
+            found.retain(|f| !f.effect.is_noise());
             self.remarks.push(
                 "what is left over goes with the gas temperature: it is an error of the model, not noise. The fit is weighted \
                  by its spectrum, and the intervals rest on it"
@@ -257,15 +257,18 @@ impl State {
             last: last_fit,
             error,
             unexplained: left.filter(|_| !is_refused),
-            not_testable: Vec::new(),
-            limits: Vec::new(),
+            not_testable: not_testable(observations, tones),
+            limits,
             remarks: self.remarks,
         }
     }
 
     /// Errors on the blocks that judge, of the fits that chose, which have not seen them.
-    fn errors(&self, prepared: &Prepared, base: &ModelFit, last: &ModelFit) -> ErrorBudget {
-        let rms = |fitted: &Fitted, observations: &Observations| {
+    ///
+    /// - `before`: the two-lag model and the readings that it is of
+    /// - `fits`: before and after, of the whole record
+    fn errors(&self, prepared: &Prepared, before: (&Fitted, &Observations), fits: [&ModelFit; 2]) -> ErrorBudget {
+        let rms = |(fitted, observations): (&Fitted, &Observations)| {
             let evaluation = fitted.model.evaluate(&fitted.theta, observations);
             // Without the frequencies in which there is only noise, which each factor of the inverse makes larger.
             let filter = Weighting::of_disagreement(observations, fitted.model.noise_std_k());
@@ -284,12 +287,8 @@ impl State {
                 (sum / count.max(1.0)).sqrt()
             })
         };
-        let before = if prepared.found.iter().any(|f| f.effect != Identifier::Quantisation) {
-            rms(&prepared.unmasked(&self.base), &prepared.raw.0)
-        } else {
-            rms(&self.base, &prepared.observations)
-        };
-        let ([r0, k0], [r1, k1]) = (before, rms(&self.current, &prepared.observations));
+        let ([r0, k0], [r1, k1]) = (rms(before), rms((&self.current, &prepared.observations)));
+        let [base, last] = fits;
         ErrorBudget {
             chi2_per_dof: BeforeAfter { before: base.chi2_per_dof, after: last.chi2_per_dof },
             held_out_normalised_rms: BeforeAfter { before: r0, after: r1 },
@@ -298,8 +297,8 @@ impl State {
     }
 }
 
-/// Both time constants of `observations` with `effects` as they are in the model; defects of the data are dealt with as in
-/// [`diagnose`].
+/// Both time constants of `observations` with `effects` as they are in the model, but for what belongs to a record, which is
+/// fitted again; defects of the data are dealt with as in [`diagnose`].
 ///
 /// # Errors
 /// As [`diagnose`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
@@ -307,12 +306,12 @@ pub fn fit_with(
     observations: &Observations,
     settings: &Settings,
     effects: &[KnownEffect],
-) -> Result<ModelFit, DiagnoseError> {
+) -> Result<KnownFit, DiagnoseError> {
     let mut prepared = Prepared::new(observations, settings)?;
     let mut model = Model::new(&settings.known, prepared.levels.std_k);
     model.is_frozen = true;
     let own = prepared.context.clone();
-    let mut rest = Vec::new();
+    let (mut rest, mut fitted_again) = (Vec::new(), Vec::new());
     for known in effects {
         let is_defect = [Identifier::Saturation, Identifier::Quantisation, Identifier::Spikes].contains(&known.effect);
         if is_defect {
@@ -344,6 +343,7 @@ pub fn fit_with(
         let effect = effect.ok_or_else(|| DiagnoseError::Model { effect: known.effect.name() })?;
         if effect.is_of_the_record() {
             rest.extend(effect.starts().into_iter().next().unwrap_or_default());
+            fitted_again.push(known.effect);
         } else {
             rest.extend(effect.parameters().iter().filter_map(|p| value(p.name)));
         }
@@ -359,5 +359,6 @@ pub fn fit_with(
         prepared.find_levels(&fitted, settings);
         fitted = fit(&prepared, &model.with_noise(prepared.levels.std_k));
     }
-    Ok(summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels))
+    let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels);
+    Ok(KnownFit { fit, fitted_again })
 }

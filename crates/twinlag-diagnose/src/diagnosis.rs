@@ -176,6 +176,15 @@ pub struct ModelFit {
     pub covariance: Option<Vec<Vec<f64>>>,
 }
 
+/// A fit with effects that were known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownFit {
+    /// The fit.
+    pub fit: ModelFit,
+    /// Effects whose parameters belong to a record and not to the rig, and were fitted again: a line, a function of time.
+    pub fitted_again: Vec<Identifier>,
+}
+
 /// The whole answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {

@@ -89,6 +89,11 @@ impl Identifier {
         self.about().name
     }
 
+    /// Whether it is a model of noise, fitted by the likelihood of the residual, not by its energy.
+    pub fn is_noise(self) -> bool {
+        matches!(self, Self::ColouredNoise | Self::InputMismatch)
+    }
+
     /// What there is to say of it.
     pub fn about(self) -> &'static About {
         match self {
@@ -174,9 +179,9 @@ pub(crate) trait Effect: Send + Sync {
     /// Puts the effect into the model.
     fn install(&self, values: &[f64], plant: &mut Plant);
 
-    /// Whether it is a model of noise, fitted by the likelihood of the residual, not by its energy.
+    /// Whether it is a model of noise ([`Identifier::is_noise`]).
     fn is_noise(&self) -> bool {
-        false
+        self.identifier().is_noise()
     }
 
     /// The number that makes the effect, for the check that it is there at all: an effect whose number is not clear of the

@@ -54,8 +54,8 @@ mod whitening;
 
 pub use diagnose::{diagnose, fit_with};
 pub use diagnosis::{
-    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, ModelFit, TimeConstant, Trace, Unexplained, Value,
-    Verdict,
+    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, KnownFit, Limit, ModelFit, TimeConstant, Trace, Unexplained,
+    Value, Verdict,
 };
 pub use effect::{About, Identifier};
 pub use error::DiagnoseError;

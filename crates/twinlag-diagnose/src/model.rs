@@ -77,6 +77,11 @@ impl Model {
         out
     }
 
+    /// The first effect that is noise.
+    pub(crate) fn noise(&self) -> Option<usize> {
+        self.effects.iter().position(|e| e.is_noise())
+    }
+
     /// With another form of effect `index`.
     pub(crate) fn replaced(&self, index: usize, effect: Shared) -> Self {
         let mut out = self.clone();
@@ -125,24 +130,6 @@ impl Model {
         self.len() - self.known.iter().filter(|k| k.std_s.is_none()).count()
     }
 
-    /// Whether each parameter belongs to the record.
-    fn is_of_the_record(&self) -> Vec<bool> {
-        let mut out = vec![true; 2];
-        for effect in &self.effects {
-            out.extend(effect.parameters().iter().map(|_| effect.is_of_the_record()));
-        }
-        out
-    }
-
-    /// Whether each parameter is one of noise.
-    fn is_noise(&self) -> Vec<bool> {
-        let mut out = vec![false; 2];
-        for effect in &self.effects {
-            out.extend(effect.parameters().iter().map(|_| effect.is_noise()));
-        }
-        out
-    }
-
     pub(crate) fn plant(&self, theta: &[f64], observations: &Observations) -> Plant {
         let mut plant = Plant::new(observations, [theta[0], theta[1]], self.noise_std_k);
         for (index, effect) in self.effects.iter().enumerate() {
@@ -182,9 +169,11 @@ impl Model {
         };
         let mut out = vec![tau(0), tau(1)];
         out.extend(self.parameters().map(|p| p.variable.clone()));
-        for (i, (is_noise, is_of_the_record)) in self.is_noise().into_iter().zip(self.is_of_the_record()).enumerate() {
-            if is_noise || (self.is_frozen && !is_of_the_record) {
-                out[i] = out[i].clone().held_at(theta[i]);
+        for (index, effect) in self.effects.iter().enumerate() {
+            if effect.is_noise() || (self.is_frozen && !effect.is_of_the_record()) {
+                for i in self.range(index) {
+                    out[i] = out[i].clone().held_at(theta[i]);
+                }
             }
         }
         out
@@ -215,6 +204,13 @@ impl Fitted {
             }
         }
         self
+    }
+
+    /// Model and parameters without effect `index`.
+    pub(crate) fn without(&self, index: usize) -> (Model, Vec<f64>) {
+        let mut theta = self.theta.clone();
+        theta.drain(self.model.range(index));
+        (self.model.without(index), theta)
     }
 
     /// Energy per residual that counts.

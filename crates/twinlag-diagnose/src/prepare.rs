@@ -80,11 +80,14 @@ impl Prepared {
         base
     }
 
-    /// The two-lag model of the record as it came, where `base` is that of the record with defects masked.
-    pub(crate) fn unmasked(&self, base: &Fitted) -> Fitted {
+    /// The two-lag model of the record as it came, where `base` is that of the record with defects masked; none where none is.
+    pub(crate) fn unmasked(&self, base: &Fitted) -> Option<Fitted> {
+        if self.found.iter().all(|f| f.effect == Identifier::Quantisation) {
+            return None;
+        }
         let (observations, levels) = &self.raw;
         let model = base.model.clone().with_noise(levels.std_k);
-        model.fit(&base.theta, observations, &self.searched, Effort::Finish)
+        Some(model.fit(&base.theta, observations, &self.searched, Effort::Finish))
     }
 
     pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {

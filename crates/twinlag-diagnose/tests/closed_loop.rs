@@ -206,11 +206,11 @@ fn a_known_effect_gives_the_time_constants_of_another_record() {
         second_order(sensors);
         offset(sensors);
     });
-    let with = fit_with(&later, &Settings::default(), &known).expect("a record and effects of this version");
+    let with = fit_with(&later, &Settings::default(), &known).expect("a record and effects of this version").fit;
     let tests: Vec<(&str, f64)> = with.tests.iter().map(|t| (t.test.as_str(), t.p_value)).collect();
     recovers(&with, TAU_S, &format!("{tests:?}"));
     assert!(tests.iter().all(|(_, p)| *p > 1e-4), "only noise is left: {tests:?}");
-    let without = fit_with(&later, &Settings::default(), &[]).expect("a record");
+    let without = fit_with(&later, &Settings::default(), &[]).expect("a record").fit;
     assert!(without.chi2_per_dof > 4.0 * with.chi2_per_dof, "{} {}", without.chi2_per_dof, with.chi2_per_dof);
 }
 
@@ -229,7 +229,7 @@ fn a_known_effect_of_unknown_parameters_is_refused() {
 fn a_known_effect_of_spikes_takes_those_of_another_record_out() {
     let known = KnownEffect { effect: Identifier::Spikes, channel: Some(1), parameters: Vec::new() };
     let later = record(SEED + 1, spikes);
-    let fit = fit_with(&later, &Settings::default(), &[known]).expect("a record and an effect of this version");
+    let fit = fit_with(&later, &Settings::default(), &[known]).expect("a record and an effect of this version").fit;
     let tests: Vec<(&str, f64)> = fit.tests.iter().map(|t| (t.test.as_str(), t.p_value)).collect();
     assert!(tests.iter().all(|(_, p)| *p > 1e-4), "only noise is left: {tests:?}");
 }

@@ -51,7 +51,7 @@ fn the_power_of_a_measured_velocity_is_found() {
         parameters: vec![("exponent".into(), -0.5)],
     };
     recovers(
-        &fit_with(&observations, &Settings::default(), &[known]).expect("known"),
+        &fit_with(&observations, &Settings::default(), &[known]).expect("known").fit,
         truth_s(),
         "with the exponent known",
     );

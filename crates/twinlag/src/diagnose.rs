@@ -186,10 +186,9 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
         out.warnings.push("the model has no effects: two first-order lags".into());
         return Ok(out);
     }
-    let observations = observations(record)?;
+    let (observations, _) = observations(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
-    let has_noise =
-        model.effects.iter().any(|e| [Identifier::ColouredNoise, Identifier::InputMismatch].contains(&e.effect));
+    let has_noise = model.effects.iter().any(|e| e.effect.is_noise());
     let noise_std_k = options.noise_std_k.or(has_noise.then_some(model.noise_std_k));
     let settings = Settings { noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
     let effects: Vec<KnownEffect> = model
@@ -201,7 +200,8 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
             parameters: e.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
         })
         .collect();
-    let fit = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
+    let known = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
+    let fit = &known.fit;
     let is_left = fit.tests.iter().any(|t| t.p_value < 1e-4);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some());
     let status = match (is_determined, is_left) {
@@ -210,15 +210,10 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
         (true, false) => Status::Ok,
     };
     let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
-    let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
+    let mut out = of_fit(&base, fit, status, FreeParameters { gain: None, offset_k: None }, options);
     out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
-    let of_the_record = |e: &&ModelEffect| {
-        let is_spline =
-            e.effect == Identifier::VaryingTimeConstant && e.parameters.iter().all(|p| p.name != "exponent");
-        is_spline || e.effect == Identifier::MainsPickup
-    };
-    let again: Vec<&str> = model.effects.iter().filter(of_the_record).map(|e| e.effect.name()).collect();
-    if !again.is_empty() {
+    if !known.fitted_again.is_empty() {
+        let again: Vec<&str> = known.fitted_again.iter().map(|e| e.name()).collect();
         out.warnings
             .push(format!("fitted again, since they belong to a record and not to the rig: {}", again.join(", ")));
     }
@@ -238,8 +233,7 @@ pub type DiagnoseWatch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 /// As [`characterise`]; [`Error::Diagnose`] for a record that is too short or in which a channel never changes.
 pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch<'_>) -> Result<Diagnosis, Error> {
     let base = characterise(record, &options.characterise)?;
-    let rows = rows(record);
-    let observations = observations(record)?;
+    let (observations, rows) = observations(record)?;
     let settings = Settings {
         noise_std_k: options.characterise.noise_std_k,
         known: known(&options.characterise),
@@ -350,15 +344,12 @@ fn stretches(record: &Record, period_s: Option<f64>) -> Vec<Vec<Option<usize>>> 
     out
 }
 
-/// The row of each sample that a diagnosis uses; `None` for those that are missing.
-fn rows(record: &Record) -> Vec<Option<usize>> {
-    stretches(record, grid_s(record)).into_iter().flatten().collect()
-}
-
-fn observations(record: &Record) -> Result<Observations, Error> {
+/// What a diagnosis takes, and the row of each of its samples; `None` for those that are missing.
+fn observations(record: &Record) -> Result<(Observations, Vec<Option<usize>>), Error> {
     let period_s = grid_s(record);
-    let stretches = stretches(record, period_s)
-        .into_iter()
+    let all = stretches(record, period_s);
+    let stretches = all
+        .iter()
         .map(|rows| {
             let first_s = rows.first().copied().flatten().map_or(0.0, |row| record.time_s[row]);
             let time_s: Vec<f64> = match period_s {
@@ -367,15 +358,15 @@ fn observations(record: &Record) -> Result<Observations, Error> {
                 None => rows.iter().flatten().map(|&row| record.time_s[row]).collect(),
             };
             let missing: Vec<bool> = rows.iter().map(Option::is_none).collect();
-            let [t1_c, t2_c] = [&record.t1_c, &record.t2_c].map(|values| bridged(&rows, values));
+            let [t1_c, t2_c] = [&record.t1_c, &record.t2_c].map(|values| bridged(rows, values));
             let stretch = Stretch::new(time_s, [t1_c, t2_c]).with_missing([missing.clone(), missing]);
             match &record.flow {
-                Some(flow) => stretch.with_flow(bridged(&rows, flow)),
+                Some(flow) => stretch.with_flow(bridged(rows, flow)),
                 None => stretch,
             }
         })
         .collect();
-    Ok(Observations::new(stretches, period_s)?)
+    Ok((Observations::new(stretches, period_s)?, all.into_iter().flatten().collect()))
 }
 
 /// Values of rows, with straight lines over those that are missing.

@@ -10,17 +10,17 @@ use twinlag_report::{
     Axis, Chart, Colour, Document, Figure, ReportError, Series, Table, between, plus_minus, probability, rounded,
 };
 
-const BEFORE: &str = "two first-order lags";
-const AFTER: &str = "with the effects";
-/// The part of the record that is shown larger, and the fewest samples that it may have.
-const ZOOM: f64 = 0.05;
-const ZOOM_SAMPLES: usize = 60;
-
 use figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
 use words::{
     ABSENT, capital, estimate, identifiers, interval, listed, parameter, question, sentence, short, unit, with_unit,
     words, words_of,
 };
+
+const BEFORE: &str = "two first-order lags";
+const AFTER: &str = "with the effects";
+/// The part of the record that is shown larger, and the fewest samples that it may have.
+const ZOOM: f64 = 0.05;
+const ZOOM_SAMPLES: usize = 60;
 
 /// What a report needs beside the diagnosis.
 #[derive(Clone, Debug, PartialEq)]

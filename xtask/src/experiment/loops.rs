@@ -5,9 +5,7 @@
 mod tables;
 
 use std::fs;
-use std::ops::ControlFlow;
 use std::path::Path;
-use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
@@ -17,7 +15,7 @@ use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Simulated;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
-use twinlag_study::{Failure, Options, Outcome, Quantity, Results, Study};
+use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -203,35 +201,6 @@ fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
     })
 }
 
-/// Runs the plan, writes results and tables to `out`; or holds it against what is there. Of a shard only its part is written.
-pub(super) fn run(plan: &Plan, out: &Path, check: bool, options: &Options) -> Result<f64> {
-    let start = Instant::now();
-    let bar = super::bar(&plan.name);
-    let finished = twinlag_study::run(plan, options, |p| {
-        bar.set_length(p.total);
-        bar.set_position(p.done);
-        ControlFlow::Continue(())
-    })?;
-    bar.finish_and_clear();
-    let seconds = start.elapsed().as_secs_f64();
-    if options.shard.of() > 1 {
-        println!("{}: part {} in {seconds:.0} s", plan.name, options.shard);
-        return Ok(seconds);
-    }
-    let results = finished.into_results()?;
-    if check {
-        let stored = fs::read_to_string(out.join("results.json")).context("there is no stored table")?;
-        if let Some(cell) = first_difference(plan, &results, &stored)? {
-            bail!("{}: {cell}", plan.name);
-        }
-        println!("{}: the stored results hold, to the byte; {seconds:.0} s", plan.name);
-        return Ok(seconds);
-    }
-    write(plan, &results, out)?;
-    println!("{}: {} records in {seconds:.0} s", plan.name, plan.records * Plan::cells(plan).len() as u64);
-    Ok(seconds)
-}
-
 /// Results, tables and pictures.
 pub(super) fn write(plan: &Plan, results: &Results, out: &Path) -> Result<()> {
     let mut plan = plan.clone();
@@ -248,23 +217,24 @@ pub(super) fn write(plan: &Plan, results: &Results, out: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The first cell whose numbers are not those that are stored.
-fn first_difference(plan: &Plan, results: &Results, stored: &str) -> Result<Option<String>> {
+/// Holds results against those that are stored in `folder`: an error names the first cell that differs.
+pub(super) fn check(plan: &Plan, results: &Results, folder: &Path) -> Result<()> {
     let now = results.to_json();
+    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
     if now == stored {
-        return Ok(None);
+        return Ok(());
     }
     let cells = |text: &str| -> Result<Vec<Value>> {
         let value: Value = serde_json::from_str(text).context("the stored results cannot be read")?;
         Ok(value["cells"].as_array().cloned().unwrap_or_default())
     };
-    let (now, stored) = (cells(&now)?, cells(stored)?);
+    let (now, stored) = (cells(&now)?, cells(&stored)?);
     let differs = now.iter().zip(&stored).position(|(a, b)| a != b);
-    Ok(Some(match differs.and_then(|i| plan.cells().get(i).map(|(kinds, size)| (*kinds, *size))) {
+    match differs.and_then(|i| plan.cells().get(i).copied()) {
         Some((kinds, size)) => {
-            let name = tables::cell_name(kinds, size, plan.size_factors.len());
-            format!("the first cell that differs from the stored results is {name}")
+            let cell = tables::cell_name(kinds, size, plan.size_factors.len());
+            bail!("{}: the first cell that differs from the stored results is {cell}", plan.name)
         }
-        None => "the stored results are of another plan".to_owned(),
-    }))
+        None => bail!("{}: the stored results are of another plan", plan.name),
+    }
 }

@@ -4,20 +4,13 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use twinlag::diagnosis::{Identifier, Verdict};
-use twinlag::record::{ColumnRef, Record, Selection};
+use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis, Options, Status, diagnose};
 
 use super::page::Page;
+use super::{Case, case};
 
-/// One record, what is known of it beforehand, and what must come out.
-struct Case {
-    file: &'static str,
-    channels: [&'static str; 2],
-    known: &'static str,
-    check: fn(&Diagnosis) -> Result<()>,
-}
-
-const CASES: &[Case] = &[
+const CASES: &[Case<Diagnosis>] = &[
     case("block100/run_004.csv", ["ref_C", "dut_C"], "", |answer| {
         calibration(answer, 0.9955, -0.169)?;
         parameter(answer, Identifier::Calibration, "curvature").map(|_| ())
@@ -59,15 +52,6 @@ const CASES: &[Case] = &[
     }),
 ];
 
-const fn case(
-    file: &'static str,
-    channels: [&'static str; 2],
-    known: &'static str,
-    check: fn(&Diagnosis) -> Result<()>,
-) -> Case {
-    Case { file, channels, known, check }
-}
-
 /// Two first-order lags are known not to be the whole story.
 fn rejected(answer: &Diagnosis) -> Result<()> {
     ensure!(answer.verdict != Verdict::Adequate, "two first-order lags are said to be adequate");
@@ -103,24 +87,19 @@ pub(super) fn run(dir: &Path) -> Diagnosed {
     for case in CASES {
         let outcome = one(dir, case, &mut page);
         if let Err(error) = outcome {
-            failures.push(format!("{} {:?} known '{}', diagnosed: {error:#}", case.file, case.channels, case.known));
+            failures.push(format!("{} {:?} known '{}', diagnosed: {error:#}", case.file, case.channels, case.with));
         }
     }
     Diagnosed { failures, questions: CASES.len(), page }
 }
 
-fn one(dir: &Path, case: &Case, page: &mut Page) -> Result<()> {
-    let selection = Selection {
-        t1: Some(ColumnRef::Name(case.channels[0].into())),
-        t2: Some(ColumnRef::Name(case.channels[1].into())),
-        ..Selection::default()
-    };
-    let record = Record::read(dir.join(case.file), &selection)?;
+fn one(dir: &Path, case: &Case<Diagnosis>, page: &mut Page) -> Result<()> {
+    let record = Record::read(dir.join(case.file), &case.selection())?;
     let mut options = Options::default();
-    if !case.known.is_empty() {
-        options.known.push(case.known.parse()?);
+    if !case.with.is_empty() {
+        options.known.push(case.with.parse()?);
     }
     let answer = diagnose(&record, &DiagnoseOptions { characterise: options, without: Vec::new() }, &|_, _, _| ())?;
-    println!("{}", page.add(case.file, case.channels, case.known, &answer)?);
+    println!("{}", page.add(case.file, case.channels, case.with, &answer)?);
     (case.check)(&answer)
 }

@@ -69,10 +69,6 @@ impl Effect for ColouredNoise {
         plant.extra.push(Extra { place: Place::Reading(self.channel), std_k: values[0], correlation_s: values[1] });
     }
 
-    fn is_noise(&self) -> bool {
-        true
-    }
-
     fn neutral(&self) -> Vec<(usize, f64)> {
         vec![(0, 0.0)]
     }

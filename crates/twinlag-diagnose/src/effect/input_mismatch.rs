@@ -58,10 +58,6 @@ impl Effect for InputMismatch {
         plant.extra.push(Extra { place: Place::Gas, std_k: values[0], correlation_s: values[1] });
     }
 
-    fn is_noise(&self) -> bool {
-        true
-    }
-
     fn neutral(&self) -> Vec<(usize, f64)> {
         vec![(0, 0.0)]
     }

@@ -27,24 +27,22 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     }
     for &frequency_hz in context.lines_hz.iter().take(2) {
         let channel = 0;
-        {
-            let width = 1.0 / context.span_s();
-            let widest = 3.0 * context.swing_k;
-            let amplitude =
-                |name| Parameter::new(name, "K", Variable::linear(name, context.typical_k(channel), -widest, widest));
-            let frequency = Variable::linear(
-                "frequency",
-                0.01 * width,
-                (frequency_hz - 1.5 * width).max(0.0),
-                frequency_hz + 1.5 * width,
-            );
-            let parameters = vec![
-                Parameter::new("frequency", "Hz", frequency),
-                amplitude("cosine_amplitude"),
-                amplitude("sine_amplitude"),
-            ];
-            out.push(Arc::new(MainsPickup { channel, parameters, frequency_hz }) as Shared);
-        }
+        let width = 1.0 / context.span_s();
+        let widest = 3.0 * context.swing_k;
+        let amplitude =
+            |name| Parameter::new(name, "K", Variable::linear(name, context.typical_k(channel), -widest, widest));
+        let frequency = Variable::linear(
+            "frequency",
+            0.01 * width,
+            (frequency_hz - 1.5 * width).max(0.0),
+            frequency_hz + 1.5 * width,
+        );
+        let parameters = vec![
+            Parameter::new("frequency", "Hz", frequency),
+            amplitude("cosine_amplitude"),
+            amplitude("sine_amplitude"),
+        ];
+        out.push(Arc::new(MainsPickup { channel, parameters, frequency_hz }) as Shared);
     }
     out
 }

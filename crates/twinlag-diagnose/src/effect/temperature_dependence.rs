@@ -25,7 +25,7 @@ struct TemperatureDependence {
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let reference_k = (0.5 * (context.mean_c[0] + context.mean_c[1]) + ZERO_CELSIUS_K).max(1.0);
-    // A factor of three over the swing, either way, where that is physics: radiation has −3, viscosity of liquids up to −8.
+    // A factor of three over the swing, either way, as far as an exponent is physics: radiation has −3.
     let widest = (1.1 * reference_k / context.swing_k).clamp(8.0, STEEPEST);
     let variable = Variable::linear("exponent", 0.05 * widest, -widest, widest);
     [[true, true], [true, false], [false, true]]

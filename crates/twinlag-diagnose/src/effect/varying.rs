@@ -22,9 +22,16 @@ const FIRST: usize = 12;
 /// Those that are tried once it is found.
 const SIZES: [usize; 4] = [3, 5, 8, 19];
 
+/// What `m` is a function of.
+enum Of {
+    /// Time: a spline between the ends of the record, s, which has so many samples.
+    Time { ends_s: [f64; 2], samples: usize },
+    /// A measured flow.
+    Flow(Arc<Flow>),
+}
+
 struct Varying {
-    ends_s: [f64; 2],
-    samples: usize,
+    of: Of,
     parameters: Vec<Parameter>,
 }
 
@@ -35,13 +42,13 @@ fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
     ];
     let parameters =
         NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, 3.0))).collect();
-    (60 * size <= samples).then(|| Arc::new(Varying { ends_s, samples, parameters }) as Shared)
+    (60 * size <= samples).then(|| Arc::new(Varying { of: Of::Time { ends_s, samples }, parameters }) as Shared)
 }
 
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
-    let of_flow = context.flow.as_ref().map(|of| {
+    let of_flow = context.flow.as_ref().map(|flow| {
         let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0))];
-        Arc::new(WithFlow { of: of.clone(), parameters }) as Shared
+        Arc::new(Varying { of: Of::Flow(flow.clone()), parameters }) as Shared
     });
     of_size(FIRST, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
@@ -64,49 +71,29 @@ impl Effect for Varying {
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.modulation = Some(Modulation::Spline(Spline::new(self.ends_s[0], self.ends_s[1], values)));
+        plant.modulation = Some(match &self.of {
+            Of::Time { ends_s: [first_s, last_s], .. } => Modulation::Spline(Spline::new(*first_s, *last_s, values)),
+            Of::Flow(of) => Modulation::Flow { exponent: values[0], of: of.clone() },
+        });
     }
 
     fn is_of_the_record(&self) -> bool {
-        true
+        matches!(self.of, Of::Time { .. })
     }
 
     fn sizes(&self) -> Vec<Shared> {
-        SIZES.into_iter().filter_map(|size| of_size(size, self.ends_s, self.samples)).collect()
+        match self.of {
+            Of::Time { ends_s, samples } => {
+                SIZES.into_iter().filter_map(|size| of_size(size, ends_s, samples)).collect()
+            }
+            Of::Flow(_) => Vec::new(),
+        }
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {
-        Vec::new()
-    }
-}
-
-struct WithFlow {
-    of: Arc<Flow>,
-    parameters: Vec<Parameter>,
-}
-
-impl Effect for WithFlow {
-    fn identifier(&self) -> Identifier {
-        Identifier::VaryingTimeConstant
-    }
-
-    fn channel(&self) -> Option<usize> {
-        None
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.modulation = Some(Modulation::Flow { exponent: values[0], of: self.of.clone() });
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        vec![(0, 0.0)]
+        match self.of {
+            Of::Time { .. } => Vec::new(),
+            Of::Flow(_) => vec![(0, 0.0)],
+        }
     }
 }
