@@ -23,8 +23,22 @@ pub(crate) struct Levels {
     pub(crate) std_k: [f64; 2],
     /// Standard error of the logarithm.
     pub(crate) log_error: [f64; 2],
+    /// Step of each converter, where there is one, K.
+    pub(crate) step_k: [Option<f64>; 2],
+}
+
+impl Levels {
     /// Step of each converter where it is coarse beside the noise, K.
-    pub(crate) coarse_step_k: [Option<f64>; 2],
+    pub(crate) fn coarse_step_k(&self) -> [Option<f64>; 2] {
+        [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE * self.std_k[i]))
+    }
+
+    /// Both times `factor`; none becomes less than its converter's own noise.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        for (std_k, step_k) in self.std_k.iter_mut().zip(self.step_k) {
+            *std_k = (*std_k * factor).max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*std_k));
+        }
+    }
 }
 
 /// The channels as the costs of the other layers take them, without what is masked.
@@ -58,7 +72,7 @@ pub(crate) fn levels(observations: &Observations) -> Option<Levels> {
     Some(Levels {
         std_k: found.map(|l| l.std_k.max(nothing)),
         log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
-        coarse_step_k: found.map(|l| l.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE * l.std_k)),
+        step_k: found.map(|l| l.quantisation_step_k),
     })
 }
 

@@ -18,6 +18,9 @@ const MOST_EFFECTS: usize = 4;
 /// Tones of a gas of which nothing but two time constants can be told.
 const SINGLE: usize = 1;
 
+/// What is said where noise levels are lowered.
+const LOWERED: &str = "the noise levels are those of what is left over: the fastest changes of the readings are larger, and so are the gas's";
+
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
 ///
 /// # Errors
@@ -34,7 +37,9 @@ pub fn diagnose(
     let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new(), is_reweighed: false };
     while state.steps.len() < MOST_EFFECTS
         && !is_refused
-        && (state.step(&mut prepared, settings, watch) || state.reweigh(&mut prepared))
+        && (state.step(&mut prepared, settings, watch)
+            || state.lower_noise(&mut prepared, settings)
+            || state.reweigh(&mut prepared))
     {}
     let limits = prepared.search(settings, watch).limits(&state.current);
     Ok(state.conclude(&prepared, tones, limits))
@@ -136,6 +141,22 @@ impl State {
         self.remarks.push(format!("{effect} was taken up first and found needless once more was known"));
         self.current = without;
         self.steps.remove(index);
+    }
+
+    /// Where less is left over than noise: levels that were found rather than given are lowered to it, for the disagreement holds all
+    /// of the noise, and third differences hold the fastest changes of the gas as well. Whether to look again.
+    fn lower_noise(&mut self, prepared: &mut Prepared, settings: &Settings) -> bool {
+        let has_noise = self.current.model.noise().is_some();
+        let energy = self.current.mean_energy();
+        if settings.noise_std_k.is_some() || has_noise || !prepared.is_clearly_less(energy, self.current.count) {
+            return false;
+        }
+        prepared.scale_levels(energy.sqrt(), settings);
+        if !self.remarks.iter().any(|r| r == LOWERED) {
+            self.remarks.push(LOWERED.into());
+        }
+        (self.current, self.base) = (prepared.refit(&self.current), prepared.refit(&self.base));
+        true
     }
 
     /// Where nothing explains what is left over and that is far more than noise: weights frequencies by its own spectrum from here

@@ -21,6 +21,9 @@ const EXCERPT: usize = 500;
 const SPIKE: f64 = 6.0;
 const SPIKE_AMONG_OTHERS: f64 = 4.5;
 
+/// Standard errors by which less is clearly less.
+const CLEARLY: f64 = 4.0;
+
 /// A record with its defects masked, and the two-lag model of it.
 pub(crate) struct Prepared {
     pub(crate) observations: Observations,
@@ -113,7 +116,23 @@ impl Prepared {
     pub(crate) fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
         let found = defects::levels(&fitted.model.without_lines(&fitted.theta, &self.observations));
         if let (None, Some(found)) = (settings.noise_std_k, found) {
-            self.levels = Levels { coarse_step_k: self.levels.coarse_step_k, ..found };
+            self.levels = Levels { step_k: self.levels.step_k, ..found };
+        }
+    }
+
+    /// Whether `energy`, the mean of `count` squared residuals over the noise, is less than what levels as uncertain as these allow.
+    pub(crate) fn is_clearly_less(&self, energy: f64, count: f64) -> bool {
+        let level_std = 2.0 * self.levels.log_error[0].max(self.levels.log_error[1]);
+        let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
+        !is_coarse && energy.ln() < -CLEARLY * (2.0 / count + level_std * level_std).sqrt()
+    }
+
+    /// Both levels times `factor`, which may show that a converter is coarse.
+    pub(crate) fn scale_levels(&mut self, factor: f64, settings: &Settings) {
+        self.levels.scale(factor);
+        self.context = context(&self.observations, &self.levels);
+        if settings.effects.contains(&Identifier::Quantisation) {
+            self.found.extend(coarse_steps(&self.levels));
         }
     }
 
@@ -162,19 +181,20 @@ impl Prepared {
 fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Identifier]) -> Vec<Found> {
     let mut out = Vec::new();
     if allowed.contains(&Identifier::Saturation) {
-        let counts = defects::mask_saturation(observations, levels.coarse_step_k);
+        let counts = defects::mask_saturation(observations, levels.coarse_step_k());
         for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
             out.push(defect(Identifier::Saturation, i, format!("{count} readings at an end of the range")));
         }
     }
     if allowed.contains(&Identifier::Quantisation) {
-        for i in 0..2 {
-            if let Some(step_k) = levels.coarse_step_k[i] {
-                out.push(defect(Identifier::Quantisation, i, format!("steps of {step_k:.4} K")));
-            }
-        }
+        out.extend(coarse_steps(levels));
     }
     out
+}
+
+fn coarse_steps(levels: &Levels) -> impl Iterator<Item = Found> {
+    let steps = levels.coarse_step_k().into_iter().enumerate();
+    steps.filter_map(|(i, step)| Some(defect(Identifier::Quantisation, i, format!("steps of {:.4} K", step?))))
 }
 
 fn defect(effect: Identifier, channel: usize, seen: String) -> Found {
@@ -230,7 +250,7 @@ fn context(observations: &Observations, levels: &Levels) -> Context {
         moments: observations.moments(),
         swing_k: observations.swing_k(),
         noise_std_k: levels.std_k,
-        is_coarse: levels.coarse_step_k.map(|q| q.is_some()),
+        is_coarse: levels.coarse_step_k().map(|q| q.is_some()),
         tau_s: [10.0 * step_s; 2],
         flow: observations.flow().filter(|flow| flow.changes()).cloned(),
         lines_hz: Vec::new(),

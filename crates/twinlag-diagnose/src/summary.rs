@@ -118,7 +118,7 @@ pub(crate) fn summarise(
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
     let mut tests = residual_tests(&residual_runs, fitted.model.fitted(), level_std);
-    let is_coarse = levels.coarse_step_k.iter().any(Option::is_some);
+    let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
     tests.extend(crate::residual::tests(fitted, observations, selection, is_coarse));
     let count: usize = residual_runs.iter().map(Vec::len).sum();
     let dof = count.saturating_sub(fitted.model.fitted()).max(1);

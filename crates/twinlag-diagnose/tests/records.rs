@@ -9,7 +9,7 @@ use common::{
 use twinlag_diagnose::{
     DiagnoseError, Diagnosis, Identifier, Observations, Settings, Stretch, Verdict, diagnose, fit_with,
 };
-use twinlag_signal::{MultiTone, Sensor, Signal, Tone};
+use twinlag_signal::{MultiTone, Noise, Sensor, Signal, Tone, Turbulence};
 
 fn second_order(sensors: &mut [Sensor; 2]) {
     sensors[1].second_time_constant_s = Some(0.018);
@@ -50,6 +50,26 @@ fn what_few_tones_can_tell_is_counted() {
     assert!(d.not_testable.iter().any(counted), "{:?}", d.not_testable);
     let broad = found(&record(SEED, |_| ()));
     assert!(broad.not_testable.iter().all(|t| !t.contains("tones")), "{:?}", broad.not_testable);
+}
+
+/// Sampled every second of the fast sensor's time constant and nearly free of noise: third differences are the gas's. What is left
+/// over says so, and its level has a standard error of `1/√(2n)` = 1.4 % of both channels together.
+#[test]
+fn noise_below_the_changes_of_the_gas_is_found() {
+    let quiet_k = 0.01;
+    let signal = Signal::Turbulence(Turbulence { std_k: GAS_K, corner_hz: 20.0, cutoff_hz: 400.0 });
+    let simulated = readings(SEED, signal, |sensors| {
+        for (sensor, (name, tau_s)) in sensors.iter_mut().zip([("T1", 0.003), ("T2", 0.015)]) {
+            *sensor = Sensor::new(name, tau_s);
+            sensor.noise = Some(Noise::white(quiet_k));
+        }
+    });
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    assert!(d.remarks.iter().any(|r| r.contains("noise levels are those of what is left over")), "{}", told(&d));
+    for (time_constant, want) in d.last.time_constants.iter().zip([0.003, 0.015]) {
+        let (got, error) = estimate(time_constant);
+        assert!((got - want).abs() <= 4.0 * error, "got {got}, want {want} ± 4 × {error}: {}", told(&d));
+    }
 }
 
 /// Bit by bit, while another diagnosis competes for the processors: no number may depend on which thread is first. (The same

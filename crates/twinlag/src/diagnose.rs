@@ -106,6 +106,10 @@ pub struct Diagnosis {
     pub limits: Vec<NamedLimit>,
     /// What to know before using the numbers.
     pub remarks: Vec<String>,
+    /// Effects that were not considered, as asked.
+    pub without: Vec<Identifier>,
+    /// Whether a measured flow was there, with which time constants may go.
+    pub has_flow: bool,
     /// Pictures' numbers; not part of the JSON.
     #[serde(skip)]
     pub core: Option<Box<Core>>,
@@ -262,6 +266,15 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         })
         .collect();
     let mut remarks = core.remarks.clone();
+    if let Some(rmse) = error.reference_rmse_k
+        && rmse.after > rmse.before
+    {
+        remarks.push(
+            "with the effects the gas temperature is farther from the reference: what both sensors share, and which of the two has \
+             a gain, an offset or a delay, no record of two sensors tells"
+                .into(),
+        );
+    }
     if options.characterise.known.iter().any(|k| !matches!(k.parameter, Parameter::Tau1 | Parameter::Tau2)) {
         remarks.push(
             "of what is known beforehand the loop uses the time constants alone; the rest is in the two lags of `base`"
@@ -290,6 +303,8 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
             })
             .collect(),
         remarks,
+        without: options.without.clone(),
+        has_flow: record.flow.is_some(),
         core: Some(Box::new(core)),
     })
 }
