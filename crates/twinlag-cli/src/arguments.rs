@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
+use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
 use twinlag::record::{ColumnRef, SamplingChoice, Selection};
@@ -23,6 +24,7 @@ Try it without a file:   twinlag demo
 On a logger file:        twinlag characterise run.csv
 With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 What the model lacks:    twinlag diagnose run.csv --report run.html
+The gas temperature:     twinlag compensate run.csv --out gas.csv
 For a script:            twinlag characterise run.csv --json
 
 Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 75 try again (a shard of a
@@ -59,6 +61,8 @@ pub(crate) enum Command {
     /// The closed loop: what two first-order lags leave over, which physical effect accounts for it, and the error before and
     /// after it is in the model.
     Diagnose(Box<Diagnose>),
+    /// The gas temperature at every sample, with its standard deviation.
+    Compensate(Box<Compensate>),
     /// A record from a described rig: gas, sensors, noise, converter.
     Simulate(Simulate),
     /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
@@ -131,6 +135,51 @@ pub(crate) struct Diagnose {
     /// Overwrite outputs that exist.
     #[arg(long)]
     pub(crate) force: bool,
+}
+
+/// The gas temperature of a record.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+OUT.csv has the columns time_s, gas_C and gas_std_K: at every sample, and at those that are missing in an even grid. The standard
+deviation is of noise, of what the readings cannot say at high frequencies, and of the uncertainty of the model's parameters.
+
+The model is the one that `twinlag diagnose` finds, or that of --model. Of the gas it is taken that it goes on as it has done:
+how much it moves, and how fast, is found from the readings. The bandwidth that is printed says up to which frequency they decide.
+
+Exit codes: 0 compensated, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
+1 anything else.")]
+pub(crate) struct Compensate {
+    /// The record; `-` reads standard input.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) columns: Columns,
+    #[command(flatten)]
+    pub(crate) method: Method,
+    /// Where the gas temperature goes; `-` is standard output.
+    #[arg(long, value_name = "CSV")]
+    pub(crate) out: PathBuf,
+    /// A model that `twinlag diagnose --save` wrote, instead of a diagnosis of this record: its effects stay as they are.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) model: Option<PathBuf>,
+    /// What the answer for an instant may rest on: smoother (the whole record), filter (what was read by then), or lag:N (that and N
+    /// samples more).
+    #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]
+    pub(crate) form: Form,
+    /// An effect that is not to be considered; may be given several times.
+    #[arg(long, value_name = "EFFECT")]
+    pub(crate) without: Vec<Identifier>,
+    /// Overwrite outputs that exist.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+fn form(text: &str) -> Result<Form, String> {
+    match (text, text.strip_prefix("lag:").map(str::parse)) {
+        ("smoother", _) => Ok(Form::Smoother),
+        ("filter", _) => Ok(Form::Filter),
+        (_, Some(Ok(samples))) => Ok(Form::FixedLag(samples)),
+        _ => Err("expected smoother, filter, or lag:N with a whole number of samples N".into()),
+    }
 }
 
 /// Which columns, and how time is meant.

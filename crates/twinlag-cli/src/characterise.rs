@@ -29,7 +29,7 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
     Ok(exit_code(answer.status))
 }
 
-fn model(path: &Path) -> Result<Model, Failure> {
+pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
     let wrong = |what: String| Failure::File(format!("{}: {what}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
     let model: Model = serde_json::from_str(&text)

@@ -1,7 +1,5 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
-use std::path::{Path, PathBuf};
-
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis, ReportContext};
@@ -9,11 +7,14 @@ use twinlag::{DiagnoseOptions, Diagnosis, ReportContext};
 use crate::arguments::{Diagnose, Talk};
 use crate::characterise::read;
 use crate::failure::Failure;
+use crate::output;
 use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
-    check_outputs(command)?;
+    let outputs = [("--report", &command.report), ("--save", &command.save)];
+    let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
+    output::check(&command.file, &outputs, command.force)?;
     let options = DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() };
     let record = read(&command.file, &command.columns.selection())?;
     print::notes(&record, talk);
@@ -21,42 +22,14 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     if let Some(path) = &command.save {
         let model = serde_json::to_string_pretty(&answer.model())
             .map_err(|e| Failure::Other(format!("the model has no JSON: {e}")))?;
-        write(path, &model)?;
+        output::write(path, &model)?;
     }
     if let Some(path) = &command.report {
         let line: Vec<String> = std::env::args().map(|a| quoted(&a)).collect();
-        write(path, &report(&record, &answer, line.join(" "))?)?;
+        output::write(path, &report(&record, &answer, line.join(" "))?)?;
     }
     print::diagnosis(&answer, talk)?;
     Ok(exit_code(&answer))
-}
-
-/// What would fail after minutes of work, or lose something, is refused before.
-fn check_outputs(command: &Diagnose) -> Result<(), Failure> {
-    let usage = |text: String| Err(Failure::Usage(text));
-    let mut seen: Vec<PathBuf> = Vec::new();
-    for path in [&command.report, &command.save].into_iter().flatten() {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let folder = folder.canonicalize().map_err(|e| cannot_be_written(path, &e))?;
-        let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
-            return usage(format!("{} is a folder: name a file in it", path.display()));
-        };
-        if path.as_os_str() == "-" {
-            return usage("standard output is for the answer: name a file for --report and --save".into());
-        }
-        let whole = folder.join(name);
-        if command.file.canonicalize().is_ok_and(|record| whole.canonicalize().is_ok_and(|out| out == record)) {
-            return usage(format!("{} is the record itself: choose another name", path.display()));
-        }
-        if seen.contains(&whole) {
-            return usage("--report and --save name the same file: each needs one of its own".into());
-        }
-        seen.push(whole);
-        if path.exists() && !command.force {
-            return usage(format!("{} exists: choose another name, or add --force", path.display()));
-        }
-    }
-    Ok(())
 }
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -> Result<Diagnosis, Failure> {
@@ -84,14 +57,6 @@ fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String
         notes: answer.base.notes.clone(),
     };
     Ok(twinlag::report(core, &context).map_err(twinlag::Error::from)?)
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
-}
-
-fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Other(format!("{}: cannot be written: {error}", path.display()))
 }
 
 /// An argument as a shell takes it.

@@ -7,9 +7,11 @@
 
 mod arguments;
 mod characterise;
+mod compensate;
 mod demo;
 mod diagnose;
 mod failure;
+mod output;
 mod print;
 mod progress;
 mod simulate;
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
     let result = match arguments.command {
         Command::Characterise(command) => characterise::run(&command, talk),
         Command::Diagnose(command) => diagnose::run(&command, talk),
+        Command::Compensate(command) => compensate::run(&command, talk),
         Command::Simulate(command) => simulate::run(&command, talk),
         Command::Study(command) => study::run(&command, talk),
         Command::Demo(command) => demo::run(&command, talk),

@@ -1,12 +1,15 @@
 //! Answers for people and for scripts.
 
 use std::io::{Write, stdout};
+use std::path::Path;
 
 use serde::Serialize;
 use twinlag::diagnosis::Verdict;
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
-use twinlag::{Characterisation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status};
+use twinlag::{
+    Characterisation, Compensation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status,
+};
 
 use crate::arguments::Talk;
 use crate::failure::Failure;
@@ -102,6 +105,56 @@ pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
     }
     let text = diagnosis_text(answer);
     stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
+}
+
+/// What there is to say of the gas temperature, as text or as JSON: on standard error where the gas itself is on standard output.
+pub(crate) fn compensation(answer: &Compensation, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
+    if talk.json {
+        return json(answer);
+    }
+    let text = compensation_text(answer, out);
+    if !to_stdout {
+        return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
+    }
+    if !talk.quiet {
+        eprint!("{text}");
+    }
+    Ok(())
+}
+
+fn compensation_text(answer: &Compensation, out: &Path) -> String {
+    let record = &answer.last.record;
+    let mut lines =
+        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
+    lines.extend(answer.verdict.map(|v| format!("model: {}", verdict(v))));
+    for effect in &answer.effects {
+        let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
+        lines.push(format!("  {}{place}", effect.effect));
+    }
+    for sensor in &answer.last.sensors {
+        lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
+    }
+    if let Some(gas) = &answer.gas {
+        lines.push(String::new());
+        lines.push(format!("gas temperature in {}: {} samples", out.display(), answer.gas_c.len()));
+        lines.push(format!("  standard deviation {} K (median)", digits(gas.median_std_k, 3)));
+        lines.push(format!("  of that the model's parameters {} K", digits(gas.parameter_std_k, 3)));
+        lines.push(match gas.bandwidth_hz {
+            Some(hz) => format!("  the readings decide up to {} Hz", digits(hz, 3)),
+            None => "  the readings decide nowhere: the gas moves less than the noise".into(),
+        });
+        if let Some(reference) = &gas.reference {
+            lines.push(format!(
+                "  against the reference: {} K rms, the faster sensor as it reads {} K; {:.1} % of it inside the 95 % band",
+                digits(reference.rmse_k, 3),
+                digits(reference.raw_rmse_k, 3),
+                100.0 * reference.inside_95
+            ));
+        }
+    }
+    lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
+    lines.push(String::new());
+    lines.join("\n")
 }
 
 fn diagnosis_text(answer: &Diagnosis) -> String {

@@ -5,6 +5,7 @@ use twinlag_cross_relation::ResidualTest;
 use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
+use crate::extended::Extended;
 
 /// Whether the model is found to be complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -174,6 +175,8 @@ pub struct ModelFit {
     pub trace: Trace,
     /// Covariance of the parameters, in their units, where there is one; the time constants come first.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// The model itself, for a compensation; `None` in a fit that was put together for its picture.
+    pub extended: Option<Extended>,
 }
 
 /// A fit with effects that were known beforehand.

@@ -1,6 +1,7 @@
 //! What can go wrong before a diagnosis starts.
 
 use thiserror::Error;
+use twinlag_compensate::CompensateError;
 
 /// Why a record cannot be diagnosed.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -19,6 +20,8 @@ pub enum DiagnoseError {
     NeedsFlow,
     #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]
     Model { effect: &'static str },
+    #[error(transparent)]
+    Compensate(#[from] CompensateError),
     #[error("there is no effect called \"{name}\"; there are {known}")]
     UnknownEffect { name: String, known: String },
 }

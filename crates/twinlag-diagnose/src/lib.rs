@@ -36,6 +36,7 @@ mod diagnosis;
 mod effect;
 mod error;
 mod excitation;
+mod extended;
 mod flow;
 mod held_out;
 mod model;
@@ -59,6 +60,7 @@ pub use diagnosis::{
 };
 pub use effect::{About, Identifier};
 pub use error::DiagnoseError;
+pub use extended::Extended;
 pub use model::KnownTimeConstant;
 pub use observations::{Observations, Stretch};
 pub use settings::{KnownEffect, Settings, Watch};

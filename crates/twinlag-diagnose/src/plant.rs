@@ -133,7 +133,7 @@ pub(crate) enum Modulation {
 }
 
 impl Modulation {
-    fn at(&self, time_s: f64) -> f64 {
+    pub(crate) fn at(&self, time_s: f64) -> f64 {
         match self {
             Self::Spline(spline) => spline.at(time_s),
             Self::Flow { exponent, of } => (exponent * of.log_ratio_at(time_s)).exp_m1(),
@@ -242,6 +242,16 @@ impl Plant {
             self.sensors.iter().map(|s| usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some())).sum();
         let (each, delay) = if is_even { (2, 2 * self.reach + 3) } else { (1, 2 * UNEVEN_REACH + 3) };
         each * (1 + factors) + if self.delay_s.is_some() { delay } else { 0 } + self.extra.len()
+    }
+
+    /// The temperatures of both sensors: readings without what calibration, lines and crosstalk make of them, °C.
+    pub(crate) fn temperatures(&self, stretch: &Stretch) -> [Vec<f64>; 2] {
+        let mut chains = [0, 1].map(|i| Chain::of(stretch, i, None));
+        self.take_off_crosstalk(&mut chains);
+        for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
+            self.correct(chain, &sensor.reading);
+        }
+        chains.map(|chain| chain.value)
     }
 
     /// `y₁ − ε (y₂ − about)`.
@@ -410,7 +420,7 @@ impl Plant {
 
 impl Radiation {
     /// `T + k (T⁴ − T_mean⁴) + loss`, T in °C, with its derivative.
-    fn add_to(&self, reading_c: f64) -> (f64, f64) {
+    pub(crate) fn add_to(&self, reading_c: f64) -> (f64, f64) {
         let t = reading_c + ZERO_CELSIUS_K;
         let (k, m) = (self.coefficient_per_k3, self.mean_k);
         let more = k * (t - m) * (t + m) * (t * t + m * m) + self.loss_k;

@@ -6,6 +6,7 @@ use crate::defects::Levels;
 use crate::dense;
 use crate::diagnosis::{ModelFit, TimeConstant, Trace};
 use crate::effect::Identifier;
+use crate::extended::Extended;
 use crate::model::{Effort, Fitted, LONGEST, Selection};
 use crate::observations::Observations;
 use crate::prepare::is_judge;
@@ -176,6 +177,7 @@ pub(crate) fn summarise(
         chi2_per_dof,
         is_weighted_by_residual: rejects,
         covariance,
+        extended: Some(Extended::new(fitted, observations)),
         trace: Trace {
             time_s: evaluation.time_s,
             residual: evaluation.residual,

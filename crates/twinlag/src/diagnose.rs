@@ -181,15 +181,31 @@ impl Diagnosis {
 /// # Errors
 /// As [`diagnose`]; an effect whose parameters are none of this version's.
 pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
-    let base = characterise(record, options)?;
-    if model.channels != record.channels {
-        return Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() });
-    }
     if model.effects.is_empty() {
-        let mut out = base;
+        check_channels(record, model)?;
+        let mut out = characterise(record, options)?;
         out.warnings.push("the model has no effects: two first-order lags".into());
         return Ok(out);
     }
+    Ok(with_model(record, model, options)?.0)
+}
+
+fn check_channels(record: &Record, model: &Model) -> Result<(), Error> {
+    if model.channels == record.channels {
+        Ok(())
+    } else {
+        Err(Error::ModelChannels { model: model.channels.clone(), record: record.channels.clone() })
+    }
+}
+
+/// The same, and the fit itself.
+pub(crate) fn with_model(
+    record: &Record,
+    model: &Model,
+    options: &Options,
+) -> Result<(Characterisation, ModelFit), Error> {
+    let base = characterise(record, options)?;
+    check_channels(record, model)?;
     let (observations, _) = observations(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let has_noise = model.effects.iter().any(|e| e.effect.is_noise());
@@ -205,7 +221,7 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
         })
         .collect();
     let known = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
-    let fit = &known.fit;
+    let fit = known.fit;
     let is_left = fit.tests.iter().any(|t| t.p_value < 1e-4);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some());
     let status = match (is_determined, is_left) {
@@ -214,7 +230,7 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
         (true, false) => Status::Ok,
     };
     let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
-    let mut out = of_fit(&base, fit, status, FreeParameters { gain: None, offset_k: None }, options);
+    let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
     out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
     if !known.fitted_again.is_empty() {
         let again: Vec<&str> = known.fitted_again.iter().map(|e| e.name()).collect();
@@ -225,7 +241,7 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
         out.warnings
             .push("gain, offset and second lags that were to be fitted are not: the model says what is fitted".into());
     }
-    Ok(out)
+    Ok((out, fit))
 }
 
 /// Told what a diagnosis is doing, how much of that is done, and of how much.
@@ -360,7 +376,7 @@ fn stretches(record: &Record, period_s: Option<f64>) -> Vec<Vec<Option<usize>>> 
 }
 
 /// What a diagnosis takes, and the row of each of its samples; `None` for those that are missing.
-fn observations(record: &Record) -> Result<(Observations, Vec<Option<usize>>), Error> {
+pub(crate) fn observations(record: &Record) -> Result<(Observations, Vec<Option<usize>>), Error> {
     let period_s = grid_s(record);
     let all = stretches(record, period_s);
     let stretches = all

@@ -1,5 +1,6 @@
 use thiserror::Error;
 use twinlag_bias::NoiseError;
+use twinlag_compensate::CompensateError;
 use twinlag_cross_relation::CostError;
 use twinlag_diagnose::DiagnoseError;
 use twinlag_optimise::ProblemError;
@@ -15,6 +16,8 @@ use twinlag_report::ReportError;
 pub enum Error {
     #[error(transparent)]
     Record(#[from] RecordError),
+    #[error(transparent)]
+    Compensate(#[from] CompensateError),
     #[error(transparent)]
     Cost(#[from] CostError),
     #[error(transparent)]

@@ -59,6 +59,7 @@
 
 mod characterisation;
 mod characterise;
+mod compensate;
 mod diagnose;
 mod error;
 pub mod estimate;
@@ -78,6 +79,7 @@ pub use characterisation::{
     SensorEstimate, Status,
 };
 pub use characterise::{characterise, characterise_watched, readings};
+pub use compensate::{AgainstReference, CompensateOptions, Compensation, Quality, compensate};
 pub use diagnose::{
     DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, NamedLimit,
     characterise_with, diagnose,
@@ -89,6 +91,7 @@ pub use question::Watch;
 pub use report::{ReportContext, report, residual_picture};
 
 pub use twinlag_bias as bias;
+pub use twinlag_compensate as compensation;
 pub use twinlag_cross_relation as cross_relation;
 pub use twinlag_diagnose as diagnosis;
 pub use twinlag_optimise as optimise;

@@ -631,6 +631,7 @@ mod tests {
             chi2_per_dof: f64::NAN,
             is_weighted_by_residual: false,
             covariance: None,
+            extended: None,
             trace: Trace::default(),
         };
         let pair = BeforeAfter { before: f64::NAN, after: f64::INFINITY };

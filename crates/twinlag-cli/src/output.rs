@@ -1,0 +1,44 @@
+//! Files that are written: checked before the work, never over something else unless asked.
+
+use std::path::{Path, PathBuf};
+
+use crate::failure::Failure;
+
+/// A file to be written, and the option that names it.
+pub(crate) type Output<'a> = (&'static str, &'a Path);
+
+/// What would fail after minutes of work, or lose something, is refused before.
+pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Result<(), Failure> {
+    let usage = |text: String| Err(Failure::Usage(text));
+    let mut seen: Vec<(&str, PathBuf)> = Vec::new();
+    for (option, path) in outputs {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder.canonicalize().map_err(|e| cannot_be_written(path, &e))?;
+        let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
+            return usage(format!("{} is a folder: name a file in it", path.display()));
+        };
+        if path.as_os_str() == "-" {
+            return usage(format!("standard output is for the answer: name a file for {option}"));
+        }
+        let whole = folder.join(name);
+        if record.canonicalize().is_ok_and(|record| whole.canonicalize().is_ok_and(|out| out == record)) {
+            return usage(format!("{} is the record itself: choose another name", path.display()));
+        }
+        if let Some((other, _)) = seen.iter().find(|s| s.1 == whole) {
+            return usage(format!("{other} and {option} name the same file: each needs one of its own"));
+        }
+        seen.push((option, whole));
+        if path.exists() && !force {
+            return usage(format!("{} exists: choose another name, or add --force", path.display()));
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
+}
+
+fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
+    Failure::Other(format!("{}: cannot be written: {error}", path.display()))
+}

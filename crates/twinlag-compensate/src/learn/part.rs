@@ -1,0 +1,127 @@
+//! What a prior is learned in: single terms, and combs of lines that share a frequency.
+
+use twinlag_optimise::Variable;
+
+use crate::prior::Term;
+
+/// Bounds of a quality, and of frequencies in units of `1/T` and of `1/Ts`.
+const QUALITY: [f64; 2] = [0.02, 1e4];
+const SLOWEST: f64 = 0.02;
+const FASTEST: f64 = 0.5;
+/// Narrowest and widest first line of a comb, in units of `1/T` and of its frequency.
+const NARROWEST: f64 = 0.01;
+const WIDEST: f64 = 0.2;
+
+/// A part of the swing that is none.
+const NOTHING: f64 = 1e-5;
+
+/// What bounds are made from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limits {
+    pub(super) swing_k: f64,
+    pub(super) span_s: f64,
+    pub(super) period_s: f64,
+}
+
+/// One part of the gas's motion.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Part {
+    Single(Term),
+    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first.
+    Comb {
+        frequency_hz: f64,
+        /// Half width of the first line.
+        width_hz: f64,
+        std_k: Vec<f64>,
+    },
+}
+
+impl Part {
+    pub(super) fn terms(&self) -> Vec<Term> {
+        match self {
+            Self::Single(term) => vec![*term],
+            Self::Comb { frequency_hz, width_hz, std_k } => (1..)
+                .zip(std_k)
+                .map(|(m, std_k)| {
+                    let m = f64::from(m);
+                    let quality = (0.5 * frequency_hz / (width_hz * m)).max(0.5);
+                    Term::Resonance { std_k: *std_k, frequency_hz: m * frequency_hz, quality }
+                })
+                .collect(),
+        }
+    }
+
+    /// Whether it has shrunk to less than anything that matters.
+    pub(super) fn is_nothing(&self, limits: &Limits) -> bool {
+        self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
+    }
+
+    /// Whether it has a frequency of its own.
+    pub(super) fn is_line(&self) -> bool {
+        match self {
+            Self::Single(Term::Resonance { quality, .. }) => *quality > 1.0,
+            Self::Single(Term::Rough { .. }) => false,
+            Self::Comb { .. } => true,
+        }
+    }
+
+    /// The numbers that are fitted.
+    pub(super) fn values(&self) -> Vec<f64> {
+        match self {
+            Self::Single(Term::Rough { std_k, corner_hz }) => vec![*std_k, *corner_hz],
+            Self::Single(Term::Resonance { std_k, frequency_hz, quality }) => vec![*std_k, *frequency_hz, *quality],
+            Self::Comb { frequency_hz, width_hz, std_k } => {
+                std_k.iter().copied().chain([*frequency_hz, *width_hz]).collect()
+            }
+        }
+    }
+
+    /// The term of which number `a` is the standard deviation.
+    pub(super) fn size_of(&self, a: usize) -> Option<usize> {
+        let sizes = match self {
+            Self::Single(_) => 1,
+            Self::Comb { std_k, .. } => std_k.len(),
+        };
+        (a < sizes).then_some(a)
+    }
+
+    pub(super) fn variables(&self, limits: &Limits) -> Vec<Variable> {
+        let Limits { swing_k, span_s, period_s } = *limits;
+        let std = || Variable::logarithmic("std", 1e-7 * swing_k, 1e3 * swing_k);
+        let frequency = || Variable::logarithmic("frequency", SLOWEST / span_s, FASTEST / period_s);
+        match self {
+            Self::Single(Term::Rough { .. }) => vec![std(), frequency()],
+            Self::Single(Term::Resonance { .. }) => {
+                vec![std(), frequency(), Variable::logarithmic("quality", QUALITY[0], QUALITY[1])]
+            }
+            Self::Comb { frequency_hz, std_k, .. } => {
+                let widest = (WIDEST * frequency_hz).max(2.0 * NARROWEST / span_s);
+                let width = Variable::logarithmic("width", NARROWEST / span_s, widest);
+                // Another frequency than one nearby would be another comb.
+                let near = Variable::logarithmic("frequency", frequency_hz / 1.1, frequency_hz * 1.1);
+                std_k.iter().map(|_| std()).chain([near, width]).collect()
+            }
+        }
+    }
+}
+
+/// Parts of the same kinds with other numbers.
+pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
+    let mut rest = x;
+    like.iter()
+        .map(|part| {
+            let (own, others) = rest.split_at(part.values().len());
+            rest = others;
+            match part {
+                Part::Single(Term::Rough { .. }) => Part::Single(Term::Rough { std_k: own[0], corner_hz: own[1] }),
+                Part::Single(Term::Resonance { .. }) => {
+                    Part::Single(Term::Resonance { std_k: own[0], frequency_hz: own[1], quality: own[2] })
+                }
+                Part::Comb { std_k, .. } => {
+                    let (std_k, shared) = own.split_at(std_k.len());
+                    Part::Comb { frequency_hz: shared[0], width_hz: shared[1], std_k: std_k.to_vec() }
+                }
+            }
+        })
+        .collect()
+}

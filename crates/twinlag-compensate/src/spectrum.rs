@@ -1,0 +1,124 @@
+//! The power of the gas as both readings together show it, and what a gas of known spectrum would show.
+
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use realfft::{RealFftPlanner, RealToComplex};
+
+use crate::prior::Term;
+use crate::readings::Readings;
+use crate::rig::Rig;
+
+/// A tapered periodogram of the gas, with what noise adds to it.
+pub(crate) struct Periodogram {
+    pub(crate) period_s: f64,
+    pub(crate) samples: usize,
+    /// The bins' frequencies, from the second on: the first is the level.
+    pub(crate) frequency_hz: Vec<f64>,
+    /// Two-sided, K²/Hz.
+    pub(crate) power: Vec<f64>,
+    pub(crate) noise: Vec<f64>,
+    /// Autocorrelation of the taper.
+    taper: Vec<f64>,
+    /// The transform of twice the length.
+    plan: Arc<dyn RealToComplex<f64>>,
+}
+
+/// Hann's taper, of unit energy.
+fn taper(n: usize) -> Vec<f64> {
+    let raw: Vec<f64> = (0..n).map(|k| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2)).collect();
+    let energy = raw.iter().map(|w| w * w).sum::<f64>().sqrt();
+    raw.iter().map(|w| w / energy).collect()
+}
+
+impl Periodogram {
+    /// Of `readings` about `level_c`, on an even grid with straight lines over what is missing.
+    ///
+    /// The inferred gas is `Σ H_i* Y_i/N_i` over `Σ |H_i|²/N_i`, which has the least noise of all that are true to the gas.
+    pub(crate) fn of(readings: &Readings, rig: &Rig, level_c: f64) -> Self {
+        let period_s = readings.period_s();
+        let first_s = readings.time_s()[0];
+        let span_s = readings.time_s()[readings.len() - 1] - first_s;
+        let samples = (span_s / period_s).round() as usize + 1;
+        let window = taper(samples);
+        let mut planner = RealFftPlanner::<f64>::new();
+        let plan = planner.plan_fft_forward(samples);
+        let spectra = [0, 1].map(|i| {
+            let mut even = on_grid(readings, i, first_s, period_s, samples);
+            even.iter_mut().zip(&window).for_each(|(y, w)| *y = (*y - level_c) * w);
+            let mut out = plan.make_output_vec();
+            plan.process(&mut even, &mut out).expect("lengths agree");
+            out
+        });
+        let bins = 1..samples.div_ceil(2);
+        let frequency_hz: Vec<f64> = bins.clone().map(|j| j as f64 / (samples as f64 * period_s)).collect();
+        let power = bins.zip(&frequency_hz).map(|(j, &hz)| {
+            let (mut sum, mut information) = (Complex64::default(), 0.0);
+            for (sensor, spectrum) in rig.sensors.iter().zip(&spectra) {
+                let weight = sensor.response(hz).conj() / sensor.noise_density_k2_per_hz(hz, period_s);
+                sum += weight * spectrum[j];
+                information += (weight * sensor.response(hz)).re;
+            }
+            (sum / information).norm_sqr() * period_s
+        });
+        let power = power.collect();
+        let noise = frequency_hz.iter().map(|&hz| rig.noise_density_k2_per_hz(hz, period_s)).collect();
+        let taper = autocorrelation(&window);
+        let plan = planner.plan_fft_forward(2 * samples);
+        Self { period_s, samples, frequency_hz, power, noise, taper, plan }
+    }
+
+    /// What the periodogram of a gas with these terms is expected to be: `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's
+    /// autocorrelation, which is exact for a record of any length (Sykulski et al. 2019).
+    pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
+        let n = self.samples;
+        let plan = &self.plan;
+        let mut input = plan.make_input_vec();
+        for m in 0..n {
+            let lag_s = m as f64 * self.period_s;
+            let value = terms.iter().map(|t| t.autocovariance_k2(lag_s)).sum::<f64>() * self.taper[m];
+            input[m] = value;
+            if m > 0 {
+                input[2 * n - m] = value;
+            }
+        }
+        let mut out = plan.make_output_vec();
+        plan.process(&mut input, &mut out).expect("lengths agree");
+        (1..=self.frequency_hz.len()).map(|j| (out[2 * j].re * self.period_s).max(0.0)).collect()
+    }
+}
+
+fn autocorrelation(window: &[f64]) -> Vec<f64> {
+    let n = window.len();
+    let mut planner = RealFftPlanner::<f64>::new();
+    let (forward, inverse) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));
+    let mut padded = window.to_vec();
+    padded.resize(2 * n, 0.0);
+    let mut spectrum = forward.make_output_vec();
+    forward.process(&mut padded, &mut spectrum).expect("lengths agree");
+    spectrum.iter_mut().for_each(|s| *s = Complex64::new(s.norm_sqr() / (2 * n) as f64, 0.0));
+    let mut out = inverse.make_output_vec();
+    inverse.process(&mut spectrum, &mut out).expect("lengths agree");
+    out.truncate(n);
+    out
+}
+
+fn on_grid(readings: &Readings, channel: usize, first_s: f64, period_s: f64, samples: usize) -> Vec<f64> {
+    let known: Vec<(f64, f64)> = (0..readings.len())
+        .filter_map(|k| Some(((readings.time_s()[k] - first_s) / period_s, readings.reading_c(channel, k)?)))
+        .collect();
+    let mut next = 0;
+    (0..samples)
+        .map(|j| {
+            let at = j as f64;
+            while next < known.len() && known[next].0 < at {
+                next += 1;
+            }
+            match (next.checked_sub(1).and_then(|k| known.get(k)), known.get(next)) {
+                (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (at - a.0) / (b.0 - a.0),
+                (Some(only), None) | (None, Some(only)) => only.1,
+                (None, None) => 0.0,
+            }
+        })
+        .collect()
+}

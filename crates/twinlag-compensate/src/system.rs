@@ -1,0 +1,221 @@
+//! Gas and sensors as one linear system `dz/dt = A z + noise`, and what it does over a step of time.
+//!
+//! The state is that of the gas's terms, then of each sensor (its body, a second lag, a slow path), then of noise that is not
+//! white, then a constant one that carries losses; what is left of `D` rests at zero.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::prior::{Prior, Term};
+use crate::rig::{Between, Coloured, Local, Rig};
+
+/// Terms of the exponential's series: with `‖A h‖ ≤ 1/8` the next is below `8⁻¹¹/11!`.
+const SERIES: usize = 10;
+const LONGEST: f64 = 0.125;
+
+/// Where each part of the state is.
+#[derive(Clone, Copy, Debug, Default)]
+struct Layout {
+    gas: usize,
+    body: [usize; 2],
+    second: [Option<usize>; 2],
+    slow: [Option<usize>; 2],
+    coloured: [Option<usize>; 2],
+    mismatch: Option<usize>,
+    one: usize,
+}
+
+/// The system with a state of dimension `D`.
+#[derive(Clone, Debug)]
+pub(crate) struct System<const D: usize> {
+    layout: Layout,
+    rig: Rig,
+    /// Rates without those of the sensors, which may change.
+    rates: SMatrix<f64, D, D>,
+    /// Intensity of the driving noise.
+    drive: SMatrix<f64, D, D>,
+    /// The gas about its level.
+    pub(crate) gas: SVector<f64, D>,
+    /// What each channel reads.
+    pub(crate) reads: [SVector<f64, D>; 2],
+    /// Covariance of the state before the first reading.
+    pub(crate) before: SMatrix<f64, D, D>,
+}
+
+/// What a step of time does: `z → Φ z`, and the covariance that it adds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Step<const D: usize> {
+    pub(crate) transition: SMatrix<f64, D, D>,
+    pub(crate) added: SMatrix<f64, D, D>,
+}
+
+/// Numbers that the state needs.
+pub(crate) fn states(rig: &Rig, prior: &Prior) -> usize {
+    let sensor = |i: usize| {
+        let s = &rig.sensors[i];
+        1 + usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some()) + usize::from(s.coloured.is_some())
+    };
+    prior.terms.iter().map(Term::states).sum::<usize>()
+        + sensor(0)
+        + sensor(1)
+        + usize::from(rig.mismatch.is_some())
+        + 1
+}
+
+impl<const D: usize> System<D> {
+    pub(crate) fn new(rig: &Rig, prior: &Prior) -> Self {
+        let mut next = 0;
+        let mut take = |count: usize| {
+            next += count;
+            next - count
+        };
+        let mut rates = SMatrix::<f64, D, D>::zeros();
+        let mut drive = SMatrix::<f64, D, D>::zeros();
+        let mut before = SMatrix::<f64, D, D>::zeros();
+        let mut gas = SVector::<f64, D>::zeros();
+        for term in &prior.terms {
+            let at = take(term.states());
+            gas[at] = 1.0;
+            match *term {
+                Term::Rough { std_k, corner_hz } => {
+                    let rate = core::f64::consts::TAU * corner_hz;
+                    rates[(at, at)] = -rate;
+                    drive[(at, at)] = 2.0 * rate * std_k * std_k;
+                    before[(at, at)] = std_k * std_k;
+                }
+                Term::Resonance { std_k, frequency_hz, quality } => {
+                    let rate = core::f64::consts::TAU * frequency_hz;
+                    rates[(at, at + 1)] = rate;
+                    rates[(at + 1, at)] = -rate;
+                    rates[(at + 1, at + 1)] = -rate / quality;
+                    drive[(at + 1, at + 1)] = 2.0 * rate / quality * std_k * std_k;
+                    before[(at, at)] = std_k * std_k;
+                    before[(at + 1, at + 1)] = std_k * std_k;
+                }
+            }
+        }
+        let mut layout = Layout { gas: take(0), ..Layout::default() };
+        let mut reads = [SVector::<f64, D>::zeros(); 2];
+        let swing = gas.dot(&(before * gas));
+        for (i, sensor) in rig.sensors.iter().enumerate() {
+            layout.body[i] = take(1);
+            let mut direct = layout.body[i];
+            if let Some(tau_s) = sensor.second_tau_s {
+                let at = take(1);
+                rates[(at, direct)] = 1.0 / tau_s;
+                rates[(at, at)] = -1.0 / tau_s;
+                layout.second[i] = Some(at);
+                direct = at;
+            }
+            reads[i][direct] = 1.0;
+            if let Some(slow) = sensor.slow {
+                let at = take(1);
+                rates[(at, direct)] = 1.0 / slow.tau_s;
+                rates[(at, at)] = -1.0 / slow.tau_s;
+                reads[i][direct] -= slow.share;
+                reads[i][at] = slow.share;
+                layout.slow[i] = Some(at);
+            }
+            let mut noise = |coloured: Coloured| {
+                let at = take(1);
+                rates[(at, at)] = -1.0 / coloured.correlation_s;
+                drive[(at, at)] = 2.0 * coloured.std_k * coloured.std_k / coloured.correlation_s;
+                before[(at, at)] = coloured.std_k * coloured.std_k;
+                at
+            };
+            layout.coloured[i] = sensor.coloured.map(&mut noise);
+            if let Some(at) = layout.coloured[i] {
+                reads[i][at] = 1.0;
+            }
+            if i == 1 {
+                layout.mismatch = rig.mismatch.map(&mut noise);
+            }
+        }
+        layout.one = take(1);
+        before[(layout.one, layout.one)] = 0.0;
+        // Where each body was before the first reading nobody knows: as far from the level as the gas goes, twice.
+        for i in 0..2 {
+            for at in [Some(layout.body[i]), layout.second[i], layout.slow[i]].into_iter().flatten() {
+                before[(at, at)] = 4.0 * swing;
+            }
+        }
+        Self { layout, rig: *rig, rates, drive, gas, reads, before }
+    }
+
+    /// The state before the first reading.
+    pub(crate) fn start(&self) -> SVector<f64, D> {
+        let mut state = SVector::zeros();
+        state[self.layout.one] = 1.0;
+        state
+    }
+
+    /// What happens in `step_s`, with each sensor as it is then. `reading_k` is what each reads about the level, where losses are known.
+    pub(crate) fn step(&self, step_s: f64, locals: Option<[(Local, f64); 2]>) -> Step<D> {
+        let mut rates = self.rates;
+        for i in 0..2 {
+            let (local, reading_k) =
+                locals.map_or((Local { tau_factor: 1.0, loss_k: 0.0, loss_slope: 0.0 }, 0.0), |l| l[i]);
+            let rate = 1.0 / (self.rig.sensors[i].tau_s * local.tau_factor);
+            let body = self.layout.body[i];
+            for at in 0..self.layout.gas {
+                rates[(body, at)] = rate * self.gas[at];
+            }
+            if let Some(at) = self.layout.mismatch {
+                rates[(body, at)] = if i == 0 { -0.5 * rate } else { 0.5 * rate };
+            }
+            rates[(body, body)] = -rate * (1.0 + local.loss_slope);
+            rates[(body, self.layout.one)] = -rate * (local.loss_k - local.loss_slope * reading_k);
+        }
+        match self.rig.between {
+            Between::Continuous => exponential(&rates, &self.drive, step_s),
+            Between::Held => {
+                let gas = self.layout.gas;
+                let moves = exponential(&self.rates, &self.drive, step_s);
+                for row in 0..gas {
+                    rates.row_mut(row).fill(0.0);
+                }
+                let mut drive = self.drive;
+                drive.view_mut((0, 0), (gas, D)).fill(0.0);
+                drive.view_mut((0, 0), (D, gas)).fill(0.0);
+                let mut step = exponential(&rates, &drive, step_s);
+                for row in 0..gas {
+                    for column in 0..gas {
+                        step.transition[(row, column)] = moves.transition[(row, column)];
+                        step.added[(row, column)] = moves.added[(row, column)];
+                    }
+                }
+                step
+            }
+        }
+    }
+}
+
+/// `Φ = exp(A t)` and `∫₀ᵗ exp(A u) Q exp(Aᵀ u) du`: their series over a part of the step, doubled until it is whole, so that
+/// nothing cancels.
+fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, D, D>, step_s: f64) -> Step<D> {
+    let size = (0..D).map(|row| rates.row(row).iter().map(|r| r.abs()).sum::<f64>()).fold(0.0, f64::max) * step_s;
+    let mut doublings = 0;
+    let mut part_s = step_s;
+    let mut left = size;
+    while left > LONGEST {
+        left *= 0.5;
+        part_s *= 0.5;
+        doublings += 1;
+    }
+    let scaled = rates * part_s;
+    let mut power = SMatrix::<f64, D, D>::identity();
+    let mut transition = power;
+    let mut driven = drive * part_s;
+    let mut added = driven;
+    for k in 1..=SERIES {
+        power = power * scaled / k as f64;
+        transition += power;
+        let half = scaled * driven;
+        driven = (half + half.transpose()) / (k + 1) as f64;
+        added += driven;
+    }
+    for _ in 0..doublings {
+        added += transition * added * transition.transpose();
+        transition = transition * transition;
+    }
+    Step { transition, added }
+}

@@ -1,0 +1,264 @@
+//! The gas temperature of a record: schema `twinlag.compensation/1`.
+
+use serde::{Deserialize, Serialize};
+use twinlag_compensate::{Form, Gas, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
+use twinlag_diagnose::{Extended, ModelFit, Verdict};
+use twinlag_record::Record;
+
+use crate::characterisation::{Characterisation, Status};
+use crate::diagnose::{DiagnoseOptions, DiagnoseWatch, Model, NamedEffect, diagnose, observations, with_model};
+use crate::error::Error;
+
+/// Standard deviations within which 95 % of a normal distribution lie.
+const Z_95: f64 = 1.959_963_984_540_054;
+/// Standard errors by which innovations may be larger than expected before bands are widened.
+const CLEARLY: f64 = 4.0;
+
+/// What a compensation may assume.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CompensateOptions {
+    /// How the model is found, where none is given.
+    pub diagnose: DiagnoseOptions,
+    /// A model that was found in another record: its effects stay as they are.
+    pub model: Option<Model>,
+    /// Which readings the gas temperature at an instant may rest on.
+    pub form: Form,
+}
+
+/// How good the gas temperature is, held against a trusted one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AgainstReference {
+    /// Root mean square error, K.
+    #[serde(rename = "rmse_K")]
+    pub rmse_k: f64,
+    /// The same of the faster sensor as it reads, K.
+    #[serde(rename = "raw_rmse_K")]
+    pub raw_rmse_k: f64,
+    /// Share of the instants at which the reference lies within the 95 % band.
+    pub inside_95: f64,
+}
+
+/// How good a gas temperature is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Median of its standard deviation, K.
+    #[serde(rename = "median_std_K")]
+    pub median_std_k: f64,
+    /// Root mean square of the part of it that is due to the model's parameters, K.
+    #[serde(rename = "parameter_std_K")]
+    pub parameter_std_k: f64,
+    /// Highest frequency of which the readings say more than the prior, Hz: above it the answer is what the gas is like, not what it
+    /// did. `None` where there is none.
+    #[serde(rename = "bandwidth_Hz")]
+    pub bandwidth_hz: Option<f64>,
+    /// Mean square of readings less what earlier ones led to expect, over its variance: 1 where model and prior are right.
+    pub innovation_energy: f64,
+    /// What the bands were multiplied by, since that is too large.
+    pub widened_by: f64,
+    /// What the gas is like, as the readings say.
+    pub prior: Prior,
+    /// Held against the reference, where there is one.
+    pub reference: Option<AgainstReference>,
+}
+
+/// The gas temperature of a record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Compensation {
+    /// `twinlag.compensation/1`.
+    pub schema: String,
+    /// `ok`, or `not-identifiable` where the record does not determine the time constants: there is no gas temperature then.
+    pub status: Status,
+    /// Which readings the answer for an instant rests on.
+    pub form: Form,
+    /// How good it is; `None` where there is none.
+    pub gas: Option<Quality>,
+    /// Instants, s: those of the record, and those that are missing in an even grid. The series are not part of the JSON.
+    #[serde(skip)]
+    pub time_s: Vec<f64>,
+    /// The gas temperature, °C.
+    #[serde(skip)]
+    pub gas_c: Vec<f64>,
+    /// Its standard deviation, K: noise, prior and the uncertainty of the model's parameters.
+    #[serde(skip)]
+    pub gas_std_k: Vec<f64>,
+    /// What the diagnosis said, where there was one.
+    pub verdict: Option<Verdict>,
+    /// The effects in the model.
+    pub effects: Vec<NamedEffect>,
+    /// The model.
+    #[serde(rename = "final")]
+    pub last: Characterisation,
+    /// What to know before using the numbers.
+    pub warnings: Vec<String>,
+    /// The rig, for pictures.
+    #[serde(skip)]
+    pub rig: Option<Rig>,
+}
+
+impl Compensation {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.compensation/1";
+}
+
+/// The gas temperature of `record` with its standard deviation: by the model that a diagnosis finds, or by the one given.
+///
+/// # Errors
+/// As [`diagnose`] and [`crate::characterise_with`].
+pub fn compensate(
+    record: &Record,
+    options: &CompensateOptions,
+    watch: DiagnoseWatch<'_>,
+) -> Result<Compensation, Error> {
+    let mut warnings = Vec::new();
+    let (last, fit, verdict, effects) = match &options.model {
+        Some(model) => {
+            let (last, fit) = with_model(record, model, &options.diagnose.characterise)?;
+            warnings.extend(last.warnings.iter().cloned());
+            (last, fit, None, Vec::new())
+        }
+        None => {
+            let answer = diagnose(record, &options.diagnose, watch)?;
+            warnings.extend(answer.remarks.iter().cloned());
+            let fit = answer.core.expect("it was made just now").last;
+            (answer.last, fit, Some(answer.verdict), answer.effects)
+        }
+    };
+    let mut out = Compensation {
+        schema: Compensation::SCHEMA.into(),
+        status: Status::NotIdentifiable,
+        form: options.form,
+        gas: None,
+        time_s: Vec::new(),
+        gas_c: Vec::new(),
+        gas_std_k: Vec::new(),
+        verdict,
+        effects,
+        last,
+        warnings,
+        rig: None,
+    };
+    if fit.time_constants.iter().any(|t| t.value_s.is_none()) || verdict == Some(Verdict::Refused) {
+        out.warnings.push(
+            "the record does not determine both time constants, so it has no gas temperature: say what is known of one (--known \
+             T1.time_constant_s=VALUE), or take a model from another record (--model)"
+                .into(),
+        );
+        return Ok(out);
+    }
+    if matches!(verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained)) {
+        out.warnings.push(
+            "the model does not explain the record: the bands are those of noise and parameters, and of no error of the model"
+                .into(),
+        );
+    }
+    let extended = fit.extended.as_ref().expect("a fit of a record");
+    let found = Found::of(extended, &fit, options.form, watch)?;
+    if found.widened_by > 1.0 {
+        out.warnings.push(format!(
+            "readings differ from what the others led to expect by {:.2} times what noise explains: the bands are as much wider",
+            found.widened_by
+        ));
+    }
+    out.warnings.push(
+        "what both sensors share (a gain, an offset, a delay, a second lag) is in the gas temperature, and no band knows of it"
+            .into(),
+    );
+    let mut sorted = found.std_k.clone();
+    sorted.sort_by(f64::total_cmp);
+    out.status = Status::Ok;
+    out.gas = Some(Quality {
+        median_std_k: sorted.get(sorted.len() / 2).copied().unwrap_or(0.0),
+        parameter_std_k: found.parameter_std_k,
+        bandwidth_hz: bandwidth_hz(&found.rig, &found.prior, out.last.record.sample_period_s),
+        innovation_energy: found.gas.innovation_energy,
+        widened_by: found.widened_by,
+        reference: against(record, &found),
+        prior: found.prior,
+    });
+    out.time_s = found.readings.time_s().to_vec();
+    (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.std_k, Some(found.rig));
+    Ok(out)
+}
+
+/// The gas with everything that its bands rest on.
+struct Found {
+    readings: Readings,
+    rig: Rig,
+    prior: Prior,
+    gas: Gas,
+    std_k: Vec<f64>,
+    parameter_std_k: f64,
+    widened_by: f64,
+}
+
+impl Found {
+    /// The gas temperature, and how much it moves with each standard error of the parameters: a column of the covariance's
+    /// Cholesky factor at a time, so that what goes together moves together (JCGM 100, 5.2).
+    fn of(extended: &Extended, fit: &ModelFit, form: Form, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
+        let theta = extended.parameters();
+        let (readings, rig) = extended.rig(theta)?;
+        let prior = learn(&readings, &rig)?;
+        let gas = reconstruct(&readings, &rig, &prior, form)?;
+        let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
+        let mut variance = vec![0.0; gas.gas_c.len()];
+        for (done, column) in columns.iter().enumerate() {
+            watch("how the parameters move the gas temperature", done, columns.len());
+            let moved: Vec<f64> = theta.iter().zip(column).map(|(t, d)| t + d).collect();
+            let Ok((readings, rig)) = extended.rig(&moved) else { continue };
+            let other = reconstruct(&readings, &rig, &prior, form)?;
+            for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
+                *v += (a - b) * (a - b);
+            }
+        }
+        let excess = gas.innovation_energy - 1.0 > CLEARLY * (2.0 / gas.innovations as f64).sqrt();
+        let widened_by = if excess { gas.innovation_energy.sqrt() } else { 1.0 };
+        let parameter_std_k = (variance.iter().sum::<f64>() / variance.len().max(1) as f64).sqrt();
+        let std_k = gas.std_k.iter().zip(&variance).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
+        Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
+    }
+}
+
+/// Columns of the Cholesky factor of `covariance`; what is held has none.
+fn columns(covariance: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = covariance.len();
+    let mut left: Vec<Vec<f64>> = covariance.to_vec();
+    let mut out = Vec::new();
+    for j in 0..n {
+        let pivot = left[j][j];
+        if !pivot.is_finite() || pivot <= 1e-12 * covariance[j][j].abs() {
+            continue;
+        }
+        let column: Vec<f64> = (0..n).map(|i| left[i][j] / pivot.sqrt()).collect();
+        for a in 0..n {
+            for b in 0..n {
+                left[a][b] -= column[a] * column[b];
+            }
+        }
+        out.push(column);
+    }
+    out
+}
+
+fn against(record: &Record, found: &Found) -> Option<AgainstReference> {
+    let reference = record.reference_c.as_ref()?;
+    let (_, rows) = observations(record).ok()?;
+    let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
+    let raw = [&record.t1_c, &record.t2_c][faster];
+    let (mut squares, mut raw_squares, mut inside, mut count) = (0.0, 0.0, 0.0, 0.0_f64);
+    for (k, row) in rows.iter().enumerate() {
+        let Some(row) = *row else { continue };
+        if !reference[row].is_finite() || !raw[row].is_finite() {
+            continue;
+        }
+        let error = found.gas.gas_c[k] - reference[row];
+        squares += error * error;
+        raw_squares += (raw[row] - reference[row]).powi(2);
+        inside += f64::from(u8::from(error.abs() <= Z_95 * found.std_k[k]));
+        count += 1.0;
+    }
+    (count > 0.0).then(|| AgainstReference {
+        rmse_k: (squares / count).sqrt(),
+        raw_rmse_k: (raw_squares / count).sqrt(),
+        inside_95: inside / count,
+    })
+}
