@@ -3,6 +3,7 @@
 use std::io::{Read, stdin};
 use std::path::Path;
 
+use twinlag::diagnosis::DiagnoseError;
 use twinlag::record::{Record, Selection, Table};
 use twinlag::{Characterisation, Model, Options, Status};
 
@@ -19,7 +20,11 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
         Some(path) => {
             let _progress = Progress::start(talk, format!("characterising {} samples", record.len()));
             twinlag::characterise_with(&record, &model(path)?, &options).map_err(|e| match e {
-                twinlag::Error::ModelChannels { .. } => Failure::File(format!("{}: {e}", path.display())),
+                twinlag::Error::ModelChannels { .. }
+                | twinlag::Error::ModelNumber { .. }
+                | twinlag::Error::Diagnose(
+                    DiagnoseError::Model { .. } | DiagnoseError::Parameter { .. } | DiagnoseError::Absurd,
+                ) => Failure::File(format!("{}: {e}", path.display())),
                 e => e.into(),
             })?
         }

@@ -14,6 +14,8 @@ const COARSE: f64 = 0.5;
 const FEWEST_AT_END: usize = 8;
 /// How much farther than others a reading must stick out of its neighbours that the residual hardly shows.
 const PLAIN: f64 = 1.7;
+/// Bins beside a line that it is held against: beyond the window's main lobe.
+const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
 /// More of the readings than this are no single ones.
 const MOST_SPIKES: f64 = 0.05;
 
@@ -198,6 +200,31 @@ pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[u
         }
         first += stretch.len();
     }
+}
+
+/// The channel in whose own readings the line at `hz` sticks out most of what is beside it: pick-up comes after the lag, and the other
+/// channel does not show it.
+pub(crate) fn line_channel(observations: &Observations, hz: f64) -> usize {
+    let Some(stretch) = observations.stretches.iter().max_by_key(|s| s.len()) else { return 0 };
+    let span_s = stretch.len() as f64 * observations.step_s();
+    let sticks_out = |i: usize| {
+        let power = |hz: f64| tone_power(&stretch.time_s, &stretch.reading_c[i], hz);
+        let beside = BESIDE.map(|bins| power((hz + bins / span_s).abs())).iter().sum::<f64>() / BESIDE.len() as f64;
+        power(hz) / beside.max(f64::MIN_POSITIVE)
+    };
+    usize::from(sticks_out(1) > sticks_out(0))
+}
+
+/// Power of `values` at `hz` under Hann's window.
+fn tone_power(time_s: &[f64], values: &[f64], hz: f64) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let sum = time_s.iter().zip(values).enumerate().fold((0.0, 0.0), |(c, s), (k, (t, y))| {
+        let window = (std::f64::consts::PI * (k as f64 + 0.5) / n).sin().powi(2);
+        let (sine, cosine) = (std::f64::consts::TAU * hz * (t - time_s[0])).sin_cos();
+        (c + window * (y - mean) * cosine, s + window * (y - mean) * sine)
+    });
+    sum.0 * sum.0 + sum.1 * sum.1
 }
 
 /// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.

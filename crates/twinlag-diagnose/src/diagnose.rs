@@ -1,7 +1,9 @@
 //! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by what has seen none of it.
 
+use twinlag_optimise::Scale;
+
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, KnownFit, Limit, ModelFit, Verdict};
-use crate::effect::{Identifier, Shared, candidates};
+use crate::effect::{Identifier, Parameter, Shared, candidates};
 use crate::error::DiagnoseError;
 use crate::excitation::tones;
 use crate::model::{Effort, Fitted, Model};
@@ -339,7 +341,7 @@ pub fn fit_with(
             continue;
         }
         let value = |name: &str| known.parameters.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
-        prepared.context.lines_hz = value("frequency").into_iter().collect();
+        prepared.context.lines = value("frequency").into_iter().flat_map(|hz| [(hz, 0), (hz, 1)]).collect();
         // Numbers are about the temperatures of the record that they were found in.
         let [mean_c, variance_k2, skew_k] = own.moments;
         prepared.context.moments = [
@@ -362,6 +364,9 @@ pub fn fit_with(
         // Of those whose parameters are all given the one with the most of them.
         let effect = all.into_iter().chain(sizes).filter(fits).max_by_key(|e| e.parameters().len());
         let effect = effect.ok_or_else(|| DiagnoseError::Model { effect: known.effect.name() })?;
+        for parameter in effect.parameters() {
+            check(known.effect, parameter, value(parameter.name).unwrap_or(f64::NAN))?;
+        }
         if effect.is_of_the_record() {
             rest.extend(effect.starts().into_iter().next().unwrap_or_default());
             fitted_again.push(known.effect);
@@ -376,10 +381,40 @@ pub fn fit_with(
         search.over_grid(model, &rest, 3)
     };
     let mut fitted = fit(&prepared, &model);
-    if settings.effects.contains(&Identifier::Spikes) && prepared.mask_spikes(&fitted) {
+    let has_spikes = settings.effects.contains(&Identifier::Spikes) && prepared.mask_spikes(&fitted);
+    let has_line = model.effects.iter().any(|e| e.identifier() == Identifier::MainsPickup);
+    if has_spikes || has_line || !prepared.found.is_empty() {
         prepared.find_levels(&fitted, settings);
-        fitted = fit(&prepared, &model.with_noise(prepared.levels.std_k));
+        fitted = fit(&prepared, &model.clone().with_noise(prepared.levels.std_k));
+    }
+    if settings.noise_std_k.is_none()
+        && model.noise().is_none()
+        && prepared.is_clearly_less(fitted.mean_energy(), fitted.count)
+    {
+        prepared.scale_levels(fitted.mean_energy().sqrt(), settings);
+        fitted = prepared.refit(&fitted);
+    }
+    if !fitted.chi2.is_finite() {
+        return Err(DiagnoseError::Absurd);
     }
     let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels);
     Ok(KnownFit { fit, fitted_again })
+}
+
+/// A parameter of a model that comes from outside must be one that its kind can have.
+fn check(effect: Identifier, parameter: &Parameter, got: f64) -> Result<(), DiagnoseError> {
+    let is_positive = matches!(parameter.variable.scale, Scale::Logarithmic);
+    let expected = match (is_positive, parameter.name) {
+        (true, _) if got.is_finite() && got > 0.0 => return Ok(()),
+        (true, _) => "a finite number above 0",
+        (false, "gain") if got.is_finite() && got != 0.0 => return Ok(()),
+        (false, "gain") => "a finite number that is not 0",
+        (false, "share") if got.abs() < 1.0 => return Ok(()),
+        (false, "share") => "a share between -1 and 1",
+        (false, "frequency") if got.is_finite() && got >= 0.0 => return Ok(()),
+        (false, "frequency") => "a frequency of 0 or more",
+        _ if got.is_finite() => return Ok(()),
+        _ => "a finite number",
+    };
+    Err(DiagnoseError::Parameter { effect: effect.name(), name: parameter.name, got, expected })
 }

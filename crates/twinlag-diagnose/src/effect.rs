@@ -245,8 +245,8 @@ pub(crate) struct Context {
     pub(crate) tau_s: [f64; 2],
     /// Flow, where it was measured.
     pub(crate) flow: Option<Arc<Flow>>,
-    /// Lines that stick out of the residual, Hz.
-    pub(crate) lines_hz: Vec<f64>,
+    /// Lines that stick out of the residual: frequency in Hz, and the channel that shows them.
+    pub(crate) lines: Vec<(f64, usize)>,
 }
 
 impl Context {

@@ -20,6 +20,10 @@ pub enum DiagnoseError {
     NeedsFlow,
     #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]
     Model { effect: &'static str },
+    #[error("the model has {effect} with {name} = {got}: expected {expected}")]
+    Parameter { effect: &'static str, name: &'static str, got: f64, expected: &'static str },
+    #[error("with the numbers of the model nothing finite comes out of this record: was it changed by hand?")]
+    Absurd,
     #[error(transparent)]
     Compensate(#[from] CompensateError),
     #[error("there is no effect called \"{name}\"; there are {known}")]

@@ -9,6 +9,8 @@ use crate::observations::Observations;
 const CLEAR: f64 = 30.0;
 /// Samples below which tones are not told apart.
 const SHORTEST: usize = 200;
+/// Periods in the record that a tone must have at least.
+const FEWEST_PERIODS: usize = 5;
 /// Bins of one tone under the window.
 const WIDTH: usize = 12;
 
@@ -39,6 +41,11 @@ pub(crate) fn tones(observations: &Observations) -> Option<usize> {
     let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = (CLEAR * noise_k * noise_k).max(1e-9 * largest);
+    // What moves less than a few times in the whole record is no tone: it is not seen to come back.
+    let strongest = power.iter().position(|p| *p == largest)?;
+    if strongest < FEWEST_PERIODS {
+        return None;
+    }
     let (mut tones, mut bin) = (0, 0);
     while bin < power.len() {
         if power[bin] <= least {

@@ -9,7 +9,7 @@ use crate::plant::{Evaluation, Plant};
 use crate::weighting::Weighting;
 
 /// Longest time constant beside the length of the record: of a longer one there is no more than a drift in it.
-pub(crate) const LONGEST: f64 = 1.0;
+pub(crate) const LONGEST: f64 = 4.0;
 /// Parameters whose second derivatives are taken.
 const MOST_EXACT: usize = 7;
 

@@ -109,7 +109,7 @@ pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>) ->
         "anything that both sensors share: gain, offset, drift, delay, a second lag, a slow mode, radiation".to_owned(),
         "crosstalk that takes the place of a part of the reading: it is a wrong time constant and nothing else"
             .to_owned(),
-        "which channel picks up a line that only one of them has".to_owned(),
+        "which channel picks up a line, where the gas has one of that frequency".to_owned(),
     ];
     if let Some(tones) = tones.filter(|t| (2..=FEW_TONES).contains(t)) {
         let (equations, left) = (2 * tones, 2 * tones - 2);

@@ -43,6 +43,11 @@ impl Stretch {
         Self { flow: Some(flow), ..self }
     }
 
+    /// The mean of the first readings, °C.
+    pub(crate) fn start_c(&self) -> f64 {
+        0.5 * (self.reading_c[0][0] + self.reading_c[1][0])
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.time_s.len()
     }

@@ -254,6 +254,19 @@ impl Plant {
         chains.map(|chain| chain.value)
     }
 
+    /// Takes off the factors `1 + (1 − φ) τ s` with which slow paths are compared, so that `values` are those of the gas, which was at
+    /// `start_c` before.
+    pub(crate) fn undo_slow(&self, values: &mut [f64], start_c: f64, step_s: f64) {
+        for [share, tau_s] in self.sensors.iter().filter_map(|s| s.slow) {
+            let keep = (-step_s / ((1.0 - share) * tau_s)).exp();
+            let (mut now, mut before) = (start_c, values.first().copied().unwrap_or(start_c));
+            for value in values.iter_mut() {
+                now = keep * now + (1.0 - keep) * 0.5 * (before + *value);
+                before = std::mem::replace(value, now);
+            }
+        }
+    }
+
     /// `y₁ − ε (y₂ − about)`.
     fn take_off_crosstalk(&self, chains: &mut [Chain; 2]) {
         for i in 0..2 {
@@ -402,7 +415,9 @@ impl Plant {
             out.sample.extend((0..count).map(|k| first_sample + start + k));
             out.time_s.extend_from_slice(&one.time_s);
             let skipped = self.extra.len();
-            let [c1, c2] = [0, 1].map(|i| &inferred[i].value[skipped..skipped + count]);
+            let mut gas = inferred.clone().map(|chain| chain.value);
+            gas.iter_mut().for_each(|gas| self.undo_slow(gas, stretch.start_c(), observations.step_s()));
+            let [c1, c2] = [0, 1].map(|i| &gas[i][skipped..skipped + count]);
             out.gas_c.extend(c1.iter().zip(c2).map(|(a, b)| 0.5 * (a + b)));
             out.disagreement_k.extend(c1.iter().zip(c2).map(|(a, b)| a - b));
             out.residual.extend_from_slice(&whitened.residual);

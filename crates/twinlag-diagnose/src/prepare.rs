@@ -21,6 +21,8 @@ const EXCERPT: usize = 500;
 const SPIKE: f64 = 6.0;
 const SPIKE_AMONG_OTHERS: f64 = 4.5;
 
+/// Times that spikes are looked for.
+const SPIKE_ROUNDS: usize = 3;
 /// Standard errors by which less is clearly less.
 const CLEARLY: f64 = 4.0;
 
@@ -31,6 +33,8 @@ pub(crate) struct Prepared {
     pub(crate) context: Context,
     /// Defects of the data.
     pub(crate) found: Vec<Found>,
+    /// Single wrong readings of each channel.
+    spikes: [usize; 2],
     /// The record as it came, and its noise.
     pub(crate) raw: (Observations, Levels),
     /// Residuals of the whole record.
@@ -65,6 +69,7 @@ impl Prepared {
             observations,
             levels,
             found,
+            spikes: [0; 2],
             raw,
         })
     }
@@ -73,7 +78,11 @@ impl Prepared {
     pub(crate) fn base(&mut self, settings: &Settings, watch: Watch<'_>) -> Fitted {
         let model = Model::new(&settings.known, self.levels.std_k);
         let mut base = self.search(settings, watch).base(&model);
-        if settings.effects.contains(&Identifier::Spikes) && self.mask_spikes(&base) {
+        // A wrong reading hides its neighbours: once more where there were some.
+        for _ in 0..SPIKE_ROUNDS {
+            if !settings.effects.contains(&Identifier::Spikes) || !self.mask_spikes(&base) {
+                break;
+            }
             base = self.search(settings, watch).base(&model);
         }
         if !self.found.is_empty() {
@@ -107,7 +116,9 @@ impl Prepared {
             }
         }
         for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
-            self.found.push(defect(Identifier::Spikes, i, format!("{count} single readings")));
+            self.spikes[i] += count;
+            self.found.retain(|f| f.effect != Identifier::Spikes || f.channel != Some(i));
+            self.found.push(defect(Identifier::Spikes, i, format!("{} single readings", self.spikes[i])));
         }
         counts != [0; 2]
     }
@@ -253,6 +264,6 @@ fn context(observations: &Observations, levels: &Levels) -> Context {
         is_coarse: levels.coarse_step_k().map(|q| q.is_some()),
         tau_s: [10.0 * step_s; 2],
         flow: observations.flow().filter(|flow| flow.changes()).cloned(),
-        lines_hz: Vec::new(),
+        lines: Vec::new(),
     }
 }

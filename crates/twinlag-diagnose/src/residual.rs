@@ -79,7 +79,7 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
         let stretch = &observations.stretches[part.stretch];
         let noise = part.noise_of(channel, stretch.len());
         let chain = &part.inferred[channel];
-        let inferred: Vec<f64> = (0..part.whitened.residual.len())
+        let mut gas: Vec<f64> = (0..part.whitened.residual.len())
             .map(|k| {
                 let k = k + part.skipped;
                 let first = chain.rows.start + k;
@@ -88,7 +88,8 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
                 chain.value[k] - taken
             })
             .collect();
-        out.extend(filter.smooth(&inferred));
+        plant.undo_slow(&mut gas, stretch.start_c(), observations.step_s());
+        out.extend(filter.smooth(&gas));
     }
     out
 }

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::defects::lines;
+use crate::defects::{line_channel, lines};
 use crate::dense;
 use crate::diagnosis::Limit;
 use crate::effect::{Context, Identifier, Parameter, Shared, candidates};
@@ -90,7 +90,8 @@ impl Search<'_> {
     pub(crate) fn look(&mut self, current: &Fitted) {
         self.context.tau_s = [current.theta[0], current.theta[1]];
         let evaluation = current.model.evaluate(&current.theta, self.observations);
-        self.context.lines_hz = lines(self.observations, &evaluation, |s| self.selection.holds(s));
+        let found = lines(self.observations, &evaluation, |s| self.selection.holds(s));
+        self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
     }
 
     fn robust(&self, fitted: &Fitted) -> f64 {
@@ -244,7 +245,9 @@ impl Search<'_> {
         });
         let clashes = candidate.parameters().iter().any(|p| p.name == "offset" && has("offset"));
         let radiates = |id: Identifier| id == Identifier::Radiation || id == Identifier::Calibration;
-        let twice = radiates(candidate.identifier()) && effects.iter().any(|e| radiates(e.identifier()));
+        // The loss of radiation is an offset.
+        let has_offset = candidate.parameters().iter().any(|p| p.name == "offset") || has("offset");
+        let twice = has_offset && radiates(candidate.identifier()) && effects.iter().any(|e| radiates(e.identifier()));
         // A share of the other channel is a gain and another time constant: both together are not told apart.
         let scales = |id: Identifier| id == Identifier::Crosstalk || id == Identifier::Calibration;
         let same = scales(candidate.identifier()) && effects.iter().any(|e| scales(e.identifier()));
@@ -334,6 +337,9 @@ impl Search<'_> {
     pub(crate) fn grown(&self, current: &Fitted, index: usize, tried: &Tried) -> Option<Tried> {
         let range = current.model.range(index);
         let (effect, start) = tried.effect.grown(&current.theta[range.clone()])?;
+        if !Self::fits(&current.model.without(index), &effect) {
+            return None;
+        }
         let added = start.len() - range.len();
         let mut theta = current.theta.clone();
         theta.splice(range, start);

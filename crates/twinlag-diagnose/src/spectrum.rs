@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use realfft::RealFftPlanner;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 
-use crate::effect::coloured_noise::LONGEST;
+use crate::effect::coloured_noise::{LONGEST, SHORTEST};
 use crate::observations::Observations;
 use crate::plant::{Evaluation, Extra, Place, Plant};
 
@@ -259,7 +259,7 @@ pub(crate) fn fit_noise(
             variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
             variables.push(Variable::logarithmic(
                 "correlation time",
-                0.3 * observations.step_s(),
+                SHORTEST * observations.step_s(),
                 LONGEST * (last - first),
             ));
             all = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();

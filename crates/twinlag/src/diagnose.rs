@@ -183,6 +183,7 @@ impl Diagnosis {
 pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
     if model.effects.is_empty() {
         check_channels(record, model)?;
+        check_numbers(model)?;
         let mut out = characterise(record, options)?;
         out.warnings.push("the model has no effects: two first-order lags".into());
         return Ok(out);
@@ -198,14 +199,26 @@ fn check_channels(record: &Record, model: &Model) -> Result<(), Error> {
     }
 }
 
+fn check_numbers(model: &Model) -> Result<(), Error> {
+    let noise = (1..).zip(&model.noise_std_k).map(|(i, k)| (format!("a noise of channel {i} of"), *k));
+    let tau = (1..)
+        .zip(&model.time_constants_s)
+        .filter_map(|(i, s)| Some((format!("a time constant of sensor {i} of"), (*s)?)));
+    match noise.chain(tau).find(|(_, got)| !got.is_finite() || *got <= 0.0) {
+        Some((what, got)) => Err(Error::ModelNumber { what, got }),
+        None => Ok(()),
+    }
+}
+
 /// The same, and the fit itself.
 pub(crate) fn with_model(
     record: &Record,
     model: &Model,
     options: &Options,
 ) -> Result<(Characterisation, ModelFit), Error> {
-    let base = characterise(record, options)?;
     check_channels(record, model)?;
+    check_numbers(model)?;
+    let base = characterise(record, options)?;
     let (observations, _) = observations(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let has_noise = model.effects.iter().any(|e| e.effect.is_noise());

@@ -46,6 +46,8 @@ pub enum Error {
          {needed} samples or more in unbroken stretches there"
     )]
     QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
+    #[error("the model has {what} {got}: expected a finite number above 0")]
+    ModelNumber { what: String, got: f64 },
     #[error(
         "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
          use a longer record, a smaller --discard, or the whitened estimator, which discards none"

@@ -20,6 +20,8 @@ struct ColouredNoise {
     noise_std_k: f64,
 }
 
+/// Shortest correlation, of a step: what lasts shorter is white.
+pub(crate) const SHORTEST: f64 = 1.0;
 /// Longest correlation, of the record: what lasts longer is a drift.
 pub(crate) const LONGEST: f64 = 0.05;
 
@@ -30,7 +32,7 @@ pub(crate) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
         Parameter::new(
             "correlation_time",
             "s",
-            Variable::logarithmic("correlation time", 0.3 * context.step_s, LONGEST * context.span_s()),
+            Variable::logarithmic("correlation time", SHORTEST * context.step_s, LONGEST * context.span_s()),
         ),
     ]
 }

@@ -18,6 +18,9 @@ pub(crate) const ABOUT: About = About {
     unseen: "crosstalk that takes the place of a part of the reading: with it one time constant is a mixture of both",
 };
 
+/// Largest share: of more, wires are not crossed but swapped.
+const LARGEST: f64 = 0.25;
+
 struct Crosstalk {
     channel: usize,
     /// Temperature of the other channel that adds nothing, °C.
@@ -28,7 +31,7 @@ struct Crosstalk {
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let mut out = Vec::new();
     for channel in 0..2 {
-        let share = Parameter::new("share", "1", Variable::linear("share", 0.03, -0.45, 0.45));
+        let share = Parameter::new("share", "1", Variable::linear("share", 0.03, -LARGEST, LARGEST));
         for about_c in [0.0, context.mean_c[1 - channel]] {
             out.push(Arc::new(Crosstalk { channel, about_c, parameters: vec![share.clone()] }) as Shared);
         }

@@ -25,8 +25,7 @@ pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     if !context.is_even {
         return out;
     }
-    for &frequency_hz in context.lines_hz.iter().take(2) {
-        let channel = 0;
+    for &(frequency_hz, channel) in context.lines.iter().take(2) {
         let width = 1.0 / context.span_s();
         let widest = 3.0 * context.swing_k;
         let amplitude =
