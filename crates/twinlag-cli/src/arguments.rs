@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
@@ -165,12 +165,24 @@ pub(crate) struct Compensate {
     /// samples more).
     #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]
     pub(crate) form: Form,
+    /// The channel that is right where gain, offset or delay differ: no record of two sensors tells.
+    #[arg(long, value_name = "CHANNEL", default_value = "T1", ignore_case = true)]
+    pub(crate) trust: Trust,
     /// An effect that is not to be considered; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     pub(crate) without: Vec<Identifier>,
     /// Overwrite outputs that exist.
     #[arg(long)]
     pub(crate) force: bool,
+}
+
+/// One of the two channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Trust {
+    #[value(name = "T1")]
+    T1,
+    #[value(name = "T2")]
+    T2,
 }
 
 fn form(text: &str) -> Result<Form, String> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use twinlag::record::{Decimals, write_csv};
 use twinlag::{CompensateOptions, Compensation, DiagnoseOptions, Status};
 
-use crate::arguments::{Compensate, Talk};
+use crate::arguments::{Compensate, Talk, Trust};
 use crate::characterise::{model, read};
 use crate::failure::Failure;
 use crate::output;
@@ -25,6 +25,7 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         diagnose: DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
         form: command.form,
+        trusted: usize::from(command.trust == Trust::T2),
     };
     let record = read(&command.file, &command.columns.selection())?;
     print::notes(&record, talk);

@@ -92,6 +92,8 @@ pub struct Rig {
     pub between: Between,
     /// How much later the second channel is, s.
     pub delay_s: f64,
+    /// The channel, 0 or 1, whose clock the gas is wanted by.
+    pub clock: usize,
     /// What the gas at the second sensor has that the gas at the first has not: half of it is added to the gas at one and taken from
     /// that at the other.
     pub mismatch: Option<Coloured>,
@@ -100,7 +102,7 @@ pub struct Rig {
 impl Rig {
     /// Two sensors in the same gas.
     pub const fn new(sensors: [Sensor; 2]) -> Self {
-        Self { sensors, between: Between::Continuous, delay_s: 0.0, mismatch: None }
+        Self { sensors, between: Between::Continuous, delay_s: 0.0, clock: 0, mismatch: None }
     }
 }
 

@@ -76,7 +76,9 @@ struct Forward<const D: usize> {
     innovations: usize,
 }
 
-fn events(readings: &Readings, delay_s: f64) -> Vec<Event> {
+/// Instants in the time of the first channel, whose reading is not late.
+fn events(readings: &Readings, rig: &Rig) -> Vec<Event> {
+    let delay_s = rig.delay_s;
     let both = |k: usize| [0, 1].map(|i| readings.reading_c(i, k).map(|_| k));
     let times = readings.time_s().iter().enumerate();
     if delay_s == 0.0 {
@@ -85,10 +87,12 @@ fn events(readings: &Readings, delay_s: f64) -> Vec<Event> {
     let mut out: Vec<Event> = times
         .flat_map(|(k, &time_s)| {
             let [first, second] = both(k);
-            let now = Event { time_s, answers: Some(k), reads: [first, None] };
-            [Some(now), second.map(|k| Event { time_s: time_s - delay_s, answers: None, reads: [None, Some(k)] })]
+            let answers = |clock: usize| (rig.clock == clock).then_some(k);
+            [
+                Event { time_s, answers: answers(0), reads: [first, None] },
+                Event { time_s: time_s - delay_s, answers: answers(1), reads: [None, second] },
+            ]
         })
-        .flatten()
         .collect();
     out.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     out
@@ -96,7 +100,7 @@ fn events(readings: &Readings, delay_s: f64) -> Vec<Event> {
 
 impl<const D: usize> Forward<D> {
     fn run(system: &System<D>, readings: &Readings, rig: &Rig, level_c: f64) -> (Self, Vec<Event>) {
-        let events = events(readings, rig.delay_s);
+        let events = events(readings, rig);
         let mut belief = Belief { state: system.start(), covariance: system.before };
         let mut out = Self {
             steps: Vec::new(),
@@ -108,7 +112,7 @@ impl<const D: usize> Forward<D> {
         let mut last_s = events.first().map_or(0.0, |e| e.time_s);
         let mut lengths: Vec<f64> = Vec::new();
         for event in &events {
-            let sample = event.answers.or(event.reads[1]).unwrap_or(0);
+            let sample = event.answers.or(event.reads[0]).or(event.reads[1]).unwrap_or(0);
             let step = out.step(system, &mut lengths, event.time_s - last_s, readings.locals(sample, level_c));
             last_s = event.time_s;
             belief.predict(&out.steps[step]);

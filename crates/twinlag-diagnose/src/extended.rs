@@ -42,6 +42,13 @@ impl Extended {
         &self.theta
     }
 
+    /// Gain and offset of the second channel against the first, 1 and K.
+    pub fn calibration(&self, parameters: &[f64]) -> [f64; 2] {
+        let plant = self.model.plant(parameters, &self.observations);
+        let [first, second] = [0, 1].map(|i| &plant.sensors[i].reading);
+        [second.gain / first.gain, second.offset_k - first.offset_k * second.gain / first.gain]
+    }
+
     /// The sensors' temperatures at every sample of the record, and the sensors, with other `parameters`.
     ///
     /// Readings are taken back through their calibration; what masks a reading, and missing samples of a grid, is missing. Of noise
@@ -85,7 +92,13 @@ fn rig(plant: &Plant) -> Rig {
             coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
         }
     });
-    Rig { sensors, between: Between::Continuous, delay_s: plant.delay_s.unwrap_or(0.0), mismatch: extra(Place::Gas) }
+    Rig {
+        sensors,
+        between: Between::Continuous,
+        delay_s: plant.delay_s.unwrap_or(0.0),
+        clock: 0,
+        mismatch: extra(Place::Gas),
+    }
 }
 
 /// What each sensor does at each instant, where that changes.

@@ -1,5 +1,8 @@
 //! The gas temperature of a record: schema `twinlag.compensation/1`.
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Gas, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
 use twinlag_diagnose::{Extended, ModelFit, Verdict};
@@ -23,6 +26,8 @@ pub struct CompensateOptions {
     pub model: Option<Model>,
     /// Which readings the gas temperature at an instant may rest on.
     pub form: Form,
+    /// The channel, 0 or 1, that gain, offset and delay are held to be right of: no record of two sensors tells.
+    pub trusted: usize,
 }
 
 /// How good the gas temperature is, held against a trusted one.
@@ -152,7 +157,7 @@ pub fn compensate(
         );
     }
     let extended = fit.extended.as_ref().expect("a fit of a record");
-    let found = Found::of(extended, &fit, options.form, watch)?;
+    let found = Found::of(extended, &fit, options, watch)?;
     if found.widened_by > 1.0 {
         out.warnings.push(format!(
             "readings differ from what the others led to expect by {:.2} times what noise explains: the bands are as much wider",
@@ -194,18 +199,37 @@ struct Found {
 impl Found {
     /// The gas temperature, and how much it moves with each standard error of the parameters: a column of the covariance's
     /// Cholesky factor at a time, so that what goes together moves together (JCGM 100, 5.2).
-    fn of(extended: &Extended, fit: &ModelFit, form: Form, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
+    fn of(
+        extended: &Extended,
+        fit: &ModelFit,
+        options: &CompensateOptions,
+        watch: DiagnoseWatch<'_>,
+    ) -> Result<Self, Error> {
         let theta = extended.parameters();
-        let (readings, rig) = extended.rig(theta)?;
+        let rig = |theta: &[f64]| -> Result<(Readings, Rig), Error> {
+            let (readings, rig) = extended.rig(theta)?;
+            Ok((readings, Rig { clock: options.trusted, ..rig }))
+        };
+        let with = |theta: &[f64], prior: &Prior| -> Result<Gas, Error> {
+            let (readings, rig) = rig(theta)?;
+            let mut gas = reconstruct(&readings, &rig, prior, options.form)?;
+            if options.trusted == 1 {
+                let [gain, offset_k] = extended.calibration(theta);
+                gas.gas_c.iter_mut().for_each(|c| *c = gain * *c + offset_k);
+                gas.std_k.iter_mut().for_each(|k| *k *= gain.abs());
+            }
+            Ok(gas)
+        };
+        let (readings, rig) = rig(theta)?;
         let prior = learn(&readings, &rig)?;
-        let gas = reconstruct(&readings, &rig, &prior, form)?;
+        let gas = with(theta, &prior)?;
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
         let mut variance = vec![0.0; gas.gas_c.len()];
-        for (done, column) in columns.iter().enumerate() {
-            watch("how the parameters move the gas temperature", done, columns.len());
+        let others = in_parallel(&columns, watch, |column| {
             let moved: Vec<f64> = theta.iter().zip(column).map(|(t, d)| t + d).collect();
-            let Ok((readings, rig)) = extended.rig(&moved) else { continue };
-            let other = reconstruct(&readings, &rig, &prior, form)?;
+            with(&moved, &prior).ok()
+        });
+        for other in others.iter().flatten() {
             for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
                 *v += (a - b) * (a - b);
             }
@@ -216,6 +240,43 @@ impl Found {
         let std_k = gas.std_k.iter().zip(&variance).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
+}
+
+/// The work on each of `columns`, in their order whatever the number of threads.
+fn in_parallel(
+    columns: &[Vec<f64>],
+    watch: DiagnoseWatch<'_>,
+    work: impl Fn(&[f64]) -> Option<Gas> + Sync,
+) -> Vec<Option<Gas>> {
+    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
+    let results = Mutex::new(vec![None; columns.len()]);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads.min(columns.len()) {
+            scope.spawn(|| {
+                while let Some((index, column)) =
+                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, columns.get(i)?)))
+                {
+                    let result = work(column);
+                    results.lock().expect("no thread panics")[index] = result;
+                    watch(
+                        "how the parameters move the gas temperature",
+                        done.fetch_add(1, Ordering::Relaxed) + 1,
+                        columns.len(),
+                    );
+                }
+            });
+        }
+    });
+    results.into_inner().expect("no thread panics")
+}
+
+/// The gas temperature by the model of `fit`, without what its parameters add to the bands; `None` where the model gives none.
+pub(crate) fn gas(fit: &ModelFit) -> Option<Gas> {
+    let extended = fit.extended.as_ref()?;
+    let (readings, rig) = extended.rig(extended.parameters()).ok()?;
+    let prior = learn(&readings, &rig).ok()?;
+    reconstruct(&readings, &rig, &prior, Form::Smoother).ok()
 }
 
 /// Columns of the Cholesky factor of `covariance`; what is held has none.

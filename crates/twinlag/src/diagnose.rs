@@ -13,6 +13,7 @@ use crate::characterisation::{
     SensorEstimate, Status,
 };
 use crate::characterise::characterise;
+use crate::compensate::gas;
 use crate::error::Error;
 use crate::estimate::IntervalBasis;
 use crate::options::{Known, Options};
@@ -444,14 +445,16 @@ fn known(options: &Options) -> Vec<KnownTimeConstant> {
         .collect()
 }
 
-/// Errors of the estimated gas temperature against the reference on the blocks that judge.
+/// Errors of the gas temperature of each model ([`crate::compensate()`]) against the reference on the blocks that judge.
 fn reference_rmse(record: &Record, rows: &[Option<usize>], core: &Core) -> Option<BeforeAfter<f64>> {
     let reference = record.reference_c.as_ref()?;
     let rmse = |fit: &ModelFit| {
         let trace = &fit.trace;
+        let gas = gas(fit)?;
         let errors: Vec<f64> = (0..trace.sample.len())
             .filter(|&k| trace.is_judge[k])
-            .filter_map(|k| Some(trace.gas_c[k] - reference[rows[trace.sample[k]]?]))
+            .map(|k| trace.sample[k])
+            .filter_map(|sample| Some(gas.gas_c[sample] - reference[rows[sample]?]))
             .filter(|e| e.is_finite())
             .collect();
         (!errors.is_empty()).then(|| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
