@@ -247,14 +247,13 @@ impl Cost for Whittle<'_> {
             expected.iter_mut().zip(&own).for_each(|(sum, p)| *sum += p);
             let values = part.values();
             for (a, value) in values.iter().enumerate() {
-                slopes.push(match part.size_of(a) {
-                    Some(term) => each[term].iter().map(|p| 2.0 * p / value).collect(),
-                    None => {
-                        let mut moved = values.clone();
-                        moved[a] *= STEP.exp();
-                        let moved = p.expected(&part::with(std::slice::from_ref(part), &moved)[0].terms());
-                        moved.iter().zip(&own).map(|(b, a)| (b - a) / (STEP.exp_m1() * value)).collect()
-                    }
+                slopes.push(if let Some(term) = part.size_of(a) {
+                    each[term].iter().map(|p| 2.0 * p / value).collect()
+                } else {
+                    let mut moved = values.clone();
+                    moved[a] *= STEP.exp();
+                    let moved = p.expected(&part::with(std::slice::from_ref(part), &moved)[0].terms());
+                    moved.iter().zip(&own).map(|(b, a)| (b - a) / (STEP.exp_m1() * value)).collect()
                 });
             }
         }

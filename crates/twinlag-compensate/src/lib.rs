@@ -1,53 +1,76 @@
-//! doc
+//! The gas temperature, with its standard deviation, from the readings of two sensors whose lags are known.
+//!
+//! For anyone who has a model of two sensors, however it was found, and wants what they measured: [`learn`] finds from the readings
+//! how much the gas moves and how fast, [`reconstruct`] gives its temperature at every sample with an honest band, from the whole record
+//! (Kalman's filter and a smoother), from what was read so far, or with a fixed lag; [`Stream`] does the second sample by sample. Uneven
+//! sampling, missing readings, a delay between the channels, second lags, slow paths, noise that is not white, time constants that
+//! change and radiation are in the model ([`Rig`], [`Local`]). The crate knows neither files nor how a model is found: for logger files
+//! take `twinlag`, for the model `twinlag-diagnose`.
+//!
+//! ```
+//! use twinlag_compensate::{Form, Readings, Rig, Sensor, learn, reconstruct};
+//! use twinlag_signal::{Gas, Noise, Plunge, Record, Rig as Simulation, Sensor as Simulated, Signal};
+//!
+//! // Two thermocouples in gas that steps between levels, read every 2 ms with noise of 0.2 K.
+//! let sensor = |name: &str, tau_s| {
+//!     let mut sensor = Simulated::new(name, tau_s);
+//!     sensor.noise = Some(Noise::white(0.2));
+//!     sensor
+//! };
+//! let signal = Signal::Plunge(Plunge { amplitude_k: 20.0, dwell_s: 0.3, rise_s: 0.02 });
+//! let sensors = [sensor("fine", 0.024), sensor("coarse", 0.117)];
+//! let record = Simulation::new(1, Record::new(1500, 0.002), Gas::new(300.0, signal), sensors)?.simulate()?;
+//!
+//! let readings = Readings::new(record.time_s, [record.t1_c.clone(), record.t2_c])?;
+//! let rig = Rig::new([Sensor::new(0.024, 0.2), Sensor::new(0.117, 0.2)]);
+//! let prior = learn(&readings, &rig)?;
+//! let gas = reconstruct(&readings, &rig, &prior, Form::Smoother)?;
+//!
+//! // Far nearer to the gas than the faster sensor, and it knows how near.
+//! let rms = |values: &[f64]| {
+//!     let squares: f64 = values.iter().zip(&record.gas_c).map(|(a, b)| (a - b) * (a - b)).sum();
+//!     (squares / values.len() as f64).sqrt()
+//! };
+//! assert!(rms(&gas.gas_c) < 0.25 * rms(&record.t1_c));
+//! let inside = (0..1500).filter(|&k| (gas.gas_c[k] - record.gas_c[k]).abs() < 2.0 * gas.std_k[k]).count();
+//! assert!(inside > 1350);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Without its default feature `std` the crate is [`Stream`] and what that needs, for machines without an operating system.
 
+#![cfg_attr(not(feature = "std"), no_std)]
+
+#[cfg(feature = "std")]
 mod error;
 mod filter;
+#[cfg(feature = "std")]
 mod learn;
 mod prior;
+#[cfg(feature = "std")]
 mod readings;
+#[cfg(feature = "std")]
+mod reconstruct;
 mod rig;
+#[cfg(feature = "std")]
 mod smooth;
+#[cfg(feature = "std")]
 mod spectrum;
+mod stream;
 mod system;
 
+#[cfg(feature = "std")]
 pub use error::CompensateError;
+#[cfg(feature = "std")]
 pub use learn::learn;
-pub use prior::{Prior, Term};
+#[cfg(feature = "std")]
+pub use prior::Prior;
+pub use prior::Term;
+#[cfg(feature = "std")]
 pub use readings::Readings;
+#[cfg(feature = "std")]
+pub use reconstruct::{bandwidth_hz, reconstruct};
 pub use rig::{Between, Coloured, Local, Rig, Sensor, SlowPath};
+#[cfg(feature = "std")]
 pub use smooth::{Form, Gas};
-
-/// Largest state.
-const MOST_STATES: usize = 32;
-
-/// The highest frequency, Hz, of which readings every `period_s` say more than the prior: where the gas has as much power as the
-/// noise of both inferred gas temperatures together. `None` if it has less everywhere.
-pub fn bandwidth_hz(rig: &Rig, prior: &Prior, period_s: f64) -> Option<f64> {
-    const POINTS: i32 = 2000;
-    let highest_hz = 0.5 / period_s;
-    (0..POINTS)
-        .map(|k| highest_hz * 1e-5_f64.powf(f64::from(k) / f64::from(POINTS)))
-        .find(|&hz| prior.density_k2_per_hz(hz) > rig.noise_density_k2_per_hz(hz, period_s))
-}
-
-/// The gas temperature that `readings` of `rig` tell, where the gas moves as `prior` says.
-///
-/// # Errors
-/// [`CompensateError::NotPositive`] for a time constant or noise that is not, [`CompensateError::TooLarge`] for a prior with too
-/// many terms.
-pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Result<Gas, CompensateError> {
-    rig.check()?;
-    let states = system::states(rig, prior);
-    let run = match states {
-        0..=4 => smooth::run::<4>,
-        5 => smooth::run::<5>,
-        6 => smooth::run::<6>,
-        7..=8 => smooth::run::<8>,
-        9..=12 => smooth::run::<12>,
-        13..=16 => smooth::run::<16>,
-        17..=24 => smooth::run::<24>,
-        25..=MOST_STATES => smooth::run::<MOST_STATES>,
-        _ => return Err(CompensateError::TooLarge { got: states, most: MOST_STATES }),
-    };
-    Ok(run(readings, rig, prior, form))
-}
+pub use stream::{Now, Stream};

@@ -4,11 +4,12 @@
 //! resonances and of one-over-frequency-squared falls, which is enough for turbulence, steps and pulsation; what the gas really
 //! did is then up to the readings, as far as they go.
 
+#[cfg(feature = "std")]
 use serde::{Deserialize, Serialize};
 
 /// One part of the gas's motion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize), serde(tag = "kind", rename_all = "kebab-case"))]
 pub enum Term {
     /// First-order noise (Ornstein and Uhlenbeck 1930), autocovariance `σ² exp(−2π f |t|)`: rough, like turbulence or steps.
     Rough {
@@ -61,6 +62,7 @@ impl Term {
     }
 
     /// Autocovariance at `lag_s`, K².
+    #[cfg(feature = "std")]
     pub fn autocovariance_k2(&self, lag_s: f64) -> f64 {
         use core::f64::consts::TAU;
         match *self {
@@ -87,6 +89,7 @@ impl Term {
 }
 
 /// The gas: a constant level and a sum of independent [`Term`]s about it.
+#[cfg(feature = "std")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
     /// The level, °C.
@@ -95,6 +98,7 @@ pub struct Prior {
     pub terms: Vec<Term>,
 }
 
+#[cfg(feature = "std")]
 impl Prior {
     /// Two-sided spectral density of the gas about its level, K²/Hz.
     pub fn density_k2_per_hz(&self, frequency_hz: f64) -> f64 {
@@ -102,7 +106,7 @@ impl Prior {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
 

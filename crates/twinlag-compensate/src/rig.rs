@@ -1,12 +1,16 @@
 //! Two sensors in one gas: what is known of them when the gas temperature is asked for.
 
+#[cfg(feature = "std")]
 use num_complex::Complex64;
+#[cfg(feature = "std")]
 use serde::{Deserialize, Serialize};
 
+#[cfg(feature = "std")]
 use crate::error::CompensateError;
 
 /// Noise that keeps its value for a while: first-order noise, autocovariance `σ² exp(−|t|/t_c)`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Coloured {
     /// Standard deviation `σ`, K.
     pub std_k: f64,
@@ -16,6 +20,7 @@ pub struct Coloured {
 
 impl Coloured {
     /// Two-sided spectral density at `frequency_hz`, K²/Hz.
+    #[cfg(feature = "std")]
     pub fn density_k2_per_hz(&self, frequency_hz: f64) -> f64 {
         let angle = core::f64::consts::TAU * frequency_hz * self.correlation_s;
         2.0 * self.std_k * self.std_k * self.correlation_s / (1.0 + angle * angle)
@@ -23,7 +28,8 @@ impl Coloured {
 }
 
 /// A slow path beside the direct one: `(1 − φ) + φ/(1 + τ_s s)` of what the direct path gives.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct SlowPath {
     /// Share `φ`.
     pub share: f64,
@@ -32,7 +38,8 @@ pub struct SlowPath {
 }
 
 /// One sensor: `τ dT/dt = x − T − loss`, and what follows on it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Sensor {
     /// Time constant `τ`, s.
     pub tau_s: f64,
@@ -53,6 +60,7 @@ impl Sensor {
     }
 
     /// Its response at `frequency_hz`, without losses.
+    #[cfg(feature = "std")]
     pub fn response(&self, frequency_hz: f64) -> Complex64 {
         let s = |tau_s: f64| Complex64::new(0.0, core::f64::consts::TAU * frequency_hz * tau_s);
         let mut response = 1.0 / (1.0 + s(self.tau_s));
@@ -66,6 +74,7 @@ impl Sensor {
     }
 
     /// Two-sided spectral density of its noise at `frequency_hz`, read every `period_s`, K²/Hz.
+    #[cfg(feature = "std")]
     pub fn noise_density_k2_per_hz(&self, frequency_hz: f64, period_s: f64) -> f64 {
         self.noise_std_k * self.noise_std_k * period_s
             + self.coloured.map_or(0.0, |noise| noise.density_k2_per_hz(frequency_hz))
@@ -73,8 +82,8 @@ impl Sensor {
 }
 
 /// What the gas does between two readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
 pub enum Between {
     /// It goes on as it does at them.
     #[default]
@@ -84,7 +93,8 @@ pub enum Between {
 }
 
 /// Both sensors and what they share.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Rig {
     /// The sensors.
     pub sensors: [Sensor; 2],
@@ -106,6 +116,7 @@ impl Rig {
     }
 }
 
+#[cfg(feature = "std")]
 impl Rig {
     pub(crate) fn check(&self) -> Result<(), CompensateError> {
         let positive = |what: &str, got: f64| {

@@ -177,7 +177,7 @@ impl<const D: usize> Forward<D> {
 
 /// The gas temperature with a state of dimension `D`.
 pub(crate) fn run<const D: usize>(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Gas {
-    let system = System::<D>::new(rig, prior);
+    let system = System::<D>::new(rig, &prior.terms);
     let (forward, events) = Forward::run(&system, readings, rig, prior.level_c);
     let mut gas_c = vec![prior.level_c; readings.len()];
     let mut std_k = vec![0.0; readings.len()];

@@ -5,7 +5,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::prior::{Prior, Term};
+use crate::prior::Term;
 use crate::rig::{Between, Coloured, Local, Rig};
 
 /// Terms of the exponential's series: with `‖A h‖ ≤ 1/2` the next is `2⁻¹³/13!`, below 2e-14.
@@ -49,20 +49,16 @@ pub(crate) struct Step<const D: usize> {
 }
 
 /// Numbers that the state needs.
-pub(crate) fn states(rig: &Rig, prior: &Prior) -> usize {
+pub(crate) fn states(rig: &Rig, terms: &[Term]) -> usize {
     let sensor = |i: usize| {
         let s = &rig.sensors[i];
         1 + usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some()) + usize::from(s.coloured.is_some())
     };
-    prior.terms.iter().map(Term::states).sum::<usize>()
-        + sensor(0)
-        + sensor(1)
-        + usize::from(rig.mismatch.is_some())
-        + 1
+    terms.iter().map(Term::states).sum::<usize>() + sensor(0) + sensor(1) + usize::from(rig.mismatch.is_some()) + 1
 }
 
 impl<const D: usize> System<D> {
-    pub(crate) fn new(rig: &Rig, prior: &Prior) -> Self {
+    pub(crate) fn new(rig: &Rig, terms: &[Term]) -> Self {
         let mut next = 0;
         let mut take = |count: usize| {
             next += count;
@@ -72,7 +68,7 @@ impl<const D: usize> System<D> {
         let mut drive = SMatrix::<f64, D, D>::zeros();
         let mut before = SMatrix::<f64, D, D>::zeros();
         let mut gas = SVector::<f64, D>::zeros();
-        for term in &prior.terms {
+        for term in terms {
             let at = take(term.states());
             gas[at] = 1.0;
             match *term {

@@ -5,11 +5,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Gas, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
-use twinlag_diagnose::{Extended, ModelFit, Verdict};
+use twinlag_diagnose::{ModelFit, Verdict};
 use twinlag_record::Record;
 
 use crate::characterisation::{Characterisation, Status};
-use crate::diagnose::{DiagnoseOptions, DiagnoseWatch, Model, NamedEffect, diagnose, observations, with_model};
+use crate::diagnose::{self, DiagnoseOptions, DiagnoseWatch, NamedEffect, diagnose, observations, with_model};
 use crate::error::Error;
 
 /// Standard deviations within which 95 % of a normal distribution lie.
@@ -23,7 +23,7 @@ pub struct CompensateOptions {
     /// How the model is found, where none is given.
     pub diagnose: DiagnoseOptions,
     /// A model that was found in another record: its effects stay as they are.
-    pub model: Option<Model>,
+    pub model: Option<diagnose::Model>,
     /// Which readings the gas temperature at an instant may rest on.
     pub form: Form,
     /// The channel, 0 or 1, that gain, offset and delay are held to be right of: no record of two sensors tells.
@@ -114,20 +114,7 @@ pub fn compensate(
     options: &CompensateOptions,
     watch: DiagnoseWatch<'_>,
 ) -> Result<Compensation, Error> {
-    let mut warnings = Vec::new();
-    let (last, fit, verdict, effects) = match &options.model {
-        Some(model) => {
-            let (last, fit) = with_model(record, model, &options.diagnose.characterise)?;
-            warnings.extend(last.warnings.iter().cloned());
-            (last, fit, None, Vec::new())
-        }
-        None => {
-            let answer = diagnose(record, &options.diagnose, watch)?;
-            warnings.extend(answer.remarks.iter().cloned());
-            let fit = answer.core.expect("it was made just now").last;
-            (answer.last, fit, Some(answer.verdict), answer.effects)
-        }
-    };
+    let Model { last, fit, verdict, effects, warnings } = Model::of(record, options, watch)?;
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
         status: Status::NotIdentifiable,
@@ -156,8 +143,7 @@ pub fn compensate(
                 .into(),
         );
     }
-    let extended = fit.extended.as_ref().expect("a fit of a record");
-    let found = Found::of(extended, &fit, options, watch)?;
+    let found = Found::of(&fit, options, watch)?;
     if found.widened_by > 1.0 {
         out.warnings.push(format!(
             "readings differ from what the others led to expect by {:.2} times what noise explains: the bands are as much wider",
@@ -185,6 +171,29 @@ pub fn compensate(
     Ok(out)
 }
 
+/// The model, and where it comes from.
+struct Model {
+    last: Characterisation,
+    fit: ModelFit,
+    verdict: Option<Verdict>,
+    effects: Vec<NamedEffect>,
+    warnings: Vec<String>,
+}
+
+impl Model {
+    fn of(record: &Record, options: &CompensateOptions, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
+        if let Some(model) = &options.model {
+            let (last, fit) = with_model(record, model, &options.diagnose.characterise)?;
+            let warnings = last.warnings.clone();
+            return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings });
+        }
+        let answer = diagnose(record, &options.diagnose, watch)?;
+        let fit = answer.core.expect("it was made just now").last;
+        let (verdict, effects, warnings) = (Some(answer.verdict), answer.effects, answer.remarks);
+        Ok(Self { last: answer.last, fit, verdict, effects, warnings })
+    }
+}
+
 /// The gas with everything that its bands rest on.
 struct Found {
     readings: Readings,
@@ -199,12 +208,8 @@ struct Found {
 impl Found {
     /// The gas temperature, and how much it moves with each standard error of the parameters: a column of the covariance's
     /// Cholesky factor at a time, so that what goes together moves together (JCGM 100, 5.2).
-    fn of(
-        extended: &Extended,
-        fit: &ModelFit,
-        options: &CompensateOptions,
-        watch: DiagnoseWatch<'_>,
-    ) -> Result<Self, Error> {
+    fn of(fit: &ModelFit, options: &CompensateOptions, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
+        let extended = fit.extended.as_ref().expect("a fit of a record");
         let theta = extended.parameters();
         let rig = |theta: &[f64]| -> Result<(Readings, Rig), Error> {
             let (readings, rig) = extended.rig(theta)?;

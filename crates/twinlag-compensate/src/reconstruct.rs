@@ -1,0 +1,46 @@
+//! The gas temperature, with a state of the size that the model needs.
+
+use crate::error::CompensateError;
+use crate::prior::Prior;
+use crate::readings::Readings;
+use crate::rig::Rig;
+use crate::smooth::{self, Form, Gas};
+use crate::system;
+
+/// Largest state.
+const MOST_STATES: usize = 32;
+
+/// The gas temperature that `readings` of `rig` tell, where the gas moves as `prior` says.
+///
+/// The mean and standard deviation of the gas given the readings that `form` allows: exact where sensors and gas are as `rig` and `prior`
+/// say, with a state-space model of both in continuous time; sensors that lose heat or change are linearised at their readings.
+///
+/// # Errors
+/// [`CompensateError::NotPositive`] for a time constant or noise that is not, [`CompensateError::TooLarge`] for a prior with too
+/// many terms.
+pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Result<Gas, CompensateError> {
+    rig.check()?;
+    let states = system::states(rig, &prior.terms);
+    let run = match states {
+        0..=4 => smooth::run::<4>,
+        5 => smooth::run::<5>,
+        6 => smooth::run::<6>,
+        7..=8 => smooth::run::<8>,
+        9..=12 => smooth::run::<12>,
+        13..=16 => smooth::run::<16>,
+        17..=24 => smooth::run::<24>,
+        25..=MOST_STATES => smooth::run::<MOST_STATES>,
+        _ => return Err(CompensateError::TooLarge { got: states, most: MOST_STATES }),
+    };
+    Ok(run(readings, rig, prior, form))
+}
+
+/// The highest frequency, Hz, of which readings every `period_s` say more than the prior: where the gas has as much power as the
+/// noise of both inferred gas temperatures together. `None` if it has less everywhere.
+pub fn bandwidth_hz(rig: &Rig, prior: &Prior, period_s: f64) -> Option<f64> {
+    const POINTS: i32 = 2000;
+    let highest_hz = 0.5 / period_s;
+    (0..POINTS)
+        .map(|k| highest_hz * 1e-5_f64.powf(f64::from(k) / f64::from(POINTS)))
+        .find(|&hz| prior.density_k2_per_hz(hz) > rig.noise_density_k2_per_hz(hz, period_s))
+}
