@@ -25,6 +25,7 @@ On a logger file:        twinlag characterise run.csv
 With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 What the model lacks:    twinlag diagnose run.csv --report run.html
 The gas temperature:     twinlag compensate run.csv --out gas.csv
+In changing flow:        twinlag track run.csv --out tau.csv
 For a script:            twinlag characterise run.csv --json
 
 Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 75 try again (a shard of a
@@ -63,6 +64,8 @@ pub(crate) enum Command {
     Diagnose(Box<Diagnose>),
     /// The gas temperature at every sample, with its standard deviation.
     Compensate(Box<Compensate>),
+    /// Both time constants along the record, in flow that changes, with bands.
+    Track(Box<Track>),
     /// A record from a described rig: gas, sensors, noise, converter.
     Simulate(Simulate),
     /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
@@ -171,6 +174,39 @@ pub(crate) struct Compensate {
     /// An effect that is not to be considered; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     pub(crate) without: Vec<Identifier>,
+    /// Overwrite outputs that exist.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// Time constants along a record.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+OUT.csv has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s and tau2_high_s: each time constant with its
+pointwise 95 % band. Both change by the same share, as they do in flow that changes: as a smooth function of time with as many
+coefficients as the record supports, in one step, or not at all, whichever Schwarz's criterion prefers. Whether their ratio stays is
+tested.
+
+With --window each window is characterised by itself, the published way: wider bands, and nothing is shared.
+
+Exit codes: 0 tracked, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
+1 anything else.")]
+pub(crate) struct Track {
+    /// The record; `-` reads standard input.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) columns: Columns,
+    #[command(flatten)]
+    pub(crate) method: Method,
+    /// Where the time constants go; `-` is standard output.
+    #[arg(long, value_name = "CSV")]
+    pub(crate) out: PathBuf,
+    /// A model that `twinlag diagnose --save` wrote: its other effects stay as they are.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) model: Option<PathBuf>,
+    /// Length of a sliding window.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) window: Option<f64>,
     /// Overwrite outputs that exist.
     #[arg(long)]
     pub(crate) force: bool,

@@ -1,10 +1,7 @@
 //! `twinlag compensate FILE --out OUT.csv`: the gas temperature with its standard deviation.
 
-use std::io::stdout;
-use std::path::Path;
-
 use twinlag::record::{Decimals, write_csv};
-use twinlag::{CompensateOptions, Compensation, DiagnoseOptions, Status};
+use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 
 use crate::arguments::{Compensate, Talk, Trust};
 use crate::characterise::{model, read};
@@ -14,13 +11,7 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout = command.out == Path::new("-");
-    if to_stdout && talk.json {
-        return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
-    }
-    if !to_stdout {
-        output::check(&command.file, &[("--out", &command.out)], command.force)?;
-    }
+    let to_stdout = output::check_data(&command.file, &command.out, command.force, talk)?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
@@ -35,20 +26,12 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         twinlag::compensate(&record, &options, &watch)?
     };
     if answer.status == Status::Ok {
-        if to_stdout {
-            write(&mut stdout().lock(), &answer)?;
-        } else {
-            let mut text = Vec::new();
-            write(&mut text, &answer)?;
-            output::write(&command.out, &text)?;
-        }
+        let columns: [(&str, &[f64]); 3] =
+            [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
+        let mut text = Vec::new();
+        write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+        output::data(&command.out, to_stdout, &text)?;
     }
     print::compensation(&answer, &command.out, to_stdout, talk)?;
     Ok(if answer.status == Status::Ok { 0 } else { 4 })
-}
-
-fn write(out: &mut impl std::io::Write, answer: &Compensation) -> Result<(), Failure> {
-    let columns: [(&str, &[f64]); 3] =
-        [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
-    Ok(write_csv(out, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?)
 }

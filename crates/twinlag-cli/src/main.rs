@@ -16,6 +16,7 @@ mod print;
 mod progress;
 mod simulate;
 mod study;
+mod track;
 
 use std::process::ExitCode;
 
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Command::Diagnose(command) => diagnose::run(&command, talk),
         Command::Compensate(command) => compensate::run(&command, talk),
         Command::Simulate(command) => simulate::run(&command, talk),
+        Command::Track(command) => track::run(&command, talk),
         Command::Study(command) => study::run(&command, talk),
         Command::Demo(command) => demo::run(&command, talk),
     };

@@ -1,7 +1,9 @@
 //! Files that are written: checked before the work, never over something else unless asked.
 
+use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 
+use crate::arguments::Talk;
 use crate::failure::Failure;
 
 /// A file to be written, and the option that names it.
@@ -33,6 +35,26 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
         }
     }
     Ok(())
+}
+
+/// The same for a table of numbers, which may go to standard output, `-`: whether it does.
+pub(crate) fn check_data(record: &Path, out: &Path, force: bool, talk: Talk) -> Result<bool, Failure> {
+    let to_stdout = out == Path::new("-");
+    if to_stdout && talk.json {
+        return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
+    }
+    if !to_stdout {
+        check(record, &[("--out", out)], force)?;
+    }
+    Ok(to_stdout)
+}
+
+/// Writes such a table.
+pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failure> {
+    if to_stdout {
+        return stdout().write_all(text).map_err(|e| Failure::Other(format!("standard output: {e}")));
+    }
+    write(out, text)
 }
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {

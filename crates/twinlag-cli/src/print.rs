@@ -8,7 +8,7 @@ use twinlag::diagnosis::Verdict;
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
 use twinlag::{
-    Characterisation, Compensation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status,
+    Characterisation, Compensation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status, Track,
 };
 
 use crate::arguments::Talk;
@@ -112,14 +112,7 @@ pub(crate) fn compensation(answer: &Compensation, out: &Path, to_stdout: bool, t
     if talk.json {
         return json(answer);
     }
-    let text = compensation_text(answer, out);
-    if !to_stdout {
-        return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
-    }
-    if !talk.quiet {
-        eprint!("{text}");
-    }
-    Ok(())
+    about(&compensation_text(answer, out), to_stdout, talk)
 }
 
 fn compensation_text(answer: &Compensation, out: &Path) -> String {
@@ -155,6 +148,61 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// What there is to say of time constants along the record, as [`compensation`] does.
+pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
+    if talk.json {
+        return json(answer);
+    }
+    about(&track_text(answer, out), to_stdout, talk)
+}
+
+fn track_text(answer: &Track, out: &Path) -> String {
+    let record = &answer.last.record;
+    let mut lines =
+        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
+    lines.push(match (answer.change.as_str(), answer.coefficients, &answer.step) {
+        ("smooth", Some(size), _) => format!("both time constants change smoothly: {size} coefficients"),
+        ("step", _, Some(step)) => format!(
+            "both time constants change by a factor of {} at {}",
+            digits(step.factor, 4),
+            interval(step.at_s, step.interval_95_s[0], step.interval_95_s[1], " s")
+        ),
+        ("windows", _, _) => format!("{} windows", answer.time_s.len()),
+        _ => "time constants do not change, as far as the record tells".into(),
+    });
+    for (i, sensor) in answer.last.sensors.iter().enumerate() {
+        let range = answer.range_s.map(|r| format!(", from {} to {} s", digits(r[i][0], 4), digits(r[i][1], 4)));
+        lines.push(format!(
+            "  {}: time constant {}{}",
+            sensor.channel,
+            time_constant(sensor),
+            range.unwrap_or_default()
+        ));
+    }
+    if let Some(ratio) = &answer.ratio {
+        let stays = if ratio.stays { "stays" } else { "changes" };
+        lines.push(format!("  their ratio {stays}: p = {:.2e}", ratio.p_value));
+    }
+    lines.push(format!("status: {}", status(answer.status)));
+    if !answer.time_s.is_empty() {
+        lines.push(format!("time constants in {}: {} instants", out.display(), answer.time_s.len()));
+    }
+    lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// Text about data that are in a file, or on standard output.
+fn about(text: &str, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
+    if !to_stdout {
+        return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
+    }
+    if !talk.quiet {
+        eprint!("{text}");
+    }
+    Ok(())
 }
 
 fn diagnosis_text(answer: &Diagnosis) -> String {

@@ -42,6 +42,12 @@ impl Extended {
         &self.theta
     }
 
+    /// Both time constants at `time_s` with other `parameters`, s: where they change along the record, as they do then.
+    pub fn time_constants_s(&self, parameters: &[f64], time_s: &[f64]) -> [Vec<f64>; 2] {
+        let plant = self.model.plant(parameters, &self.observations);
+        [0, 1].map(|i| time_s.iter().map(|t| plant.sensors[i].tau_s * (1.0 + plant.change(i, *t)).max(0.02)).collect())
+    }
+
     /// Gain and offset of the second channel against the first, 1 and K.
     pub fn calibration(&self, parameters: &[f64]) -> [f64; 2] {
         let plant = self.model.plant(parameters, &self.observations);
@@ -103,13 +109,12 @@ fn rig(plant: &Plant) -> Rig {
 
 /// What each sensor does at each instant, where that changes.
 fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<Local>; 2]> {
-    let changes =
-        plant.modulation.is_some() || plant.sensors.iter().any(|s| s.radiation.is_some() || s.exponent.is_some());
+    let changes = plant.changes(1) || plant.sensors.iter().any(|s| s.radiation.is_some() || s.exponent.is_some());
     changes.then(|| {
         [0, 1].map(|i| {
             let sensor = &plant.sensors[i];
             let each = time_s.iter().zip(&temperature_c[i]).map(|(&time_s, &c)| {
-                let change = plant.modulation.as_ref().map_or(0.0, |m| m.at(time_s));
+                let change = plant.change(i, time_s);
                 let with_temperature = sensor
                     .exponent
                     .map_or(1.0, |[p, reference_k]| ((c + ZERO_CELSIUS_K).max(1.0) / reference_k).powf(p));

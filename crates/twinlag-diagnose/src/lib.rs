@@ -39,6 +39,7 @@ mod excitation;
 mod extended;
 mod flow;
 mod held_out;
+mod known;
 mod model;
 mod naming;
 mod observations;
@@ -50,10 +51,11 @@ mod settings;
 mod spectrum;
 mod spline;
 mod summary;
+mod track;
 mod weighting;
 mod whitening;
 
-pub use diagnose::{diagnose, fit_with};
+pub use diagnose::diagnose;
 pub use diagnosis::{
     BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, KnownFit, Limit, ModelFit, TimeConstant, Trace, Unexplained,
     Value, Verdict,
@@ -61,6 +63,8 @@ pub use diagnosis::{
 pub use effect::{About, Identifier};
 pub use error::DiagnoseError;
 pub use extended::Extended;
+pub use known::fit_with;
 pub use model::KnownTimeConstant;
 pub use observations::{Observations, Stretch};
 pub use settings::{KnownEffect, Settings, Watch};
+pub use track::{Change, ChangePoint, RatioTest, Track, track};

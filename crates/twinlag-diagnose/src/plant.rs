@@ -130,13 +130,22 @@ pub(crate) enum Modulation {
     Spline(Spline),
     /// `(v/v_mean)^exponent − 1` of a measured flow.
     Flow { exponent: f64, of: Arc<Flow> },
+    /// Nothing before an instant, s, and this from then on.
+    Step { at_s: f64, change: f64 },
 }
 
 impl Modulation {
-    pub(crate) fn at(&self, time_s: f64) -> f64 {
+    fn at(&self, time_s: f64) -> f64 {
         match self {
             Self::Spline(spline) => spline.at(time_s),
             Self::Flow { exponent, of } => (exponent * of.log_ratio_at(time_s)).exp_m1(),
+            Self::Step { at_s, change } => {
+                if time_s < *at_s {
+                    0.0
+                } else {
+                    *change
+                }
+            }
         }
     }
 }
@@ -162,6 +171,8 @@ pub(crate) struct Plant {
     pub(crate) reach: usize,
     /// Relative change of both time constants along the record.
     pub(crate) modulation: Option<Modulation>,
+    /// Relative change of the ratio `τ₂/τ₁` along the record.
+    pub(crate) ratio: Option<Spline>,
     pub(crate) extra: Vec<Extra>,
     /// The middle of the record, s.
     pub(crate) middle_s: f64,
@@ -185,6 +196,7 @@ impl Plant {
             delay_s: None,
             reach: reach(observations),
             modulation: None,
+            ratio: None,
             extra: Vec::new(),
             middle_s: 0.5 * (first_s + last_s),
         }
@@ -218,11 +230,9 @@ impl Plant {
                 pass(&mut gas, 0.0);
             }
         }
-        let change = self.modulation.as_ref().map(|modulation| -> Vec<f64> {
-            // Both chains have the same instants here.
-            chains[0].times_after_factor().iter().map(|t| modulation.at(*t)).collect()
-        });
-        for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
+        for (i, (chain, sensor)) in chains.iter_mut().zip(&self.sensors).enumerate() {
+            let change: Option<Vec<f64>> =
+                self.changes(i).then(|| chain.times_after_factor().iter().map(|t| self.change(i, *t)).collect());
             Self::lag(chain, sensor, change.as_deref());
         }
         pass(&mut gas, 0.0);
@@ -292,6 +302,18 @@ impl Plant {
         if let Some(curvature) = reading.curvature {
             chain.map(|v| curvature.straighten(v));
         }
+    }
+
+    /// Whether the time constant of sensor `i` changes along the record.
+    pub(crate) fn changes(&self, i: usize) -> bool {
+        self.modulation.is_some() || (i == 1 && self.ratio.is_some())
+    }
+
+    /// Its relative change at an instant.
+    pub(crate) fn change(&self, i: usize, time_s: f64) -> f64 {
+        let shared = self.modulation.as_ref().map_or(0.0, |m| m.at(time_s));
+        let own = self.ratio.as_ref().filter(|_| i == 1).map_or(0.0, |r| r.at(time_s));
+        (1.0 + shared) * (1.0 + own) - 1.0
     }
 
     /// - `change`: relative change of the time constants at each value, where they change along the record

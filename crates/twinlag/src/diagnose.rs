@@ -192,7 +192,7 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
     Ok(with_model(record, model, options)?.0)
 }
 
-fn check_channels(record: &Record, model: &Model) -> Result<(), Error> {
+pub(crate) fn check_channels(record: &Record, model: &Model) -> Result<(), Error> {
     if model.channels == record.channels {
         Ok(())
     } else {
@@ -200,7 +200,21 @@ fn check_channels(record: &Record, model: &Model) -> Result<(), Error> {
     }
 }
 
-fn check_numbers(model: &Model) -> Result<(), Error> {
+/// The effects of a model by the places of their channels.
+pub(crate) fn known_effects(model: &Model) -> Vec<KnownEffect> {
+    let place = |name: &String| model.channels.iter().position(|c| c == name);
+    model
+        .effects
+        .iter()
+        .map(|e| KnownEffect {
+            effect: e.effect,
+            channel: e.channel.as_ref().and_then(place),
+            parameters: e.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
+        })
+        .collect()
+}
+
+pub(crate) fn check_numbers(model: &Model) -> Result<(), Error> {
     let noise = (1..).zip(&model.noise_std_k).map(|(i, k)| (format!("a noise of channel {i} of"), *k));
     let tau = (1..)
         .zip(&model.time_constants_s)
@@ -225,15 +239,7 @@ pub(crate) fn with_model(
     let has_noise = model.effects.iter().any(|e| e.effect.is_noise());
     let noise_std_k = options.noise_std_k.or(has_noise.then_some(model.noise_std_k));
     let settings = Settings { noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
-    let effects: Vec<KnownEffect> = model
-        .effects
-        .iter()
-        .map(|e| KnownEffect {
-            effect: e.effect,
-            channel: e.channel.as_ref().and_then(|name| model.channels.iter().position(|c| c == name)),
-            parameters: e.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
-        })
-        .collect();
+    let effects = known_effects(model);
     let known = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
     let fit = known.fit;
     let is_left = fit.tests.iter().any(|t| t.p_value < 1e-4);
@@ -430,7 +436,7 @@ fn bridged(rows: &[Option<usize>], values: &[f64]) -> Vec<f64> {
     out
 }
 
-fn known(options: &Options) -> Vec<KnownTimeConstant> {
+pub(crate) fn known(options: &Options) -> Vec<KnownTimeConstant> {
     options
         .known
         .iter()
@@ -484,7 +490,7 @@ fn with_effects(base: &Characterisation, core: &Core, options: &DiagnoseOptions)
 }
 
 /// A characterisation with the numbers of `fit`.
-fn of_fit(
+pub(crate) fn of_fit(
     base: &Characterisation,
     fit: &ModelFit,
     status: Status,

@@ -72,6 +72,7 @@ mod question;
 mod report;
 mod second_lag;
 mod starts;
+mod track;
 mod verdict;
 
 pub use characterisation::{
@@ -89,6 +90,7 @@ pub use levels::{NoiseColour, NoiseSource};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
 pub use report::{ReportContext, report, residual_picture};
+pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
 pub use twinlag_bias as bias;
 pub use twinlag_compensate as compensation;

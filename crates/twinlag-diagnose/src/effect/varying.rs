@@ -35,10 +35,10 @@ struct Varying {
     parameters: Vec<Parameter>,
 }
 
-fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
-    const NAMES: [&str; 19] = [
+pub(crate) fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
+    const NAMES: [&str; 32] = [
         "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
-        "m18", "m19",
+        "m18", "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
     ];
     let parameters =
         NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, 3.0))).collect();

@@ -1,0 +1,45 @@
+//! `twinlag track FILE --out OUT.csv`: both time constants along the record.
+
+use twinlag::record::{Decimals, write_csv};
+use twinlag::{Status, TrackOptions};
+
+use crate::arguments::{Talk, Track};
+use crate::characterise::{model, read};
+use crate::failure::Failure;
+use crate::output;
+use crate::print;
+use crate::progress::Progress;
+
+pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
+    let to_stdout = output::check_data(&command.file, &command.out, command.force, talk)?;
+    let options = TrackOptions {
+        characterise: command.method.options()?,
+        model: command.model.as_deref().map(model).transpose()?,
+        window_s: command.window,
+    };
+    let record = read(&command.file, &command.columns.selection())?;
+    print::notes(&record, talk);
+    let answer = {
+        let progress = Progress::start(talk, format!("tracking {} samples", record.len()));
+        let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
+        twinlag::track(&record, &options, &watch)?
+    };
+    let is_answered = !answer.time_s.is_empty();
+    if is_answered {
+        let [one, two] = &answer.sensors;
+        let columns: [(&str, &[f64]); 7] = [
+            ("time_s", &answer.time_s),
+            ("tau1_s", &one.tau_s),
+            ("tau1_low_s", &one.low_s),
+            ("tau1_high_s", &one.high_s),
+            ("tau2_s", &two.tau_s),
+            ("tau2_low_s", &two.low_s),
+            ("tau2_high_s", &two.high_s),
+        ];
+        let mut text = Vec::new();
+        write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+        output::data(&command.out, to_stdout, &text)?;
+    }
+    print::track(&answer, &command.out, to_stdout, talk)?;
+    Ok(if answer.status == Status::NotIdentifiable { 4 } else { 0 })
+}
