@@ -1,0 +1,187 @@
+//! What scripts rely on in `twinlag compensate` and `twinlag track`: columns, schemas, exit codes; and that the numbers are those of the
+//! simulated gas and flow, which no estimator is told.
+
+mod common;
+
+use common::{Bench, interval, number};
+use serde_json::Value;
+
+/// Two thermocouples in turbulence, the second read 2 K too hot, 3000 samples.
+const RIG: &str = r#"
+seed = 5
+
+[record]
+samples = 3000
+sample_period_s = 0.01
+
+[gas]
+kind = "turbulence"
+mean_c = 300.0
+std_k = 15.0
+corner_hz = 0.5
+cutoff_hz = 45.0
+
+[[sensors]]
+channel = "T1"
+time_constant_s = 0.12
+noise = { std_k = 0.1 }
+
+[[sensors]]
+channel = "T2"
+time_constant_s = 0.45
+offset_k = 2.0
+noise = { std_k = 0.1 }
+"#;
+
+fn simulated(test: &str, rig: &str) -> Bench {
+    let bench = Bench::with(test, "rig.toml", rig);
+    let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    bench
+}
+
+/// Columns of a table that the program wrote.
+fn columns(bench: &Bench, file: &str, header: &str) -> Vec<Vec<f64>> {
+    let text = String::from_utf8(bench.read(file)).expect("text");
+    let mut lines = text.lines();
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect()).collect();
+    (0..header.split(',').count()).map(|i| rows.iter().map(|row| row[i]).collect()).collect()
+}
+
+fn gas(bench: &Bench, further: &[&str]) -> Value {
+    let answer = bench.run(&[&["compensate", "run.csv", "--out", "gas.csv", "--json", "--quiet"], further].concat());
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    answer.json()
+}
+
+/// The gas temperature is far nearer to the gas than the faster sensor, and the band holds it as often as it says: of 3000 instants,
+/// of which some 30 a second are independent, 95 ± 2.5 %, and four of those.
+#[test]
+fn the_gas_temperature_is_that_of_the_rig() {
+    let bench = simulated("gas", RIG);
+    let value = gas(&bench, &["--reference", "Tref"]);
+    assert_eq!(value["schema"], "twinlag.compensation/1");
+    assert_eq!(value["status"], "ok");
+    assert_eq!(value["effects"][0]["effect"], "calibration");
+    let reference = &value["gas"]["reference"];
+    assert!(number(&reference["rmse_K"]) < 0.3 * number(&reference["raw_rmse_K"]), "{reference}");
+    let inside = number(&reference["inside_95"]);
+    assert!((0.85..=1.0).contains(&inside), "{reference}");
+    let [time_s, gas_c, std_k]: [Vec<f64>; 3] =
+        columns(&bench, "gas.csv", "time_s,gas_C,gas_std_K").try_into().expect("three columns");
+    assert_eq!(time_s.len(), 3000);
+    assert!(gas_c.iter().all(|c| (200.0..400.0).contains(c)) && std_k.iter().all(|k| *k > 0.0));
+}
+
+/// The offset is that of the second channel: whoever trusts it has the gas 2 K hotter.
+#[test]
+fn the_trusted_channel_sets_the_level() {
+    let bench = simulated("trust", RIG);
+    gas(&bench, &[]);
+    let first = columns(&bench, "gas.csv", "time_s,gas_C,gas_std_K");
+    gas(&bench, &["--trust", "T2", "--force"]);
+    let second = columns(&bench, "gas.csv", "time_s,gas_C,gas_std_K");
+    let apart_k = second[1].iter().zip(&first[1]).map(|(b, a)| b - a).sum::<f64>() / 3000.0;
+    assert!((apart_k - 2.0).abs() < 0.2, "{apart_k} K apart");
+}
+
+#[test]
+fn a_saved_model_compensates_without_a_diagnosis() {
+    let bench = simulated("saved", RIG);
+    assert_eq!(bench.run(&["diagnose", "run.csv", "--save", "model.json", "--quiet"]).code, 0);
+    let value = gas(&bench, &["--model", "model.json", "--reference", "Tref", "--form", "lag:20"]);
+    assert_eq!(value["verdict"], Value::Null);
+    assert_eq!(value["form"]["fixed-lag"], 20);
+    let reference = &value["gas"]["reference"];
+    assert!(number(&reference["rmse_K"]) < 0.3 * number(&reference["raw_rmse_K"]), "{reference}");
+}
+
+/// A row that is missing is bridged: it is there, and less certain than its neighbours.
+#[test]
+fn missing_rows_are_bridged_with_wider_bands() {
+    let bench = simulated("bridged", RIG);
+    let text = String::from_utf8(bench.read("run.csv")).expect("text");
+    let kept: Vec<&str> = text.lines().enumerate().filter(|(k, _)| !(1001..1011).contains(k)).map(|l| l.1).collect();
+    bench.write("run.csv", kept.join("\n"));
+    gas(&bench, &[]);
+    let table = columns(&bench, "gas.csv", "time_s,gas_C,gas_std_K");
+    assert_eq!(table[0].len(), 3000);
+    assert!(table[2][1005] > 1.5 * table[2][900], "{} and {} K", table[2][1005], table[2][900]);
+}
+
+#[test]
+fn outputs_are_never_lost_and_never_mixed() {
+    let bench = simulated("outputs", RIG);
+    bench.write("gas.csv", "precious");
+    bench.refuses(2, &["compensate", "run.csv", "--out", "gas.csv"], &["gas.csv exists", "--force"]);
+    bench.refuses(2, &["track", "run.csv", "--out", "run.csv"], &["the record itself"]);
+    let both = bench.run(&["compensate", "run.csv", "--out", "-", "--json"]);
+    assert_eq!(both.code, 2, "{both:#?}");
+    both.says(&["standard output"]);
+    bench.refuses(1, &["track", "run.csv", "--out", "nowhere/tau.csv"], &["nowhere/tau.csv", "cannot be written"]);
+    bench.refuses(2, &["compensate", "run.csv", "--out", "o.csv", "--form", "best"], &["smoother, filter, or lag:N"]);
+    assert_eq!(bench.read("gas.csv"), b"precious");
+    let answer = bench.run(&["track", "run.csv", "--out", "-", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    assert!(answer.stdout.starts_with("time_s,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s\n"));
+}
+
+/// Equal sensors tell no time constant: exit code 4, the JSON all the same, and no table.
+#[test]
+fn equal_sensors_have_no_gas_temperature() {
+    let bench = simulated("equal", &RIG.replace("0.45", "0.12").replace("offset_k = 2.0\n", ""));
+    for command in ["compensate", "track"] {
+        let answer = bench.run(&[command, "run.csv", "--out", "out.csv", "--json", "--quiet"]);
+        assert_eq!(answer.code, 4, "{answer:#?}");
+        assert_eq!(answer.json()["status"], "not-identifiable", "{command}");
+        assert!(!bench.has("out.csv"), "{command} wrote a table");
+    }
+}
+
+const HEADER: &str = "time_s,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
+
+/// In a flow that swings by 30 % the band follows the truth: of 3000 instants all but few inside three of its half widths.
+#[test]
+fn a_swinging_flow_is_followed() {
+    let flow = "\n[flow]\nkind = \"sine\"\ndepth = 0.3\nperiod_s = 15.0\n";
+    let bench = simulated("swing", &(RIG.replace("offset_k = 2.0\n", "") + flow));
+    let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--json", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let value = answer.json();
+    assert_eq!(value["schema"], "twinlag.track/1");
+    assert_eq!(value["change"], "smooth");
+    assert_eq!(value["ratio"]["stays"], true);
+    let table = columns(&bench, "tau.csv", HEADER);
+    let far = (0..table[0].len()).filter(|&k| {
+        let truth_s = 0.12 * (1.0 + 0.3 * (std::f64::consts::TAU * table[0][k] / 15.0).sin());
+        let half_s = 0.5 * (table[3][k] - table[2][k]);
+        (table[1][k] - truth_s).abs() > 3.0 * half_s
+    });
+    assert!(far.count() < 150, "the band misses the flow");
+}
+
+#[test]
+fn a_step_of_the_flow_is_located() {
+    let flow = "\n[flow]\nkind = \"step\"\nfactor = 1.4\nat_s = 18.0\nover_s = 0.05\n";
+    let bench = simulated("step", &(RIG.replace("offset_k = 2.0\n", "") + flow));
+    let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--json", "--quiet"]);
+    let value = answer.json();
+    assert_eq!(value["change"], "step", "{value:#}");
+    let [low_s, high_s] = interval(&value["step"]["interval_95_s"]);
+    assert!(low_s < 18.05 && high_s > 18.0 && high_s - low_s < 1.0, "{low_s} to {high_s} s");
+    assert!((number(&value["step"]["factor"]) - 1.4).abs() < 0.05, "{value:#}");
+}
+
+#[test]
+fn windows_are_the_published_way() {
+    let bench = simulated("windows", &RIG.replace("offset_k = 2.0\n", ""));
+    let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--window", "6", "--json", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    assert_eq!(answer.json()["change"], "windows");
+    let text = String::from_utf8(bench.read("tau.csv")).expect("text");
+    assert_eq!(text.lines().next(), Some(HEADER));
+    assert!(text.lines().count() > 10, "{text}");
+    bench.refuses(2, &["track", "run.csv", "--out", "o.csv", "--window", "0.5"], &["--window", "200 samples"]);
+}
