@@ -161,6 +161,9 @@ pub(crate) struct Compensate {
     /// Where the gas temperature goes; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
+    /// Draws readings, gas temperature with its band, and spectra: one SVG.
+    #[arg(long, value_name = "SVG")]
+    pub(crate) picture: Option<PathBuf>,
     /// A model that `twinlag diagnose --save` wrote, instead of a diagnosis of this record: its effects stay as they are.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
@@ -201,6 +204,9 @@ pub(crate) struct Track {
     /// Where the time constants go; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
+    /// Draws both time constants with their bands: one SVG.
+    #[arg(long, value_name = "SVG")]
+    pub(crate) picture: Option<PathBuf>,
     /// A model that `twinlag diagnose --save` wrote: its other effects stay as they are.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,

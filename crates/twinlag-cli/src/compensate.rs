@@ -11,7 +11,7 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout = output::check_data(&command.file, &command.out, command.force, talk)?;
+    let to_stdout = output::check_data(&command.file, &command.out, command.picture.as_deref(), command.force, talk)?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
@@ -31,6 +31,9 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
         output::data(&command.out, to_stdout, &text)?;
+        if let Some(path) = &command.picture {
+            output::write(path, twinlag::gas_picture(&record, &answer).map_err(twinlag::Error::from)?)?;
+        }
     }
     print::compensation(&answer, &command.out, to_stdout, talk)?;
     Ok(if answer.status == Status::Ok { 0 } else { 4 })

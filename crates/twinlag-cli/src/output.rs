@@ -37,15 +37,21 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     Ok(())
 }
 
-/// The same for a table of numbers, which may go to standard output, `-`: whether it does.
-pub(crate) fn check_data(record: &Path, out: &Path, force: bool, talk: Talk) -> Result<bool, Failure> {
+/// The same for a table of numbers, which may go to standard output, `-`, and its picture: whether it does.
+pub(crate) fn check_data(
+    record: &Path,
+    out: &Path,
+    picture: Option<&Path>,
+    force: bool,
+    talk: Talk,
+) -> Result<bool, Failure> {
     let to_stdout = out == Path::new("-");
     if to_stdout && talk.json {
         return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
     }
-    if !to_stdout {
-        check(record, &[("--out", out)], force)?;
-    }
+    let table = (!to_stdout).then_some(("--out", out));
+    let outputs: Vec<_> = table.into_iter().chain(picture.map(|path| ("--picture", path))).collect();
+    check(record, &outputs, force)?;
     Ok(to_stdout)
 }
 

@@ -348,6 +348,10 @@ fn digits(value: f64, significant: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
+    if !(1e-9..1e12).contains(&value.abs()) {
+        let decimals = significant.max(1) as usize - 1;
+        return format!("{value:.decimals$e}");
+    }
     let decimals = (f64::from(significant - 1) - value.abs().log10().floor()).clamp(0.0, 15.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -73,4 +73,6 @@ pub use reconstruct::{bandwidth_hz, reconstruct};
 pub use rig::{Between, Coloured, Local, Rig, Sensor, SlowPath};
 #[cfg(feature = "std")]
 pub use smooth::{Form, Gas};
+#[cfg(feature = "std")]
+pub use spectrum::power_spectrum;
 pub use stream::{Now, Stream};

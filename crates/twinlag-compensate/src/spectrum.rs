@@ -122,3 +122,25 @@ fn on_grid(readings: &Readings, channel: usize, first_s: f64, period_s: f64, sam
         })
         .collect()
 }
+
+/// Frequencies, Hz, and two-sided spectral densities, K²/Hz, of `values` that are read every `period_s`: the periodogram under Hann's
+/// taper, its mean in bands that widen with frequency, a tenth of it each. For pictures.
+pub fn power_spectrum(values: &[f64], period_s: f64) -> (Vec<f64>, Vec<f64>) {
+    let n = values.len();
+    let mean = values.iter().sum::<f64>() / (n as f64).max(1.0);
+    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n.max(2));
+    let mut input: Vec<f64> = values.iter().zip(taper(n)).map(|(v, w)| (v - mean) * w).collect();
+    input.resize(n.max(2), 0.0);
+    let mut spectrum = plan.make_output_vec();
+    plan.process(&mut input, &mut spectrum).expect("lengths agree");
+    let (mut hz, mut density) = (Vec::new(), Vec::new());
+    let mut from = 1;
+    while from < spectrum.len() {
+        let to = (from + 1 + from / 10).min(spectrum.len());
+        let power: f64 = spectrum[from..to].iter().map(|s| s.norm_sqr()).sum();
+        hz.push(0.5 * (from + to - 1) as f64 / (n as f64 * period_s));
+        density.push(power / (to - from) as f64 * period_s);
+        from = to;
+    }
+    (hz, density)
+}

@@ -271,6 +271,12 @@ impl State {
             (false, None) if !is_imitated => Verdict::Explained,
             (false, _) => Verdict::PartlyExplained,
         };
+        if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
+            self.remarks.push(
+                "the intervals are those of noise and of what is left over: how far the missing effect moves the numbers they do not know"
+                    .into(),
+            );
+        }
         Diagnosis {
             verdict,
             effects: found,

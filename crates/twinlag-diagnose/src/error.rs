@@ -8,7 +8,9 @@ use twinlag_compensate::CompensateError;
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]
 pub enum DiagnoseError {
-    #[error("a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}")]
+    #[error(
+        "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record for longer, or ask for the time constants alone (`characterise`)"
+    )]
     TooShort { samples: usize, needed: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,

@@ -161,7 +161,8 @@ pub enum RecordError {
     Constant { file: String, column: String, value_c: f64 },
     #[error(
         "{file}: {samples} of {counted} ({missing} with a missing temperature), expected at least {least}; usable are rows \
-         with both temperatures, next to another such row without a gap: record for longer",
+         with both temperatures, next to another such row without a gap: {advice}",
+        advice = remedy(*missing, *rows),
         samples = Counted(*usable, "usable sample"), counted = Counted(*rows, "row")
     )]
     TooShort { file: String, usable: usize, rows: usize, missing: usize, least: usize },
@@ -172,4 +173,13 @@ pub enum RecordError {
     LengthMismatch { file: String, name: String, found: usize, like: String, expected: usize },
     #[error("cannot write the table: {reason}; check the disk and the permissions")]
     CannotWrite { reason: String },
+}
+
+/// What to do about too few rows with both temperatures.
+fn remedy(missing: usize, rows: usize) -> &'static str {
+    if 2 * missing > rows {
+        "where a logger reads one channel after the other, write both into one row, the second interpolated to the time of the first"
+    } else {
+        "record for longer"
+    }
 }

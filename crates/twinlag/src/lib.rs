@@ -89,7 +89,7 @@ pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
-pub use report::{ReportContext, report, residual_picture};
+pub use report::{ReportContext, gas_picture, report, residual_picture, track_picture};
 pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
 pub use twinlag_bias as bias;

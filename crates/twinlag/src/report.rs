@@ -1,6 +1,7 @@
 //! A diagnosis as a page: what was found, how well it is shown, what it changes, and what stays open, with pictures.
 
 mod figures;
+mod gas;
 mod words;
 
 use std::ops::Range;
@@ -9,6 +10,8 @@ use twinlag_diagnose::{Diagnosis, Found, Identifier, ModelFit, TimeConstant, Tra
 use twinlag_report::{
     Axis, Chart, Colour, Document, Figure, ReportError, Series, Table, between, plus_minus, probability, rounded,
 };
+
+pub use gas::{gas_picture, track_picture};
 
 use figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
 use words::{

@@ -1,0 +1,96 @@
+//! Pictures of the gas temperature, and of time constants along a record.
+
+use twinlag_compensate::power_spectrum;
+use twinlag_record::Record;
+use twinlag_report::{Axis, Chart, Colour, Figure, Reference, ReportError, Series};
+
+use super::figures::{WIDTH_PX, trace};
+use crate::compensate::Compensation;
+use crate::track::Track;
+
+/// Part of the record that is shown large.
+const EXCERPT: usize = 20;
+/// Standard deviations within which 95 % of a normal distribution lie.
+const Z_95: f64 = 1.959_963_984_540_054;
+
+/// Readings and gas temperature with its band, over the record and where it moves most, and the spectra before and after with the
+/// frequency up to which the readings decide: one SVG.
+///
+/// # Errors
+/// [`ReportError`], if there is nothing to draw.
+pub fn gas_picture(record: &Record, answer: &Compensation) -> Result<String, ReportError> {
+    let n = answer.time_s.len();
+    let length = (n / EXCERPT).max(50).min(n);
+    let swing = |from: usize| {
+        let part = &answer.gas_c[from..from + length];
+        let (low, high) = part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| (l.min(*c), h.max(*c)));
+        high - low
+    };
+    let starts = (0..=n - length).step_by((length / 2).max(1));
+    let from = starts.max_by(|a, b| swing(*a).total_cmp(&swing(*b))).unwrap_or(0);
+    let figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    let figure = figure
+        .panel(temperatures(record, answer, "The whole record", 0..n))
+        .panel(temperatures(record, answer, "Where it moves most", from..from + length))
+        .panel(spectra(record, answer));
+    figure.to_svg()
+}
+
+fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std::ops::Range<usize>) -> Chart {
+    let time_s = &answer.time_s[shown.clone()];
+    let ends = [time_s.first().copied().unwrap_or(0.0), time_s.last().copied().unwrap_or(0.0)];
+    let rows = record.time_s.partition_point(|t| *t < ends[0])..record.time_s.partition_point(|t| *t <= ends[1]);
+    let band = |sign: f64| -> Vec<f64> {
+        shown.clone().map(|k| answer.gas_c[k] + sign * Z_95 * answer.gas_std_k[k]).collect()
+    };
+    let gas = Series::trace("gas, with its 95 % band", time_s, &answer.gas_c[shown.clone()]).colour(Colour::Green);
+    let chart = Chart::new(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"));
+    let mut chart = chart.series(gas.band(band(-1.0), band(1.0)));
+    for (i, values) in [&record.t1_c, &record.t2_c].into_iter().enumerate() {
+        let colour = [Colour::Blue, Colour::Orange][i];
+        let series = trace(&record.channels[i], &record.time_s[rows.clone()], &values[rows.clone()], colour);
+        chart = series.into_iter().fold(chart, Chart::series);
+    }
+    chart
+}
+
+fn spectra(record: &Record, answer: &Compensation) -> Chart {
+    let period_s = record.sampling.period_s;
+    let faster = answer.rig.is_some_and(|rig| rig.sensors[1].tau_s < rig.sensors[0].tau_s);
+    let (name, raw) = if faster { (&record.channels[1], &record.t2_c) } else { (&record.channels[0], &record.t1_c) };
+    let known: Vec<f64> = raw.iter().copied().filter(|c| c.is_finite()).collect();
+    let (hz, density) = power_spectrum(&known, period_s);
+    let (gas_hz, gas) = power_spectrum(&answer.gas_c, period_s);
+    let mut chart = Chart::new("Spectra", Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("density (K²/Hz)"))
+        .series(Series::line(format!("{name} as it reads"), hz, density).colour(Colour::Blue))
+        .series(Series::line("gas", gas_hz.clone(), gas).colour(Colour::Green));
+    if let (Some(quality), Some(rig)) = (&answer.gas, &answer.rig) {
+        let noise: Vec<f64> = gas_hz.iter().map(|hz| rig.noise_density_k2_per_hz(*hz, period_s)).collect();
+        chart = chart.series(Series::trace("noise of the inferred gas", gas_hz, noise).colour(Colour::Orange).dashed());
+        if let Some(hz) = quality.bandwidth_hz {
+            chart = chart.reference(Reference::vertical(hz).label("the readings decide up to here"));
+        }
+    }
+    chart
+}
+
+/// Both time constants along the record with their bands: one SVG.
+///
+/// # Errors
+/// [`ReportError`], if there is nothing to draw.
+pub fn track_picture(answer: &Track) -> Result<String, ReportError> {
+    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    for (i, along) in answer.sensors.iter().enumerate() {
+        let name = &answer.last.sensors[i].channel;
+        let colour = [Colour::Blue, Colour::Orange][i];
+        let series = Series::trace("time constant, with its 95 % band", answer.time_s.clone(), along.tau_s.clone());
+        let series = series.colour(colour).band(along.low_s.clone(), along.high_s.clone());
+        let axis = Axis::linear("time constant (s)");
+        let mut chart = Chart::new(name, Axis::linear("time (s)"), axis).series(series).without_legend();
+        if let Some(step) = &answer.step {
+            chart = chart.reference(Reference::vertical(step.at_s).label("step"));
+        }
+        figure = figure.panel(chart);
+    }
+    figure.to_svg()
+}
