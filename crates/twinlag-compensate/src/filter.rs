@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::system::Step;
+use crate::system::{Step, around};
 
 /// What is known of the state: its mean and covariance.
 #[derive(Clone, Copy, Debug)]
@@ -21,12 +21,14 @@ pub(crate) struct Update<const D: usize> {
 }
 
 impl<const D: usize> Belief<D> {
+    #[inline(never)]
     pub(crate) fn predict(&mut self, step: &Step<D>) {
         self.state = step.transition * self.state;
-        self.covariance = step.transition * self.covariance * step.transition.transpose() + step.added;
+        self.covariance = around(&step.transition, &self.covariance) + step.added;
     }
 
     /// A reading `value` of `reads · z` with white noise of `noise_variance`.
+    #[inline(never)]
     pub(crate) fn update(&mut self, reads: &SVector<f64, D>, value: f64, noise_variance: f64) -> Update<D> {
         let row = self.covariance * reads;
         let variance = reads.dot(&row) + noise_variance;

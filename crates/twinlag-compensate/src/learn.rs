@@ -16,9 +16,9 @@ use crate::spectrum::Periodogram;
 use part::{Limits, Part};
 
 /// Most states of the gas.
-const MOST_STATES: usize = 24;
+const MOST_STATES: usize = 18;
 /// Harmonics of a comb, at most and at least.
-const HARMONICS: usize = 9;
+const HARMONICS: usize = 8;
 const FEWEST_HARMONICS: usize = 3;
 /// Fewest samples with both readings.
 const FEWEST: usize = 32;

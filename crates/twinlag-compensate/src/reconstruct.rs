@@ -8,7 +8,7 @@ use crate::smooth::{self, Form, Gas};
 use crate::system;
 
 /// Largest state.
-const MOST_STATES: usize = 32;
+const MOST_STATES: usize = 24;
 
 /// The gas temperature that `readings` of `rig` tell, where the gas moves as `prior` says.
 ///
@@ -23,13 +23,11 @@ pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) ->
     let states = system::states(rig, &prior.terms);
     let run = match states {
         0..=4 => smooth::run::<4>,
-        5 => smooth::run::<5>,
-        6 => smooth::run::<6>,
+        5..=6 => smooth::run::<6>,
         7..=8 => smooth::run::<8>,
         9..=12 => smooth::run::<12>,
         13..=16 => smooth::run::<16>,
-        17..=24 => smooth::run::<24>,
-        25..=MOST_STATES => smooth::run::<MOST_STATES>,
+        17..=MOST_STATES => smooth::run::<MOST_STATES>,
         _ => return Err(CompensateError::TooLarge { got: states, most: MOST_STATES }),
     };
     Ok(run(readings, rig, prior, form))

@@ -11,7 +11,7 @@ use crate::filter::{Belief, Update};
 use crate::prior::Prior;
 use crate::readings::Readings;
 use crate::rig::Rig;
-use crate::system::{Step, System};
+use crate::system::{Step, System, around};
 
 /// Steps that differ by less are the same.
 const SAME_STEP: f64 = 1e-9;
@@ -170,7 +170,7 @@ impl<const D: usize> Forward<D> {
             told(j, kept.gas - kept.row.dot(&pull), kept.variance - kept.row.dot(&(weight * kept.row)));
             let transition = &self.steps[kept.step].transition;
             pull = transition.tr_mul(&pull);
-            weight = transition.tr_mul(&weight) * transition;
+            weight = around(&transition.transpose(), &weight);
         }
     }
 }

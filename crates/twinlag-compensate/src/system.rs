@@ -185,6 +185,27 @@ impl<const D: usize> System<D> {
     }
 }
 
+/// `a b`, in loops that are not unrolled, one copy for each size: otherwise the larger sizes take minutes to compile.
+#[inline(never)]
+pub(crate) fn product<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    let mut out = SMatrix::<f64, D, D>::zeros();
+    let (a, b) = (a.as_slice(), b.as_slice());
+    for (column, factors) in out.as_mut_slice().chunks_exact_mut(D).zip(b.chunks_exact(D)) {
+        for (part, factor) in a.chunks_exact(D).zip(factors) {
+            for (sum, value) in column.iter_mut().zip(part) {
+                *sum += value * factor;
+            }
+        }
+    }
+    out
+}
+
+/// `a b aᵀ`.
+#[inline(never)]
+pub(crate) fn around<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
+    product(&product(a, b), &a.transpose())
+}
+
 /// `Φ = exp(A t)` and `∫₀ᵗ exp(A u) Q exp(Aᵀ u) du`: their series over a part of the step, doubled until it is whole, so that
 /// nothing cancels. Most of `A` is zero, which the series makes use of.
 fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, D, D>, step_s: f64) -> Step<D> {
@@ -223,8 +244,8 @@ fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, 
         added += driven;
     }
     for _ in 0..doublings {
-        added += transition * added * transition.transpose();
-        transition *= transition;
+        added += around(&transition, &added);
+        transition = product(&transition, &transition);
     }
     Step { transition, added }
 }
