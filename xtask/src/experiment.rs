@@ -1,6 +1,7 @@
 //! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
 
 mod loops;
+mod reconstruction;
 mod surface;
 
 use std::fs;
@@ -20,6 +21,7 @@ use twinlag_study::{Options, Outcome, Part, Shard, Study};
 
 use crate::root;
 pub(crate) use loops::record_of;
+use reconstruction::Reconstruction;
 
 /// What to do with the experiments.
 #[derive(Subcommand)]
@@ -98,6 +100,9 @@ pub(crate) fn run(task: Task) -> Result<()> {
             if let Some(plan) = loops::Plan::read(&text(&name)?) {
                 return loops::write(&plan?, &results, &out);
             }
+            if let Some(plan) = reconstruction::Plan::read(&text(&name)?) {
+                return reconstruction::write(&Reconstruction::new(plan?), &results, &out);
+            }
             let plan = plan(&name)?;
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
             let plan = with_trials_of(plan, &results);
@@ -161,11 +166,15 @@ fn title(name: &str) -> Result<String> {
     if let Some(plan) = loops::Plan::read(&text(name)?) {
         return Ok(plan?.title);
     }
+    if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
+        return Ok(plan?.title);
+    }
     if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
 }
 
 fn draw(name: &str) -> Result<()> {
-    if name == surface::NAME || loops::Plan::read(&text(name)?).is_some() {
+    let text = text(name)?;
+    if name == surface::NAME || loops::Plan::read(&text).is_some() || reconstruction::Plan::read(&text).is_some() {
         println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
@@ -186,6 +195,9 @@ fn one(name: &str, run: &Run) -> Result<()> {
     }
     if let Some(plan) = loops::Plan::read(&text(name)?) {
         return closed_loop(plan?, &folder, run);
+    }
+    if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
+        return reconstruct(plan?, &folder, run);
     }
     let mut plan = plan(name)?;
     plan.trials = run.trials.unwrap_or(plan.trials);
@@ -291,6 +303,36 @@ fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
     if let Some(part) = options.checkpoint {
         fs::remove_file(part)?;
     }
+    Ok(())
+}
+
+/// An experiment of the gas temperature.
+fn reconstruct(mut plan: reconstruction::Plan, folder: &Path, run: &Run) -> Result<()> {
+    plan.trials = run.trials.unwrap_or(plan.trials);
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    if run.quick {
+        plan.shorten();
+    }
+    let out = place(run, folder)?;
+    let options = options(run, &out)?;
+    let study = Reconstruction::new(plan);
+    let (finished, seconds) = observed(&study, &study.plan.name, &options)?;
+    if let Some(shard) = run.shard {
+        println!("{}: part {shard} in {seconds:.0} s", study.plan.name);
+        return Ok(());
+    }
+    let results = finished.into_results()?;
+    if run.check {
+        reconstruction::check(&study, &results, folder)?;
+        println!("{}: the stored results hold, to the byte; {seconds:.0} s", study.plan.name);
+        return Ok(());
+    }
+    reconstruction::write(&study, &results, &out)?;
+    provenance(&study.plan.name, study.plan.seed, study.plan.trials, &out, seconds, options.threads.get())?;
+    if let Some(part) = options.checkpoint {
+        fs::remove_file(part)?;
+    }
+    println!("{}: {seconds:.0} s, {}", study.plan.name, out.display());
     Ok(())
 }
 
