@@ -11,12 +11,14 @@ use twinlag_optimise::{Budget, Cost, Derivatives, Minimiser, Optimiser, Problem}
 use crate::error::CompensateError;
 use crate::prior::{Prior, Term};
 use crate::readings::Readings;
+use crate::reconstruct::MOST_STATES;
 use crate::rig::Rig;
 use crate::spectrum::Periodogram;
+use crate::system::states as states_of;
 use part::{Limits, Part};
 
 /// Most states of the gas.
-const MOST_STATES: usize = 18;
+const MOST_OF_GAS: usize = 20;
 /// Harmonics of a comb, at most and at least.
 const HARMONICS: usize = 8;
 const FEWEST_HARMONICS: usize = 3;
@@ -49,13 +51,16 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Prior, CompensateError> {
     let periodogram = Periodogram::of(readings, rig, level_c);
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
-    let parts = Search { periodogram: &periodogram, limits }.run();
+    let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
+    let parts = Search { periodogram: &periodogram, limits, room }.run();
     Ok(Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() })
 }
 
 struct Search<'a> {
     periodogram: &'a Periodogram,
     limits: Limits,
+    /// States that the gas may have.
+    room: usize,
 }
 
 /// Parts with what they leave unlikely.
@@ -79,7 +84,7 @@ impl Search<'_> {
         let nothing = Fitted { parts: Vec::new(), deviance: f64::INFINITY };
         let mut current = self.best(&nothing, self.first());
         loop {
-            let room = MOST_STATES - states(&current.parts);
+            let room = self.room.saturating_sub(states(&current.parts));
             let candidates = self.more(&current).into_iter().filter(|p| states(std::slice::from_ref(p)) <= room);
             let mut next = self.best(&current, candidates.collect());
             if next.parts.len() > 1 {

@@ -8,7 +8,7 @@ use crate::smooth::{self, Form, Gas};
 use crate::system;
 
 /// Largest state.
-const MOST_STATES: usize = 24;
+pub(crate) const MOST_STATES: usize = 24;
 
 /// The gas temperature that `readings` of `rig` tell, where the gas moves as `prior` says.
 ///

@@ -27,7 +27,8 @@ pub(super) struct Limits {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Part {
     Single(Term),
-    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first.
+    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first. Beyond the last one
+    /// that is seen they are taken to fall as `1/m²`, as those of a pulse with a kink do: a band with their power.
     Comb {
         frequency_hz: f64,
         /// Half width of the first line.
@@ -40,14 +41,14 @@ impl Part {
     pub(super) fn terms(&self) -> Vec<Term> {
         match self {
             Self::Single(term) => vec![*term],
-            Self::Comb { frequency_hz, width_hz, std_k } => (1..)
-                .zip(std_k)
-                .map(|(m, std_k)| {
+            Self::Comb { frequency_hz, width_hz, std_k } => {
+                let lines = (1..).zip(std_k).map(|(m, std_k)| {
                     let m = f64::from(m);
                     let quality = (0.5 * frequency_hz / (width_hz * m)).max(0.5);
                     Term::Resonance { std_k: *std_k, frequency_hz: m * frequency_hz, quality }
-                })
-                .collect(),
+                });
+                lines.chain(tail(*frequency_hz, std_k)).collect()
+            }
         }
     }
 
@@ -76,11 +77,12 @@ impl Part {
         }
     }
 
-    /// The term of which number `a` is the standard deviation.
+    /// The term of which number `a` is the standard deviation, and which nothing else depends on.
     pub(super) fn size_of(&self, a: usize) -> Option<usize> {
         let sizes = match self {
             Self::Single(_) => 1,
-            Self::Comb { std_k, .. } => std_k.len(),
+            // The last two are in what goes on above them.
+            Self::Comb { std_k, .. } => std_k.len().saturating_sub(2),
         };
         (a < sizes).then_some(a)
     }
@@ -103,6 +105,15 @@ impl Part {
             }
         }
     }
+}
+
+/// Where the lines go on: `Σ_{m > M} s² (M/m)⁴` is `s² M/3`, most of it just above the last one, of which `s` is the larger of it and
+/// its neighbour.
+fn tail(frequency_hz: f64, std_k: &[f64]) -> Option<Term> {
+    let last = std_k.len().checked_sub(1)?;
+    let line_k = std_k[last].max(std_k[last.saturating_sub(1)] * (last as f64 / (last + 1) as f64).powi(2));
+    let std_k = line_k * ((last + 1) as f64 / 3.0).sqrt();
+    Some(Term::Resonance { std_k, frequency_hz: (last as f64 + 2.0) * frequency_hz, quality: 2.0 })
 }
 
 /// Parts of the same kinds with other numbers.
