@@ -12,6 +12,11 @@ use crate::root;
 pub(crate) fn run() -> Result<()> {
     step("tests", "cargo", &["test", "--workspace"])?;
     step("format", "cargo", &["fmt", "--all", "--check"])?;
+    step(
+        "without the standard library",
+        "cargo",
+        &["check", "--package", "twinlag-compensate", "--no-default-features"],
+    )?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
     // In one build: asked for one by one, packages take features one by one, and are compiled anew each time.
