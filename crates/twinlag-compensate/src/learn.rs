@@ -158,7 +158,7 @@ impl Search<'_> {
     fn comb(&self, ratio: &[f64], excess_k: impl Fn(usize, usize) -> f64) -> Option<Part> {
         let gain = |j: usize| {
             let r = ratio[j];
-            if r > 1.0 { r - 1.0 - r.ln() } else { 0.0 }
+            if r > 1.0 { self.periodogram.pieces * (r - 1.0 - r.ln()) } else { 0.0 }
         };
         // Bins count from the second one; a quarter of a bin of the highest harmonic is the step.
         let bins = ratio.len() as f64;
@@ -226,7 +226,8 @@ struct Whittle<'a> {
 
 impl Whittle<'_> {
     fn deviance(&self, expected: &[f64]) -> f64 {
-        2.0 * expected.iter().zip(&self.periodogram.power).map(|(e, i)| e.ln() + i / e).sum::<f64>()
+        let sum: f64 = expected.iter().zip(&self.periodogram.power).map(|(e, i)| e.ln() + i / e).sum();
+        2.0 * self.periodogram.pieces * sum
     }
 }
 
@@ -266,7 +267,7 @@ impl Cost for Whittle<'_> {
             slope.iter_mut().zip(&expected).for_each(|(s, e)| *s /= e);
         }
         let residual: Vec<f64> = p.power.iter().zip(&expected).map(|(i, e)| 1.0 - i / e).collect();
-        let dot = |a: &[f64], b: &[f64]| 2.0 * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let dot = |a: &[f64], b: &[f64]| 2.0 * p.pieces * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         Some(Derivatives {
             value: self.deviance(&expected),
             gradient: slopes.iter().map(|s| dot(s, &residual)).collect(),
