@@ -36,7 +36,7 @@ const STEP: f64 = 1e-4;
 /// Instants that are missing, and uneven ones, are bridged by straight lines; the smoother itself does not need that.
 ///
 /// # Errors
-/// [`CompensateError::TooShort`], and as [`crate::reconstruct`].
+/// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
 pub fn learn(readings: &Readings, rig: &Rig) -> Result<Prior, CompensateError> {
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());

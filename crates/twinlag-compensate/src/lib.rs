@@ -1,7 +1,7 @@
 //! The gas temperature, with its standard deviation, from the readings of two sensors whose lags are known.
 //!
-//! For anyone who has a model of two sensors, however it was found, and wants what they measured: [`learn`] finds from the readings
-//! how much the gas moves and how fast, [`reconstruct`] gives its temperature at every sample with an honest band, from the whole record
+//! For anyone who has a model of two sensors, however it was found, and wants what they measured: [`learn()`] finds from the readings
+//! how much the gas moves and how fast, [`reconstruct()`] gives its temperature at every sample with an honest band, from the whole record
 //! (Kalman's filter and a smoother), from what was read so far, or with a fixed lag; [`Stream`] does the second sample by sample. Uneven
 //! sampling, missing readings, a delay between the channels, second lags, slow paths, noise that is not white, time constants that
 //! change and radiation are in the model ([`Rig`], [`Local`]). The crate knows neither files nor how a model is found: for logger files

@@ -12,10 +12,10 @@ use crate::settings::{KnownEffect, Settings};
 use crate::summary::summarise;
 
 /// Both time constants of `observations` with `effects` as they are in the model, but for what belongs to a record, which is
-/// fitted again; defects of the data are dealt with as in [`diagnose`].
+/// fitted again; defects of the data are dealt with as in [`crate::diagnose()`].
 ///
 /// # Errors
-/// As [`diagnose`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
+/// As [`crate::diagnose()`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
 pub fn fit_with(
     observations: &Observations,
     settings: &Settings,

@@ -108,7 +108,7 @@ impl Compensation {
 /// The gas temperature of `record` with its standard deviation: by the model that a diagnosis finds, or by the one given.
 ///
 /// # Errors
-/// As [`diagnose`] and [`crate::characterise_with`].
+/// As [`crate::diagnose()`] and [`crate::characterise_with`].
 pub fn compensate(
     record: &Record,
     options: &CompensateOptions,
