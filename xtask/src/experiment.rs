@@ -15,9 +15,9 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
+use serde_json::{Value, json};
 use twinlag_experiment::{Experiment, Method, Plan, Table, write};
-use twinlag_study::{Options, Outcome, Part, Shard, Study};
+use twinlag_study::{Options, Outcome, Part, Results, Shard, Study};
 
 use crate::root;
 pub(crate) use loops::record_of;
@@ -98,10 +98,10 @@ pub(crate) fn run(task: Task) -> Result<()> {
         Task::Merge { name, parts, out } => {
             let results = twinlag_study::merge(&parts)?;
             if let Some(plan) = loops::Plan::read(&text(&name)?) {
-                return loops::write(&plan?, &results, &out);
+                return merge_stored(plan?, &results, &out);
             }
             if let Some(plan) = reconstruction::Plan::read(&text(&name)?) {
-                return reconstruction::write(&Reconstruction::new(plan?), &results, &out);
+                return merge_stored(Reconstruction::new(plan?), &results, &out);
             }
             let plan = plan(&name)?;
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
@@ -133,7 +133,7 @@ pub(crate) fn quick(out: &Path) -> Result<()> {
     self::run(Task::Run(run))
 }
 
-fn with_trials_of(mut plan: Plan, results: &twinlag_study::Results) -> Plan {
+fn with_trials_of(mut plan: Plan, results: &Results) -> Plan {
     plan.trials = results.header().trials();
     plan
 }
@@ -278,6 +278,83 @@ fn observed<S: Study>(study: &S, name: &str, options: &Options) -> Result<(Part,
     Ok((finished, start.elapsed().as_secs_f64()))
 }
 
+/// An experiment that is a study of its own, with tables of its own.
+trait Stored: Study {
+    fn name(&self) -> &str;
+
+    fn seed(&self) -> u64;
+
+    fn set_trials(&mut self, trials: u64);
+
+    fn cell_name(&self, cell: usize) -> String;
+
+    /// Tables and pictures.
+    fn tables(&self, results: &Results, out: &Path) -> Result<()>;
+}
+
+/// Results, tables and pictures.
+fn write_stored(study: &impl Stored, results: &Results, out: &Path) -> Result<()> {
+    ensure!(
+        results.header().plan() == study.plan(),
+        "the results are of another plan than {}, or of another version of it",
+        study.name()
+    );
+    fs::create_dir_all(out)?;
+    fs::write(out.join("results.json"), results.to_json())?;
+    study.tables(results, out)?;
+    println!("{}: {}", study.name(), out.display());
+    Ok(())
+}
+
+/// Holds results against those that are stored in `folder`: an error names the first cell that differs.
+fn check_stored(study: &impl Stored, results: &Results, folder: &Path) -> Result<()> {
+    let name = study.name();
+    let now = results.to_json();
+    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
+    if now == stored {
+        return Ok(());
+    }
+    let cells = |text: &str| -> Result<Vec<Value>> {
+        let value: Value = serde_json::from_str(text).context("the stored results cannot be read")?;
+        Ok(value["cells"].as_array().cloned().unwrap_or_default())
+    };
+    let (now, stored) = (cells(&now)?, cells(&stored)?);
+    match now.iter().zip(&stored).position(|(a, b)| a != b) {
+        Some(cell) => bail!("{name}: the first cell that differs from the stored results is {}", study.cell_name(cell)),
+        None => bail!("{name}: the stored results are of another plan"),
+    }
+}
+
+/// The parts of shards, in one.
+fn merge_stored(mut study: impl Stored, results: &Results, out: &Path) -> Result<()> {
+    study.set_trials(results.header().trials());
+    write_stored(&study, results, out)
+}
+
+/// Runs it, and writes or checks what came of it.
+fn stored(study: &impl Stored, folder: &Path, run: &Run) -> Result<()> {
+    let name = study.name();
+    let out = place(run, folder)?;
+    let options = options(run, &out)?;
+    let (finished, seconds) = observed(study, name, &options)?;
+    if let Some(shard) = run.shard {
+        println!("{name}: part {shard} in {seconds:.0} s");
+        return Ok(());
+    }
+    let results = finished.into_results()?;
+    if run.check {
+        check_stored(study, &results, folder)?;
+        println!("{name}: the stored results hold, to the byte; {seconds:.0} s");
+        return Ok(());
+    }
+    write_stored(study, &results, &out)?;
+    provenance(name, study.seed(), study.trials(), &out, seconds, options.threads.get())?;
+    if let Some(part) = options.checkpoint {
+        fs::remove_file(part)?;
+    }
+    Ok(())
+}
+
 /// An experiment of the closed loop.
 fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
     plan.records = run.trials.unwrap_or(plan.records);
@@ -285,55 +362,17 @@ fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
         plan.shorten();
     }
     plan.seed = run.seed.unwrap_or(plan.seed);
-    let out = place(run, folder)?;
-    let options = options(run, &out)?;
-    let (finished, seconds) = observed(&plan, &plan.name, &options)?;
-    if let Some(shard) = run.shard {
-        println!("{}: part {shard} in {seconds:.0} s", plan.name);
-        return Ok(());
-    }
-    let results = finished.into_results()?;
-    if run.check {
-        loops::check(&plan, &results, folder)?;
-        println!("{}: the stored results hold, to the byte; {seconds:.0} s", plan.name);
-        return Ok(());
-    }
-    loops::write(&plan, &results, &out)?;
-    provenance(&plan.name, plan.seed, plan.records, &out, seconds, options.threads.get())?;
-    if let Some(part) = options.checkpoint {
-        fs::remove_file(part)?;
-    }
-    Ok(())
+    stored(&plan, folder, run)
 }
 
 /// An experiment of the gas temperature.
 fn reconstruct(mut plan: reconstruction::Plan, folder: &Path, run: &Run) -> Result<()> {
     plan.trials = run.trials.unwrap_or(plan.trials);
-    plan.seed = run.seed.unwrap_or(plan.seed);
     if run.quick {
         plan.shorten();
     }
-    let out = place(run, folder)?;
-    let options = options(run, &out)?;
-    let study = Reconstruction::new(plan);
-    let (finished, seconds) = observed(&study, &study.plan.name, &options)?;
-    if let Some(shard) = run.shard {
-        println!("{}: part {shard} in {seconds:.0} s", study.plan.name);
-        return Ok(());
-    }
-    let results = finished.into_results()?;
-    if run.check {
-        reconstruction::check(&study, &results, folder)?;
-        println!("{}: the stored results hold, to the byte; {seconds:.0} s", study.plan.name);
-        return Ok(());
-    }
-    reconstruction::write(&study, &results, &out)?;
-    provenance(&study.plan.name, study.plan.seed, study.plan.trials, &out, seconds, options.threads.get())?;
-    if let Some(part) = options.checkpoint {
-        fs::remove_file(part)?;
-    }
-    println!("{}: {seconds:.0} s, {}", study.plan.name, out.display());
-    Ok(())
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    stored(&Reconstruction::new(plan), folder, run)
 }
 
 fn bar(name: &str) -> ProgressBar {

@@ -93,12 +93,8 @@ data-sheet value of one sensor often decides: --known T1.time_constant_s=0.5+-0.
 
 Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
 pub(crate) struct Characterise {
-    /// The record; `-` reads standard input.
-    pub(crate) file: PathBuf,
     #[command(flatten)]
-    pub(crate) columns: Columns,
-    #[command(flatten)]
-    pub(crate) method: Method,
+    pub(crate) input: Input,
     /// A model that `twinlag diagnose --save` wrote: its effects stay as they are, the time constants are fitted.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
@@ -120,12 +116,8 @@ explain the record as well are named as alternatives.
 
 Exit codes: 0 diagnosed, 4 refused, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
 pub(crate) struct Diagnose {
-    /// The record; `-` reads standard input.
-    pub(crate) file: PathBuf,
     #[command(flatten)]
-    pub(crate) columns: Columns,
-    #[command(flatten)]
-    pub(crate) method: Method,
+    pub(crate) input: Input,
     /// Writes a report to look at: one HTML file that needs nothing else.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
@@ -152,12 +144,8 @@ how much it moves, and how fast, is found from the readings. The bandwidth that 
 Exit codes: 0 compensated, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
 1 anything else.")]
 pub(crate) struct Compensate {
-    /// The record; `-` reads standard input.
-    pub(crate) file: PathBuf,
     #[command(flatten)]
-    pub(crate) columns: Columns,
-    #[command(flatten)]
-    pub(crate) method: Method,
+    pub(crate) input: Input,
     /// Where the gas temperature goes; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
@@ -195,12 +183,8 @@ With --window each window is characterised by itself, the published way: wider b
 Exit codes: 0 tracked, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
 1 anything else.")]
 pub(crate) struct Track {
-    /// The record; `-` reads standard input.
-    pub(crate) file: PathBuf,
     #[command(flatten)]
-    pub(crate) columns: Columns,
-    #[command(flatten)]
-    pub(crate) method: Method,
+    pub(crate) input: Input,
     /// Where the time constants go; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
@@ -234,6 +218,17 @@ fn form(text: &str) -> Result<Form, String> {
         (_, Some(Ok(samples))) => Ok(Form::FixedLag(samples)),
         _ => Err("expected smoother, filter, or lag:N with a whole number of samples N".into()),
     }
+}
+
+/// The record, and how it is asked.
+#[derive(Debug, Args)]
+pub(crate) struct Input {
+    /// The record; `-` reads standard input.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) columns: Columns,
+    #[command(flatten)]
+    pub(crate) method: Method,
 }
 
 /// Which columns, and how time is meant.

@@ -13,8 +13,8 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
-    let options = command.method.options()?;
-    let record = read(&command.file, &command.columns.selection())?;
+    let options = command.input.method.options()?;
+    let record = read(&command.input.file, &command.input.columns.selection())?;
     print::notes(&record, talk);
     let answer = match &command.model {
         Some(path) => {

@@ -11,14 +11,15 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout = output::check_data(&command.file, &command.out, command.picture.as_deref(), command.force, talk)?;
+    let to_stdout =
+        output::check_data(&command.input.file, &command.out, command.picture.as_deref(), command.force, talk)?;
     let options = CompensateOptions {
-        diagnose: DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() },
+        diagnose: DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
         form: command.form,
         trusted: usize::from(command.trust == Trust::T2),
     };
-    let record = read(&command.file, &command.columns.selection())?;
+    let record = read(&command.input.file, &command.input.columns.selection())?;
     print::notes(&record, talk);
     let answer = {
         let progress = Progress::start(talk, format!("compensating {} samples", record.len()));

@@ -14,9 +14,9 @@ use crate::progress::Progress;
 pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     let outputs = [("--report", &command.report), ("--save", &command.save)];
     let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
-    output::check(&command.file, &outputs, command.force)?;
-    let options = DiagnoseOptions { characterise: command.method.options()?, without: command.without.clone() };
-    let record = read(&command.file, &command.columns.selection())?;
+    output::check(&command.input.file, &outputs, command.force)?;
+    let options = DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() };
+    let record = read(&command.input.file, &command.input.columns.selection())?;
     print::notes(&record, talk);
     let answer = diagnose(&record, &options, talk)?;
     if let Some(path) = &command.save {

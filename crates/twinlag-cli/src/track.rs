@@ -11,13 +11,14 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout = output::check_data(&command.file, &command.out, command.picture.as_deref(), command.force, talk)?;
+    let to_stdout =
+        output::check_data(&command.input.file, &command.out, command.picture.as_deref(), command.force, talk)?;
     let options = TrackOptions {
-        characterise: command.method.options()?,
+        characterise: command.input.method.options()?,
         model: command.model.as_deref().map(model).transpose()?,
         window_s: command.window,
     };
-    let record = read(&command.file, &command.columns.selection())?;
+    let record = read(&command.input.file, &command.input.columns.selection())?;
     print::notes(&record, talk);
     let answer = {
         let progress = Progress::start(talk, format!("tracking {} samples", record.len()));

@@ -70,7 +70,7 @@ pub use prior::Term;
 pub use readings::Readings;
 #[cfg(feature = "std")]
 pub use reconstruct::{bandwidth_hz, reconstruct};
-pub use rig::{Between, Coloured, Local, Rig, Sensor, SlowPath};
+pub use rig::{Coloured, Local, Rig, Sensor, SlowPath};
 #[cfg(feature = "std")]
 pub use smooth::{Form, Gas};
 #[cfg(feature = "std")]

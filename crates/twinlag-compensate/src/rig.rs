@@ -81,25 +81,12 @@ impl Sensor {
     }
 }
 
-/// What the gas does between two readings.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "std", derive(Serialize, Deserialize), serde(rename_all = "kebab-case"))]
-pub enum Between {
-    /// It goes on as it does at them.
-    #[default]
-    Continuous,
-    /// It keeps the value of a reading's instant until the next.
-    Held,
-}
-
 /// Both sensors and what they share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Rig {
     /// The sensors.
     pub sensors: [Sensor; 2],
-    /// The gas between readings.
-    pub between: Between,
     /// How much later the second channel is, s.
     pub delay_s: f64,
     /// The channel, 0 or 1, whose clock the gas is wanted by.
@@ -112,7 +99,7 @@ pub struct Rig {
 impl Rig {
     /// Two sensors in the same gas.
     pub const fn new(sensors: [Sensor; 2]) -> Self {
-        Self { sensors, between: Between::Continuous, delay_s: 0.0, clock: 0, mismatch: None }
+        Self { sensors, delay_s: 0.0, clock: 0, mismatch: None }
     }
 }
 

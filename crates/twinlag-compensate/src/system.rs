@@ -6,7 +6,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::prior::Term;
-use crate::rig::{Between, Coloured, Local, Rig};
+use crate::rig::{Coloured, Local, Rig};
 
 /// Terms of the exponential's series: with `‖A h‖ ≤ 1/2` the next is `2⁻¹³/13!`, below 2e-14.
 const SERIES: usize = 12;
@@ -161,27 +161,7 @@ impl<const D: usize> System<D> {
             rates[(body, body)] = -rate * (1.0 + local.loss_slope);
             rates[(body, self.layout.one)] = -rate * (local.loss_k - local.loss_slope * reading_k);
         }
-        match self.rig.between {
-            Between::Continuous => exponential(&rates, &self.drive, step_s),
-            Between::Held => {
-                let gas = self.layout.gas;
-                let moves = exponential(&self.rates, &self.drive, step_s);
-                for row in 0..gas {
-                    rates.row_mut(row).fill(0.0);
-                }
-                let mut drive = self.drive;
-                drive.view_mut((0, 0), (gas, D)).fill(0.0);
-                drive.view_mut((0, 0), (D, gas)).fill(0.0);
-                let mut step = exponential(&rates, &drive, step_s);
-                for row in 0..gas {
-                    for column in 0..gas {
-                        step.transition[(row, column)] = moves.transition[(row, column)];
-                        step.added[(row, column)] = moves.added[(row, column)];
-                    }
-                }
-                step
-            }
-        }
+        exponential(&rates, &self.drive, step_s)
     }
 }
 

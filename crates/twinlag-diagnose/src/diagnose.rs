@@ -143,15 +143,11 @@ impl State {
         self.steps.remove(index);
     }
 
-    /// Where less is left over than noise: levels that were found rather than given are lowered to it, for the disagreement holds all
-    /// of the noise, and third differences hold the fastest changes of the gas as well. Whether to look again.
+    /// Lowers noise levels to what is left over, where that is less. Whether to look again.
     fn lower_noise(&mut self, prepared: &mut Prepared, settings: &Settings) -> bool {
-        let has_noise = self.current.model.noise().is_some();
-        let energy = self.current.mean_energy();
-        if settings.noise_std_k.is_some() || has_noise || !prepared.is_clearly_less(energy, self.current.count) {
+        if !prepared.lower_levels(&self.current, settings) {
             return false;
         }
-        prepared.scale_levels(energy.sqrt(), settings);
         if !self.remarks.iter().any(|r| r == LOWERED) {
             self.remarks.push(LOWERED.into());
         }

@@ -6,6 +6,7 @@ use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
 use crate::extended::Extended;
+use crate::summary::LEFT_OVER;
 
 /// Whether the model is found to be complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -177,6 +178,13 @@ pub struct ModelFit {
     pub covariance: Option<Vec<Vec<f64>>>,
     /// The model itself, for a compensation; `None` in a fit that was put together for its picture.
     pub extended: Option<Extended>,
+}
+
+impl ModelFit {
+    /// Whether a test of what it leaves over says that this is not noise of the levels found.
+    pub fn is_contradicted(&self) -> bool {
+        self.tests.iter().any(|t| t.p_value < LEFT_OVER)
+    }
 }
 
 /// A fit with effects that were known beforehand.

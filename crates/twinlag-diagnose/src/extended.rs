@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use twinlag_compensate::{Between, Coloured, Local, Readings, Rig, Sensor, SlowPath};
+use twinlag_compensate::{Coloured, Local, Readings, Rig, Sensor, SlowPath};
 
 use crate::error::DiagnoseError;
 use crate::model::{Fitted, Model};
@@ -98,13 +98,7 @@ fn rig(plant: &Plant) -> Rig {
             coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
         }
     });
-    Rig {
-        sensors,
-        between: Between::Continuous,
-        delay_s: plant.delay_s.unwrap_or(0.0),
-        clock: 0,
-        mismatch: extra(Place::Gas),
-    }
+    Rig { sensors, delay_s: plant.delay_s.unwrap_or(0.0), clock: 0, mismatch: extra(Place::Gas) }
 }
 
 /// What each sensor does at each instant, where that changes.

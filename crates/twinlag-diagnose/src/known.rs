@@ -97,11 +97,7 @@ impl Known {
             prepared.find_levels(&fitted, settings);
             fitted = fit(&prepared, &model.clone().with_noise(prepared.levels.std_k));
         }
-        if settings.noise_std_k.is_none()
-            && model.noise().is_none()
-            && prepared.is_clearly_less(fitted.mean_energy(), fitted.count)
-        {
-            prepared.scale_levels(fitted.mean_energy().sqrt(), settings);
+        if prepared.lower_levels(&fitted, settings) {
             fitted = prepared.refit(&fitted);
         }
         if !fitted.chi2.is_finite() {

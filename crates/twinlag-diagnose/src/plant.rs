@@ -230,10 +230,13 @@ impl Plant {
                 pass(&mut gas, 0.0);
             }
         }
-        for (i, (chain, sensor)) in chains.iter_mut().zip(&self.sensors).enumerate() {
-            let change: Option<Vec<f64>> =
-                self.changes(i).then(|| chain.times_after_factor().iter().map(|t| self.change(i, *t)).collect());
-            Self::lag(chain, sensor, change.as_deref());
+        // Both chains have the same instants here.
+        let times_s = chains[0].times_after_factor();
+        let shared: Option<Vec<f64>> =
+            self.modulation.as_ref().map(|modulation| times_s.iter().map(|t| modulation.at(*t)).collect());
+        let second = self.ratio.as_ref().map(|_| times_s.iter().map(|t| self.change(1, *t)).collect());
+        for (chain, (sensor, own)) in chains.iter_mut().zip(self.sensors.iter().zip([None, second])) {
+            Self::lag(chain, sensor, own.as_ref().or(shared.as_ref()).map(Vec::as_slice));
         }
         pass(&mut gas, 0.0);
         for i in 0..2 {
@@ -312,8 +315,10 @@ impl Plant {
     /// Its relative change at an instant.
     pub(crate) fn change(&self, i: usize, time_s: f64) -> f64 {
         let shared = self.modulation.as_ref().map_or(0.0, |m| m.at(time_s));
-        let own = self.ratio.as_ref().filter(|_| i == 1).map_or(0.0, |r| r.at(time_s));
-        (1.0 + shared) * (1.0 + own) - 1.0
+        match self.ratio.as_ref().filter(|_| i == 1) {
+            Some(ratio) => (1.0 + shared) * (1.0 + ratio.at(time_s)) - 1.0,
+            None => shared,
+        }
     }
 
     /// - `change`: relative change of the time constants at each value, where they change along the record

@@ -131,20 +131,23 @@ impl Prepared {
         }
     }
 
-    /// Whether `energy`, the mean of `count` squared residuals over the noise, is less than what levels as uncertain as these allow.
-    pub(crate) fn is_clearly_less(&self, energy: f64, count: f64) -> bool {
+    /// Lowers levels that were found rather than given to what `fitted` leaves over, where that is less than levels as uncertain as
+    /// these allow: the disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. May
+    /// show that a converter is coarse. Whether they were lowered.
+    pub(crate) fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) -> bool {
+        let energy = fitted.mean_energy();
         let level_std = 2.0 * self.levels.log_error[0].max(self.levels.log_error[1]);
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
-        !is_coarse && energy.ln() < -CLEARLY * (2.0 / count + level_std * level_std).sqrt()
-    }
-
-    /// Both levels times `factor`, which may show that a converter is coarse.
-    pub(crate) fn scale_levels(&mut self, factor: f64, settings: &Settings) {
-        self.levels.scale(factor);
+        let is_clearly_less = energy.ln() < -CLEARLY * (2.0 / fitted.count + level_std * level_std).sqrt();
+        if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse || !is_clearly_less {
+            return false;
+        }
+        self.levels.scale(energy.sqrt());
         self.context = context(&self.observations, &self.levels);
         if settings.effects.contains(&Identifier::Quantisation) {
             self.found.extend(coarse_steps(&self.levels));
         }
+        true
     }
 
     /// From here on frequencies count by the spectrum of what `fitted` leaves over.

@@ -1,28 +1,21 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
-use std::sync::Arc;
-
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use twinlag_optimise::Variable;
 
 use crate::diagnosis::ModelFit;
-use crate::effect::{Context, Effect, Identifier, Parameter, Shared, varying};
+use crate::effect::{Context, Identifier, Shared, varying};
 use crate::error::DiagnoseError;
 use crate::known::Known;
 use crate::model::{Effort, Fitted};
 use crate::observations::Observations;
-use crate::plant::{Modulation, Plant};
 use crate::prepare::Prepared;
 use crate::settings::{KnownEffect, Settings, Watch};
-use crate::spline::Spline;
 use crate::summary::summarise;
 
 /// Coefficients of the shared change that are tried.
 const SIZES: [usize; 8] = [3, 5, 8, 12, 16, 20, 26, 32];
 /// Numbers more that take nothing off are a change that is well enough described.
 const ENOUGH: usize = 2;
-/// Coefficients of the change of the ratio.
-const RATIO: [&str; 4] = ["ratio1", "ratio2", "ratio3", "ratio4"];
 /// Instants at which a step is looked for, and times that the best is looked around.
 const INSTANTS: usize = 40;
 const ROUNDS: usize = 4;
@@ -207,7 +200,7 @@ impl Tracker<'_> {
             watch("steps", round, ROUNDS);
             let instants: Vec<f64> = (0..INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
             for at_s in instants.into_iter().filter(|t| *t > first_s && *t < last_s) {
-                tried.push((at_s, self.fit(constant, Step::at(at_s), &[0.0], Effort::Look)));
+                tried.push((at_s, self.fit(constant, varying::step(at_s), &[0.0], Effort::Look)));
             }
             let best_s = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.0;
             from_s = best_s - apart_s;
@@ -217,7 +210,7 @@ impl Tracker<'_> {
             }
         }
         let (at_s, looked) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.clone();
-        let fitted = self.fit(constant, Step::at(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
+        let fitted = self.fit(constant, varying::step(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
         let energy = fitted.mean_energy().max(1.0);
         let within = tried.iter().filter(|t| t.1.chi2 - looked.chi2 < CHI2_95 * energy).map(|t| t.0);
         let half_s = 0.5 * self.prepared.context.step_s;
@@ -232,99 +225,10 @@ impl Tracker<'_> {
     }
 
     fn ratio(&self, fitted: &Fitted) -> RatioTest {
-        let effect = Ratio::between(self.prepared.context.ends_s);
-        let other = self.fit(fitted, effect, &[0.0; RATIO.len()], Effort::Finish);
+        let effect = varying::ratio(self.prepared.context.ends_s);
+        let other = self.fit(fitted, effect, &[0.0; varying::RATIO], Effort::Finish);
         let statistic = (score(fitted, 0.0) - score(&other, 0.0)).max(0.0);
-        let chi2 = ChiSquared::new(RATIO.len() as f64).expect("a positive number of degrees of freedom");
-        RatioTest { statistic, degrees_of_freedom: RATIO.len(), p_value: chi2.sf(statistic) }
-    }
-}
-
-/// Both time constants change at one instant by the same share.
-struct Step {
-    at_s: f64,
-    parameters: Vec<Parameter>,
-}
-
-impl Step {
-    fn at(at_s: f64) -> Shared {
-        Arc::new(Self {
-            at_s,
-            parameters: vec![Parameter::new("change", "1", Variable::linear("change", 0.05, -0.9, 9.0))],
-        })
-    }
-}
-
-impl Effect for Step {
-    fn identifier(&self) -> Identifier {
-        Identifier::VaryingTimeConstant
-    }
-
-    fn channel(&self) -> Option<usize> {
-        None
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.0]]
-    }
-
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.modulation = Some(Modulation::Step { at_s: self.at_s, change: values[0] });
-    }
-
-    fn is_of_the_record(&self) -> bool {
-        true
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        vec![(0, 0.0)]
-    }
-}
-
-/// The ratio of the time constants changes along the record.
-struct Ratio {
-    ends_s: [f64; 2],
-    parameters: Vec<Parameter>,
-}
-
-impl Ratio {
-    fn between(ends_s: [f64; 2]) -> Shared {
-        let parameters = RATIO.map(|name| Parameter::new(name, "1", Variable::linear(name, 0.05, -0.9, 3.0)));
-        Arc::new(Self { ends_s, parameters: parameters.to_vec() })
-    }
-}
-
-impl Effect for Ratio {
-    fn identifier(&self) -> Identifier {
-        Identifier::VaryingTimeConstant
-    }
-
-    fn channel(&self) -> Option<usize> {
-        Some(1)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.0; RATIO.len()]]
-    }
-
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        let [from_s, to_s] = self.ends_s;
-        plant.ratio = Some(Spline::new(from_s, to_s, values));
-    }
-
-    fn is_of_the_record(&self) -> bool {
-        true
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        Vec::new()
+        let chi2 = ChiSquared::new(varying::RATIO as f64).expect("a positive number of degrees of freedom");
+        RatioTest { statistic, degrees_of_freedom: varying::RATIO, p_value: chi2.sf(statistic) }
     }
 }

@@ -9,11 +9,10 @@ use twinlag_diagnose::{ModelFit, Verdict};
 use twinlag_record::Record;
 
 use crate::characterisation::{Characterisation, Status};
-use crate::diagnose::{self, DiagnoseOptions, DiagnoseWatch, NamedEffect, diagnose, observations, with_model};
+use crate::diagnose::{DiagnoseOptions, DiagnoseWatch, Model, NamedEffect, diagnose, observations, with_model};
 use crate::error::Error;
+use crate::profile::Z_975;
 
-/// Standard deviations within which 95 % of a normal distribution lie.
-const Z_95: f64 = 1.959_963_984_540_054;
 /// Standard errors by which innovations may be larger than expected before bands are widened.
 const CLEARLY: f64 = 4.0;
 
@@ -23,7 +22,7 @@ pub struct CompensateOptions {
     /// How the model is found, where none is given.
     pub diagnose: DiagnoseOptions,
     /// A model that was found in another record: its effects stay as they are.
-    pub model: Option<diagnose::Model>,
+    pub model: Option<Model>,
     /// Which readings the gas temperature at an instant may rest on.
     pub form: Form,
     /// The channel, 0 or 1, that gain, offset and delay are held to be right of: no record of two sensors tells.
@@ -114,7 +113,7 @@ pub fn compensate(
     options: &CompensateOptions,
     watch: DiagnoseWatch<'_>,
 ) -> Result<Compensation, Error> {
-    let Model { last, fit, verdict, effects, warnings } = Model::of(record, options, watch)?;
+    let Modelled { last, fit, verdict, effects, warnings } = Modelled::of(record, options, watch)?;
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
         status: Status::NotIdentifiable,
@@ -172,7 +171,7 @@ pub fn compensate(
 }
 
 /// The model, and where it comes from.
-struct Model {
+struct Modelled {
     last: Characterisation,
     fit: ModelFit,
     verdict: Option<Verdict>,
@@ -180,14 +179,17 @@ struct Model {
     warnings: Vec<String>,
 }
 
-impl Model {
+impl Modelled {
     fn of(record: &Record, options: &CompensateOptions, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
         if let Some(model) = &options.model {
             let (last, fit) = with_model(record, model, &options.diagnose.characterise)?;
             let warnings = last.warnings.clone();
             return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings });
         }
-        let answer = diagnose(record, &options.diagnose, watch)?;
+        // The reference is for the gas temperature that comes of it.
+        let mut blind = record.clone();
+        blind.reference_c = None;
+        let answer = diagnose(&blind, &options.diagnose, watch)?;
         let fit = answer.core.expect("it was made just now").last;
         let (verdict, effects, warnings) = (Some(answer.verdict), answer.effects, answer.remarks);
         Ok(Self { last: answer.last, fit, verdict, effects, warnings })
@@ -319,7 +321,7 @@ fn against(record: &Record, found: &Found) -> Option<AgainstReference> {
         let error = found.gas.gas_c[k] - reference[row];
         squares += error * error;
         raw_squares += (raw[row] - reference[row]).powi(2);
-        inside += f64::from(u8::from(error.abs() <= Z_95 * found.std_k[k]));
+        inside += f64::from(u8::from(error.abs() <= Z_975 * found.std_k[k]));
         count += 1.0;
     }
     (count > 0.0).then(|| AgainstReference {

@@ -242,7 +242,7 @@ pub(crate) fn with_model(
     let effects = known_effects(model);
     let known = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
     let fit = known.fit;
-    let is_left = fit.tests.iter().any(|t| t.p_value < 1e-4);
+    let is_left = fit.is_contradicted();
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some());
     let status = match (is_determined, is_left) {
         (false, _) => Status::NotIdentifiable,

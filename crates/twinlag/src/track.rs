@@ -13,13 +13,10 @@ use crate::diagnose::{
 };
 use crate::error::Error;
 use crate::options::Options;
+use crate::profile::Z_975;
 
-/// Standard deviations within which 95 % of a normal distribution lie.
-const Z_95: f64 = 1.959_963_984_540_054;
 /// Below this chance the ratio does not stay.
 const RATIO_CHANGES: f64 = 1e-3;
-/// Below this p-value of any test of the residual the record is not explained.
-const LEFT_OVER: f64 = 1e-4;
 /// Windows of a sliding estimate that overlap.
 const OVERLAP: f64 = 4.0;
 /// Fewest samples of a window.
@@ -136,7 +133,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) -> R
         effects: Identifier::ALL.to_vec(),
     };
     let found = core(&observations, &settings, &effects, watch)?;
-    let is_left = found.fit.tests.iter().any(|t| t.p_value < LEFT_OVER);
+    let is_left = found.fit.is_contradicted();
     let status = match (&found.log_error, is_left) {
         (None, _) => Status::NotIdentifiable,
         (Some(_), true) => Status::ModelRejected,
@@ -159,7 +156,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) -> R
     let sensors = found.log_error.as_ref().map(|errors| {
         [0, 1].map(|i| {
             let by = |sign: f64| {
-                found.tau_s[i].iter().zip(&errors[i]).map(|(tau, e)| tau * (sign * Z_95 * e).exp()).collect()
+                found.tau_s[i].iter().zip(&errors[i]).map(|(tau, e)| tau * (sign * Z_975 * e).exp()).collect()
             };
             Along { tau_s: found.tau_s[i].clone(), low_s: by(-1.0), high_s: by(1.0) }
         })

@@ -4,18 +4,18 @@
 
 mod tables;
 
-use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Simulated;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
+
+use super::Stored;
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -201,40 +201,25 @@ fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
     })
 }
 
-/// Results, tables and pictures.
-pub(super) fn write(plan: &Plan, results: &Results, out: &Path) -> Result<()> {
-    let mut plan = plan.clone();
-    plan.records = results.header().trials();
-    ensure!(
-        results.header().plan() == Study::plan(&plan),
-        "the results are of another plan than {}, or of another version of it",
-        plan.name
-    );
-    fs::create_dir_all(out)?;
-    fs::write(out.join("results.json"), results.to_json())?;
-    tables::write(&plan, results, out)?;
-    println!("{}: {}", plan.name, out.display());
-    Ok(())
-}
-
-/// Holds results against those that are stored in `folder`: an error names the first cell that differs.
-pub(super) fn check(plan: &Plan, results: &Results, folder: &Path) -> Result<()> {
-    let now = results.to_json();
-    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
-    if now == stored {
-        return Ok(());
+impl Stored for Plan {
+    fn name(&self) -> &str {
+        &self.name
     }
-    let cells = |text: &str| -> Result<Vec<Value>> {
-        let value: Value = serde_json::from_str(text).context("the stored results cannot be read")?;
-        Ok(value["cells"].as_array().cloned().unwrap_or_default())
-    };
-    let (now, stored) = (cells(&now)?, cells(&stored)?);
-    let differs = now.iter().zip(&stored).position(|(a, b)| a != b);
-    match differs.and_then(|i| plan.cells().get(i).copied()) {
-        Some((kinds, size)) => {
-            let cell = tables::cell_name(kinds, size, plan.size_factors.len());
-            bail!("{}: the first cell that differs from the stored results is {cell}", plan.name)
-        }
-        None => bail!("{}: the stored results are of another plan", plan.name),
+
+    fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    fn set_trials(&mut self, trials: u64) {
+        self.records = trials;
+    }
+
+    fn cell_name(&self, cell: usize) -> String {
+        let (kinds, size) = Plan::cells(self)[cell];
+        tables::cell_name(kinds, size, self.size_factors.len())
+    }
+
+    fn tables(&self, results: &Results, out: &Path) -> Result<()> {
+        tables::write(self, results, out)
     }
 }

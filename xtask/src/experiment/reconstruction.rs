@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use realfft::RealFftPlanner;
@@ -17,6 +17,8 @@ use twinlag::record::Record;
 use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal};
 use twinlag::{CompensateOptions, Estimator, MadeBy, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
+
+use super::Stored;
 
 /// A plan: which gases, with how much noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -261,29 +263,45 @@ fn inverse(reading_c: &[f64], tau_s: f64, period_s: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Results and table.
-pub(super) fn write(study: &Reconstruction, results: &Results, out: &Path) -> Result<()> {
-    fs::create_dir_all(out)?;
-    fs::write(out.join("results.json"), results.to_json())?;
-    let mut text = String::from(
-        "| gas | noise (%) | oracle (K) | twinlag / oracle | inverse of the faster sensor / oracle | inverse by the compensated \
-         estimate / oracle | faster sensor / oracle | inside the 95 % band (%) |\n|---|---|---|---|---|---|---|---|\n",
-    );
-    for (cell, tally) in results.cells().iter().enumerate() {
-        let (gas, percent) = study.place(cell);
-        let root = |name: &str| rms(tally, name);
-        let oracle = root("oracle");
-        let ratios: Vec<String> = ESTIMATES.iter().map(|name| format!("{:.3}", root(name) / oracle)).collect();
-        let inside = mean(tally, "inside the 95 % band").map_or(f64::NAN, |m| 100.0 * m);
-        let _ = writeln!(
-            text,
-            "| {} | {percent} | {oracle:.3} | {} | {inside:.1} |",
-            study.plan.gases[gas].name,
-            ratios.join(" | ")
-        );
+impl Stored for Reconstruction {
+    fn name(&self) -> &str {
+        &self.plan.name
     }
-    fs::write(out.join("error.md"), text)?;
-    Ok(())
+
+    fn seed(&self) -> u64 {
+        self.plan.seed
+    }
+
+    fn set_trials(&mut self, trials: u64) {
+        self.plan.trials = trials;
+    }
+
+    fn cell_name(&self, cell: usize) -> String {
+        let (gas, percent) = self.place(cell);
+        format!("{}, {percent} %", self.plan.gases[gas].name)
+    }
+
+    fn tables(&self, results: &Results, out: &Path) -> Result<()> {
+        let mut text = String::from(
+            "| gas | noise (%) | oracle (K) | twinlag / oracle | inverse of the faster sensor / oracle | inverse by the compensated \
+             estimate / oracle | faster sensor / oracle | inside the 95 % band (%) |\n|---|---|---|---|---|---|---|---|\n",
+        );
+        for (cell, tally) in results.cells().iter().enumerate() {
+            let (gas, percent) = self.place(cell);
+            let root = |name: &str| rms(tally, name);
+            let oracle = root("oracle");
+            let ratios: Vec<String> = ESTIMATES.iter().map(|name| format!("{:.3}", root(name) / oracle)).collect();
+            let inside = mean(tally, "inside the 95 % band").map_or(f64::NAN, |m| 100.0 * m);
+            let _ = writeln!(
+                text,
+                "| {} | {percent} | {oracle:.3} | {} | {inside:.1} |",
+                self.plan.gases[gas].name,
+                ratios.join(" | ")
+            );
+        }
+        fs::write(out.join("error.md"), text)?;
+        Ok(())
+    }
 }
 
 /// Root of the mean over all trials.
@@ -293,13 +311,4 @@ fn rms(tally: &Tally, name: &str) -> f64 {
 
 fn mean(tally: &Tally, name: &str) -> Option<f64> {
     tally.values(name)?.moments().mean()
-}
-
-/// Holds results against those that are stored in `folder`.
-pub(super) fn check(study: &Reconstruction, results: &Results, folder: &Path) -> Result<()> {
-    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
-    if results.to_json() == stored {
-        return Ok(());
-    }
-    bail!("{}: the results are not those that are stored", study.plan.name)
 }

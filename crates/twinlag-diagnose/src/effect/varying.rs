@@ -19,6 +19,8 @@ pub(crate) const ABOUT: About = About {
 
 /// Coefficients that it is looked for with.
 const FIRST: usize = 12;
+/// Those of a change of the ratio.
+pub(crate) const RATIO: usize = 4;
 /// Those that are tried once it is found.
 const SIZES: [usize; 4] = [3, 5, 8, 19];
 
@@ -28,6 +30,10 @@ enum Of {
     Time { ends_s: [f64; 2], samples: usize },
     /// A measured flow.
     Flow(Arc<Flow>),
+    /// Nothing before an instant, s, and one number from then on.
+    Step { at_s: f64 },
+    /// Time, and it is the ratio `τ₂/τ₁` that changes so.
+    Ratio { ends_s: [f64; 2] },
 }
 
 struct Varying {
@@ -45,6 +51,19 @@ pub(crate) fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<S
     (60 * size <= samples).then(|| Arc::new(Varying { of: Of::Time { ends_s, samples }, parameters }) as Shared)
 }
 
+/// A step at an instant, for [`crate::track()`]: the search knows smooth changes alone.
+pub(crate) fn step(at_s: f64) -> Shared {
+    let parameters = vec![Parameter::new("change", "1", Variable::linear("change", 0.05, -0.9, 9.0))];
+    Arc::new(Varying { of: Of::Step { at_s }, parameters })
+}
+
+/// A smooth change of the ratio of both time constants, of [`RATIO`] coefficients, for its test.
+pub(crate) fn ratio(ends_s: [f64; 2]) -> Shared {
+    let names: [&str; RATIO] = ["ratio1", "ratio2", "ratio3", "ratio4"];
+    let parameters = names.map(|name| Parameter::new(name, "1", Variable::linear(name, 0.05, -0.9, 3.0)));
+    Arc::new(Varying { of: Of::Ratio { ends_s }, parameters: parameters.to_vec() })
+}
+
 pub(crate) fn candidates(context: &Context) -> Vec<Shared> {
     let of_flow = context.flow.as_ref().map(|flow| {
         let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0))];
@@ -59,7 +78,7 @@ impl Effect for Varying {
     }
 
     fn channel(&self) -> Option<usize> {
-        None
+        matches!(self.of, Of::Ratio { .. }).then_some(1)
     }
 
     fn parameters(&self) -> &[Parameter] {
@@ -71,14 +90,18 @@ impl Effect for Varying {
     }
 
     fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.modulation = Some(match &self.of {
-            Of::Time { ends_s: [first_s, last_s], .. } => Modulation::Spline(Spline::new(*first_s, *last_s, values)),
-            Of::Flow(of) => Modulation::Flow { exponent: values[0], of: of.clone() },
-        });
+        match &self.of {
+            Of::Time { ends_s: [first_s, last_s], .. } => {
+                plant.modulation = Some(Modulation::Spline(Spline::new(*first_s, *last_s, values)));
+            }
+            Of::Flow(of) => plant.modulation = Some(Modulation::Flow { exponent: values[0], of: of.clone() }),
+            Of::Step { at_s } => plant.modulation = Some(Modulation::Step { at_s: *at_s, change: values[0] }),
+            Of::Ratio { ends_s: [first_s, last_s] } => plant.ratio = Some(Spline::new(*first_s, *last_s, values)),
+        }
     }
 
     fn is_of_the_record(&self) -> bool {
-        matches!(self.of, Of::Time { .. })
+        !matches!(self.of, Of::Flow(_))
     }
 
     fn sizes(&self) -> Vec<Shared> {
@@ -86,14 +109,14 @@ impl Effect for Varying {
             Of::Time { ends_s, samples } => {
                 SIZES.into_iter().filter_map(|size| of_size(size, ends_s, samples)).collect()
             }
-            Of::Flow(_) => Vec::new(),
+            Of::Flow(_) | Of::Step { .. } | Of::Ratio { .. } => Vec::new(),
         }
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {
         match self.of {
-            Of::Time { .. } => Vec::new(),
-            Of::Flow(_) => vec![(0, 0.0)],
+            Of::Time { .. } | Of::Ratio { .. } => Vec::new(),
+            Of::Flow(_) | Of::Step { .. } => vec![(0, 0.0)],
         }
     }
 }

@@ -6,12 +6,11 @@ use twinlag_report::{Axis, Chart, Colour, Figure, Reference, ReportError, Series
 
 use super::figures::{WIDTH_PX, trace};
 use crate::compensate::Compensation;
+use crate::profile::Z_975;
 use crate::track::Track;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
-/// Standard deviations within which 95 % of a normal distribution lie.
-const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Readings and gas temperature with its band, over the record and where it moves most, and the spectra before and after with the
 /// frequency up to which the readings decide: one SVG.
@@ -41,7 +40,7 @@ fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std:
     let ends = [time_s.first().copied().unwrap_or(0.0), time_s.last().copied().unwrap_or(0.0)];
     let rows = record.time_s.partition_point(|t| *t < ends[0])..record.time_s.partition_point(|t| *t <= ends[1]);
     let band = |sign: f64| -> Vec<f64> {
-        shown.clone().map(|k| answer.gas_c[k] + sign * Z_95 * answer.gas_std_k[k]).collect()
+        shown.clone().map(|k| answer.gas_c[k] + sign * Z_975 * answer.gas_std_k[k]).collect()
     };
     let gas = Series::trace("gas, with its 95 % band", time_s, &answer.gas_c[shown.clone()]).colour(Colour::Green);
     let chart = Chart::new(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"));
