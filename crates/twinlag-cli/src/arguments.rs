@@ -49,6 +49,15 @@ pub(crate) struct Talk {
     pub(crate) quiet: bool,
 }
 
+impl Talk {
+    /// A line on standard error, unless the program is to be quiet.
+    pub(crate) fn say(self, text: impl FnOnce() -> String) {
+        if !self.quiet {
+            eprintln!("{}", text());
+        }
+    }
+}
+
 impl Arguments {
     pub(crate) fn talk(&self) -> Talk {
         Talk { json: self.json, quiet: self.quiet }
@@ -152,6 +161,9 @@ pub(crate) struct Compensate {
     /// Draws readings, gas temperature with its band, and spectra: one SVG.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,
+    /// Writes a report to look at: one HTML file that needs nothing else.
+    #[arg(long, value_name = "HTML")]
+    pub(crate) report: Option<PathBuf>,
     /// A model that `twinlag diagnose --save` wrote, instead of a diagnosis of this record: its effects stay as they are.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
@@ -180,6 +192,10 @@ tested.
 
 With --window each window is characterised by itself, the published way: wider bands, and nothing is shared.
 
+With --live rows are answered as they come, from a pipe that need not end: logger | twinlag track - --live 2000 --out -
+The first rows are waited for, and tell what sensors, noise and gas are like; then each row gives the gas temperature, its standard
+deviation and both time constants with their bands, from what was read by then: time_s, gas_C, gas_std_K, tau1_s, tau1_low_s, ...
+
 Exit codes: 0 tracked, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
 1 anything else.")]
 pub(crate) struct Track {
@@ -191,12 +207,22 @@ pub(crate) struct Track {
     /// Draws both time constants with their bands: one SVG.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,
+    /// Writes a report to look at: one HTML file that needs nothing else.
+    #[arg(long, value_name = "HTML")]
+    pub(crate) report: Option<PathBuf>,
     /// A model that `twinlag diagnose --save` wrote: its other effects stay as they are.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
     /// Length of a sliding window.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) window: Option<f64>,
+    /// Answers rows as they come, once so many have.
+    #[arg(long, value_name = "ROWS", conflicts_with_all = ["window", "picture", "report"], value_parser = clap::value_parser!(u32).range(200..))]
+    pub(crate) live: Option<u32>,
+    /// With --live: by what share the time constants may change in a second (standard deviation; it grows as the root of time) [default:
+    /// a tenth in ten time constants of the slower sensor].
+    #[arg(long, value_name = "SHARE", requires = "live")]
+    pub(crate) change: Option<f64>,
     /// Overwrite outputs that exist.
     #[arg(long)]
     pub(crate) force: bool,

@@ -6,13 +6,13 @@ use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 use crate::arguments::{Compensate, Talk, Trust};
 use crate::characterise::{model, read};
 use crate::failure::Failure;
-use crate::output;
+use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout =
-        output::check_data(&command.input.file, &command.out, command.picture.as_deref(), command.force, talk)?;
+    let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
+    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, talk)?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
@@ -32,9 +32,13 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
         output::data(&command.out, to_stdout, &text)?;
-        if let Some(path) = &command.picture {
+        if let Some(path) = views.picture {
             output::write(path, twinlag::gas_picture(&record, &answer).map_err(twinlag::Error::from)?)?;
         }
+    }
+    if let Some(path) = views.report {
+        let report = twinlag::gas_report(&record, &answer, &output::command_line()).map_err(twinlag::Error::from)?;
+        output::write(path, report)?;
     }
     print::compensation(&answer, &command.out, to_stdout, talk)?;
     Ok(if answer.status == Status::Ok { 0 } else { 4 })

@@ -25,8 +25,7 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
         output::write(path, &model)?;
     }
     if let Some(path) = &command.report {
-        let line: Vec<String> = std::env::args().map(|a| quoted(&a)).collect();
-        output::write(path, &report(&record, &answer, line.join(" "))?)?;
+        output::write(path, &report(&record, &answer, output::command_line())?)?;
     }
     print::diagnosis(&answer, talk)?;
     Ok(exit_code(&answer))
@@ -57,14 +56,4 @@ fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String
         notes: answer.base.notes.clone(),
     };
     Ok(twinlag::report(core, &context).map_err(twinlag::Error::from)?)
-}
-
-/// An argument as a shell takes it.
-fn quoted(argument: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
-    if !argument.is_empty() && argument.chars().all(is_plain) {
-        argument.to_owned()
-    } else {
-        format!("'{}'", argument.replace('\'', "'\\''"))
-    }
 }

@@ -10,6 +10,8 @@ pub(crate) enum Failure {
     Usage(String),
     File(String),
     Other(String),
+    /// The data were read, and do not tell.
+    Undetermined(String),
     /// It will work once something else has: a shard is missing.
     NotYet(String),
 }
@@ -20,6 +22,7 @@ impl Failure {
             Self::Usage(_) => 2,
             Self::File(_) => 3,
             Self::Other(_) => 1,
+            Self::Undetermined(_) => 4,
             Self::NotYet(_) => 75,
         }
     }
@@ -28,7 +31,11 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Usage(text) | Self::File(text) | Self::Other(text) | Self::NotYet(text) => f.write_str(text),
+            Self::Usage(text)
+            | Self::File(text)
+            | Self::Other(text)
+            | Self::Undetermined(text)
+            | Self::NotYet(text) => f.write_str(text),
         }
     }
 }
@@ -37,6 +44,7 @@ impl From<twinlag::Error> for Failure {
     fn from(error: twinlag::Error) -> Self {
         match error {
             twinlag::Error::Record(error) => error.into(),
+            twinlag::Error::LiveStart { .. } => Self::Undetermined(error.to_string()),
             error if error.is_usage() => Self::Usage(error.to_string()),
             error => Self::File(error.to_string()),
         }

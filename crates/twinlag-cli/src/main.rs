@@ -11,6 +11,7 @@ mod compensate;
 mod demo;
 mod diagnose;
 mod failure;
+mod live;
 mod output;
 mod print;
 mod progress;

@@ -37,11 +37,17 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     Ok(())
 }
 
-/// The same for a table of numbers, which may go to standard output, `-`, and its picture: whether it does.
+/// What is drawn of a table of numbers.
+pub(crate) struct Views<'a> {
+    pub(crate) picture: Option<&'a Path>,
+    pub(crate) report: Option<&'a Path>,
+}
+
+/// The same for a table of numbers, which may go to standard output, `-`, and what is drawn of it: whether it does.
 pub(crate) fn check_data(
     record: &Path,
     out: &Path,
-    picture: Option<&Path>,
+    views: &Views<'_>,
     force: bool,
     talk: Talk,
 ) -> Result<bool, Failure> {
@@ -50,8 +56,9 @@ pub(crate) fn check_data(
         return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
     }
     let table = (!to_stdout).then_some(("--out", out));
-    let outputs: Vec<_> = table.into_iter().chain(picture.map(|path| ("--picture", path))).collect();
-    check(record, &outputs, force)?;
+    let views = [("--picture", views.picture), ("--report", views.report)];
+    let views = views.into_iter().filter_map(|(option, path)| Some((option, path?)));
+    check(record, &table.into_iter().chain(views).collect::<Vec<_>>(), force)?;
     Ok(to_stdout)
 }
 
@@ -65,6 +72,19 @@ pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failu
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
+}
+
+/// The command that is being run, as a shell takes it.
+pub(crate) fn command_line() -> String {
+    let quoted = |argument: String| {
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
+        if !argument.is_empty() && argument.chars().all(is_plain) {
+            argument
+        } else {
+            format!("'{}'", argument.replace('\'', "'\\''"))
+        }
+    };
+    std::env::args().map(quoted).collect::<Vec<_>>().join(" ")
 }
 
 fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {

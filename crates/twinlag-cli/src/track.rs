@@ -6,13 +6,17 @@ use twinlag::{Status, TrackOptions};
 use crate::arguments::{Talk, Track};
 use crate::characterise::{model, read};
 use crate::failure::Failure;
-use crate::output;
+use crate::live;
+use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
-    let to_stdout =
-        output::check_data(&command.input.file, &command.out, command.picture.as_deref(), command.force, talk)?;
+    let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
+    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, talk)?;
+    if let Some(rows) = command.live {
+        return live::run(command, rows as usize, to_stdout, talk);
+    }
     let options = TrackOptions {
         characterise: command.input.method.options()?,
         model: command.model.as_deref().map(model).transpose()?,
@@ -40,9 +44,13 @@ pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
         output::data(&command.out, to_stdout, &text)?;
-        if let Some(path) = &command.picture {
+        if let Some(path) = views.picture {
             output::write(path, twinlag::track_picture(&answer).map_err(twinlag::Error::from)?)?;
         }
+    }
+    if let Some(path) = views.report {
+        let report = twinlag::track_report(&record, &answer, &output::command_line()).map_err(twinlag::Error::from)?;
+        output::write(path, report)?;
     }
     print::track(&answer, &command.out, to_stdout, talk)?;
     Ok(if answer.status == Status::NotIdentifiable { 4 } else { 0 })

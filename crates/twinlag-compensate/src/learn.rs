@@ -6,6 +6,7 @@
 
 mod part;
 
+use nalgebra::DMatrix;
 use twinlag_optimise::{Budget, Cost, Derivatives, Minimiser, Optimiser, Problem};
 
 use crate::error::CompensateError;
@@ -30,14 +31,26 @@ const BINS_PER_ONE: f64 = 1.944;
 const HARMONIC_GAIN: f64 = 1.0;
 /// Step of a logarithm in differences.
 const STEP: f64 = 1e-4;
+/// Standard deviation of the logarithm of each number before the readings are looked at: what they do not tell is known within a factor
+/// of e.
+const LOG_STD: f64 = 1.0;
 
-/// The prior that `readings` of `rig` support.
+/// A prior, and how well the readings tell it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Learned {
+    /// The prior.
+    pub prior: Prior,
+    /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky factor at a time.
+    pub deviations: Vec<Prior>,
+}
+
+/// The prior that `readings` of `rig` support, the covariance of its numbers the inverse of Fisher's information.
 ///
 /// Instants that are missing, and uneven ones, are bridged by straight lines; the smoother itself does not need that.
 ///
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
-pub fn learn(readings: &Readings, rig: &Rig) -> Result<Prior, CompensateError> {
+pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());
     let got = (0..readings.len()).filter(both).count();
@@ -52,8 +65,10 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Prior, CompensateError> {
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
-    let parts = Search { periodogram: &periodogram, limits, room }.run();
-    Ok(Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() })
+    let search = Search { periodogram: &periodogram, limits, room };
+    let parts = search.run();
+    let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
+    Ok(Learned { prior: prior(&parts), deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect() })
 }
 
 struct Search<'a> {
@@ -111,6 +126,25 @@ impl Search<'_> {
         }
     }
 
+    /// `parts` with their numbers moved by a standard error, one column at a time.
+    fn deviations(&self, parts: &[Part]) -> Vec<Vec<Part>> {
+        let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
+        let cost = Whittle { periodogram: self.periodogram, others: &self.periodogram.noise, parts };
+        let Some(derivatives) = cost.derivatives(&values) else { return Vec::new() };
+        // Of the logarithms; the deviance is twice the logarithm of the likelihood.
+        let information = DMatrix::from_fn(values.len(), values.len(), |a, b| {
+            let told = derivatives.curvature[a][b] * values[a] * values[b] / (2.0 * BINS_PER_ONE);
+            told + if a == b { 1.0 / (LOG_STD * LOG_STD) } else { 0.0 }
+        });
+        let Some(factor) = information.cholesky() else { return Vec::new() };
+        let columns = factor.l().transpose().try_inverse().unwrap_or_default();
+        let moved = columns.column_iter().map(|column| {
+            let moved: Vec<f64> = values.iter().zip(column.iter()).map(|(v, by)| v * by.exp()).collect();
+            part::with(parts, &moved)
+        });
+        moved.collect()
+    }
+
     fn first(&self) -> Vec<Part> {
         let Limits { swing_k, span_s, period_s } = self.limits;
         let [low, high] = [1.0 / span_s, 0.3 / period_s];
@@ -118,7 +152,11 @@ impl Search<'_> {
         frequencies
             .flat_map(|hz| {
                 let smooth = Term::Resonance { std_k: swing_k, frequency_hz: hz, quality: 0.3 };
-                [Part::Single(Term::Rough { std_k: swing_k, corner_hz: hz }), Part::Single(smooth)]
+                [
+                    Part::Turbulent { std_k: swing_k, corner_hz: hz, fastest_hz: 0.5 / period_s },
+                    Part::Single(Term::Rough { std_k: swing_k, corner_hz: hz }),
+                    Part::Single(smooth),
+                ]
             })
             .collect()
     }

@@ -2,7 +2,7 @@
 //!
 //! For anyone who has a model of two sensors, however it was found, and wants what they measured: [`learn()`] finds from the readings
 //! how much the gas moves and how fast, [`reconstruct()`] gives its temperature at every sample with an honest band, from the whole record
-//! (Kalman's filter and a smoother), from what was read so far, or with a fixed lag; [`Stream`] does the second sample by sample. Uneven
+//! (Kalman's filter and a smoother), from what was read so far, or with a fixed lag; [`Stream`] does the second sample by sample, and [`Tracker`] also while the flow changes the time constants. Uneven
 //! sampling, missing readings, a delay between the channels, second lags, slow paths, noise that is not white, time constants that
 //! change and radiation are in the model ([`Rig`], [`Local`]). The crate knows neither files nor how a model is found: for logger files
 //! take `twinlag`, for the model `twinlag-diagnose`.
@@ -23,7 +23,7 @@
 //!
 //! let readings = Readings::new(record.time_s, [record.t1_c.clone(), record.t2_c])?;
 //! let rig = Rig::new([Sensor::new(0.024, 0.2), Sensor::new(0.117, 0.2)]);
-//! let prior = learn(&readings, &rig)?;
+//! let prior = learn(&readings, &rig)?.prior;
 //! let gas = reconstruct(&readings, &rig, &prior, Form::Smoother)?;
 //!
 //! // Far nearer to the gas than the faster sensor, and it knows how near.
@@ -58,11 +58,13 @@ mod smooth;
 mod spectrum;
 mod stream;
 mod system;
+#[cfg(feature = "std")]
+mod tracker;
 
 #[cfg(feature = "std")]
 pub use error::CompensateError;
 #[cfg(feature = "std")]
-pub use learn::learn;
+pub use learn::{Learned, learn};
 #[cfg(feature = "std")]
 pub use prior::Prior;
 pub use prior::Term;
@@ -76,3 +78,5 @@ pub use smooth::{Form, Gas};
 #[cfg(feature = "std")]
 pub use spectrum::power_spectrum;
 pub use stream::{Now, Stream};
+#[cfg(feature = "std")]
+pub use tracker::{Push, Tracked, Tracker, tracker};

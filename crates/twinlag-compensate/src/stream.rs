@@ -20,6 +20,8 @@ pub struct Now {
     /// How far the readings are from what the earlier ones led to expect: the sum of squares over their variances, chi-square with as
     /// many degrees of freedom as there were readings while the rig is what it was.
     pub surprise: f64,
+    /// The product of these variances, K² each: `−2 ln` of the likelihood of the readings is `surprise + ln scatter` and a constant.
+    pub scatter: f64,
 }
 
 /// A causal filter for two sensors that are read every `period_s`: push readings, read the gas temperature.
@@ -56,6 +58,7 @@ struct Settled<const D: usize> {
     /// Of each reading: its gain, and one over the variance of what is new in it.
     gains: [(SVector<f64, D>, f64); 2],
     variance_k2: f64,
+    scatter: f64,
 }
 
 impl<const D: usize> Stream<D> {
@@ -87,7 +90,8 @@ impl<const D: usize> Stream<D> {
                 self.belief.state += gain * innovation;
                 surprise += innovation * innovation * weight;
             }
-            return Now { gas_c: self.gas_c(), variance_k2: settled.variance_k2, surprise };
+            let Settled { variance_k2, scatter, .. } = settled;
+            return Now { gas_c: self.gas_c(), variance_k2, surprise, scatter };
         }
         self.settled = None;
         let before = self.belief.covariance;
@@ -95,19 +99,20 @@ impl<const D: usize> Stream<D> {
             self.belief.predict(&self.step);
         }
         let mut gains = [(SVector::zeros(), 0.0); 2];
-        let mut surprise = 0.0;
+        let (mut surprise, mut scatter) = (0.0, 1.0);
         for i in 0..2 {
             if let Some(y) = reading_c[i] {
                 let update = self.belief.update(&self.system.reads[i], y - self.level_c, self.noise_k2[i]);
                 gains[i] = (update.gain, 1.0 / update.variance);
                 surprise += update.innovation * update.innovation / update.variance;
+                scatter *= update.variance;
             }
         }
         let variance_k2 = self.system.gas.dot(&(self.belief.covariance * self.system.gas));
         if reading_c.iter().all(Option::is_some) && has_settled(&before, &self.belief.covariance) {
-            self.settled = Some(Settled { gains, variance_k2 });
+            self.settled = Some(Settled { gains, variance_k2, scatter });
         }
-        Now { gas_c: self.gas_c(), variance_k2, surprise }
+        Now { gas_c: self.gas_c(), variance_k2, surprise, scatter }
     }
 
     /// Whether its gains no longer change.

@@ -39,7 +39,7 @@ fn engine() -> Signal {
 /// In 32 periods, each with a scatter of 2 %, the mean frequency scatters by 0.35 %; four of these.
 #[test]
 fn a_pulsation_is_learned_as_a_comb() {
-    let prior = learn(&case(engine()).readings, &rig()).expect("long enough");
+    let prior = learn(&case(engine()).readings, &rig()).expect("long enough").prior;
     for m in 1..=4 {
         let want_hz = 8.0 * f64::from(m);
         let is_there = prior.terms.iter().any(|t| match t {
@@ -60,7 +60,7 @@ fn bands_hold_what_they_say() {
     let plunge = Signal::Plunge(Plunge { amplitude_k: 17.0, dwell_s: 0.3, rise_s: 0.02 });
     for signal in [turbulence, plunge, engine()] {
         let case = case(signal.clone());
-        let prior = learn(&case.readings, &rig()).expect("long enough");
+        let prior = learn(&case.readings, &rig()).expect("long enough").prior;
         let gas = reconstruct(&case.readings, &rig(), &prior, Form::Smoother).expect("a good rig");
         let rms = |values: &[f64]| {
             let squares: f64 = values.iter().zip(&case.gas_c).map(|(a, b)| (a - b) * (a - b)).sum();
@@ -79,7 +79,7 @@ fn bands_hold_what_they_say() {
 #[test]
 fn what_comes_later_makes_it_more_certain() {
     let case = case(engine());
-    let prior = learn(&case.readings, &rig()).expect("long enough");
+    let prior = learn(&case.readings, &rig()).expect("long enough").prior;
     let form = |form| reconstruct(&case.readings, &rig(), &prior, form).expect("a good rig").std_k;
     let (smoother, lag, filter) = (form(Form::Smoother), form(Form::FixedLag(10)), form(Form::Filter));
     for k in 0..SAMPLES {

@@ -22,9 +22,9 @@ use crate::{Place, RecordError};
 const LEAST_SAMPLES: usize = 8;
 /// Gaps that get a note each.
 const LISTED_GAPS: usize = 5;
-const ABSOLUTE_ZERO_C: f64 = -273.15;
+pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// No thermocouple reaches this; sentinels such as 9999 and 1e37 lie beyond.
-const HOTTEST_C: f64 = 5000.0;
+pub(crate) const HOTTEST_C: f64 = 5000.0;
 
 /// Vectors to make a record from; `[n]` each, missing temperatures NaN.
 #[derive(Clone, Debug, PartialEq)]

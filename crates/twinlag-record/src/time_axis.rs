@@ -63,9 +63,12 @@ fn numeric(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<TimeAxi
         notes.push(Note::Unit { column: table.title(index), unit: symbol.to_owned(), stated, to });
     }
     let first = values.first().copied().unwrap_or(0.0);
-    // Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.
-    let scale = |value: f64| if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s };
-    Ok(TimeAxis { time_s: values.iter().map(|value| scale(value - first)).collect(), unit_s })
+    Ok(TimeAxis { time_s: values.iter().map(|value| seconds(value - first, unit_s)).collect(), unit_s })
+}
+
+/// Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.
+pub(crate) fn seconds(value: f64, unit_s: f64) -> f64 {
+    if unit_s < 1.0 { value / (1.0 / unit_s).round() } else { value * unit_s }
 }
 
 fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {

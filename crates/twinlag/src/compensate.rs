@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
-use twinlag_compensate::{Form, Gas, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
+use twinlag_compensate::{Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
 use twinlag_diagnose::{ModelFit, Verdict};
 use twinlag_record::Record;
 
@@ -208,8 +208,9 @@ struct Found {
 }
 
 impl Found {
-    /// The gas temperature, and how much it moves with each standard error of the parameters: a column of the covariance's
-    /// Cholesky factor at a time, so that what goes together moves together (JCGM 100, 5.2).
+    /// The gas temperature, and how much it moves with each standard error of the model's parameters and of the prior's numbers: a column
+    /// of the covariance's Cholesky factor at a time, so that what goes together moves together (JCGM 100, 5.2; of the prior Kackar
+    /// and Harville 1984, Prasad and Rao 1990).
     fn of(fit: &ModelFit, options: &CompensateOptions, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
         let extended = fit.extended.as_ref().expect("a fit of a record");
         let theta = extended.parameters();
@@ -228,48 +229,55 @@ impl Found {
             Ok(gas)
         };
         let (readings, rig) = rig(theta)?;
-        let prior = learn(&readings, &rig)?;
+        let Learned { prior, deviations } = learn(&readings, &rig)?;
         let gas = with(theta, &prior)?;
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
-        let mut variance = vec![0.0; gas.gas_c.len()];
-        let others = in_parallel(&columns, watch, |column| {
-            let moved: Vec<f64> = theta.iter().zip(column).map(|(t, d)| t + d).collect();
-            with(&moved, &prior).ok()
-        });
-        for other in others.iter().flatten() {
-            for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
-                *v += (a - b) * (a - b);
+        let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
+        let of_model: Vec<(Vec<f64>, &Prior)> = moved.map(|moved| (moved, &prior)).collect();
+        let of_prior: Vec<(Vec<f64>, &Prior)> = deviations.iter().map(|prior| (theta.to_vec(), prior)).collect();
+        let others = in_parallel(&[of_model, of_prior].concat(), watch, |(theta, prior)| with(theta, prior).ok());
+        let variance = |others: &[Option<Gas>]| {
+            let mut variance = vec![0.0; gas.gas_c.len()];
+            for other in others.iter().flatten() {
+                for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
+                    *v += (a - b) * (a - b);
+                }
             }
-        }
+            variance
+        };
+        let (of_model, of_prior) = others.split_at(columns.len());
+        let (of_model, of_prior) = (variance(of_model), variance(of_prior));
         let excess = gas.innovation_energy - 1.0 > CLEARLY * (2.0 / gas.innovations as f64).sqrt();
         let widened_by = if excess { gas.innovation_energy.sqrt() } else { 1.0 };
-        let parameter_std_k = (variance.iter().sum::<f64>() / variance.len().max(1) as f64).sqrt();
-        let std_k = gas.std_k.iter().zip(&variance).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
+        let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
+        // The prior's share counts twice: an estimated prior takes the gas for better known than it is, by as much as it moves it.
+        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
+        let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
 }
 
-/// The work on each of `columns`, in their order whatever the number of threads.
-fn in_parallel(
-    columns: &[Vec<f64>],
+/// The work on each of `cases`, in their order whatever the number of threads.
+fn in_parallel<Case: Sync>(
+    cases: &[Case],
     watch: DiagnoseWatch<'_>,
-    work: impl Fn(&[f64]) -> Option<Gas> + Sync,
+    work: impl Fn(&Case) -> Option<Gas> + Sync,
 ) -> Vec<Option<Gas>> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let results = Mutex::new(vec![None; columns.len()]);
+    let results = Mutex::new(vec![None; cases.len()]);
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
-        for _ in 0..threads.min(columns.len()) {
+        for _ in 0..threads.min(cases.len()) {
             scope.spawn(|| {
-                while let Some((index, column)) =
-                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, columns.get(i)?)))
+                while let Some((index, case)) =
+                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, cases.get(i)?)))
                 {
-                    let result = work(column);
+                    let result = work(case);
                     results.lock().expect("no thread panics")[index] = result;
                     watch(
-                        "how the parameters move the gas temperature",
+                        "how model and prior move the gas temperature",
                         done.fetch_add(1, Ordering::Relaxed) + 1,
-                        columns.len(),
+                        cases.len(),
                     );
                 }
             });
@@ -282,7 +290,7 @@ fn in_parallel(
 pub(crate) fn gas(fit: &ModelFit) -> Option<Gas> {
     let extended = fit.extended.as_ref()?;
     let (readings, rig) = extended.rig(extended.parameters()).ok()?;
-    let prior = learn(&readings, &rig).ok()?;
+    let prior = learn(&readings, &rig).ok()?.prior;
     reconstruct(&readings, &rig, &prior, Form::Smoother).ok()
 }
 

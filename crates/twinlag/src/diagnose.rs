@@ -153,6 +153,22 @@ pub struct ModelEffect {
 impl Model {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.model/1";
+
+    /// The model of two first-order lags: nothing in it.
+    pub fn of_two_lags(channels: [String; 2]) -> Self {
+        Self {
+            schema: Self::SCHEMA.into(),
+            channels,
+            time_constants_s: [None; 2],
+            noise_std_k: [1.0; 2],
+            effects: Vec::new(),
+            made_by: MadeBy {
+                program: "twinlag".into(),
+                version: env!("CARGO_PKG_VERSION").into(),
+                options: Options::default(),
+            },
+        }
+    }
 }
 
 impl Diagnosis {
@@ -251,7 +267,9 @@ pub(crate) fn with_model(
     };
     let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
     let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
-    out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
+    if !names.is_empty() {
+        out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
+    }
     if !known.fitted_again.is_empty() {
         let again: Vec<&str> = known.fitted_again.iter().map(|e| e.name()).collect();
         out.warnings

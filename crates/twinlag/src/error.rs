@@ -46,6 +46,12 @@ pub enum Error {
          {needed} samples or more in unbroken stretches there"
     )]
     QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
+    #[error(
+        "--live: the model has {effect}, which readings alone as they come do not allow to undo: leave out --live, or take a model          of calibration, second lags, slow paths and noise"
+    )]
+    LiveEffect { effect: &'static str },
+    #[error("the start of --live needs {why}")]
+    LiveStart { why: String },
     #[error("the model has {what} {got}: expected a finite number above 0")]
     ModelNumber { what: String, got: f64 },
     #[error(

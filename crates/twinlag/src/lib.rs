@@ -65,6 +65,7 @@ mod error;
 pub mod estimate;
 mod fitting;
 mod levels;
+mod live;
 mod objective;
 mod options;
 mod profile;
@@ -87,9 +88,10 @@ pub use diagnose::{
 };
 pub use error::Error;
 pub use levels::{NoiseColour, NoiseSource};
+pub use live::{Live, LiveAnswer, LiveOptions};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
-pub use report::{ReportContext, gas_picture, report, residual_picture, track_picture};
+pub use report::{ReportContext, gas_picture, gas_report, report, residual_picture, track_picture, track_report};
 pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
 pub use twinlag_bias as bias;

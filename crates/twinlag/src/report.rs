@@ -2,6 +2,7 @@
 
 mod figures;
 mod gas;
+mod pages;
 mod words;
 
 use std::ops::Range;
@@ -12,6 +13,7 @@ use twinlag_report::{
 };
 
 pub use gas::{gas_picture, track_picture};
+pub use pages::{gas_report, track_report};
 
 use figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
 use words::{

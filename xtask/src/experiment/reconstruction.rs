@@ -13,9 +13,8 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
-use twinlag::record::Record;
 use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal};
-use twinlag::{CompensateOptions, Estimator, MadeBy, Model, Options, characterise, compensate};
+use twinlag::{CompensateOptions, Estimator, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 
 use super::Stored;
@@ -216,7 +215,10 @@ impl Study for Reconstruction {
         outcome.value(0, mean_square(&by_oracle));
         let faster = simulated.t1_c.clone();
         let record = super::record_of(simulated)?;
-        let options = CompensateOptions { model: Some(two_lags(&record)), ..CompensateOptions::default() };
+        let options = CompensateOptions {
+            model: Some(Model::of_two_lags(record.channels.clone())),
+            ..CompensateOptions::default()
+        };
         let answer = compensate(&record, &options, &|_, _, _| ())?;
         if !answer.gas_c.is_empty() {
             outcome.value(1, mean_square(&answer.gas_c));
@@ -233,22 +235,6 @@ impl Study for Reconstruction {
         }
         outcome.value(4, mean_square(&faster));
         Ok(())
-    }
-}
-
-/// A model with nothing in it: no diagnosis, time constants and noise from the record itself.
-fn two_lags(record: &Record) -> Model {
-    Model {
-        schema: Model::SCHEMA.into(),
-        channels: record.channels.clone(),
-        time_constants_s: [None; 2],
-        noise_std_k: [1.0; 2],
-        effects: Vec::new(),
-        made_by: MadeBy {
-            program: "twinlag".into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            options: Options::default(),
-        },
     }
 }
 

@@ -56,9 +56,13 @@ impl Bench {
             .stderr(Stdio::piped())
             .spawn()
             .expect("cargo built the program");
-        // A program that refuses its arguments does not read: the pipe may be closed, which is no error here.
-        let _ = child.stdin.take().expect("piped above").write_all(input);
-        let output = child.wait_with_output().expect("the program was started");
+        let mut pipe = child.stdin.take().expect("piped above");
+        let output = std::thread::scope(|scope| {
+            // A program that refuses its arguments does not read: the pipe may be closed, which is no error here. One that answers
+            // while it reads wants to be read.
+            scope.spawn(move || pipe.write_all(input));
+            child.wait_with_output().expect("the program was started")
+        });
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("the program writes UTF-8");
         let answer = Answer {
             asked: arguments.join(" "),

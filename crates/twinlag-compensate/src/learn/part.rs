@@ -12,6 +12,9 @@ const FASTEST: f64 = 0.5;
 const NARROWEST: f64 = 0.01;
 const WIDEST: f64 = 0.2;
 
+/// Rough terms of a turbulent part.
+const CASCADE: usize = 4;
+
 /// A part of the swing that is none.
 const NOTHING: f64 = 1e-5;
 
@@ -27,6 +30,13 @@ pub(super) struct Limits {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Part {
     Single(Term),
+    /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms with corners evenly spaced in their
+    /// logarithm from that one to the fastest that is sampled, their variances as `f^(−2/3)`.
+    Turbulent {
+        std_k: f64,
+        corner_hz: f64,
+        fastest_hz: f64,
+    },
     /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first. Beyond the last one
     /// that is seen they are taken to fall as `1/m²`, as those of a pulse with a kink do: a band with their power.
     Comb {
@@ -41,6 +51,18 @@ impl Part {
     pub(super) fn terms(&self) -> Vec<Term> {
         match self {
             Self::Single(term) => vec![*term],
+            Self::Turbulent { std_k, corner_hz, fastest_hz } => {
+                let step = (fastest_hz / corner_hz).powf(1.0 / (CASCADE - 1) as f64);
+                let shares: [f64; CASCADE] = std::array::from_fn(|k| step.powf(-2.0 / 3.0 * k as f64));
+                let all: f64 = shares.iter().sum();
+                let terms = (0..CASCADE as i32).zip(shares);
+                terms
+                    .map(|(k, share)| Term::Rough {
+                        std_k: std_k * (share / all).sqrt(),
+                        corner_hz: corner_hz * step.powi(k),
+                    })
+                    .collect()
+            }
             Self::Comb { frequency_hz, width_hz, std_k } => {
                 let lines = (1..).zip(std_k).map(|(m, std_k)| {
                     let m = f64::from(m);
@@ -61,7 +83,7 @@ impl Part {
     pub(super) fn is_line(&self) -> bool {
         match self {
             Self::Single(Term::Resonance { quality, .. }) => *quality > 1.0,
-            Self::Single(Term::Rough { .. }) => false,
+            Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => false,
             Self::Comb { .. } => true,
         }
     }
@@ -69,7 +91,9 @@ impl Part {
     /// The numbers that are fitted.
     pub(super) fn values(&self) -> Vec<f64> {
         match self {
-            Self::Single(Term::Rough { std_k, corner_hz }) => vec![*std_k, *corner_hz],
+            Self::Single(Term::Rough { std_k, corner_hz }) | Self::Turbulent { std_k, corner_hz, .. } => {
+                vec![*std_k, *corner_hz]
+            }
             Self::Single(Term::Resonance { std_k, frequency_hz, quality }) => vec![*std_k, *frequency_hz, *quality],
             Self::Comb { frequency_hz, width_hz, std_k } => {
                 std_k.iter().copied().chain([*frequency_hz, *width_hz]).collect()
@@ -81,6 +105,8 @@ impl Part {
     pub(super) fn size_of(&self, a: usize) -> Option<usize> {
         let sizes = match self {
             Self::Single(_) => 1,
+            // It is in all of its terms.
+            Self::Turbulent { .. } => 0,
             // The last two are in what goes on above them.
             Self::Comb { std_k, .. } => std_k.len().saturating_sub(2),
         };
@@ -92,7 +118,7 @@ impl Part {
         let std = || Variable::logarithmic("std", 1e-7 * swing_k, 1e3 * swing_k);
         let frequency = || Variable::logarithmic("frequency", SLOWEST / span_s, FASTEST / period_s);
         match self {
-            Self::Single(Term::Rough { .. }) => vec![std(), frequency()],
+            Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => vec![std(), frequency()],
             Self::Single(Term::Resonance { .. }) => {
                 vec![std(), frequency(), Variable::logarithmic("quality", QUALITY[0], QUALITY[1])]
             }
@@ -127,6 +153,9 @@ pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
                 Part::Single(Term::Rough { .. }) => Part::Single(Term::Rough { std_k: own[0], corner_hz: own[1] }),
                 Part::Single(Term::Resonance { .. }) => {
                     Part::Single(Term::Resonance { std_k: own[0], frequency_hz: own[1], quality: own[2] })
+                }
+                Part::Turbulent { fastest_hz, .. } => {
+                    Part::Turbulent { std_k: own[0], corner_hz: own[1], fastest_hz: *fastest_hz }
                 }
                 Part::Comb { std_k, .. } => {
                     let (std_k, shared) = own.split_at(std_k.len());

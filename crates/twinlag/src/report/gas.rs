@@ -18,6 +18,11 @@ const EXCERPT: usize = 20;
 /// # Errors
 /// [`ReportError`], if there is nothing to draw.
 pub fn gas_picture(record: &Record, answer: &Compensation) -> Result<String, ReportError> {
+    temperature_figure(record, answer).panel(spectra(record, answer)).to_svg()
+}
+
+/// Readings and gas temperature with its band, over the record and where it moves most.
+pub(super) fn temperature_figure(record: &Record, answer: &Compensation) -> Figure {
     let n = answer.time_s.len();
     let length = (n / EXCERPT).max(50).min(n);
     let swing = |from: usize| {
@@ -28,11 +33,12 @@ pub fn gas_picture(record: &Record, answer: &Compensation) -> Result<String, Rep
     let starts = (0..=n - length).step_by((length / 2).max(1));
     let from = starts.max_by(|a, b| swing(*a).total_cmp(&swing(*b))).unwrap_or(0);
     let figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
-    let figure = figure
-        .panel(temperatures(record, answer, "The whole record", 0..n))
-        .panel(temperatures(record, answer, "Where it moves most", from..from + length))
-        .panel(spectra(record, answer));
-    figure.to_svg()
+    figure.panel(temperatures(record, answer, "The whole record", 0..n)).panel(temperatures(
+        record,
+        answer,
+        "Where it moves most",
+        from..from + length,
+    ))
 }
 
 fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std::ops::Range<usize>) -> Chart {
@@ -53,7 +59,7 @@ fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std:
     chart
 }
 
-fn spectra(record: &Record, answer: &Compensation) -> Chart {
+pub(super) fn spectra(record: &Record, answer: &Compensation) -> Chart {
     let period_s = record.sampling.period_s;
     let faster = answer.rig.is_some_and(|rig| rig.sensors[1].tau_s < rig.sensors[0].tau_s);
     let (name, raw) = if faster { (&record.channels[1], &record.t2_c) } else { (&record.channels[0], &record.t1_c) };

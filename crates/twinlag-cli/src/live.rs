@@ -1,0 +1,220 @@
+//! `twinlag track - --live ROWS --out -`: rows answered as they come.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write, stdin, stdout};
+use std::path::Path;
+
+use twinlag::record::{Record, RecordError, RowReader, Table};
+use twinlag::{Live, LiveAnswer, LiveOptions};
+
+use crate::arguments::{Talk, Track};
+use crate::characterise::model;
+use crate::failure::Failure;
+use crate::print;
+
+const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
+/// Warnings of bad rows that are printed one by one.
+const SHOWN: usize = 5;
+
+pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> Result<u8, Failure> {
+    if talk.json {
+        return Err(Failure::Usage(
+            "--live answers in rows, and --json in one object at the end: leave out one".into(),
+        ));
+    }
+    if let Some(change) = command.change.filter(|c| !(c.is_finite() && *c > 0.0)) {
+        return Err(Failure::Usage(format!("--change {change}: expected a share above 0, for example 0.1")));
+    }
+    let options = LiveOptions {
+        characterise: command.input.method.options()?,
+        model: command.model.as_deref().map(model).transpose()?,
+        change_per_root_s: command.change,
+    };
+    let selection = command.input.columns.selection();
+    let mut lines = Lines::open(&command.input.file)?;
+    let (table, source) = lines.start(rows)?;
+    let record = Record::from_table(&table, &selection)?;
+    print::notes(&record, talk);
+    let reader = RowReader::after(&table, &selection)?;
+    let mut live = Live::start(&record, &options)?;
+    let mut out = Out::open(&command.out, to_stdout)?;
+    talk.say(|| started(&live));
+    for warning in &live.start.warnings {
+        talk.say(|| format!("warning: {warning}"));
+    }
+    let missing = |c: f64| c.is_finite().then_some(c);
+    for k in 0..record.len() {
+        let reading_c = [missing(record.t1_c[k]), missing(record.t2_c[k])];
+        if !out.answer(live.push(Some(record.time_s[k]), reading_c))? {
+            return Ok(0);
+        }
+    }
+    // What was read so far is out before the next row is waited for.
+    out.flush()?;
+    let mut bad = Bad::default();
+    let mut is_beyond = false;
+    while let Some((number, line)) = lines.next()? {
+        let (time_s, reading_c) = match reader.read(&line, number) {
+            Ok(None) => continue,
+            Ok(Some(row)) => (row.time_s, row.reading_c),
+            Err(error) => {
+                bad.say(&error, talk);
+                (None, [None, None])
+            }
+        };
+        let answer = live.push(time_s, reading_c);
+        if answer.is_none() {
+            bad.say(
+                &format!("{source}: line {number}: expected a later time than in the row before; the row is left out"),
+                talk,
+            );
+        }
+        if let Some(now) = answer.filter(|now| now.is_beyond && !is_beyond) {
+            is_beyond = true;
+            talk.say(|| {
+                format!(
+                    "warning: at {} s the time constants may have left the range in view, 0.4 to 2.5 times those of the start: start again there",
+                    now.time_s
+                )
+            });
+        }
+        if !out.answer(answer)? || !out.flush()? {
+            return Ok(0);
+        }
+    }
+    bad.sum(talk);
+    Ok(0)
+}
+
+fn started(live: &Live) -> String {
+    let sensor = |i: usize| {
+        let sensor = &live.start.sensors[i];
+        format!("{} {:.4} s", sensor.channel, sensor.time_constant_s.unwrap_or(f64::NAN))
+    };
+    format!("started: time constants {}, {}; rows are answered as they come", sensor(0), sensor(1))
+}
+
+/// Lines of a file or of standard input, as they come.
+struct Lines {
+    from: Box<dyn BufRead>,
+    name: String,
+    number: usize,
+}
+
+impl Lines {
+    fn open(file: &Path) -> Result<Self, Failure> {
+        if file == Path::new("-") {
+            return Ok(Self { from: Box::new(BufReader::new(stdin())), name: "standard input".into(), number: 0 });
+        }
+        let name = file.display().to_string();
+        let opened = File::open(file);
+        let opened = opened.map_err(|e| RecordError::CannotRead { file: name.clone(), reason: e.to_string() })?;
+        Ok(Self { from: Box::new(BufReader::new(opened)), name, number: 0 })
+    }
+
+    fn bytes(&mut self, to: &mut Vec<u8>) -> Result<bool, Failure> {
+        let read = self.from.read_until(b'\n', to);
+        let read = read.map_err(|e| RecordError::CannotRead { file: self.name.clone(), reason: e.to_string() })?;
+        self.number += usize::from(read > 0);
+        Ok(read > 0)
+    }
+
+    /// The first lines, until `rows` of them are rows, and the name for messages.
+    fn start(&mut self, rows: usize) -> Result<(Table, String), Failure> {
+        let mut text = Vec::new();
+        let mut wanted = rows;
+        loop {
+            let mut goes_on = true;
+            for _ in 0..wanted {
+                goes_on = self.bytes(&mut text)?;
+            }
+            let table = Table::read(&text, &self.name)?;
+            if table.rows() >= rows {
+                return Ok((table, self.name.clone()));
+            }
+            if !goes_on {
+                let (name, got) = (&self.name, table.rows());
+                return Err(Failure::File(format!(
+                    "{name}: --live waits for {rows} rows, and there are {got}: ask for fewer, or leave out --live"
+                )));
+            }
+            wanted = rows - table.rows();
+        }
+    }
+
+    /// The next line with its number, from 1.
+    fn next(&mut self) -> Result<Option<(usize, String)>, Failure> {
+        let mut line = Vec::new();
+        let is_one = self.bytes(&mut line)?;
+        Ok(is_one.then(|| (self.number, String::from_utf8_lossy(&line).into_owned())))
+    }
+}
+
+/// Where answers go.
+struct Out {
+    to: Box<dyn Write>,
+    name: String,
+}
+
+impl Out {
+    fn open(path: &Path, to_stdout: bool) -> Result<Self, Failure> {
+        let name = if to_stdout { "standard output".to_owned() } else { path.display().to_string() };
+        let to: Box<dyn Write> = if to_stdout {
+            Box::new(BufWriter::new(stdout()))
+        } else {
+            let file = File::create(path).map_err(|e| Failure::Other(format!("{name}: cannot be written: {e}")))?;
+            Box::new(BufWriter::new(file))
+        };
+        let mut out = Self { to, name };
+        out.line(HEADER)?;
+        Ok(out)
+    }
+
+    /// `false` where nobody reads any more.
+    fn line(&mut self, line: &str) -> Result<bool, Failure> {
+        let written = writeln!(self.to, "{line}");
+        self.done(written)
+    }
+
+    fn flush(&mut self) -> Result<bool, Failure> {
+        let flushed = self.to.flush();
+        self.done(flushed)
+    }
+
+    fn answer(&mut self, answer: Option<LiveAnswer>) -> Result<bool, Failure> {
+        let Some(now) = answer else { return Ok(true) };
+        let [[low1, high1], [low2, high2]] = now.tau_95_s;
+        let [tau1, tau2] = now.tau_s;
+        let numbers = [now.time_s, now.gas_c, now.gas_std_k, tau1, low1, high1, tau2, low2, high2];
+        self.line(&numbers.map(|v| v.to_string()).join(","))
+    }
+
+    fn done(&self, written: std::io::Result<()>) -> Result<bool, Failure> {
+        match written {
+            Ok(()) => Ok(true),
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(false),
+            Err(error) => Err(Failure::Other(format!("{}: {error}", self.name))),
+        }
+    }
+}
+
+/// Rows that could not be used.
+#[derive(Default)]
+struct Bad {
+    count: usize,
+}
+
+impl Bad {
+    fn say(&mut self, what: &impl ToString, talk: Talk) {
+        self.count += 1;
+        if self.count <= SHOWN {
+            talk.say(|| format!("warning: {}", what.to_string()));
+        }
+    }
+
+    fn sum(&self, talk: Talk) {
+        if self.count > SHOWN {
+            talk.say(|| format!("warning: {} rows could not be used", self.count));
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! `twinlag track - --live`: rows are answered while the pipe is open, the numbers are those of the rig, and no row ends it.
+
+mod common;
+
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Write};
+use std::process::{Command, Stdio};
+
+use common::Bench;
+
+/// Turbulence past two thermocouples; at 20 s the flow falls, and both are 1.4 times as slow from then on.
+const RIG: &str = r#"
+seed = 8
+
+[record]
+samples = 5000
+sample_period_s = 0.01
+
+[gas]
+kind = "turbulence"
+mean_c = 300.0
+std_k = 15.0
+corner_hz = 0.5
+cutoff_hz = 45.0
+
+[flow]
+kind = "step"
+factor = 1.4
+at_s = 20.0
+over_s = 0.01
+
+[[sensors]]
+channel = "T1"
+time_constant_s = 0.12
+noise = { std_k = 0.1 }
+
+[[sensors]]
+channel = "T2"
+time_constant_s = 0.45
+noise = { std_k = 0.1 }
+"#;
+
+const LIVE: [&str; 6] = ["track", "-", "--live", "1500", "--out", "-"];
+
+fn record(test: &str) -> (Bench, String) {
+    let bench = Bench::with(test, "rig.toml", RIG);
+    let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let text = String::from_utf8(bench.read("run.csv")).expect("text");
+    (bench, text)
+}
+
+fn rows(text: &str) -> Vec<Vec<f64>> {
+    text.lines().skip(1).map(|l| l.split(',').map(|c| c.parse().expect("a number")).collect()).collect()
+}
+
+/// Before the step both time constants are those of the rig within their bands, and so are they 2 s (four time constants of the slower
+/// sensor) after it; the gas is within five of its standard deviations, but where the step has just been.
+#[test]
+fn the_numbers_are_those_of_the_rig() {
+    let (bench, text) = record("numbers");
+    let answer = bench.run_with_input(&LIVE, text.as_bytes());
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    answer.says(&["started: time constants T1 0.1"]);
+    let gas_c: Vec<f64> =
+        text.lines().skip(1).map(|l| l.split(',').nth(3).and_then(|c| c.parse().ok()).expect("Tref")).collect();
+    let rows = rows(&answer.stdout);
+    assert_eq!(rows.len(), 5000);
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row[0] - k as f64 * 0.01).abs() < 1e-9);
+        let has_settled = k > 100 && !(2000..2200).contains(&k);
+        if has_settled {
+            assert!((row[1] - gas_c[k]).abs() < 5.0 * row[2], "row {k}: {row:?}, gas {}", gas_c[k]);
+        }
+    }
+    for (time_s, factor) in [(15.0, 1.0), (19.9, 1.0), (22.0, 1.4), (40.0, 1.4)] {
+        let row = &rows[(time_s / 0.01) as usize];
+        let [tau1, low1, high1, tau2, low2, high2] = row[3..].try_into().expect("six numbers");
+        // Two bands of 95 %: wider by half, that one of eight misses by chance is less likely than one in twenty.
+        let holds = |tau: f64, low: f64, high: f64, want: f64| (want / tau).ln().abs() < 0.75 * (high / low).ln();
+        assert!(
+            holds(tau1, low1, high1, 0.12 * factor) && holds(tau2, low2, high2, 0.45 * factor),
+            "{time_s} s: {row:?}"
+        );
+    }
+}
+
+/// The answer to a row comes before the next one is written.
+#[test]
+fn a_row_is_answered_while_the_pipe_is_open() {
+    let (_, text) = record("open");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_twinlag"))
+        .args(LIVE)
+        .arg("--quiet")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("cargo built the program");
+    let mut pipe = child.stdin.take().expect("piped above");
+    let mut answers = BufReader::new(child.stdout.take().expect("piped above")).lines();
+    let mut rows = text.lines();
+    for line in rows.by_ref().take(1501) {
+        writeln!(pipe, "{line}").expect("it reads");
+    }
+    let mut answer = || answers.next().expect("it answers").expect("text");
+    for _ in 0..1501 {
+        answer();
+    }
+    for line in rows.take(20) {
+        writeln!(pipe, "{line}").expect("it reads");
+        pipe.flush().expect("it reads");
+        let asked = line.split(',').next().expect("a time");
+        assert!(answer().starts_with(&format!("{asked},")), "after {line}");
+    }
+    drop(pipe);
+    assert!(child.wait().expect("it ends with its input").success());
+}
+
+/// Bad rows are named and count as missing, rows that come again are left out, a gap is gone through; what follows is answered.
+#[test]
+fn bad_rows_do_not_end_it() {
+    let (bench, text) = record("bad");
+    let lines: Vec<&str> = text.lines().collect();
+    let mut broken: Vec<String> = lines[..1800].iter().map(ToString::to_string).collect();
+    broken.push("18,warm,300,300".into());
+    broken.push(lines[1700].into());
+    broken.push("# a word of the logger".into());
+    broken.push(",,".into());
+    broken.extend(lines[1900..2000].iter().map(ToString::to_string));
+    let answer = bench.run_with_input(&LIVE, (broken.join("\n") + "\n").as_bytes());
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    answer.says(&["line 1801", "'warm'", "line 1802", "later time", "line 1804"]);
+    let rows = rows(&answer.stdout);
+    assert_eq!(rows.len(), 1799 + 2 + 100);
+    assert!(rows.iter().flatten().all(|v| v.is_finite()));
+    assert!((rows.last().expect("rows")[0] - 19.98).abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_answered_live_is_refused() {
+    let (bench, _) = record("refused");
+    bench.refuses(2, &["track", "run.csv", "--live", "100", "--out", "out.csv"], &["--live", "200"]);
+    bench.refuses(2, &["track", "run.csv", "--live", "500", "--window", "1", "--out", "out.csv"], &["--window"]);
+    bench.refuses(2, &["track", "run.csv", "--change", "0.1", "--out", "out.csv"], &["--live"]);
+    let few = bench.run(&["track", "run.csv", "--live", "6000", "--out", "out.csv"]);
+    assert_eq!(few.code, 3, "{few:#?}");
+    few.says(&["waits for 6000 rows", "there are 5000"]);
+    // Gas at rest tells no time constant.
+    let mut rest = String::from("time_s,T1,T2\n");
+    for k in 0..400 {
+        let noise_k = |step: i32, of: i32| f64::from(k * step % of) * 1e-3;
+        let _ =
+            writeln!(rest, "{},{},{}", f64::from(k) * 0.01, 300.0 + noise_k(7919, 101), 300.0 + noise_k(104_729, 97));
+    }
+    let rest = bench.run_with_input(&["track", "-", "--live", "300", "--out", "-"], rest.as_bytes());
+    assert_eq!(rest.code, 4, "{rest:#?}");
+    rest.says(&["the start of --live needs"]);
+}

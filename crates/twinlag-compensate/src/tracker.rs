@@ -1,0 +1,112 @@
+//! Gas temperature and time constants as readings come in, while the flow changes both sensors.
+
+use crate::prior::Prior;
+use crate::rig::Rig;
+use crate::stream::Stream;
+
+/// Factors of the time constants that are kept in view, evenly spaced in their logarithm between `1/FARTHEST` and `FARTHEST`.
+const FACTORS: usize = 41;
+const FARTHEST: f64 = 2.5;
+/// Chance of a sample that the factor jumps anywhere: a sudden change is followed once readings tell it so often to one.
+const JUMP: f64 = 1e-9;
+
+/// What is known at an instant from the readings up to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tracked {
+    /// The gas temperature, °C.
+    pub gas_c: f64,
+    /// Its variance, K².
+    pub variance_k2: f64,
+    /// Logarithm of the time constants over those of the rig.
+    pub log_factor: f64,
+    /// Variance of that.
+    pub log_variance: f64,
+    /// Chance that the factor is the smallest or the largest in view: where it is not small, the factor is beyond.
+    pub chance_beyond: f64,
+}
+
+/// A filter for sensors whose time constants change by a common factor, as they do in flow that changes.
+///
+/// One [`Stream`] for each of a grid of factors; their likelihoods, and a random walk of the logarithm of the factor between its
+/// neighbours, give the chance of each factor (a hidden Markov model's forward recursion), and the gas temperature is their mixture.
+/// Constant memory and work for a sample, nothing allocated after [`Tracker::new`].
+#[derive(Clone, Debug)]
+pub struct Tracker<const D: usize> {
+    streams: Vec<Stream<D>>,
+    log_factor: Vec<f64>,
+    chance: Vec<f64>,
+    /// Those after the step, and the logarithms of the likelihoods.
+    next: Vec<f64>,
+    log_likelihood: Vec<f64>,
+    /// Chance of a step to either neighbour.
+    leaves: f64,
+}
+
+impl<const D: usize> Tracker<D> {
+    /// A filter for sensors that are read every `period_s`, whose time constants were those of `rig` and whose logarithm wanders by
+    /// `change` a second, standard deviation, growing as the root of time. `None` as for [`Stream::new`].
+    pub fn new(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Self> {
+        let spacing = 2.0 * FARTHEST.ln() / (FACTORS - 1) as f64;
+        let log_factor: Vec<f64> = (0..FACTORS).map(|k| (k as f64 - (FACTORS - 1) as f64 / 2.0) * spacing).collect();
+        let stream = |log: &f64| {
+            let mut rig = *rig;
+            rig.sensors.iter_mut().for_each(|s| s.tau_s *= log.exp());
+            Stream::new(&rig, prior.level_c, &prior.terms, period_s)
+        };
+        let streams = log_factor.iter().map(stream).collect::<Option<Vec<_>>>()?;
+        let mut chance = vec![0.0; FACTORS];
+        chance[FACTORS / 2] = 1.0;
+        let leaves = (0.5 * change * change * period_s / (spacing * spacing)).min(1.0 / 3.0);
+        let (next, log_likelihood) = (chance.clone(), vec![0.0; FACTORS]);
+        Some(Self { streams, log_factor, chance, next, log_likelihood, leaves })
+    }
+
+    /// What is known once the next readings, °C, are; `None` for one that is missing.
+    pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> Tracked {
+        let last = FACTORS - 1;
+        for k in 0..FACTORS {
+            // At the ends of the grid what would step out stays.
+            let [below, above] = [k.saturating_sub(1), (k + 1).min(last)].map(|j| self.chance[j]);
+            let wandered = self.chance[k] + self.leaves * (below + above - 2.0 * self.chance[k]);
+            self.next[k] = (1.0 - JUMP) * wandered + JUMP / FACTORS as f64;
+        }
+        let (mut gas_c, mut square, mut most) = ([0.0; FACTORS], [0.0; FACTORS], f64::NEG_INFINITY);
+        for (k, stream) in self.streams.iter_mut().enumerate() {
+            let now = stream.push(reading_c);
+            (gas_c[k], square[k]) = (now.gas_c, now.variance_k2);
+            self.log_likelihood[k] = -0.5 * (now.surprise + now.scatter.ln());
+            most = most.max(self.log_likelihood[k]);
+        }
+        let mut sum = 0.0;
+        for ((next, log), chance) in self.next.iter().zip(&self.log_likelihood).zip(&mut self.chance) {
+            *chance = next * (log - most).exp();
+            sum += *chance;
+        }
+        self.chance.iter_mut().for_each(|c| *c /= sum);
+        let mean = |of: &dyn Fn(usize) -> f64| (0..FACTORS).map(|k| self.chance[k] * of(k)).sum::<f64>();
+        let gas = mean(&|k| gas_c[k]);
+        let log_factor = mean(&|k| self.log_factor[k]);
+        // Between two factors of the grid any is as good: a twelfth of its square.
+        let spacing = self.log_factor[1] - self.log_factor[0];
+        Tracked {
+            gas_c: gas,
+            variance_k2: mean(&|k| square[k] + (gas_c[k] - gas).powi(2)),
+            log_factor,
+            log_variance: mean(&|k| (self.log_factor[k] - log_factor).powi(2)) + spacing * spacing / 12.0,
+            chance_beyond: self.chance[0] + self.chance[last],
+        }
+    }
+}
+
+/// [`Tracker::push`] with as many states as are needed.
+pub type Push = Box<dyn FnMut([Option<f64>; 2]) -> Tracked + Send>;
+
+/// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` where there is none.
+pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
+    fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
+        let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;
+        Some(Box::new(move |reading_c| tracker.push(reading_c)))
+    }
+    let sizes = [of::<4>, of::<6>, of::<8>, of::<12>, of::<16>, of::<24>];
+    sizes.into_iter().find_map(|of| of(rig, prior, period_s, change))
+}

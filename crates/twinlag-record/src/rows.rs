@@ -1,0 +1,122 @@
+//! Rows that come after those of a table, one line at a time, as a live pipe delivers them.
+
+use crate::cells::{is_idle, split};
+use crate::choose::choose;
+use crate::dialect::{Decimal, Delimiter};
+use crate::note::Note;
+use crate::number::{self, Value};
+use crate::record::{ABSOLUTE_ZERO_C, HOTTEST_C};
+use crate::selection::Selection;
+use crate::table::{Kind, Table, shortened};
+use crate::time_axis::{TimeColumns, seconds};
+use crate::unit::Unit;
+use crate::{Place, RecordError};
+
+/// One row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Time since the first row of the table, s; `None` where the time column holds no plain numbers, or there is none.
+    pub time_s: Option<f64>,
+    /// Both temperatures, °C; `None` for one that is missing.
+    pub reading_c: [Option<f64>; 2],
+}
+
+/// Reads further lines in the way that the first ones were read.
+#[derive(Clone, Debug)]
+pub struct RowReader {
+    source: String,
+    delimiter: Delimiter,
+    decimal: Decimal,
+    width: usize,
+    time: Option<Time>,
+    channels: [Channel; 2],
+}
+
+#[derive(Clone, Debug)]
+struct Time {
+    index: usize,
+    first: f64,
+    unit_s: f64,
+}
+
+#[derive(Clone, Debug)]
+struct Channel {
+    index: usize,
+    title: String,
+    unit: Unit,
+}
+
+impl RowReader {
+    /// For lines that come after those of `table`, of which `selection` chose the columns.
+    ///
+    /// # Errors
+    /// As [`crate::Record::from_table`] on columns that cannot be told.
+    pub fn after(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
+        let chosen = choose(table, selection, &mut Vec::new())?;
+        let format = table.notes().iter().find_map(|note| match note {
+            Note::Format { delimiter, decimal, .. } => Some((*delimiter, *decimal)),
+            _ => None,
+        });
+        let (delimiter, decimal) = format.unwrap_or((Delimiter::Comma, Decimal::Point));
+        let column = |index: usize| &table.columns()[index];
+        let time = match chosen.time {
+            Some(TimeColumns::One(index)) if column(index).kind() == Kind::Number => {
+                let unit_s = if let Unit::Time { seconds, .. } = column(index).unit() { *seconds } else { 1.0 };
+                let first = column(index).raw().first().copied().unwrap_or(0.0);
+                Some(Time { index, first, unit_s })
+            }
+            _ => None,
+        };
+        let channels = chosen.channels.map(|index| Channel {
+            index,
+            title: table.title(index),
+            unit: column(index).unit().clone(),
+        });
+        let width = table.columns().len();
+        Ok(Self { source: table.source().to_owned(), delimiter, decimal, width, time, channels })
+    }
+
+    /// The row of line `number`, from 1; `None` for a blank or a comment.
+    ///
+    /// # Errors
+    /// [`RecordError::CellCount`], [`RecordError::OpenQuote`], [`RecordError::NotANumber`], [`RecordError::OutOfRange`]: what the row says is
+    /// not known then, those after it can still be read.
+    pub fn read(&self, line: &str, number: usize) -> Result<Option<Row>, RecordError> {
+        let line = line.trim_end_matches(['\n', '\r']);
+        if is_idle(line) {
+            return Ok(None);
+        }
+        let file = || self.source.clone();
+        let mut cells = Vec::with_capacity(self.width + 1);
+        split(line, self.delimiter, &mut cells).map_err(|_| RecordError::OpenQuote { file: file(), line: number })?;
+        let found = cells.len();
+        if found != self.width && !(found == self.width + 1 && cells[self.width].is_empty()) {
+            return Err(RecordError::CellCount { file: file(), line: number, expected: self.width, found });
+        }
+        let reading = |channel: &Channel| {
+            let cell = cells[channel.index].as_ref();
+            let column = channel.title.clone();
+            let value = match number::read(cell, self.decimal) {
+                Value::Missing => return Ok(None),
+                Value::Number(value) => value,
+                Value::Other => {
+                    let cell = shortened(cell);
+                    return Err(RecordError::NotANumber { file: file(), line: number, column, cell });
+                }
+            };
+            match channel.unit.to_celsius(value) {
+                Some(c) if (ABSOLUTE_ZERO_C..=HOTTEST_C).contains(&c) => Ok(Some(c)),
+                _ => {
+                    let (at, unit) = (Place::Line(number), channel.unit.symbol());
+                    Err(RecordError::OutOfRange { file: file(), at, column, value, cell: None, unit })
+                }
+            }
+        };
+        let reading_c = [reading(&self.channels[0])?, reading(&self.channels[1])?];
+        let time_s = self.time.as_ref().and_then(|time| match number::read(&cells[time.index], self.decimal) {
+            Value::Number(value) => Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite()),
+            Value::Missing | Value::Other => None,
+        });
+        Ok(Some(Row { time_s, reading_c }))
+    }
+}

@@ -1,0 +1,39 @@
+//! That further lines are read as the first ones were, and that a bad one is named and harms no other.
+
+use twinlag_record::{RecordError, Row, RowReader, Selection, Table};
+
+const START: &str = "\
+Zeit [ms];T1 [°C];Sonde;T2 [K]
+100;20,0;a;293,15
+102;20,5;b;293,25
+";
+
+fn reader() -> RowReader {
+    let table = Table::read(START.as_bytes(), "pipe").expect("a table");
+    RowReader::after(&table, &Selection::default()).expect("columns that can be told")
+}
+
+#[test]
+fn lines_are_read_as_the_first_ones_were() {
+    let row = |line: &str| reader().read(line, 4).expect("a good line");
+    let near = |got: Option<Row>, want: (f64, [Option<f64>; 2])| {
+        let got = got.expect("a row");
+        let same = |a: Option<f64>, b: Option<f64>| a.zip(b).map_or(a == b, |(a, b)| (a - b).abs() < 1e-9);
+        assert!(same(got.time_s, Some(want.0)), "{got:?}, want {want:?}");
+        assert!((0..2).all(|i| same(got.reading_c[i], want.1[i])), "{got:?}, want {want:?}");
+    };
+    near(row("104;21,0;c;293,65\r\n"), (0.004, [Some(21.0), Some(20.5)]));
+    near(row("106;---;c;293,65;"), (0.006, [None, Some(20.5)]));
+    assert_eq!(row("# a comment"), None);
+    assert_eq!(row("\n"), None);
+}
+
+#[test]
+fn bad_lines_are_named() {
+    let reader = reader();
+    let error = |line: &str| reader.read(line, 7).expect_err("a bad line");
+    assert!(matches!(error("104;21,0"), RecordError::CellCount { line: 7, expected: 4, found: 2, .. }));
+    assert!(matches!(error("104;warm;c;293,65"), RecordError::NotANumber { line: 7, .. }));
+    assert!(matches!(error("104;21,0;c;-5,0"), RecordError::OutOfRange { .. }));
+    assert!(matches!(error("104;\"21,0;c;293,65"), RecordError::OpenQuote { line: 7, .. }));
+}

@@ -1,0 +1,144 @@
+//! Gas temperature and time constants as readings come in.
+
+use twinlag_compensate::{Push, learn, tracker};
+use twinlag_diagnose::Identifier;
+use twinlag_record::{Record, SamplingKind};
+
+use crate::characterisation::Characterisation;
+use crate::diagnose::{Model, with_model};
+use crate::error::Error;
+use crate::options::Options;
+use crate::profile::Z_975;
+
+/// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower sensor, where nothing is said.
+const CHANGE: f64 = 0.1;
+const CHANGE_OVER: f64 = 10.0;
+/// Missing samples of a gap that are gone through one by one; after so many nothing is left of what was before.
+const LONGEST_GAP: u64 = 100_000;
+/// Chance that the time constants are beyond the range in view, above which that is said.
+const LIKELY: f64 = 0.05;
+
+/// What live tracking may assume.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LiveOptions {
+    /// Noise, known time constants, and how the start is characterised.
+    pub characterise: Options,
+    /// A model that was found in another record: its effects stay as they are.
+    pub model: Option<Model>,
+    /// By how much the time constants may change in a second, as a share: the standard deviation, which grows as the root of time.
+    /// Where nothing is said, a tenth in ten time constants of the slower sensor.
+    pub change_per_root_s: Option<f64>,
+}
+
+/// What is known at an instant from the readings up to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LiveAnswer {
+    /// The instant, s.
+    pub time_s: f64,
+    /// The gas temperature, °C.
+    pub gas_c: f64,
+    /// Its standard deviation, K.
+    pub gas_std_k: f64,
+    /// Both time constants, s.
+    pub tau_s: [f64; 2],
+    /// Ends of their 95 % bands, s.
+    pub tau_95_s: [[f64; 2]; 2],
+    /// Whether the time constants may have left the range that is in view.
+    pub is_beyond: bool,
+}
+
+/// Tracks both sensors from a start on.
+pub struct Live {
+    /// The start's characterisation.
+    pub start: Characterisation,
+    push: Push,
+    gain: f64,
+    offset_k: f64,
+    tau_s: [f64; 2],
+    log_variance: [f64; 2],
+    period_s: f64,
+    last_s: Option<f64>,
+}
+
+impl Live {
+    /// Characterises `record`, the start, and learns from it what the gas is like: what comes after is taken to go on so.
+    ///
+    /// # Errors
+    /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a stream cannot undo,
+    /// [`Error::LiveStart`] where the start does not determine both time constants, or is not evenly spaced.
+    pub fn start(record: &Record, options: &LiveOptions) -> Result<Self, Error> {
+        if record.sampling.kind == SamplingKind::Irregular {
+            return Err(Error::LiveStart { why: "rows that are evenly spaced in time".into() });
+        }
+        let mut model = options.model.clone().unwrap_or_else(|| Model::of_two_lags(record.channels.clone()));
+        // What masks readings belongs to a record; what changes the time constants is what is followed.
+        let is_of_the_record = |effect: Identifier| {
+            use Identifier::{Quantisation, Saturation, Spikes, VaryingTimeConstant};
+            [Saturation, Quantisation, Spikes, VaryingTimeConstant].contains(&effect)
+        };
+        model.effects.retain(|e| !is_of_the_record(e.effect));
+        let can_be_undone = |effect: Identifier| {
+            use Identifier::{Calibration, ColouredNoise, InputMismatch, SecondOrder, SlowMode};
+            [Calibration, ColouredNoise, InputMismatch, SecondOrder, SlowMode].contains(&effect)
+        };
+        let is_curved = |name: &str| name.starts_with("curvature");
+        for e in &model.effects {
+            if !can_be_undone(e.effect) || e.parameters.iter().any(|p| is_curved(&p.name)) {
+                return Err(Error::LiveEffect { effect: e.effect.name() });
+            }
+        }
+        let (start, fit) = with_model(record, &model, &options.characterise)?;
+        let tau_s = [0, 1].map(|i| fit.time_constants[i].value_s);
+        let (Some(extended), [Some(tau1_s), Some(tau2_s)]) = (&fit.extended, tau_s) else {
+            return Err(Error::LiveStart {
+                why: "both time constants to be determined by it: wait for more rows, or say what is known of one (--known \
+                      T1.time_constant_s=VALUE)"
+                    .into(),
+            });
+        };
+        let tau_s = [tau1_s, tau2_s];
+        let (readings, rig) = extended.rig(extended.parameters())?;
+        let [gain, offset_k] = extended.calibration(extended.parameters());
+        let prior = learn(&readings, &rig)?.prior;
+        let change = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
+        let period_s = record.sampling.period_s;
+        let push = tracker(&rig, &prior, period_s, change).ok_or(Error::LiveEffect { effect: "delay" })?;
+        let log_variance = [0, 1].map(|i| {
+            let error_s = fit.time_constants[i].standard_error_s.unwrap_or(0.0);
+            (error_s / tau_s[i]).powi(2)
+        });
+        Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None })
+    }
+
+    /// What is known once a row is read: both readings, °C, `None` for one that is missing, at `time_s`; a sample after the last one where
+    /// that is not said. `None` for a row that is not later than the last one, which is left out. Samples that are missing in a gap are
+    /// gone through as such.
+    pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
+        let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
+        let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);
+        let steps = self.last_s.map_or(1.0, |last_s| ((time_s - last_s) / self.period_s).round());
+        if steps < 1.0 {
+            return None;
+        }
+        for _ in 1..(steps as u64).min(LONGEST_GAP) {
+            (self.push)([None, None]);
+        }
+        self.last_s = Some(time_s);
+        let [first, second] = reading_c.map(|c| c.filter(|c| c.is_finite()));
+        let now = (self.push)([first, second.map(|c| (c - self.offset_k) / self.gain)]);
+        let factor = now.log_factor.exp();
+        let tau_s = self.tau_s.map(|tau_s| tau_s * factor);
+        let tau_95_s = [0, 1].map(|i| {
+            let half = Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
+            [-half, half].map(|by| tau_s[i] * by.exp())
+        });
+        Some(LiveAnswer {
+            time_s,
+            gas_c: now.gas_c,
+            gas_std_k: now.variance_k2.sqrt(),
+            tau_s,
+            tau_95_s,
+            is_beyond: now.chance_beyond > LIKELY,
+        })
+    }
+}

@@ -1,0 +1,133 @@
+//! A gas temperature, and time constants along a record, as pages.
+
+use twinlag_record::Record;
+use twinlag_report::{Document, Figure, ReportError, Table, between, plus_minus, probability, rounded};
+
+use super::figures::WIDTH_PX;
+use super::gas::{spectra, temperature_figure, track_picture};
+use super::words::{ABSENT, listed, sentence, with_unit, words};
+use crate::characterisation::Characterisation;
+use crate::compensate::Compensation;
+use crate::track::Track;
+
+/// The report on a gas temperature: an HTML page that needs no other file. The same answer gives the same bytes.
+///
+/// - `command`: the one that makes it again
+///
+/// # Errors
+/// [`ReportError`], if something cannot be drawn. Where there is no gas temperature the page says why, and that is no error.
+pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
+    let mut document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
+    document = match &answer.gas {
+        None => document.lead("This record has no gas temperature."),
+        Some(gas) => document.lead(format!(
+            "The gas temperature is known to {} (standard deviation, median), and follows the gas up to {}.",
+            with_unit(&rounded(gas.median_std_k, 2), "K"),
+            gas.bandwidth_hz
+                .map_or("no frequency: it moves less than the noise".into(), |hz| with_unit(&rounded(hz, 3), "Hz"))
+        )),
+    };
+    for warning in &answer.warnings {
+        document = document.warning(sentence(warning));
+    }
+    if let Some(gas) = &answer.gas {
+        let effects: Vec<String> = answer.effects.iter().map(|e| words(e.effect)).collect();
+        let mut facts = vec![
+            (
+                "Model",
+                if effects.is_empty() {
+                    "two first-order lags".into()
+                } else {
+                    format!("two lags, and {}", listed(&effects))
+                },
+            ),
+            ("Its parameters' share of the standard deviation", with_unit(&rounded(gas.parameter_std_k, 2), "K")),
+            ("Bands are multiplied by", rounded(gas.widened_by, 3)),
+        ];
+        if let Some(reference) = &gas.reference {
+            facts.push((
+                "Error against the reference",
+                format!("{} rms", with_unit(&rounded(reference.rmse_k, 3), "K")),
+            ));
+            facts.push((
+                "The same of the faster sensor",
+                format!("{} rms", with_unit(&rounded(reference.raw_rmse_k, 3), "K")),
+            ));
+            facts.push(("Reference inside the 95 % band", with_unit(&rounded(100.0 * reference.inside_95, 3), "%")));
+        }
+        document = document.facts(facts).figure(
+            temperature_figure(record, answer).to_svg()?,
+            "Readings, and the gas temperature with its 95 % band. Below, the part where it moves most, larger.",
+        );
+        let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 260.0).panel(spectra(record, answer));
+        document = document.heading("Before and after").figure(
+            spectra.to_svg()?,
+            "Spectra of the faster sensor as it reads, of the gas temperature, and of the noise that the inferred gas temperature would \
+             have without what is known of the gas. The lag is compensated up to the line; beyond it the answer is what the gas is like, \
+             not what it did.",
+        );
+    }
+    Ok(end(numbers(document, &answer.last), &answer.last, command))
+}
+
+/// The report on time constants along a record, like [`gas_report`].
+///
+/// # Errors
+/// As [`gas_report`].
+pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<String, ReportError> {
+    let lead = match (answer.change.as_str(), answer.coefficients, &answer.step) {
+        _ if answer.time_s.is_empty() => "This record does not determine both time constants.".into(),
+        ("smooth", Some(size), _) => {
+            format!("Both time constants change smoothly along the record: {size} coefficients describe it.")
+        }
+        ("step", _, Some(step)) => format!(
+            "Both time constants change by a factor of {} at {}, between {} (95 %).",
+            rounded(step.factor, 3),
+            with_unit(&rounded(step.at_s, 5), "s"),
+            with_unit(&between(step.interval_95_s), "s")
+        ),
+        ("windows", _, _) => format!("Each of {} windows is characterised by itself.", answer.time_s.len()),
+        _ => "Time constants do not change, as far as the record tells.".into(),
+    };
+    let mut document = Document::new(format!("Time constants along {}", record.source))
+        .heading("Time constants along the record")
+        .lead(lead);
+    for warning in &answer.warnings {
+        document = document.warning(sentence(warning));
+    }
+    if let Some(ratio) = &answer.ratio {
+        let stays = if ratio.stays { "stays, as far as the record tells" } else { "changes" };
+        let text =
+            format!("{stays} (p = {}, {} degrees of freedom)", probability(ratio.p_value), ratio.degrees_of_freedom);
+        document = document.facts([("The ratio of both", text)]);
+    }
+    if !answer.time_s.is_empty() {
+        document = document.figure(track_picture(answer)?, "Both time constants with their pointwise 95 % bands.");
+    }
+    Ok(end(numbers(document, &answer.last), &answer.last, command))
+}
+
+fn numbers(document: Document, last: &Characterisation) -> Document {
+    let mut table = Table::new(["channel", "time constant", "95 % interval", "noise"]);
+    for sensor in &last.sensors {
+        let value = sensor.time_constant_s.map(|v| with_unit(&plus_minus(v, sensor.standard_error_s), "s"));
+        let interval = sensor.interval_95_s.map(|ends| with_unit(&between(ends), "s"));
+        table = table.row([
+            sensor.channel.clone(),
+            value.unwrap_or(ABSENT.into()),
+            interval.unwrap_or(ABSENT.into()),
+            with_unit(&rounded(sensor.noise_std_k, 3), "K"),
+        ]);
+    }
+    let record = &last.record;
+    document.heading("The record and its model").table(table).facts([
+        ("Source", record.source.clone()),
+        ("Samples", format!("{}, {} apart", record.samples, with_unit(&rounded(record.sample_period_s, 4), "s"))),
+    ])
+}
+
+fn end(document: Document, last: &Characterisation, command: &str) -> String {
+    let mut document = document.heading("How to reproduce this").command(command);
+    document = document.paragraph(format!("Made by {} {}.", last.made_by.program, last.made_by.version));
+    last.notes.iter().fold(document, |document, note| document.note(note.clone())).to_html()
+}
