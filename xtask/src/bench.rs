@@ -1,6 +1,8 @@
 //! How long a fit and a trial take (Criterion, `benches/fits.rs`), the fits beside the SciPy script that a user would otherwise
 //! write: same record, same cost, same start, same minimum, in one run.
 
+mod stream;
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::process::Command;
@@ -34,6 +36,9 @@ pub(crate) struct Bench {
     /// Times the closed loop on a record of 20 000 samples of every kind in place of the fits.
     #[arg(long, conflicts_with = "million")]
     diagnose: bool,
+    /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
+    #[arg(long, conflicts_with_all = ["million", "diagnose"])]
+    stream: bool,
 }
 
 pub(crate) fn run(arguments: &Bench) -> Result<()> {
@@ -42,6 +47,9 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
     }
     if arguments.diagnose {
         return closed_loop();
+    }
+    if arguments.stream {
+        return stream::run();
     }
     let status = Command::new("cargo")
         .args(["bench", "--package", "xtask", "--bench", "fits", "--", "--noplot", "--quiet"])
@@ -104,23 +112,27 @@ fn mean_s(id: &str) -> Result<f64> {
     Ok(1e-9 * estimates["mean"]["point_estimate"].as_f64().context("a mean")?)
 }
 
-/// The study of a million trials.
-fn million(trials: Option<u64>) -> Result<()> {
-    let mut plan = Plan::from_toml(&fs::read_to_string(root()?.join("xtask/bench/million.toml"))?)?;
-    plan.trials = trials.unwrap_or(plan.trials);
-    let memory = || -> Option<f64> {
+/// The most memory that this process has had.
+fn peak_memory() -> String {
+    let peak_mb = || -> Option<f64> {
         let text = fs::read_to_string("/proc/self/status").ok()?;
         let line = text.lines().find(|l| l.starts_with("VmHWM"))?;
         Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
     };
+    peak_mb().map_or("unknown".into(), |m| format!("{m:.1} MB"))
+}
+
+/// The study of a million trials.
+fn million(trials: Option<u64>) -> Result<()> {
+    let mut plan = Plan::from_toml(&fs::read_to_string(root()?.join("xtask/bench/million.toml"))?)?;
+    plan.trials = trials.unwrap_or(plan.trials);
     let experiment = Experiment::new(&plan)?;
     let start = Instant::now();
     let mut tenth = 0;
     let part = twinlag_study::run(&experiment, &Options::default(), |p| {
         if p.done * 10 / p.total > tenth {
             tenth = p.done * 10 / p.total;
-            let peak = memory().map_or("unknown".into(), |m| format!("{m:.1} MB"));
-            eprintln!("{} trials, {:.1} s, peak memory {peak}", p.done, start.elapsed().as_secs_f64());
+            eprintln!("{} trials, {:.1} s, peak memory {}", p.done, start.elapsed().as_secs_f64(), peak_memory());
         }
         ControlFlow::Continue(())
     })?;
@@ -132,7 +144,7 @@ fn million(trials: Option<u64>) -> Result<()> {
         "{trials} trials of {} samples in {seconds:.1} s on {threads} threads, {:.1} µs each on one; peak memory {}",
         plan.samples[0],
         1e6 * seconds * threads.get() as f64 / trials as f64,
-        memory().map_or("unknown".into(), |m| format!("{m:.1} MB"))
+        peak_memory()
     );
     Ok(())
 }

@@ -15,7 +15,7 @@ pub(crate) fn run() -> Result<()> {
     step(
         "without the standard library",
         "cargo",
-        &["check", "--package", "twinlag-compensate", "--no-default-features"],
+        &["check", "--package", "twinlag-compensate", "--package", "twinlag-sensor", "--no-default-features"],
     )?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;

@@ -1,10 +1,13 @@
 //! From the continuous sensor to a difference equation, and what each way of doing it assumes of the gas between samples.
 
+use core::fmt;
+
 use num_complex::Complex64;
-use num_dual::DualNum;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ModelError;
+use crate::number::Number;
+use crate::stream::EquationResponder;
 
 /// What the gas temperature is taken to do between two samples.
 ///
@@ -28,48 +31,40 @@ pub enum Discretisation {
 }
 
 /// `y[k] = Σ_j num[j] x[k−j] − Σ_{j≥1} den[j] y[k−j]`, `den[0] = 1`, unit static gain.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DifferenceEquation {
-    numerator: Vec<f64>,
-    denominator: Vec<f64>,
+    numerator: Polynomial,
+    denominator: Polynomial,
 }
 
 impl DifferenceEquation {
-    /// Coefficients of `x[k], x[k−1], …`.
+    /// Coefficients of `x[k], x[k−1], …`, three at most.
     pub fn numerator(&self) -> &[f64] {
-        &self.numerator
+        self.numerator.coefficients()
     }
 
-    /// Coefficients of `y[k], y[k−1], …`, the first of them 1.
+    /// Coefficients of `y[k], y[k−1], …`, three at most, the first of them 1.
     pub fn denominator(&self) -> &[f64] {
-        &self.denominator
+        self.denominator.coefficients()
     }
 
     /// Reading in gas of temperature `x`, `[n]` to `[n]`, at rest at `x[0]` before the first sample.
+    #[cfg(feature = "std")]
     pub fn respond(&self, x: &[f64]) -> Vec<f64> {
-        let mut y: Vec<f64> = Vec::with_capacity(x.len());
-        let Some(&rest) = x.first() else { return y };
-        for k in 0..x.len() {
-            let input: f64 = past(&self.numerator, x, k, rest);
-            let output: f64 = self.denominator[1..]
-                .iter()
-                .enumerate()
-                .map(|(j, d)| d * if k > j { y[k - 1 - j] } else { rest })
-                .sum();
-            y.push(input - output);
-        }
-        y
+        let mut responder = self.responder();
+        x.iter().map(|&gas| responder.push(gas)).collect()
+    }
+
+    /// The same sample by sample.
+    pub fn responder(&self) -> EquationResponder {
+        EquationResponder::new(*self)
     }
 
     /// Frequency response at `frequency_hz` for samples `period_s` apart.
     pub fn frequency_response(&self, frequency_hz: f64, period_s: f64) -> Complex64 {
-        let delay = Complex64::from_polar(1.0, -std::f64::consts::TAU * frequency_hz * period_s);
-        at(&self.numerator, delay) / at(&self.denominator, delay)
+        let delay = Complex64::from_polar(1.0, -core::f64::consts::TAU * frequency_hz * period_s);
+        at(self.numerator(), delay) / at(self.denominator(), delay)
     }
-}
-
-fn past(coefficients: &[f64], x: &[f64], k: usize, rest: f64) -> f64 {
-    coefficients.iter().enumerate().map(|(j, c)| c * if k >= j { x[k - j] } else { rest }).sum()
 }
 
 fn at(coefficients: &[f64], delay: Complex64) -> Complex64 {
@@ -77,33 +72,24 @@ fn at(coefficients: &[f64], delay: Complex64) -> Complex64 {
 }
 
 impl Discretisation {
-    /// The difference equation of `G(s) = Σ r_i / (1 + s τ_i)`, given `(r_i, τ_i)` with `Σ r_i = 1` and distinct `τ_i`.
+    /// The difference equation of `G(s) = Σ r_i / (1 + s τ_i)`, given `(r_i, τ_i)`, two at most, with `Σ r_i = 1` and distinct
+    /// `τ_i`.
     pub(crate) fn of_modes(self, modes: &[(f64, f64)], period_s: f64) -> Result<DifferenceEquation, ModelError> {
-        let mut numerator = vec![0.0];
-        let mut denominator = vec![1.0];
+        let mut numerator = Polynomial::new(&[0.0]);
+        let mut denominator = Polynomial::new(&[1.0]);
         for &(weight, tau_s) in modes {
-            let (num, den) = self.of_mode(tau_s, period_s)?;
-            let ours: Vec<f64> = product(&num, &denominator).iter().map(|c| weight * c).collect();
-            numerator = sum(&product(&numerator, &den), &ours);
-            denominator = product(&denominator, &den);
+            let mode = self.first_order(tau_s, period_s).ok_or(ModelError::NoDifferenceEquation)?;
+            let (num, den) = (Polynomial::new(&mode.numerator), Polynomial::new(&mode.denominator));
+            numerator = numerator.times(&den).plus(&num.times(&denominator).scaled(weight));
+            denominator = denominator.times(&den);
         }
         Ok(DifferenceEquation { numerator, denominator })
-    }
-
-    fn of_mode(self, tau_s: f64, period_s: f64) -> Result<(Vec<f64>, Vec<f64>), ModelError> {
-        let FirstOrderCoefficients { numerator, denominator } =
-            self.first_order(tau_s, period_s).ok_or(ModelError::NoDifferenceEquation)?;
-        Ok((numerator.to_vec(), denominator.to_vec()))
     }
 
     /// Coefficients of the first-order sensor of time constant `tau_s` (s), `None` for [`Discretisation::BandLimited`].
     ///
     /// Generic over dual numbers, so that a cost gets exact derivatives with respect to `tau_s` from the one formula.
-    pub fn first_order<D: DualNum<Primitive = f64> + Copy>(
-        self,
-        tau_s: D,
-        period_s: f64,
-    ) -> Option<FirstOrderCoefficients<D>> {
+    pub fn first_order<D: Number>(self, tau_s: D, period_s: f64) -> Option<FirstOrderCoefficients<D>> {
         let zero = D::from(0.0);
         let one = D::from(1.0);
         let step = tau_s.recip() * period_s;
@@ -128,7 +114,7 @@ impl Discretisation {
     /// Generic over dual numbers as [`Discretisation::first_order`] is. Exact for any two positive time constants, equal ones
     /// included: the partial fractions are combined into the divided difference of the exponential before their poles can
     /// cancel.
-    pub fn second_order<D: DualNum<Primitive = f64> + Copy>(
+    pub fn second_order<D: Number>(
         self,
         tau_s: D,
         second_tau_s: D,
@@ -175,9 +161,9 @@ impl Discretisation {
 }
 
 /// `(e^(−p t) − e^(−q t))/(q − p)`, also where `p` and `q` meet.
-fn divided_difference<D: DualNum<Primitive = f64> + Copy>(p: D, q: D, t: f64) -> D {
+fn divided_difference<D: Number>(p: D, q: D, t: f64) -> D {
     let half = (q - p) * (0.5 * t);
-    if half.re().abs() > 0.05 {
+    if half.value().abs() > 0.05 {
         return ((-p * t).exp() - (-q * t).exp()) / (q - p);
     }
     // t e^(−(p + q) t/2) sinh(half)/half; the next term of the series is below 1e-16.
@@ -204,21 +190,52 @@ pub struct FirstOrderCoefficients<D> {
     pub denominator: [D; 2],
 }
 
-fn product(p: &[f64], q: &[f64]) -> Vec<f64> {
-    let mut out = vec![0.0; p.len() + q.len() - 1];
-    for (i, a) in p.iter().enumerate() {
-        for (j, b) in q.iter().enumerate() {
-            out[i + j] += a * b;
-        }
+/// A polynomial in the delay, of degree two at most.
+#[derive(Clone, Copy, PartialEq)]
+struct Polynomial {
+    /// Zero from `len` on.
+    padded: [f64; 3],
+    len: usize,
+}
+
+impl Polynomial {
+    fn new(coefficients: &[f64]) -> Self {
+        let mut padded = [0.0; 3];
+        padded[..coefficients.len()].copy_from_slice(coefficients);
+        Self { padded, len: coefficients.len() }
     }
-    out
+
+    fn coefficients(&self) -> &[f64] {
+        &self.padded[..self.len]
+    }
+
+    fn times(&self, other: &Self) -> Self {
+        let mut padded = [0.0; 3];
+        for (i, a) in self.coefficients().iter().enumerate() {
+            for (j, b) in other.coefficients().iter().enumerate() {
+                padded[i + j] += a * b;
+            }
+        }
+        Self { padded, len: self.len + other.len - 1 }
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        let padded = core::array::from_fn(|i| self.padded[i] + other.padded[i]);
+        Self { padded, len: self.len.max(other.len) }
+    }
+
+    fn scaled(&self, weight: f64) -> Self {
+        Self { padded: self.padded.map(|c| weight * c), len: self.len }
+    }
 }
 
-fn sum(p: &[f64], q: &[f64]) -> Vec<f64> {
-    (0..p.len().max(q.len())).map(|i| p.get(i).unwrap_or(&0.0) + q.get(i).unwrap_or(&0.0)).collect()
+impl fmt::Debug for Polynomial {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.coefficients()).finish()
+    }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
     use crate::{FirstOrder, Lag, SecondOrder, SlowMode};

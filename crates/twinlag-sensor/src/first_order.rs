@@ -2,11 +2,14 @@
 //! *exactly* `y[k] = a y[k−1] + (1 − a) x[k−1]`, `a = exp(−Ts/τ)`. Derivation: docs, chapter "Theory", section 1.
 
 use num_complex::Complex64;
+#[cfg(not(any(feature = "std", test)))]
+use num_traits::Float as _;
 use serde::{Deserialize, Serialize};
 
 use crate::Lag;
 use crate::difference::{DifferenceEquation, Discretisation};
 use crate::error::{ModelError, positive};
+use crate::stream::{FirstOrderInverter, FirstOrderResponder};
 
 /// A first-order sensor read at a fixed rate. Both fields are finite and positive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,31 +83,36 @@ impl FirstOrder {
 
     /// Reading of the sensor in gas of temperature `x` (any unit, `[n]`), held between samples and constant at `x[0]`
     /// before the first: `y[0] = x[0]`, `y[k] = a y[k−1] + (1 − a) x[k−1]`.
+    #[cfg(feature = "std")]
     pub fn respond(&self, x: &[f64]) -> Vec<f64> {
-        let b = self.input_gain();
-        let Some(&first) = x.first() else { return Vec::new() };
-        let mut y = first;
-        std::iter::once(first)
-            .chain(x[..x.len() - 1].iter().map(|&held| {
-                y += b * (held - y);
-                y
-            }))
-            .collect()
+        let mut responder = self.responder();
+        x.iter().map(|&gas| responder.push(gas)).collect()
+    }
+
+    /// The same sample by sample.
+    pub fn responder(&self) -> FirstOrderResponder {
+        FirstOrderResponder::new(self.input_gain())
     }
 
     /// Gas temperature that the reading `y` (`[n]`) implies, `[n − 1]`: `f[k] = (y[k+1] − a y[k])/(1 − a)`.
     ///
     /// Exact inverse of [`FirstOrder::respond`], whatever the state before the first sample. Measurement noise is
     /// amplified by `(1 + a²)/(1 − a)²` in variance.
+    #[cfg(feature = "std")]
     pub fn invert(&self, y: &[f64]) -> Vec<f64> {
-        let b = self.input_gain();
-        y.windows(2).map(|w| w[0] + (w[1] - w[0]) / b).collect()
+        let mut inverter = self.inverter();
+        y.iter().filter_map(|&reading| inverter.push(reading)).collect()
+    }
+
+    /// The same sample by sample.
+    pub fn inverter(&self) -> FirstOrderInverter {
+        FirstOrderInverter::new(self.input_gain())
     }
 }
 
 impl Lag for FirstOrder {
     fn continuous_response(&self, frequency_hz: f64) -> Complex64 {
-        Complex64::new(1.0, std::f64::consts::TAU * frequency_hz * self.tau_s).inv()
+        Complex64::new(1.0, core::f64::consts::TAU * frequency_hz * self.tau_s).inv()
     }
 
     fn difference_equation(&self, discretisation: Discretisation) -> Result<DifferenceEquation, ModelError> {
@@ -116,7 +124,7 @@ impl Lag for FirstOrder {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
 

@@ -5,6 +5,8 @@
 //! from the true ones by the *floor*: no amount of data removes it.
 
 use num_complex::Complex64;
+#[cfg(not(any(feature = "std", test)))]
+use num_traits::Float as _;
 
 use crate::difference::Discretisation;
 use crate::error::ModelError;
@@ -64,7 +66,7 @@ pub fn tone_floor(
     Err(ModelError::OutOfRange { name: "tone frequency", low: 0.0, high: nyquist_hz, value: frequency_hz })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
 

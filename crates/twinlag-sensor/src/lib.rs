@@ -26,20 +26,31 @@
 //! assert!((floor[0] + 0.0019).abs() < 1e-4);
 //! # Ok::<(), twinlag_sensor::ModelError>(())
 //! ```
+//!
+//! Sample by sample, in constant memory, it is [`FirstOrder::responder`], [`FirstOrder::inverter`] and
+//! [`DifferenceEquation::responder`]. Without its default feature `std` the crate is all but the functions that give a whole record and
+//! dual numbers, for machines without an operating system or an allocator. Exponentials are then those of `libm`, which may differ in the
+//! last digit.
+
+#![cfg_attr(not(feature = "std"), no_std)]
 
 mod difference;
 mod error;
 mod first_order;
 mod floor;
+mod number;
 mod second_order;
 mod slow_mode;
+mod stream;
 
 pub use difference::{DifferenceEquation, Discretisation, FirstOrderCoefficients, SecondOrderCoefficients};
 pub use error::ModelError;
 pub use first_order::FirstOrder;
 pub use floor::tone_floor;
+pub use number::Number;
 pub use second_order::SecondOrder;
 pub use slow_mode::SlowMode;
+pub use stream::{EquationResponder, FirstOrderInverter, FirstOrderResponder};
 
 use num_complex::Complex64;
 

@@ -58,7 +58,7 @@ impl SecondOrder {
 
 impl Lag for SecondOrder {
     fn continuous_response(&self, frequency_hz: f64) -> Complex64 {
-        let s = Complex64::new(0.0, std::f64::consts::TAU * frequency_hz);
+        let s = Complex64::new(0.0, core::f64::consts::TAU * frequency_hz);
         ((s * self.tau_s + 1.0) * (s * self.second_tau_s + 1.0)).inv()
     }
 
@@ -85,7 +85,7 @@ pub(crate) fn apart(slow: f64, fast: f64) -> (f64, f64) {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
     use crate::FirstOrder;

@@ -76,7 +76,7 @@ impl SlowMode {
 
 impl Lag for SlowMode {
     fn continuous_response(&self, frequency_hz: f64) -> Complex64 {
-        let s = Complex64::new(0.0, std::f64::consts::TAU * frequency_hz);
+        let s = Complex64::new(0.0, core::f64::consts::TAU * frequency_hz);
         ((s * self.slow_tau_s + 1.0).inv() * self.fraction + (1.0 - self.fraction)) / (s * self.tau_s + 1.0)
     }
 
@@ -91,7 +91,7 @@ impl Lag for SlowMode {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests {
     use super::*;
     use crate::FirstOrder;
