@@ -1,5 +1,6 @@
 //! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
 
+mod coverage;
 mod loops;
 mod reconstruction;
 mod surface;
@@ -100,6 +101,9 @@ pub(crate) fn run(task: Task) -> Result<()> {
             if let Some(plan) = loops::Plan::read(&text(&name)?) {
                 return merge_stored(plan?, &results, &out);
             }
+            if let Some(plan) = coverage::Plan::read(&text(&name)?) {
+                return merge_stored(plan?, &results, &out);
+            }
             if let Some(plan) = reconstruction::Plan::read(&text(&name)?) {
                 return merge_stored(Reconstruction::new(plan?), &results, &out);
             }
@@ -166,6 +170,9 @@ fn title(name: &str) -> Result<String> {
     if let Some(plan) = loops::Plan::read(&text(name)?) {
         return Ok(plan?.title);
     }
+    if let Some(plan) = coverage::Plan::read(&text(name)?) {
+        return Ok(plan?.title);
+    }
     if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
         return Ok(plan?.title);
     }
@@ -174,7 +181,12 @@ fn title(name: &str) -> Result<String> {
 
 fn draw(name: &str) -> Result<()> {
     let text = text(name)?;
-    if name == surface::NAME || loops::Plan::read(&text).is_some() || reconstruction::Plan::read(&text).is_some() {
+    let is_stored = [
+        loops::Plan::read(&text).is_some(),
+        coverage::Plan::read(&text).is_some(),
+        reconstruction::Plan::read(&text).is_some(),
+    ];
+    if name == surface::NAME || is_stored.contains(&true) {
         println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
@@ -195,6 +207,9 @@ fn one(name: &str, run: &Run) -> Result<()> {
     }
     if let Some(plan) = loops::Plan::read(&text(name)?) {
         return closed_loop(plan?, &folder, run);
+    }
+    if let Some(plan) = coverage::Plan::read(&text(name)?) {
+        return covered(plan?, &folder, run);
     }
     if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
         return reconstruct(plan?, &folder, run);
@@ -358,6 +373,16 @@ fn stored(study: &impl Stored, folder: &Path, run: &Run) -> Result<()> {
 /// An experiment of the closed loop.
 fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
     plan.records = run.trials.unwrap_or(plan.records);
+    if run.quick {
+        plan.shorten();
+    }
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    stored(&plan, folder, run)
+}
+
+/// An experiment of the gas temperature's bands.
+fn covered(mut plan: coverage::Plan, folder: &Path, run: &Run) -> Result<()> {
+    plan.trials = run.trials.unwrap_or(plan.trials);
     if run.quick {
         plan.shorten();
     }

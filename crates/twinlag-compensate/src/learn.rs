@@ -4,6 +4,7 @@
 //! added one at a time, each where it explains most, as long as the likelihood gains more than the numbers cost (Akaike's
 //! criterion; a line costs the choice of its frequency among all bins as well).
 
+mod holes;
 mod part;
 
 use nalgebra::DMatrix;
@@ -25,6 +26,8 @@ const HARMONICS: usize = 8;
 const FEWEST_HARMONICS: usize = 3;
 /// Fewest samples with both readings.
 const FEWEST: usize = 32;
+/// Share of instants that may be missing before the lines over them matter.
+const FEW_MISSING: f64 = 0.01;
 /// Neighbouring bins of a periodogram with Hann's taper go together: this many are worth one, `1 + 2 ((2/3)² + (1/6)²)`.
 const BINS_PER_ONE: f64 = 1.944;
 /// What a harmonic must gain to count as one: chance gains less, 19 times in 20.
@@ -46,7 +49,8 @@ pub struct Learned {
 
 /// The prior that `readings` of `rig` support, the covariance of its numbers the inverse of Fisher's information.
 ///
-/// Instants that are missing, and uneven ones, are bridged by straight lines; the smoother itself does not need that.
+/// Instants that are missing, and uneven ones, are bridged by straight lines; where that is more than a few the likelihood is that of the
+/// readings themselves.
 ///
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
@@ -66,7 +70,10 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
     let search = Search { periodogram: &periodogram, limits, room };
-    let parts = search.run();
+    let mut parts = search.run();
+    if (readings.len() - got) as f64 > FEW_MISSING * readings.len() as f64 {
+        parts = holes::choose(&search, readings, rig, level_c, parts);
+    }
     let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
     Ok(Learned { prior: prior(&parts), deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect() })
 }
@@ -88,14 +95,18 @@ struct Fitted {
 impl Fitted {
     /// Twice the negative logarithm of the likelihood, and what the numbers cost. A part of a periodogram of `bins` independent bins.
     fn score(&self, bins: f64) -> f64 {
-        let cost = |p: &Part| 2.0 * p.values().len() as f64 + if p.is_line() { 2.0 * bins.ln() } else { 0.0 };
-        self.deviance / BINS_PER_ONE + self.parts.iter().map(cost).sum::<f64>()
+        self.deviance / BINS_PER_ONE + self.parts.iter().map(|p| p.cost(bins)).sum::<f64>()
     }
 }
 
 impl Search<'_> {
+    /// Independent bins.
+    fn bins(&self) -> f64 {
+        self.periodogram.power.len() as f64 / BINS_PER_ONE
+    }
+
     fn run(&self) -> Vec<Part> {
-        let n = self.periodogram.power.len() as f64 / BINS_PER_ONE;
+        let n = self.bins();
         let nothing = Fitted { parts: Vec::new(), deviance: f64::INFINITY };
         let mut current = self.best(&nothing, self.first());
         loop {
@@ -117,7 +128,7 @@ impl Search<'_> {
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
         let others = self.expected(&current.parts);
         let added = candidates.into_iter().map(|part| self.fit(&[part], &others, 12));
-        let n = self.periodogram.power.len() as f64 / BINS_PER_ONE;
+        let n = self.bins();
         match added.min_by(|a, b| a.score(n).total_cmp(&b.score(n))) {
             Some(added) => {
                 Fitted { parts: current.parts.iter().cloned().chain(added.parts).collect(), deviance: added.deviance }
@@ -146,19 +157,28 @@ impl Search<'_> {
     }
 
     fn first(&self) -> Vec<Part> {
+        self.kinds().concat()
+    }
+
+    /// Of each kind of single part the one that explains most.
+    fn best_of_each_kind(&self) -> Vec<Part> {
+        let nothing = Fitted { parts: Vec::new(), deviance: f64::INFINITY };
+        self.kinds().into_iter().flat_map(|kind| self.best(&nothing, kind).parts).collect()
+    }
+
+    /// Single parts to begin with, of each kind at several frequencies.
+    fn kinds(&self) -> [Vec<Part>; 3] {
         let Limits { swing_k, span_s, period_s } = self.limits;
         let [low, high] = [1.0 / span_s, 0.3 / period_s];
-        let frequencies = (0..4).map(|k| low * (high / low).powf(f64::from(k) / 4.0));
-        frequencies
-            .flat_map(|hz| {
-                let smooth = Term::Resonance { std_k: swing_k, frequency_hz: hz, quality: 0.3 };
-                [
-                    Part::Turbulent { std_k: swing_k, corner_hz: hz, fastest_hz: 0.5 / period_s },
-                    Part::Single(Term::Rough { std_k: swing_k, corner_hz: hz }),
-                    Part::Single(smooth),
-                ]
-            })
-            .collect()
+        let at = |part: &dyn Fn(f64) -> Part| {
+            (0..4).map(|k| part(low * (high / low).powf(f64::from(k) / 4.0))).collect::<Vec<Part>>()
+        };
+        let smooth = |frequency_hz| Part::Single(Term::Resonance { std_k: swing_k, frequency_hz, quality: 0.3 });
+        [
+            at(&|corner_hz| Part::Turbulent { std_k: swing_k, corner_hz, fastest_hz: 0.5 / period_s }),
+            at(&|corner_hz| Part::Single(Term::Rough { std_k: swing_k, corner_hz })),
+            at(&smooth),
+        ]
     }
 
     /// What might be added to `current`, where there is most above what is expected: a line, a band, a broad process, a comb.

@@ -59,6 +59,18 @@ impl Readings {
         }
     }
 
+    /// The first `count` instants.
+    pub(crate) fn first(&self, count: usize) -> Self {
+        let count = count.min(self.len());
+        let locals = self.locals.as_ref().map(|locals| [0, 1].map(|i| locals[i][..count].to_vec()));
+        Self {
+            time_s: self.time_s[..count].to_vec(),
+            reading_c: [0, 1].map(|i| self.reading_c[i][..count].to_vec()),
+            missing: [0, 1].map(|i| self.missing[i][..count].to_vec()),
+            locals,
+        }
+    }
+
     /// Instants.
     pub fn len(&self) -> usize {
         self.time_s.len()

@@ -79,8 +79,13 @@ impl Part {
         self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
     }
 
+    /// What it costs: its numbers, and of a line the choice of its frequency among `bins`.
+    pub(super) fn cost(&self, bins: f64) -> f64 {
+        2.0 * self.values().len() as f64 + if self.is_line() { 2.0 * bins.ln() } else { 0.0 }
+    }
+
     /// Whether it has a frequency of its own.
-    pub(super) fn is_line(&self) -> bool {
+    fn is_line(&self) -> bool {
         match self {
             Self::Single(Term::Resonance { quality, .. }) => *quality > 1.0,
             Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => false,

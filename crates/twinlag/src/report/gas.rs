@@ -49,14 +49,13 @@ fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std:
         shown.clone().map(|k| answer.gas_c[k] + sign * Z_975 * answer.gas_std_k[k]).collect()
     };
     let gas = Series::trace("gas, with its 95 % band", time_s, &answer.gas_c[shown.clone()]).colour(Colour::Green);
-    let chart = Chart::new(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"));
-    let mut chart = chart.series(gas.band(band(-1.0), band(1.0)));
+    let mut chart = Chart::new(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"));
     for (i, values) in [&record.t1_c, &record.t2_c].into_iter().enumerate() {
         let colour = [Colour::Blue, Colour::Orange][i];
         let series = trace(&record.channels[i], &record.time_s[rows.clone()], &values[rows.clone()], colour);
         chart = series.into_iter().fold(chart, Chart::series);
     }
-    chart
+    chart.series(gas.band(band(-1.0), band(1.0)))
 }
 
 pub(super) fn spectra(record: &Record, answer: &Compensation) -> Chart {

@@ -1,0 +1,68 @@
+//! A prior of readings that are partly missing, by their exact likelihood.
+//!
+//! Straight lines over what is missing take high frequencies away, and a periodogram then shows a gas that is smoother than it was. Kalman's
+//! filter needs no such lines: what it leads to expect of each reading gives the likelihood of all of them.
+
+use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem};
+
+use super::Search;
+use super::part::{self, Part};
+use crate::prior::Prior;
+use crate::readings::Readings;
+use crate::reconstruct::reconstruct;
+use crate::rig::Rig;
+use crate::smooth::Form;
+
+/// Samples that the likelihood is taken of, at most.
+const MOST: usize = 4096;
+/// Evaluations of it for each candidate.
+const EVALUATIONS: u64 = 120;
+/// Edge of the first simplex: a quarter, in a logarithm.
+const EDGE: f64 = 0.25;
+const SPREAD: f64 = 0.05;
+
+/// Of `found` and each kind of single part the one that is likeliest, their costs counted, with numbers of its own.
+pub(super) fn choose(search: &Search<'_>, readings: &Readings, rig: &Rig, level_c: f64, found: Vec<Part>) -> Vec<Part> {
+    let readings = readings.first(MOST);
+    let bins = search.bins();
+    let singles = search.best_of_each_kind().into_iter().map(|part| vec![part]);
+    let candidates = singles.chain([found.clone()]).map(|parts| {
+        let cost = Exact { readings: &readings, rig, level_c, parts: &parts };
+        let (parts, deviance) = cost.fit(search);
+        let score = deviance + parts.iter().map(|p| p.cost(bins)).sum::<f64>();
+        (parts, score)
+    });
+    candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |best| best.0)
+}
+
+struct Exact<'a> {
+    readings: &'a Readings,
+    rig: &'a Rig,
+    level_c: f64,
+    parts: &'a [Part],
+}
+
+impl Exact<'_> {
+    fn fit(&self, search: &Search<'_>) -> (Vec<Part>, f64) {
+        let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
+        let variables = self.parts.iter().flat_map(|p| p.variables(&search.limits)).collect();
+        let fit = Problem::new(self, variables).ok().and_then(|problem| {
+            let optimiser = Optimiser::NelderMead { spread_tolerance: SPREAD, edge: EDGE };
+            let budget = Budget { evaluations: EVALUATIONS, ..Budget::default() };
+            optimiser.minimise(&problem, &values, &budget).ok()
+        });
+        match fit {
+            Some(fit) => (part::with(self.parts, &fit.x), fit.value),
+            None => (self.parts.to_vec(), self.value(&values)),
+        }
+    }
+}
+
+impl Cost for Exact<'_> {
+    fn value(&self, x: &[f64]) -> f64 {
+        let terms = part::with(self.parts, x).iter().flat_map(Part::terms).collect();
+        let prior = Prior { level_c: self.level_c, terms };
+        reconstruct(self.readings, self.rig, &prior, Form::Filter)
+            .map_or(f64::INFINITY, |gas| -2.0 * gas.log_likelihood)
+    }
+}
