@@ -3,6 +3,7 @@
 mod loops;
 mod reconstruction;
 mod surface;
+mod tracking;
 
 use std::fs;
 use std::io::IsTerminal;
@@ -22,6 +23,7 @@ use twinlag_study::{Options, Outcome, Part, Results, Shard, Study};
 use crate::root;
 pub(crate) use loops::record_of;
 use reconstruction::Reconstruction;
+use tracking::Tracking;
 
 /// What to do with the experiments.
 #[derive(Subcommand)]
@@ -103,6 +105,9 @@ pub(crate) fn run(task: Task) -> Result<()> {
             if let Some(plan) = reconstruction::Plan::read(&text(&name)?) {
                 return merge_stored(Reconstruction::new(plan?), &results, &out);
             }
+            if let Some(plan) = tracking::Plan::read(&text(&name)?) {
+                return merge_stored(Tracking::new(plan?), &results, &out);
+            }
             let plan = plan(&name)?;
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
             let plan = with_trials_of(plan, &results);
@@ -169,12 +174,18 @@ fn title(name: &str) -> Result<String> {
     if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
         return Ok(plan?.title);
     }
+    if let Some(plan) = tracking::Plan::read(&text(name)?) {
+        return Ok(plan?.title);
+    }
     if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
 }
 
 fn draw(name: &str) -> Result<()> {
     let text = text(name)?;
-    if name == surface::NAME || loops::Plan::read(&text).is_some() || reconstruction::Plan::read(&text).is_some() {
+    let is_stored = loops::Plan::read(&text).is_some()
+        || reconstruction::Plan::read(&text).is_some()
+        || tracking::Plan::read(&text).is_some();
+    if name == surface::NAME || is_stored {
         println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
@@ -198,6 +209,9 @@ fn one(name: &str, run: &Run) -> Result<()> {
     }
     if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
         return reconstruct(plan?, &folder, run);
+    }
+    if let Some(plan) = tracking::Plan::read(&text(name)?) {
+        return follow(plan?, &folder, run);
     }
     let mut plan = plan(name)?;
     plan.trials = run.trials.unwrap_or(plan.trials);
@@ -373,6 +387,16 @@ fn reconstruct(mut plan: reconstruction::Plan, folder: &Path, run: &Run) -> Resu
     }
     plan.seed = run.seed.unwrap_or(plan.seed);
     stored(&Reconstruction::new(plan), folder, run)
+}
+
+/// An experiment of changing flow.
+fn follow(mut plan: tracking::Plan, folder: &Path, run: &Run) -> Result<()> {
+    plan.trials = run.trials.unwrap_or(plan.trials);
+    if run.quick {
+        plan.shorten();
+    }
+    plan.seed = run.seed.unwrap_or(plan.seed);
+    stored(&Tracking::new(plan), folder, run)
 }
 
 fn bar(name: &str) -> ProgressBar {

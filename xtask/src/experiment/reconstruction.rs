@@ -55,7 +55,10 @@ const COVERED: usize = 1 + ESTIMATES.len();
 impl Plan {
     /// The plan, if the text is one of this kind.
     pub(super) fn read(text: &str) -> Option<Result<Self>> {
-        let is_one = text.contains("noise_percent") && text.lines().any(|l| l == "[[gases]]") && text.contains("tau_s");
+        let is_one = text.contains("noise_percent")
+            && text.lines().any(|l| l == "[[gases]]")
+            && text.contains("tau_s")
+            && !text.lines().any(|l| l.starts_with("swing"));
         is_one.then(|| toml::from_str(text).context("the plan of a reconstruction"))
     }
 
