@@ -31,8 +31,10 @@ pub(super) struct Plan {
     samples: usize,
     sample_period_s: f64,
     tau_s: [f64; 2],
-    /// Noise of each channel, per cent of the gas's standard deviation.
+    /// Noise of each channel in a swinging flow, per cent of the gas's standard deviation.
     noise_percent: Vec<f64>,
+    /// In a step and in steady flow.
+    other_noise_percent: Vec<f64>,
     /// By how much a swinging flow changes time constants either way.
     swing: f64,
     /// What a step multiplies them with.
@@ -82,8 +84,16 @@ const INSTANT: usize = COEFFICIENTS + 1;
 const HALF_WIDTH: usize = INSTANT + 1;
 const RESOLUTION: usize = HALF_WIDTH + 1;
 const FACTOR: usize = RESOLUTION + 1;
-const VALUES: [&str; 5] = ["coefficients", "error of the instant", "half width", "resolution", "error of the factor"];
-const ERROR: usize = FACTOR + 1;
+const OVER_BOUND: usize = FACTOR + 1;
+const VALUES: [&str; 6] = [
+    "coefficients",
+    "error of the instant",
+    "half width",
+    "resolution",
+    "error of the factor",
+    "square error over that of the bound",
+];
+const ERROR: usize = OVER_BOUND + 1;
 const BOUND: usize = ERROR + 2;
 const BIAS: usize = BOUND + 2;
 const CLAIMED: usize = BIAS + 2;
@@ -102,11 +112,17 @@ impl Plan {
     pub(super) fn shorten(&mut self) {
         (self.trials, self.samples) = (1, 600);
         self.gases.truncate(1);
-        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
-        self.pictured_percent = self.noise_percent[0];
+        for levels in [&mut self.noise_percent, &mut self.other_noise_percent] {
+            levels.drain(..levels.len().saturating_sub(1));
+        }
     }
 
-    fn rig(&self, gas: usize, flow: Option<Flow>, noise_std_k: Option<f64>) -> Result<Rig, Failure> {
+    fn noise_percent(&self, kind: Kind) -> &[f64] {
+        if kind == Kind::Swing { &self.noise_percent } else { &self.other_noise_percent }
+    }
+
+    /// - `seed`: added to the plan's
+    fn rig(&self, seed: u64, gas: usize, flow: Option<Flow>, noise_std_k: Option<f64>) -> Result<Rig, Failure> {
         let sensors = [0, 1].map(|i| {
             let mut sensor = Sensor::new(["T1", "T2"][i], self.tau_s[i]);
             sensor.noise = noise_std_k.map(Noise::white);
@@ -115,7 +131,7 @@ impl Plan {
         let mut signal = Gas::new(300.0, self.gases[gas].signal.clone());
         signal.per_trial = true;
         let sampling = Sampling::new(self.samples, self.sample_period_s);
-        let rig = Rig::new(self.seed + gas as u64, sampling, signal, sensors)?;
+        let rig = Rig::new(self.seed + seed, sampling, signal, sensors)?;
         Ok(if let Some(flow) = flow { rig.with_flow(flow)? } else { rig })
     }
 
@@ -159,23 +175,25 @@ impl Tracking {
         Self { plan, gas_std_k }
     }
 
-    fn place(&self, cell: usize) -> (Kind, usize, f64) {
-        let levels = self.plan.noise_percent.len();
-        let gases = self.plan.gases.len();
-        (KINDS[cell / levels / gases], cell / levels % gases, self.plan.noise_percent[cell % levels])
+    /// What the flow does, which gas, and its noise in per cent, of each cell.
+    fn places(&self) -> Vec<(Kind, usize, f64)> {
+        let gases = 0..self.plan.gases.len();
+        let of_kind = |kind: Kind| {
+            let levels = self.plan.noise_percent(kind);
+            gases.clone().flat_map(move |gas| levels.iter().map(move |percent| (kind, gas, *percent)))
+        };
+        KINDS.into_iter().flat_map(of_kind).collect()
     }
 
-    /// The cell of a kind of flow, a gas and a noise.
-    fn cell(&self, kind: Kind, gas: usize, noise: usize) -> usize {
-        let of_kind = KINDS.iter().position(|k| *k == kind).unwrap_or_default();
-        (of_kind * self.plan.gases.len() + gas) * self.plan.noise_percent.len() + noise
+    fn place(&self, cell: usize) -> (Kind, usize, f64) {
+        self.places()[cell]
     }
 
     fn gas_std_k(&self, gas: usize) -> Result<f64, Failure> {
         if let Some(std_k) = self.gas_std_k[gas].get() {
             return Ok(*std_k);
         }
-        let rig = self.plan.rig(gas, None, None)?;
+        let rig = self.plan.rig(gas as u64, gas, None, None)?;
         let mut sum = 0.0;
         for record in 0..RECORDS {
             // Other records than those of the trials.
@@ -189,8 +207,9 @@ impl Tracking {
         let (kind, gas, percent) = self.place(cell);
         let noise_std_k = 0.01 * percent * self.gas_std_k(gas)?;
         let flow = self.plan.flow(kind, index);
-        let clean = self.plan.rig(gas, flow, None)?.simulate_trial(index)?;
-        let record = super::record_of(self.plan.rig(gas, flow, Some(noise_std_k))?.simulate_trial(index)?)?;
+        let rig = |noise_std_k: Option<f64>| self.plan.rig(100 + cell as u64, gas, flow, noise_std_k);
+        let clean = rig(None)?.simulate_trial(index)?;
+        let record = super::record_of(rig(Some(noise_std_k))?.simulate_trial(index)?)?;
         let answer = track(&record, &TrackOptions::default(), &|_, _, _| ())?;
         Ok(Trial { clean, noise_std_k, flow, answer })
     }
@@ -214,8 +233,7 @@ impl Trial {
         let own = bound.spread(size);
         for i in 0..2 {
             let sensor = &self.answer.sensors[i];
-            let truth_s: Vec<f64> =
-                self.answer.time_s.iter().map(|t| plan.tau_s[i] * self.factor(*t)).collect();
+            let truth_s: Vec<f64> = self.answer.time_s.iter().map(|t| plan.tau_s[i] * self.factor(*t)).collect();
             let share = |of: &dyn Fn(usize) -> f64| (0..truth_s.len()).map(of).sum::<f64>() / truth_s.len() as f64;
             outcome.value(ERROR + i, share(&|k| (sensor.tau_s[k] / truth_s[k] - 1.0).powi(2)));
             let is_inside = |k: usize| sensor.low_s[k] <= truth_s[k] && truth_s[k] <= sensor.high_s[k];
@@ -225,6 +243,10 @@ impl Trial {
                 outcome.value(BOUND + i, mean(&own.variance[i]));
                 outcome.value(BIAS + i, mean_square(&own.bias[i]));
             }
+        }
+        let total = |of: usize| (0..2).map(|i| outcome.recorded_value(of + i)).sum::<Option<f64>>();
+        if let (Some(error), Some(bound)) = (total(ERROR), total(BOUND)) {
+            outcome.value(OVER_BOUND, error / bound);
         }
         for (j, size) in SIZES.into_iter().enumerate() {
             if let Some(Spread { variance, bias }) = bound.spread(size) {
@@ -263,7 +285,7 @@ impl Study for Tracking {
     }
 
     fn cells(&self) -> usize {
-        KINDS.len() * self.plan.gases.len() * self.plan.noise_percent.len()
+        self.places().len()
     }
 
     fn trials(&self) -> u64 {

@@ -83,8 +83,7 @@ impl Bound {
         let shapes: Vec<Natural> = (0..=size).map(|j| Natural::through_one(j, size)).collect();
         // By τ₁'s values on knots, then by ln τ₂/τ₁.
         let relative = |shape: &Natural, k: usize| shape.at(self.middle(k)) / self.tau_s[0][k];
-        let mut columns: Vec<Vec<f64>> =
-            shapes.iter().map(|shape| self.column(|_, k| relative(shape, k))).collect();
+        let mut columns: Vec<Vec<f64>> = shapes.iter().map(|shape| self.column(|_, k| relative(shape, k))).collect();
         columns.push(self.column(|i, _| i as f64));
         let (inverse, nearest) = solve(&columns, &self.column(|_, _| 1.0))?;
         let p = columns.len();
@@ -111,11 +110,7 @@ impl Bound {
     /// be expected against it reaches 95 % of chi-square: time constants and factor free.
     pub(super) fn step_resolution(&self, at: f64, factor: f64) -> f64 {
         let after = |k: usize, at: f64| (k as f64 + 1.0 - at).clamp(0.0, 1.0);
-        let columns = [
-            self.column(|_, _| 1.0),
-            self.column(|i, _| i as f64),
-            self.column(|_, k| after(k, at)),
-        ];
+        let columns = [self.column(|_, _| 1.0), self.column(|i, _| i as f64), self.column(|_, k| after(k, at))];
         let evidence = |by: f64| {
             let missed = self.whitened(|i, k| {
                 let [moved, true_s] = [at + by, at].map(|at| factor.powf(after(k, at)));

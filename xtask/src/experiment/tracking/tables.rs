@@ -8,15 +8,15 @@ use anyhow::{Result, anyhow};
 use twinlag_report::{Axis, Chart, Colour, Figure, Series};
 use twinlag_study::{Rate, Results, Tally};
 
-use super::{KINDS, Kind, SIZES, Tracking, fixed};
+use super::{Kind, SIZES, Tracking, fixed};
 
 pub(super) fn write(study: &Tracking, results: &Results, out: &Path) -> Result<()> {
-    let cells: Vec<(usize, &Tally)> = results.cells().iter().enumerate().collect();
-    let per_kind = cells.len() / KINDS.len();
-    let of = |kind: Kind| &cells[study.cell(kind, 0, 0)..][..per_kind];
-    fs::write(out.join("tracking.md"), tracking(study, of(Kind::Swing)))?;
-    fs::write(out.join("steps.md"), steps(study, of(Kind::Step)))?;
-    fs::write(out.join("steady.md"), steady(study, of(Kind::Steady)))?;
+    let of = |kind: Kind| -> Vec<(usize, &Tally)> {
+        results.cells().iter().enumerate().filter(|(cell, _)| study.place(*cell).0 == kind).collect()
+    };
+    fs::write(out.join("tracking.md"), tracking(study, &of(Kind::Swing)))?;
+    fs::write(out.join("steps.md"), steps(study, &of(Kind::Step)))?;
+    fs::write(out.join("steady.md"), steady(study, &of(Kind::Steady)))?;
     fs::write(out.join("tracking.svg"), picture(study)?)?;
     Ok(())
 }
@@ -55,8 +55,8 @@ fn changes(tally: &Tally) -> String {
 fn tracking(study: &Tracking, cells: &[(usize, &Tally)]) -> String {
     let mut text = String::from(
         "| gas | noise (%) | smooth / step / constant (%) | coefficients | error of τ1 (%) | of τ2 (%) | error / bound | of τ2 | \
-         systematic / bound | best fixed spline | error / its bound and systematic error | τ1 inside the 95 % band (%) | τ2 inside (%) | \
-         ratio said to change (%) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+         median over records | systematic / bound | best fixed spline | error / its bound and systematic error | τ1 inside the 95 % band (%) | τ2 inside (%) | \
+         ratio said to change (%) |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for (cell, tally) in cells {
         let rms = |name: &str| mean(tally, name).sqrt();
@@ -68,7 +68,7 @@ fn tracking(study: &Tracking, cells: &[(usize, &Tally)]) -> String {
         let (size, total) = best.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN));
         let _ = writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {size} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {size} | {} | {} | {} | {} |",
             heading(study, *cell),
             changes(tally),
             number(mean(tally, "coefficients"), 1),
@@ -76,6 +76,7 @@ fn tracking(study: &Tracking, cells: &[(usize, &Tally)]) -> String {
             number(100.0 * rms("mean square error 2"), 2),
             number(ratio(1), 3),
             number(ratio(2), 3),
+            number(median(tally, "square error over that of the bound").sqrt(), 3),
             number(systematic, 2),
             number((both(tally, "mean square error") / total).sqrt(), 3),
             number(100.0 * mean(tally, "inside 1"), 1),
@@ -139,14 +140,20 @@ fn steady(study: &Tracking, cells: &[(usize, &Tally)]) -> String {
 /// The first record of each gas in a swinging flow, and in a step.
 fn picture(study: &Tracking) -> Result<String> {
     let plan = &study.plan;
-    let noise = plan.noise_percent.iter().position(|p| *p == plan.pictured_percent).unwrap_or_default();
     let gases = plan.gases.len();
     let mut figure = Figure::new(plan.title.clone()).columns(gases).panel_size(370.0, 240.0);
     for (kind, name) in [(Kind::Swing, "swinging flow"), (Kind::Step, "a step")] {
         for gas in 0..gases {
-            let trial = study.run(study.cell(kind, gas, noise), 0).map_err(|e| anyhow!("{e}"))?;
+            // With the noise that is asked for, or that of the first cell.
+            let of_gas = |(cell, place): (usize, (Kind, usize, f64))| {
+                (place.0 == kind && place.1 == gas).then_some((cell, place.2))
+            };
+            let cells: Vec<(usize, f64)> = study.places().into_iter().enumerate().filter_map(of_gas).collect();
+            let wanted = cells.iter().find(|(_, percent)| *percent == plan.pictured_percent).or(cells.first());
+            let Some((cell, percent)) = wanted else { continue };
+            let trial = study.run(*cell, 0).map_err(|e| anyhow!("{e}"))?;
             let time_s = &trial.answer.time_s;
-            let title = format!("{}, {name}, {} % noise", plan.gases[gas].name, plan.noise_percent[noise]);
+            let title = format!("{}, {name}, {percent} % noise", plan.gases[gas].name);
             let axes = (Axis::linear("time (s)"), Axis::linear("time constant over its mean"));
             let mut chart = Chart::new(title, axes.0, axes.1);
             let truth: Vec<f64> = time_s.iter().map(|t| trial.factor(*t)).collect();
