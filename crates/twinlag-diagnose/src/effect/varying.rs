@@ -144,3 +144,21 @@ impl Effect for Varying {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of `m = u²`, but for a constant, the second derivative is 2 everywhere: `4 (size − 1)/size` over the inner knots, to rounding.
+    #[test]
+    fn what_is_known_of_a_curve_is_its_curvature() {
+        let (size, curvature) = (10_usize, 3.0);
+        let squares: Vec<f64> = (0..=size).map(|k| (k as f64 / size as f64).powi(2)).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        let values: Vec<f64> = squares[1..].iter().map(|v| v - mean).collect();
+        let effect = smooth(size, [0.0, 5.0], 2500, curvature).expect("enough samples");
+        let got: f64 = effect.prior(&values).iter().map(|p| p * p).sum();
+        let want = 4.0 * (size - 1) as f64 / size as f64 / (curvature * curvature);
+        assert!((got - want).abs() < 1e-10, "got {got}, want {want}");
+    }
+}

@@ -137,13 +137,13 @@ fn steady(study: &Tracking, cells: &[(usize, &Tally)]) -> String {
     text
 }
 
-/// The first record of each gas in a swinging flow, and in a step.
+/// The first record of each gas in a swinging flow, and in a step: the faster sensor, the other being that times a number.
 fn picture(study: &Tracking) -> Result<String> {
     let plan = &study.plan;
-    let gases = plan.gases.len();
-    let mut figure = Figure::new(plan.title.clone()).columns(gases).panel_size(370.0, 240.0);
-    for (kind, name) in [(Kind::Swing, "swinging flow"), (Kind::Step, "a step")] {
-        for gas in 0..gases {
+    let title = "The faster time constant along single records, with its 95 % band";
+    let mut figure = Figure::new(title).columns(plan.gases.len()).panel_size(370.0, 240.0);
+    for (kind, flow) in [(Kind::Swing, "swinging flow"), (Kind::Step, "a step")] {
+        for (gas, named) in plan.gases.iter().enumerate() {
             // With the noise that is asked for, or that of the first cell.
             let of_gas = |(cell, place): (usize, (Kind, usize, f64))| {
                 (place.0 == kind && place.1 == gas).then_some((cell, place.2))
@@ -153,17 +153,17 @@ fn picture(study: &Tracking) -> Result<String> {
             let Some((cell, percent)) = wanted else { continue };
             let trial = study.run(*cell, 0).map_err(|e| anyhow!("{e}"))?;
             let time_s = &trial.answer.time_s;
-            let title = format!("{}, {name}, {percent} % noise", plan.gases[gas].name);
-            let axes = (Axis::linear("time (s)"), Axis::linear("time constant over its mean"));
-            let mut chart = Chart::new(title, axes.0, axes.1);
-            let truth: Vec<f64> = time_s.iter().map(|t| trial.factor(*t)).collect();
-            for (i, colour) in [Colour::Blue, Colour::Orange].into_iter().enumerate() {
-                let over = |values: &[f64]| values.iter().map(|v| v / plan.tau_s[i]).collect::<Vec<f64>>();
-                let along = &trial.answer.sensors[i];
-                let series = Series::trace(["τ1", "τ2"][i], time_s.clone(), over(&along.tau_s));
-                chart = chart.series(series.colour(colour).band(over(&along.low_s), over(&along.high_s)));
-            }
-            figure = figure.panel(chart.series(Series::trace("truth", time_s.clone(), truth).dashed()));
+            let in_ms = |values: &[f64]| values.iter().map(|v| 1e3 * v).collect::<Vec<f64>>();
+            let along = &trial.answer.sensors[0];
+            let found = Series::trace("found", time_s.clone(), in_ms(&along.tau_s)).colour(Colour::Blue);
+            let found = found.band(in_ms(&along.low_s), in_ms(&along.high_s));
+            let truth: Vec<f64> = time_s.iter().map(|t| plan.tau_s[0] * trial.factor(*t)).collect();
+            let truth = Series::trace("truth", time_s.clone(), in_ms(&truth)).colour(Colour::Orange).dashed();
+            let title = format!("{}, {flow}, {percent} % noise", named.name);
+            let axes = (Axis::linear("time (s)"), Axis::linear("time constant (ms)"));
+            let chart = Chart::new(title, axes.0, axes.1).series(found).series(truth);
+            let has_legend = kind == Kind::Swing && gas == 0;
+            figure = figure.panel(if has_legend { chart } else { chart.without_legend() });
         }
     }
     Ok(figure.to_svg()?)
