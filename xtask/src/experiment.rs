@@ -3,7 +3,9 @@
 mod coverage;
 mod loops;
 mod reconstruction;
+mod stored;
 mod surface;
+mod tracking;
 
 use std::fs;
 use std::io::IsTerminal;
@@ -16,13 +18,13 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::json;
 use twinlag_experiment::{Experiment, Method, Plan, Table, write};
 use twinlag_study::{Options, Outcome, Part, Results, Shard, Study};
 
 use crate::root;
 pub(crate) use loops::record_of;
-use reconstruction::Reconstruction;
+use stored::Own;
 
 /// What to do with the experiments.
 #[derive(Subcommand)]
@@ -98,14 +100,8 @@ pub(crate) fn run(task: Task) -> Result<()> {
         Task::Draw { name } => draw(&name),
         Task::Merge { name, parts, out } => {
             let results = twinlag_study::merge(&parts)?;
-            if let Some(plan) = loops::Plan::read(&text(&name)?) {
-                return merge_stored(plan?, &results, &out);
-            }
-            if let Some(plan) = coverage::Plan::read(&text(&name)?) {
-                return merge_stored(plan?, &results, &out);
-            }
-            if let Some(plan) = reconstruction::Plan::read(&text(&name)?) {
-                return merge_stored(Reconstruction::new(plan?), &results, &out);
+            if let Some(own) = Own::read(&name, &text(&name)?) {
+                return own?.merge(&results, &out);
             }
             let plan = plan(&name)?;
             // The plan of the parts is in their header; a table is only made of the one that is asked for.
@@ -167,26 +163,14 @@ fn plan(name: &str) -> Result<Plan> {
 }
 
 fn title(name: &str) -> Result<String> {
-    if let Some(plan) = loops::Plan::read(&text(name)?) {
-        return Ok(plan?.title);
-    }
-    if let Some(plan) = coverage::Plan::read(&text(name)?) {
-        return Ok(plan?.title);
-    }
-    if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
-        return Ok(plan?.title);
+    if let Some(own) = Own::read(name, &text(name)?) {
+        return Ok(own?.title().to_owned());
     }
     if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
 }
 
 fn draw(name: &str) -> Result<()> {
-    let text = text(name)?;
-    let is_stored = [
-        loops::Plan::read(&text).is_some(),
-        coverage::Plan::read(&text).is_some(),
-        reconstruction::Plan::read(&text).is_some(),
-    ];
-    if name == surface::NAME || is_stored.contains(&true) {
+    if name == surface::NAME || Own::read(name, &text(name)?).is_some() {
         println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
@@ -205,14 +189,8 @@ fn one(name: &str, run: &Run) -> Result<()> {
     if name == surface::NAME {
         return surface::run(&surface::Plan::read(&text(name)?)?, run.out.as_deref().unwrap_or(&folder), run.check);
     }
-    if let Some(plan) = loops::Plan::read(&text(name)?) {
-        return closed_loop(plan?, &folder, run);
-    }
-    if let Some(plan) = coverage::Plan::read(&text(name)?) {
-        return covered(plan?, &folder, run);
-    }
-    if let Some(plan) = reconstruction::Plan::read(&text(name)?) {
-        return reconstruct(plan?, &folder, run);
+    if let Some(own) = Own::read(name, &text(name)?) {
+        return own?.run(&folder, run);
     }
     let mut plan = plan(name)?;
     plan.trials = run.trials.unwrap_or(plan.trials);
@@ -291,113 +269,6 @@ fn observed<S: Study>(study: &S, name: &str, options: &Options) -> Result<(Part,
     })?;
     bar.finish_and_clear();
     Ok((finished, start.elapsed().as_secs_f64()))
-}
-
-/// An experiment that is a study of its own, with tables of its own.
-trait Stored: Study {
-    fn name(&self) -> &str;
-
-    fn seed(&self) -> u64;
-
-    fn set_trials(&mut self, trials: u64);
-
-    fn cell_name(&self, cell: usize) -> String;
-
-    /// Tables and pictures.
-    fn tables(&self, results: &Results, out: &Path) -> Result<()>;
-}
-
-/// Results, tables and pictures.
-fn write_stored(study: &impl Stored, results: &Results, out: &Path) -> Result<()> {
-    ensure!(
-        results.header().plan() == study.plan(),
-        "the results are of another plan than {}, or of another version of it",
-        study.name()
-    );
-    fs::create_dir_all(out)?;
-    fs::write(out.join("results.json"), results.to_json())?;
-    study.tables(results, out)?;
-    println!("{}: {}", study.name(), out.display());
-    Ok(())
-}
-
-/// Holds results against those that are stored in `folder`: an error names the first cell that differs.
-fn check_stored(study: &impl Stored, results: &Results, folder: &Path) -> Result<()> {
-    let name = study.name();
-    let now = results.to_json();
-    let stored = fs::read_to_string(folder.join("results.json")).context("there is no stored table")?;
-    if now == stored {
-        return Ok(());
-    }
-    let cells = |text: &str| -> Result<Vec<Value>> {
-        let value: Value = serde_json::from_str(text).context("the stored results cannot be read")?;
-        Ok(value["cells"].as_array().cloned().unwrap_or_default())
-    };
-    let (now, stored) = (cells(&now)?, cells(&stored)?);
-    match now.iter().zip(&stored).position(|(a, b)| a != b) {
-        Some(cell) => bail!("{name}: the first cell that differs from the stored results is {}", study.cell_name(cell)),
-        None => bail!("{name}: the stored results are of another plan"),
-    }
-}
-
-/// The parts of shards, in one.
-fn merge_stored(mut study: impl Stored, results: &Results, out: &Path) -> Result<()> {
-    study.set_trials(results.header().trials());
-    write_stored(&study, results, out)
-}
-
-/// Runs it, and writes or checks what came of it.
-fn stored(study: &impl Stored, folder: &Path, run: &Run) -> Result<()> {
-    let name = study.name();
-    let out = place(run, folder)?;
-    let options = options(run, &out)?;
-    let (finished, seconds) = observed(study, name, &options)?;
-    if let Some(shard) = run.shard {
-        println!("{name}: part {shard} in {seconds:.0} s");
-        return Ok(());
-    }
-    let results = finished.into_results()?;
-    if run.check {
-        check_stored(study, &results, folder)?;
-        println!("{name}: the stored results hold, to the byte; {seconds:.0} s");
-        return Ok(());
-    }
-    write_stored(study, &results, &out)?;
-    provenance(name, study.seed(), study.trials(), &out, seconds, options.threads.get())?;
-    if let Some(part) = options.checkpoint {
-        fs::remove_file(part)?;
-    }
-    Ok(())
-}
-
-/// An experiment of the closed loop.
-fn closed_loop(mut plan: loops::Plan, folder: &Path, run: &Run) -> Result<()> {
-    plan.records = run.trials.unwrap_or(plan.records);
-    if run.quick {
-        plan.shorten();
-    }
-    plan.seed = run.seed.unwrap_or(plan.seed);
-    stored(&plan, folder, run)
-}
-
-/// An experiment of the gas temperature's bands.
-fn covered(mut plan: coverage::Plan, folder: &Path, run: &Run) -> Result<()> {
-    plan.trials = run.trials.unwrap_or(plan.trials);
-    if run.quick {
-        plan.shorten();
-    }
-    plan.seed = run.seed.unwrap_or(plan.seed);
-    stored(&plan, folder, run)
-}
-
-/// An experiment of the gas temperature.
-fn reconstruct(mut plan: reconstruction::Plan, folder: &Path, run: &Run) -> Result<()> {
-    plan.trials = run.trials.unwrap_or(plan.trials);
-    if run.quick {
-        plan.shorten();
-    }
-    plan.seed = run.seed.unwrap_or(plan.seed);
-    stored(&Reconstruction::new(plan), folder, run)
 }
 
 fn bar(name: &str) -> ProgressBar {

@@ -42,6 +42,13 @@ pub(crate) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     Some(out)
 }
 
+/// Logarithm of the determinant of a positive definite matrix; `None` for another.
+pub(crate) fn log_determinant(matrix: &[Vec<f64>]) -> Option<f64> {
+    let n = matrix.len();
+    let factor = Mat::from_fn(n, n, |p, q| matrix[p][q]).llt(Side::Lower).ok()?;
+    Some((0..n).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum())
+}
+
 pub(crate) fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
     matrix.iter().map(|row| dot(row, vector)).collect()
 }

@@ -205,6 +205,11 @@ pub(crate) trait Effect: Send + Sync {
         false
     }
 
+    /// What is known of the parameters beforehand: functions of `values` that have zero mean and unit variance then.
+    fn prior(&self, _values: &[f64]) -> Vec<f64> {
+        Vec::new()
+    }
+
     /// Values to be reported beside the fitted ones: name, unit, function of the parameters.
     fn derived(&self) -> Vec<Derived> {
         Vec::new()

@@ -120,6 +120,11 @@ impl Model {
         self.effects.iter().flat_map(|e| e.parameters())
     }
 
+    /// What the effects know of their parameters beforehand.
+    pub(crate) fn prior(&self, theta: &[f64]) -> Vec<f64> {
+        self.effects.iter().enumerate().flat_map(|(index, e)| e.prior(&theta[self.range(index)])).collect()
+    }
+
     /// Number of all parameters.
     pub(crate) fn len(&self) -> usize {
         2 + self.parameters().count()
@@ -235,6 +240,7 @@ impl Squares<'_> {
                 out.push((theta[known.sensor] - known.value_s) / std_s);
             }
         }
+        out.extend(self.model.prior(theta));
         out
     }
 

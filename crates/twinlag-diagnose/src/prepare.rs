@@ -185,6 +185,11 @@ impl Prepared {
         }
     }
 
+    /// All residuals of models without a delay, which is what takes most of those at the ends.
+    pub(crate) fn without_delay(&self) -> Selection {
+        away_from_ends(&self.observations, 0, &self.everything.weighting)
+    }
+
     /// Whether a sample is of the blocks that judge.
     pub(crate) fn judges(&self, sample: usize) -> bool {
         self.everything.holds(sample) && is_judge(sample, self.observations.samples())
@@ -230,8 +235,21 @@ pub(crate) fn is_judge(sample: usize, samples: usize) -> bool {
 /// All residuals away from the ends; without the blocks that judge, and their surroundings, if these are to be kept.
 fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weighting) -> Selection {
     let samples = observations.samples();
-    let margin = 8 + reach(observations) + weighting.half();
     let gap = (samples / BLOCKS / 10).min(20);
+    let mut out = away_from_ends(observations, reach(observations), weighting);
+    if keeps_judges {
+        for (k, counts) in out.counts.iter_mut().enumerate() {
+            let near = [k.saturating_sub(gap), k, (k + gap).min(samples - 1)];
+            *counts &= !near.iter().any(|s| is_judge(*s, samples));
+        }
+    }
+    out
+}
+
+/// All residuals away from the ends, where delays may reach so many samples.
+fn away_from_ends(observations: &Observations, reach: usize, weighting: &Weighting) -> Selection {
+    let samples = observations.samples();
+    let margin = 8 + reach + weighting.half();
     let mut counts = vec![true; samples];
     let mut first = 0;
     for stretch in &observations.stretches {
@@ -242,12 +260,6 @@ fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weight
             counts[first + k] = false;
         }
         first += n;
-    }
-    if keeps_judges {
-        for (k, counts) in counts.iter_mut().enumerate() {
-            let near = [k.saturating_sub(gap), k, (k + gap).min(samples - 1)];
-            *counts &= !near.iter().any(|s| is_judge(*s, samples));
-        }
     }
     Selection { counts, weighting: weighting.clone() }
 }

@@ -13,7 +13,7 @@ impl Spline {
     /// - `free`: coefficients of the splines that have their middle on the knots from the second on, at least 3. That of the first
     ///   knot is minus their sum; those beyond either end make the second derivative there zero: the record says little of them
     pub(crate) fn new(from_s: f64, to_s: f64, free: &[f64]) -> Self {
-        let on_knots: Vec<f64> = [-free.iter().sum::<f64>()].into_iter().chain(free.iter().copied()).collect();
+        let on_knots = on_knots(free);
         let last = on_knots.len() - 1;
         let mut coefficients = vec![2.0 * on_knots[0] - on_knots[1]];
         coefficients.extend_from_slice(&on_knots);
@@ -40,6 +40,11 @@ impl Spline {
         let from = piece as usize;
         weights.iter().zip(&self.coefficients[from..]).map(|(w, a)| w * a).sum::<f64>() - self.mean
     }
+}
+
+/// The coefficients on knots: the first is minus the sum of the others.
+pub(crate) fn on_knots(free: &[f64]) -> Vec<f64> {
+    [-free.iter().sum::<f64>()].into_iter().chain(free.iter().copied()).collect()
 }
 
 #[cfg(test)]

@@ -2,20 +2,26 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::dense;
 use crate::diagnosis::ModelFit;
 use crate::effect::{Context, Identifier, Shared, varying};
 use crate::error::DiagnoseError;
 use crate::known::Known;
-use crate::model::{Effort, Fitted};
+use crate::model::{Effort, Fitted, Selection};
 use crate::observations::Observations;
 use crate::prepare::Prepared;
 use crate::settings::{KnownEffect, Settings, Watch};
 use crate::summary::summarise;
 
-/// Coefficients of the shared change that are tried.
-const SIZES: [usize; 8] = [3, 5, 8, 12, 16, 20, 26, 32];
-/// Numbers more that take nothing off are a change that is well enough described.
-const ENOUGH: usize = 2;
+/// Most coefficients of the shared change, and samples for each.
+const COEFFICIENTS: usize = 32;
+const SAMPLES_EACH: usize = 60;
+const LEAST_COEFFICIENTS: usize = 3;
+/// Strengths of its curvature that are tried: the least lets it change by a tenth along the record, each is twice the one before.
+const CURVATURE: f64 = 0.25;
+const STRENGTHS: i32 = 12;
+/// A strength this much less likely than the best, in `−2 ln L`, ends the search.
+const HOPELESS: f64 = 20.0;
 /// Instants at which a step is looked for, and times that the best is looked around.
 const INSTANTS: usize = 40;
 const ROUNDS: usize = 4;
@@ -32,7 +38,7 @@ const CHI2_95: f64 = 3.841_458_820_694_124;
 pub enum Change {
     /// They do not, as far as the record tells.
     Constant,
-    /// As a spline with this many coefficients.
+    /// Smoothly, with this many coefficients: the effective number of a smoothing spline.
     Smooth(usize),
     /// At one instant.
     Step,
@@ -82,7 +88,10 @@ pub struct Track {
 }
 
 /// Both time constants along `observations`, `effects` in the model as they are: of a shared smooth change, a step and none the one that
-/// Schwarz's criterion prefers, the smooth change with as many coefficients as Akaike's prefers, which leaves less of its shape out.
+/// Schwarz's criterion prefers.
+///
+/// The smooth change is a smoothing spline: its curvature is white noise beforehand, of the strength under which the record is most
+/// likely. So it is determined where the record says little, and its bands hold what smoothing may have left out (Wahba 1983).
 ///
 /// # Errors
 /// As [`crate::fit_with`].
@@ -95,16 +104,22 @@ pub fn track(
     let others: Vec<KnownEffect> =
         effects.iter().filter(|e| e.effect != Identifier::VaryingTimeConstant).cloned().collect();
     let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others)?;
-    let search = Tracker { prepared: &prepared };
+    let has_delay = constant.model.effects.iter().any(|e| e.identifier() == Identifier::Delay);
+    let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
+    let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);
+    let search = Tracker { prepared: &prepared, selection: &selection };
     let mut best = (Change::Constant, constant.clone(), score(&constant, 0.0));
     let mut consider = |change: Change, fitted: Fitted, numbers: f64| {
-        let score = score(&fitted, numbers);
+        // Without what is known of its shape, which the others have nothing like.
+        let known: f64 = fitted.model.prior(&fitted.theta).iter().map(|p| p * p).sum();
+        let data = Fitted { chi2: fitted.chi2 - known, count: constant.count, ..fitted.clone() };
+        let score = score(&data, numbers);
         if score < best.2 && fitted.end.is_usable() {
             best = (change, fitted, score);
         }
     };
-    if let Some((size, fitted)) = search.smooth(&constant, watch) {
-        consider(Change::Smooth(size), fitted, size as f64);
+    if let Some((coefficients, fitted)) = search.smooth(&constant, watch) {
+        consider(Change::Smooth(coefficients.round() as usize), fitted, coefficients);
     }
     let step = search.step(&constant, watch);
     if let Some((_, fitted)) = &step {
@@ -113,7 +128,7 @@ pub fn track(
     }
     let (change, fitted, _) = best;
     let ratio = search.ratio(&fitted);
-    let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels);
+    let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels);
     let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
     let [tau_s, log_error] = along(&fit, &time_s);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
@@ -156,6 +171,7 @@ fn score(fitted: &Fitted, numbers: f64) -> f64 {
 
 struct Tracker<'a> {
     prepared: &'a Prepared,
+    selection: &'a Selection,
 }
 
 impl Tracker<'_> {
@@ -163,30 +179,54 @@ impl Tracker<'_> {
         let mut theta = from.theta.clone();
         theta.extend_from_slice(start);
         let model = from.model.with(effect);
-        model.fit(&theta, &self.prepared.observations, &self.prepared.everything, effort)
+        model.fit(&theta, &self.prepared.observations, self.selection, effort)
     }
 
-    /// The smooth change with the coefficients that Akaike's criterion prefers.
-    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(usize, Fitted)> {
+    /// The smooth change under which the record is most likely, and its effective number of coefficients.
+    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(f64, Fitted)> {
         let Context { ends_s, samples, .. } = self.prepared.context;
-        let mut best: Option<(f64, usize, Fitted)> = None;
-        let mut needless = 0;
-        for (done, size) in SIZES.into_iter().enumerate() {
-            watch("smooth changes", done, SIZES.len());
-            let Some(effect) = varying::of_size(size, ends_s, samples) else { break };
-            let fitted = self.fit(constant, effect, &vec![0.0; size], Effort::Finish);
-            let score = score(&fitted, 0.0) + 2.0 * size as f64;
-            if best.as_ref().is_none_or(|b| score < b.0) {
-                best = Some((score, size, fitted));
-                needless = 0;
-            } else {
-                needless += 1;
-                if needless == ENOUGH {
-                    break;
-                }
+        let size = COEFFICIENTS.min(samples / SAMPLES_EACH);
+        if size < LEAST_COEFFICIENTS {
+            return None;
+        }
+        let mut start = vec![0.0; size];
+        let mut best: Option<(f64, f64, Fitted)> = None;
+        for done in 0..STRENGTHS {
+            watch("smooth changes", done as usize, STRENGTHS as usize);
+            let curvature = CURVATURE * 2.0_f64.powi(done);
+            let fitted = self.fit(constant, varying::smooth(size, ends_s, samples, curvature)?, &start, Effort::Finish);
+            start = fitted.theta[constant.theta.len()..].to_vec();
+            let Some((evidence, coefficients)) = self.evidence(&fitted, size, curvature) else { break };
+            let so_far = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+            if evidence > so_far + HOPELESS {
+                break;
+            }
+            if evidence < so_far && fitted.end.is_usable() {
+                best = Some((evidence, coefficients, fitted));
             }
         }
-        best.map(|(_, size, fitted)| (size, fitted))
+        best.map(|(_, coefficients, fitted)| (coefficients, fitted))
+    }
+
+    /// `−2 ln` of the likelihood with the coefficients integrated out (Laplace's approximation), but for a constant, and how many of
+    /// the coefficients the record determines: all but the trace of the prior's share of the information.
+    fn evidence(&self, fitted: &Fitted, size: usize, curvature: f64) -> Option<(f64, f64)> {
+        let lin = fitted.model.linearised(&fitted.theta, &self.prepared.observations, self.selection);
+        let p = lin.columns.len();
+        let products = |from: usize| -> Vec<Vec<f64>> {
+            let dot = |a: usize, b: usize| dense::dot(&lin.columns[a][from..], &lin.columns[b][from..]);
+            (0..p).map(|a| (0..p).map(|b| dot(a, b)).collect()).collect()
+        };
+        let (all, prior) = (products(0), products(lin.samples.len()));
+        // Time constants that are held have no column.
+        let free: Vec<usize> = (0..p).filter(|&i| all[i][i] > 0.0).collect();
+        let of_free = free.iter().map(|&a| free.iter().map(|&b| all[a][b]).collect()).collect::<Vec<Vec<f64>>>();
+        // A straight line has no curvature: its coefficient has no prior.
+        let of_prior = 2.0 * (size - 1) as f64 * curvature.ln();
+        let evidence = fitted.chi2 + dense::log_determinant(&of_free)? + of_prior;
+        let inverse = dense::inverse(&all)?;
+        let known: f64 = (0..p).map(|a| dense::dot(&inverse[a], &prior[a])).sum();
+        Some((evidence, size as f64 - known))
     }
 
     /// The step that takes most off, and the fit with it.

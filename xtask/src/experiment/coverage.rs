@@ -14,7 +14,9 @@ use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal, Simul
 use twinlag::{CompensateOptions, DiagnoseOptions, Known, Model, Options, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
-use super::Stored;
+use super::stored::Stored;
+
+pub(super) const NAME: &str = "reconstruction-coverage";
 
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,9 +54,8 @@ const AS_GOOD_AS_EXACT: f64 = 1e-6;
 const LIVELY: f64 = 0.1;
 
 impl Plan {
-    /// The plan, if the text is one of this kind.
-    pub(super) fn read(text: &str) -> Option<Result<Self>> {
-        text.contains("missing_share").then(|| toml::from_str(text).context("the plan of a reconstruction's coverage"))
+    pub(super) fn read(text: &str) -> Result<Self> {
+        toml::from_str(text).context("the plan of a reconstruction's coverage")
     }
 
     /// One gas, short.
@@ -197,12 +198,24 @@ impl Stored for Plan {
         &self.name
     }
 
+    fn title(&self) -> &str {
+        &self.title
+    }
+
     fn seed(&self) -> u64 {
         self.seed
     }
 
+    fn set_seed(&mut self, seed: u64) {
+        self.seed = seed;
+    }
+
     fn set_trials(&mut self, trials: u64) {
         self.trials = trials;
+    }
+
+    fn shorten(&mut self) {
+        Plan::shorten(self);
     }
 
     fn cell_name(&self, cell: usize) -> String {

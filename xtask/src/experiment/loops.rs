@@ -15,7 +15,7 @@ use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
-use super::Stored;
+use super::stored::Stored;
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -206,12 +206,24 @@ impl Stored for Plan {
         &self.name
     }
 
+    fn title(&self) -> &str {
+        &self.title
+    }
+
     fn seed(&self) -> u64 {
         self.seed
     }
 
+    fn set_seed(&mut self, seed: u64) {
+        self.seed = seed;
+    }
+
     fn set_trials(&mut self, trials: u64) {
         self.records = trials;
+    }
+
+    fn shorten(&mut self) {
+        Plan::shorten(self);
     }
 
     fn cell_name(&self, cell: usize) -> String {

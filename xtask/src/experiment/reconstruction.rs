@@ -17,7 +17,9 @@ use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal};
 use twinlag::{CompensateOptions, Estimator, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 
-use super::Stored;
+use super::stored::Stored;
+
+pub(super) const NAME: &str = "reconstruction";
 
 /// A plan: which gases, with how much noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,10 +54,8 @@ const ESTIMATES: [&str; 4] =
 const COVERED: usize = 1 + ESTIMATES.len();
 
 impl Plan {
-    /// The plan, if the text is one of this kind.
-    pub(super) fn read(text: &str) -> Option<Result<Self>> {
-        let is_one = text.contains("noise_percent") && text.contains("tau_s") && !text.contains("missing_share");
-        is_one.then(|| toml::from_str(text).context("the plan of a reconstruction"))
+    pub(super) fn read(text: &str) -> Result<Self> {
+        toml::from_str(text).context("the plan of a reconstruction")
     }
 
     /// One gas with the most noise, short.
@@ -254,12 +254,26 @@ impl Stored for Reconstruction {
         &self.plan.name
     }
 
+    fn title(&self) -> &str {
+        &self.plan.title
+    }
+
     fn seed(&self) -> u64 {
         self.plan.seed
     }
 
+    fn set_seed(&mut self, seed: u64) {
+        self.plan.seed = seed;
+    }
+
     fn set_trials(&mut self, trials: u64) {
         self.plan.trials = trials;
+    }
+
+    fn shorten(&mut self) {
+        let mut plan = self.plan.clone();
+        plan.shorten();
+        *self = Self::new(plan);
     }
 
     fn cell_name(&self, cell: usize) -> String {

@@ -27,7 +27,12 @@ const SIZES: [usize; 4] = [3, 5, 8, 19];
 /// What `m` is a function of.
 enum Of {
     /// Time: a spline between the ends of the record, s, which has so many samples.
-    Time { ends_s: [f64; 2], samples: usize },
+    Time {
+        ends_s: [f64; 2],
+        samples: usize,
+        /// Strength of the white noise that its curvature is beforehand, by which it is smooth; `None` for one that need not be.
+        curvature: Option<f64>,
+    },
     /// A measured flow.
     Flow(Arc<Flow>),
     /// Nothing before an instant, s, and one number from then on.
@@ -42,13 +47,24 @@ struct Varying {
 }
 
 pub(crate) fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
+    of_time(size, ends_s, samples, None)
+}
+
+/// A spline of `size` coefficients whose second derivative by the record's share is white noise of the strength `curvature`
+/// beforehand, that is, `∫ m''² du / curvature²` is added to the energy. For [`crate::track()`].
+pub(crate) fn smooth(size: usize, ends_s: [f64; 2], samples: usize, curvature: f64) -> Option<Shared> {
+    of_time(size, ends_s, samples, Some(curvature))
+}
+
+fn of_time(size: usize, ends_s: [f64; 2], samples: usize, curvature: Option<f64>) -> Option<Shared> {
     const NAMES: [&str; 32] = [
         "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
         "m18", "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
     ];
     let parameters =
         NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, 3.0))).collect();
-    (60 * size <= samples).then(|| Arc::new(Varying { of: Of::Time { ends_s, samples }, parameters }) as Shared)
+    (60 * size <= samples)
+        .then(|| Arc::new(Varying { of: Of::Time { ends_s, samples, curvature }, parameters }) as Shared)
 }
 
 /// A step at an instant, for [`crate::track()`]: the search knows smooth changes alone.
@@ -106,11 +122,19 @@ impl Effect for Varying {
 
     fn sizes(&self) -> Vec<Shared> {
         match self.of {
-            Of::Time { ends_s, samples } => {
+            Of::Time { ends_s, samples, .. } => {
                 SIZES.into_iter().filter_map(|size| of_size(size, ends_s, samples)).collect()
             }
             Of::Flow(_) | Of::Step { .. } | Of::Ratio { .. } => Vec::new(),
         }
+    }
+
+    fn prior(&self, values: &[f64]) -> Vec<f64> {
+        let Of::Time { curvature: Some(curvature), .. } = self.of else { return Vec::new() };
+        let on_knots = crate::spline::on_knots(values);
+        // Second differences over squares of the distance of knots, each for one such distance.
+        let scale = (values.len() as f64).powf(1.5) / curvature;
+        on_knots.windows(3).map(|c| scale * (c[0] - 2.0 * c[1] + c[2])).collect()
     }
 
     fn neutral(&self) -> Vec<(usize, f64)> {
@@ -118,5 +142,23 @@ impl Effect for Varying {
             Of::Time { .. } | Of::Ratio { .. } => Vec::new(),
             Of::Flow(_) | Of::Step { .. } => vec![(0, 0.0)],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of `m = u²`, but for a constant, the second derivative is 2 everywhere: `4 (size − 1)/size` over the inner knots, to rounding.
+    #[test]
+    fn what_is_known_of_a_curve_is_its_curvature() {
+        let (size, curvature) = (10_usize, 3.0);
+        let squares: Vec<f64> = (0..=size).map(|k| (k as f64 / size as f64).powi(2)).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        let values: Vec<f64> = squares[1..].iter().map(|v| v - mean).collect();
+        let effect = smooth(size, [0.0, 5.0], 2500, curvature).expect("enough samples");
+        let got: f64 = effect.prior(&values).iter().map(|p| p * p).sum();
+        let want = 4.0 * (size - 1) as f64 / size as f64 / (curvature * curvature);
+        assert!((got - want).abs() < 1e-10, "got {got}, want {want}");
     }
 }
