@@ -87,7 +87,7 @@ pub(crate) fn run(task: Task) -> Result<()> {
     match task {
         Task::List => {
             for name in names()? {
-                println!("{name:16} {}", title(&name)?);
+                println!("{name:24} {}", title(&name)?);
             }
             Ok(())
         }
@@ -275,7 +275,7 @@ fn bar(name: &str) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let style = ProgressStyle::with_template("{prefix:16} {bar:40} {percent:>3} %, {eta} left");
+    let style = ProgressStyle::with_template("{prefix:24} {bar:40} {percent:>3} %, {eta} left");
     ProgressBar::new(1).with_prefix(name.to_owned()).with_style(style.unwrap_or(ProgressStyle::default_bar()))
 }
 
