@@ -13,8 +13,8 @@
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-/// 95 % point of chi-square with one degree of freedom.
-const CHI2_95: f64 = 3.841_458_820_694_124;
+/// 95 % point of the evidence against the true instant of a change, `(1 − exp(−x/2))² = 0.95` (Hansen 2000).
+const INSTANT_95: f64 = 7.352_277;
 
 /// A record without noise, and what its noise would be.
 pub(super) struct Bound {
@@ -107,7 +107,8 @@ impl Bound {
     }
 
     /// By how much a step by `factor` after `at` samples may be moved either way, samples, mean of both, until the evidence that is to
-    /// be expected against it reaches 95 % of chi-square: time constants and factor free.
+    /// be expected against it reaches the 95 % point: time
+    /// constants and factor free.
     pub(super) fn step_resolution(&self, at: f64, factor: f64) -> f64 {
         let after = |k: usize, at: f64| (k as f64 + 1.0 - at).clamp(0.0, 1.0);
         let columns = [self.column(|_, _| 1.0), self.column(|i, _| i as f64), self.column(|_, k| after(k, at))];
@@ -128,8 +129,8 @@ impl Bound {
             let mut last = 0.0;
             for samples in 1..self.diagonal.len() / 4 {
                 let now = evidence(sign * samples as f64);
-                if now > CHI2_95 {
-                    return samples as f64 - (now - CHI2_95) / (now - last);
+                if now > INSTANT_95 {
+                    return samples as f64 - (now - INSTANT_95) / (now - last);
                 }
                 last = now;
             }
