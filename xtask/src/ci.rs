@@ -19,13 +19,14 @@ pub(crate) fn run() -> Result<()> {
     )?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
-    // In one build: asked for one by one, packages take features one by one, and are compiled anew each time.
-    step("release build", "cargo", &["build", "--release", "--workspace", "--bins", "--examples"])?;
-    step("the README's main job", "target/release/twinlag", &["demo"])?;
-    step("example: all estimators", "target/release/examples/characterise", &[])?;
-    step("example: a solver of one's own", "target/release/own-solver", &[])?;
-    step("example: a cost of one's own", "target/release/own-cost", &[])?;
-    step("example: an estimator of one's own", "target/release/own-estimator", &[])?;
+    // In one build, most of which the tests have made: asked for one by one, packages take features one by one, and are compiled anew.
+    step("programs and examples", "cargo", &["build", "--workspace", "--bins", "--examples"])?;
+    step("the README's main job", "target/debug/twinlag", &["demo"])?;
+    step("example: all estimators", "target/debug/examples/characterise", &[])?;
+    step("example: a solver of one's own", "target/debug/own-solver", &[])?;
+    step("example: a cost of one's own", "target/debug/own-cost", &[])?;
+    step("example: an estimator of one's own", "target/debug/own-estimator", &[])?;
+    step("example: a live pipe", "target/debug/live-pipe", &[])?;
     let quick = root()?.join("target/quick-experiments");
     if quick.exists() {
         fs::remove_dir_all(&quick)?;
