@@ -52,7 +52,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
     // What was read so far is out before the next row is waited for.
     out.flush()?;
     let mut bad = Bad::default();
-    let mut is_beyond = false;
+    let (mut is_beyond, mut is_wider) = (false, false);
     while let Some((number, line)) = lines.next()? {
         let (time_s, reading_c) = match reader.read(&line, number) {
             Ok(None) => continue,
@@ -75,6 +75,15 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
                 format!(
                     "warning: at {} s the time constants may have left the range in view, 0.4 to 2.5 times those of the start: start again there",
                     now.time_s
+                )
+            });
+        }
+        if let Some(now) = answer.filter(|now| now.widened_by > 1.0 && !is_wider) {
+            is_wider = true;
+            talk.say(|| {
+                format!(
+                    "warning: at {} s readings differ from what the start led to expect by {:.1} times what it explains: the gas, or a sensor, is                      not what it was; bands are widened while that is so",
+                    now.time_s, now.widened_by
                 )
             });
         }

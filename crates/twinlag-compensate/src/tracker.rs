@@ -23,6 +23,8 @@ pub struct Tracked {
     pub log_variance: f64,
     /// Chance that the factor is the smallest or the largest in view: where it is not small, the factor is beyond.
     pub chance_beyond: f64,
+    /// How far the readings are from what the earlier ones led to expect, as in [`crate::Now`]: the mean over the factors.
+    pub surprise: f64,
 }
 
 /// A filter for sensors whose time constants change by a common factor, as they do in flow that changes.
@@ -70,10 +72,11 @@ impl<const D: usize> Tracker<D> {
             let wandered = self.chance[k] + self.leaves * (below + above - 2.0 * self.chance[k]);
             self.next[k] = (1.0 - JUMP) * wandered + JUMP / FACTORS as f64;
         }
-        let (mut gas_c, mut square, mut most) = ([0.0; FACTORS], [0.0; FACTORS], f64::NEG_INFINITY);
+        let (mut gas_c, mut square, mut surprise) = ([0.0; FACTORS], [0.0; FACTORS], [0.0; FACTORS]);
+        let mut most = f64::NEG_INFINITY;
         for (k, stream) in self.streams.iter_mut().enumerate() {
             let now = stream.push(reading_c);
-            (gas_c[k], square[k]) = (now.gas_c, now.variance_k2);
+            (gas_c[k], square[k], surprise[k]) = (now.gas_c, now.variance_k2, now.surprise);
             self.log_likelihood[k] = -0.5 * (now.surprise + now.scatter.ln());
             most = most.max(self.log_likelihood[k]);
         }
@@ -94,6 +97,7 @@ impl<const D: usize> Tracker<D> {
             log_factor,
             log_variance: mean(&|k| (self.log_factor[k] - log_factor).powi(2)) + spacing * spacing / 12.0,
             chance_beyond: self.chance[0] + self.chance[last],
+            surprise: mean(&|k| surprise[k]),
         }
     }
 }

@@ -17,6 +17,10 @@ const CHANGE_OVER: f64 = 10.0;
 const LONGEST_GAP: u64 = 100_000;
 /// Chance that the time constants are beyond the range in view, above which that is said.
 const LIKELY: f64 = 0.05;
+/// Rows over which it is watched whether readings are what the start led to expect, and by how many standard deviations of such a mean
+/// they may differ before bands are widened.
+const WATCHED: f64 = 100.0;
+const CLEARLY: f64 = 4.0;
 
 /// What live tracking may assume.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -45,6 +49,9 @@ pub struct LiveAnswer {
     pub tau_95_s: [[f64; 2]; 2],
     /// Whether the time constants may have left the range that is in view.
     pub is_beyond: bool,
+    /// What the bands were multiplied by, since readings of late are farther from what was expected of them than noise takes them: the gas is
+    /// not what it was in the start.
+    pub widened_by: f64,
 }
 
 /// Tracks both sensors from a start on.
@@ -58,6 +65,8 @@ pub struct Live {
     log_variance: [f64; 2],
     period_s: f64,
     last_s: Option<f64>,
+    /// Mean square of late of what is new in a reading, over its variance.
+    energy: f64,
 }
 
 impl Live {
@@ -107,7 +116,7 @@ impl Live {
             let error_s = fit.time_constants[i].standard_error_s.unwrap_or(0.0);
             (error_s / tau_s[i]).powi(2)
         });
-        Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None })
+        Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None, energy: 1.0 })
     }
 
     /// What is known once a row is read: both readings, °C, `None` for one that is missing, at `time_s`; a sample after the last one where
@@ -126,19 +135,27 @@ impl Live {
         self.last_s = Some(time_s);
         let [first, second] = reading_c.map(|c| c.filter(|c| c.is_finite()));
         let now = (self.push)([first, second.map(|c| (c - self.offset_k) / self.gain)]);
+        let count = reading_c.iter().flatten().filter(|c| c.is_finite()).count();
+        if count > 0 {
+            self.energy += (now.surprise / count as f64 - self.energy) / WATCHED;
+        }
+        // Of two readings a sample half a chi-square of two degrees, whose variance is 1.
+        let excess = self.energy - 1.0 > CLEARLY / (2.0 * WATCHED).sqrt();
+        let widened_by = if excess { self.energy.sqrt() } else { 1.0 };
         let factor = now.log_factor.exp();
         let tau_s = self.tau_s.map(|tau_s| tau_s * factor);
         let tau_95_s = [0, 1].map(|i| {
-            let half = Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
+            let half = widened_by * Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
             [-half, half].map(|by| tau_s[i] * by.exp())
         });
         Some(LiveAnswer {
             time_s,
             gas_c: now.gas_c,
-            gas_std_k: now.variance_k2.sqrt(),
+            gas_std_k: widened_by * now.variance_k2.sqrt(),
             tau_s,
             tau_95_s,
             is_beyond: now.chance_beyond > LIKELY,
+            widened_by,
         })
     }
 }
