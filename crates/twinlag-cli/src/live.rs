@@ -65,7 +65,9 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
         let answer = live.push(time_s, reading_c);
         if answer.is_none() {
             bad.say(
-                &format!("{source}: line {number}: expected a later time than in the row before; the row is left out"),
+                &format!(
+                    "{source}: line {number}: expected a time soon after that of the row before; the row is left out"
+                ),
                 talk,
             );
         }
@@ -82,7 +84,8 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
             is_wider = true;
             talk.say(|| {
                 format!(
-                    "warning: at {} s readings differ from what the start led to expect by {:.1} times what it explains: the gas, or a sensor, is                      not what it was; bands are widened while that is so",
+                    "warning: at {} s readings differ from what the start led to expect by {:.1} times what it explains: the gas, or a sensor, is not \
+                     what it was; bands are widened while that is so",
                     now.time_s, now.widened_by
                 )
             });

@@ -1,6 +1,6 @@
 //! Files that are written: checked before the work, never over something else unless asked.
 
-use std::io::{Write, stdout};
+use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use crate::arguments::Talk;
@@ -65,7 +65,11 @@ pub(crate) fn check_data(
 /// Writes such a table.
 pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failure> {
     if to_stdout {
-        return stdout().write_all(text).map_err(|e| Failure::Other(format!("standard output: {e}")));
+        return match stdout().write_all(text) {
+            // Whoever read has read enough.
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
+            written => written.map_err(|e| Failure::Other(format!("standard output: {e}"))),
+        };
     }
     write(out, text)
 }

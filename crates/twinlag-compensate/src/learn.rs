@@ -26,7 +26,7 @@ const HARMONICS: usize = 8;
 const FEWEST_HARMONICS: usize = 3;
 /// Fewest samples with both readings.
 const FEWEST: usize = 32;
-/// Share of instants that may be missing before the lines over them matter.
+/// Share of instants that may be missing, and by which steps may differ, before the lines between them matter.
 const FEW_MISSING: f64 = 0.01;
 /// Neighbouring bins of a periodogram with Hann's taper go together: this many are worth one, `1 + 2 ((2/3)² + (1/6)²)`.
 const BINS_PER_ONE: f64 = 1.944;
@@ -71,8 +71,10 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
     let search = Search { periodogram: &periodogram, limits, room };
     let mut parts = search.run();
-    if (readings.len() - got) as f64 > FEW_MISSING * readings.len() as f64 {
-        parts = holes::choose(&search, readings, rig, level_c, parts);
+    let missing = 1.0 - got as f64 / periodogram.all as f64;
+    let is_uneven = readings.unevenness() > FEW_MISSING;
+    if missing > FEW_MISSING || is_uneven {
+        parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
     }
     let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
     Ok(Learned { prior: prior(&parts), deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect() })

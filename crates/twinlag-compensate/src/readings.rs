@@ -97,6 +97,18 @@ impl Readings {
         Some([0, 1].map(|i| (locals[i][k], self.reading_c[i][k] - level_c)))
     }
 
+    /// Median of how far steps are from the nearest multiple of the median one, as a share of that.
+    pub(crate) fn unevenness(&self) -> f64 {
+        let period_s = self.period_s();
+        let off = |t: &[f64]| {
+            let steps = (t[1] - t[0]) / period_s;
+            (steps - steps.round().max(1.0)).abs()
+        };
+        let mut all: Vec<f64> = self.time_s.windows(2).map(off).collect();
+        let middle = all.len() / 2;
+        if all.is_empty() { 0.0 } else { *all.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    }
+
     /// The median step, s.
     pub(crate) fn period_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|t| t[1] - t[0]).collect();

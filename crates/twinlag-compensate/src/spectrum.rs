@@ -18,6 +18,8 @@ const OVERLAP: f64 = 0.947;
 /// A tapered periodogram of the gas, of long records the mean over pieces that overlap by half, with what noise adds to it.
 pub(crate) struct Periodogram {
     pub(crate) period_s: f64,
+    /// Instants of the even grid.
+    pub(crate) all: usize,
     /// Of a piece.
     pub(crate) samples: usize,
     /// Pieces that the mean is of, counted as if they did not overlap.
@@ -78,7 +80,7 @@ impl Periodogram {
         let taper = autocorrelation(&window);
         let plan = planner.plan_fft_forward(2 * samples);
         let pieces = if count > 1 { OVERLAP * count as f64 } else { 1.0 };
-        Self { period_s, samples, pieces, frequency_hz, power, noise, taper, plan }
+        Self { period_s, all, samples, pieces, frequency_hz, power, noise, taper, plan }
     }
 
     /// What the periodogram of a gas with these terms is expected to be: `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's

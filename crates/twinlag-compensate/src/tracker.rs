@@ -9,6 +9,8 @@ const FACTORS: usize = 41;
 const FARTHEST: f64 = 2.5;
 /// Chance of a sample that the factor jumps anywhere: a sudden change is followed once readings tell it so often to one.
 const JUMP: f64 = 1e-9;
+/// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a single wrong one does not decide.
+const FREEDOM: f64 = 8.0;
 
 /// What is known at an instant from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,10 +76,12 @@ impl<const D: usize> Tracker<D> {
         }
         let (mut gas_c, mut square, mut surprise) = ([0.0; FACTORS], [0.0; FACTORS], [0.0; FACTORS]);
         let mut most = f64::NEG_INFINITY;
+        let count = reading_c.iter().flatten().count() as f64;
         for (k, stream) in self.streams.iter_mut().enumerate() {
             let now = stream.push(reading_c);
             (gas_c[k], square[k], surprise[k]) = (now.gas_c, now.variance_k2, now.surprise);
-            self.log_likelihood[k] = -0.5 * (now.surprise + now.scatter.ln());
+            let tails = (FREEDOM + count) * (now.surprise / FREEDOM).ln_1p();
+            self.log_likelihood[k] = -0.5 * (tails + now.scatter.ln());
             most = most.max(self.log_likelihood[k]);
         }
         let mut sum = 0.0;
@@ -89,11 +93,12 @@ impl<const D: usize> Tracker<D> {
         let mean = |of: &dyn Fn(usize) -> f64| (0..FACTORS).map(|k| self.chance[k] * of(k)).sum::<f64>();
         let gas = mean(&|k| gas_c[k]);
         let log_factor = mean(&|k| self.log_factor[k]);
-        // Between two factors of the grid any is as good: a twelfth of its square.
+        // Between two factors of the grid any is as good: a twelfth of the square of what lies between them.
         let spacing = self.log_factor[1] - self.log_factor[0];
+        let between = |k: usize| 0.5 * (gas_c[(k + 1).min(last)] - gas_c[k.saturating_sub(1)]);
         Tracked {
             gas_c: gas,
-            variance_k2: mean(&|k| square[k] + (gas_c[k] - gas).powi(2)),
+            variance_k2: mean(&|k| square[k] + (gas_c[k] - gas).powi(2) + between(k).powi(2) / 12.0),
             log_factor,
             log_variance: mean(&|k| (self.log_factor[k] - log_factor).powi(2)) + spacing * spacing / 12.0,
             chance_beyond: self.chance[0] + self.chance[last],

@@ -25,6 +25,8 @@ const HOPELESS: f64 = 20.0;
 /// Instants at which a step is looked for, and times that the best is looked around.
 const INSTANTS: usize = 40;
 const ROUNDS: usize = 4;
+/// Halvings by which the ends of its interval are found.
+const HALVINGS: usize = 5;
 /// Share of the record at either end in which a step is not told from a slope of the start.
 const MARGIN: f64 = 0.05;
 /// Part of a standard error by which a parameter is moved for derivatives.
@@ -252,10 +254,12 @@ impl Tracker<'_> {
         }
         let (at_s, looked) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.clone();
         let fitted = self.fit(constant, varying::step(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
-        let energy = fitted.mean_energy().max(1.0);
-        let within = tried.iter().filter(|t| t.1.chi2 - looked.chi2 < INSTANT_95 * energy).map(|t| t.0);
+        let limit = INSTANT_95 * fitted.mean_energy().max(1.0);
         let half_s = 0.5 * self.prepared.context.step_s;
-        let [low, high] = within.fold([at_s, at_s], |[low, high], t| [low.min(t), high.max(t)]);
+        // All instants that are as likely, also those that others lie before, and from the best one on until none is.
+        let within = tried.iter().filter(|t| t.1.chi2 - looked.chi2 < limit).map(|t| t.0);
+        let ends = [-1.0, 1.0].map(|sign| self.farthest(constant, &fitted, at_s, sign, limit));
+        let [low, high] = within.chain(ends).fold([at_s, at_s], |[low, high], t| [low.min(t), high.max(t)]);
         let point = ChangePoint {
             at_s,
             interval_95_s: [low - half_s, high + half_s],
@@ -263,6 +267,28 @@ impl Tracker<'_> {
             evidence: score(constant, 0.0) - score(&fitted, 0.0),
         };
         Some((point, fitted))
+    }
+
+    /// The last instant before or after `at_s` up to which a step takes as much off as the `best` one, but for `limit`.
+    fn farthest(&self, constant: &Fitted, best: &Fitted, at_s: f64, sign: f64, limit: f64) -> f64 {
+        let [first_s, last_s] = self.prepared.observations.ends_s();
+        let n = constant.theta.len();
+        let from = Fitted { theta: best.theta[..n].to_vec(), ..constant.clone() };
+        let is_within = |t: f64| {
+            let is_one = t > first_s && t < last_s;
+            is_one && self.fit(&from, varying::step(t), &best.theta[n..], Effort::Look).chi2 - best.chi2 < limit
+        };
+        let mut inside_s = 0.0;
+        let mut outside_s = 0.25 * self.prepared.context.step_s;
+        while is_within(at_s + sign * outside_s) {
+            inside_s = outside_s;
+            outside_s *= 2.0;
+        }
+        for _ in 0..HALVINGS {
+            let middle_s = 0.5 * (inside_s + outside_s);
+            if is_within(at_s + sign * middle_s) { inside_s = middle_s } else { outside_s = middle_s }
+        }
+        at_s + sign * inside_s
     }
 
     fn ratio(&self, fitted: &Fitted) -> RatioTest {

@@ -47,7 +47,8 @@ pub enum Error {
     )]
     QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
     #[error(
-        "--live: the model has {effect}, which readings alone as they come do not allow to undo: leave out --live, or take a model          of calibration, second lags, slow paths and noise"
+        "--live: the model has {effect}, which readings alone as they come do not allow to undo: leave out --live, or take a model \
+         of calibration, second lags, slow paths and noise"
     )]
     LiveEffect { effect: &'static str },
     #[error("the start of --live needs {why}")]

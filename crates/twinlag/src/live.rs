@@ -4,7 +4,7 @@ use twinlag_compensate::{Push, learn, tracker};
 use twinlag_diagnose::Identifier;
 use twinlag_record::{Record, SamplingKind};
 
-use crate::characterisation::Characterisation;
+use crate::characterisation::{Characterisation, Status};
 use crate::diagnose::{Model, with_model};
 use crate::error::Error;
 use crate::options::Options;
@@ -13,8 +13,8 @@ use crate::profile::Z_975;
 /// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower sensor, where nothing is said.
 const CHANGE: f64 = 0.1;
 const CHANGE_OVER: f64 = 10.0;
-/// Missing samples of a gap that are gone through one by one; after so many nothing is left of what was before.
-const LONGEST_GAP: u64 = 100_000;
+/// Missing samples of a gap that are gone through one by one; a time that is farther off is none.
+const LONGEST_GAP: f64 = 100_000.0;
 /// Chance that the time constants are beyond the range in view, above which that is said.
 const LIKELY: f64 = 0.05;
 /// Rows over which it is watched whether readings are what the start led to expect, and by how many standard deviations of such a mean
@@ -76,6 +76,7 @@ impl Live {
     /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a stream cannot undo,
     /// [`Error::LiveStart`] where the start does not determine both time constants, or is not evenly spaced.
     pub fn start(record: &Record, options: &LiveOptions) -> Result<Self, Error> {
+        options.characterise.check_not_fitted("track --live")?;
         if record.sampling.kind == SamplingKind::Irregular {
             return Err(Error::LiveStart { why: "rows that are evenly spaced in time".into() });
         }
@@ -96,7 +97,7 @@ impl Live {
                 return Err(Error::LiveEffect { effect: e.effect.name() });
             }
         }
-        let (start, fit) = with_model(record, &model, &options.characterise)?;
+        let (mut start, fit) = with_model(record, &model, &options.characterise)?;
         let tau_s = [0, 1].map(|i| fit.time_constants[i].value_s);
         let (Some(extended), [Some(tau1_s), Some(tau2_s)]) = (&fit.extended, tau_s) else {
             return Err(Error::LiveStart {
@@ -110,6 +111,12 @@ impl Live {
         let [gain, offset_k] = extended.calibration(extended.parameters());
         let prior = learn(&readings, &rig)?.prior;
         let change = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
+        if start.status == Status::ModelRejected {
+            start.warnings.push(
+                "the start contradicts the model: gas temperature and time constants are off by more than their bands say. `twinlag                  diagnose START.csv --save model.json` looks for what is missing, --model model.json takes it"
+                    .into(),
+            );
+        }
         let period_s = record.sampling.period_s;
         let push = tracker(&rig, &prior, period_s, change).ok_or(Error::LiveEffect { effect: "delay" })?;
         let log_variance = [0, 1].map(|i| {
@@ -120,16 +127,16 @@ impl Live {
     }
 
     /// What is known once a row is read: both readings, °C, `None` for one that is missing, at `time_s`; a sample after the last one where
-    /// that is not said. `None` for a row that is not later than the last one, which is left out. Samples that are missing in a gap are
+    /// that is not said. `None` for a row that is not later than the last one, or 100 000 samples after it, which is left out. Samples that are missing in a gap are
     /// gone through as such.
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
         let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);
         let steps = self.last_s.map_or(1.0, |last_s| ((time_s - last_s) / self.period_s).round());
-        if steps < 1.0 {
+        if !(1.0..=LONGEST_GAP).contains(&steps) {
             return None;
         }
-        for _ in 1..(steps as u64).min(LONGEST_GAP) {
+        for _ in 1..steps as u64 {
             (self.push)([None, None]);
         }
         self.last_s = Some(time_s);

@@ -228,6 +228,21 @@ pub struct Options {
 }
 
 impl Options {
+    /// Refuses to leave out what was asked to be fitted: `what` takes calibration and second lags from a model.
+    pub(crate) fn check_not_fitted(&self, what: &str) -> Result<(), Error> {
+        let (option, got) = if self.free_gain || self.free_offset {
+            ("--free", "gain or offset")
+        } else if self.second_order != [false; 2] {
+            ("--second-order", "a second lag")
+        } else {
+            return Ok(());
+        };
+        let expected = format!(
+            "nothing: {what} takes what is to be undone from a model (`twinlag diagnose --save`, then --model)"
+        );
+        Err(Error::Option { option, expected, got: got.into() })
+    }
+
     /// Parses a list such as `gain,offset` into [`Options::free_gain`] and [`Options::free_offset`].
     ///
     /// # Errors

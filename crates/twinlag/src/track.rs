@@ -117,6 +117,7 @@ pub fn track(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) 
 }
 
 fn whole(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) -> Result<Track, Error> {
+    options.characterise.check_not_fitted("track")?;
     let effects = match &options.model {
         Some(model) => {
             check_channels(record, model)?;

@@ -1,6 +1,6 @@
-//! A prior of readings that are partly missing, by their exact likelihood.
+//! A prior of readings that are partly missing, or uneven, by their exact likelihood.
 //!
-//! Straight lines over what is missing take high frequencies away, and a periodogram then shows a gas that is smoother than it was. Kalman's
+//! Straight lines between readings take high frequencies away, and a periodogram then shows a gas that is smoother than it was. Kalman's
 //! filter needs no such lines: what it leads to expect of each reading gives the likelihood of all of them.
 
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem};
@@ -13,8 +13,9 @@ use crate::reconstruct::reconstruct;
 use crate::rig::Rig;
 use crate::smooth::Form;
 
-/// Samples that the likelihood is taken of, at most.
+/// Samples that the likelihood is taken of, at most: of uneven ones, each of which has a matrix exponential of its own, fewer.
 const MOST: usize = 4096;
+const MOST_UNEVEN: usize = 1024;
 /// Evaluations of it for each candidate.
 const EVALUATIONS: u64 = 120;
 /// Edge of the first simplex: a quarter, in a logarithm.
@@ -22,8 +23,15 @@ const EDGE: f64 = 0.25;
 const SPREAD: f64 = 0.05;
 
 /// Of `found` and each kind of single part the one that is likeliest, their costs counted, with numbers of its own.
-pub(super) fn choose(search: &Search<'_>, readings: &Readings, rig: &Rig, level_c: f64, found: Vec<Part>) -> Vec<Part> {
-    let readings = readings.first(MOST);
+pub(super) fn choose(
+    search: &Search<'_>,
+    readings: &Readings,
+    rig: &Rig,
+    level_c: f64,
+    found: Vec<Part>,
+    is_uneven: bool,
+) -> Vec<Part> {
+    let readings = readings.first(if is_uneven { MOST_UNEVEN } else { MOST });
     let bins = search.bins();
     let singles = search.best_of_each_kind().into_iter().map(|part| vec![part]);
     let candidates = singles.chain([found.clone()]).map(|parts| {

@@ -11,6 +11,8 @@ use crate::track::Track;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
+/// A step so many times the period is a gap.
+const GAP: f64 = 2.5;
 
 /// Readings and gas temperature with its band, over the record and where it moves most, and the spectra before and after with the
 /// frequency up to which the readings decide: one SVG.
@@ -43,12 +45,18 @@ pub(super) fn temperature_figure(record: &Record, answer: &Compensation) -> Figu
 
 fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std::ops::Range<usize>) -> Chart {
     let time_s = &answer.time_s[shown.clone()];
+    // Nothing is drawn across a gap: the instants at its ends have none between them.
+    let is_apart =
+        |k: usize| k > shown.start && answer.time_s[k] - answer.time_s[k - 1] > GAP * record.sampling.period_s;
     let ends = [time_s.first().copied().unwrap_or(0.0), time_s.last().copied().unwrap_or(0.0)];
     let rows = record.time_s.partition_point(|t| *t < ends[0])..record.time_s.partition_point(|t| *t <= ends[1]);
-    let band = |sign: f64| -> Vec<f64> {
-        shown.clone().map(|k| answer.gas_c[k] + sign * Z_975 * answer.gas_std_k[k]).collect()
+    let broken = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        shown.clone().flat_map(|k| is_apart(k).then_some(f64::NAN).into_iter().chain([value(k)])).collect()
     };
-    let gas = Series::trace("gas, with its 95 % band", time_s, &answer.gas_c[shown.clone()]).colour(Colour::Green);
+    let band = |sign: f64| broken(&|k| answer.gas_c[k] + sign * Z_975 * answer.gas_std_k[k]);
+    // The instant of a break is that of what comes after it.
+    let at_s: Vec<f64> = shown.clone().flat_map(|k| vec![answer.time_s[k]; 1 + usize::from(is_apart(k))]).collect();
+    let gas = Series::trace("gas, with its 95 % band", at_s, broken(&|k| answer.gas_c[k])).colour(Colour::Green);
     let mut chart = Chart::new(title, Axis::linear("time (s)"), Axis::linear("temperature (°C)"));
     for (i, values) in [&record.t1_c, &record.t2_c].into_iter().enumerate() {
         let colour = [Colour::Blue, Colour::Orange][i];
