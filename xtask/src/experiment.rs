@@ -2,6 +2,7 @@
 
 mod coverage;
 mod loops;
+mod pair;
 mod reconstruction;
 mod stored;
 mod surface;
@@ -24,7 +25,6 @@ use twinlag_study::{Options, Outcome, Part, Results, Shard, Study};
 
 use crate::root;
 pub(crate) use loops::record_of;
-use stored::Own;
 
 /// What to do with the experiments.
 #[derive(Subcommand)]
@@ -100,7 +100,7 @@ pub(crate) fn run(task: Task) -> Result<()> {
         Task::Draw { name } => draw(&name),
         Task::Merge { name, parts, out } => {
             let results = twinlag_study::merge(&parts)?;
-            if let Some(own) = Own::read(&name, &text(&name)?) {
+            if let Some(own) = stored::read(&name, &text(&name)?) {
                 return own?.merge(&results, &out);
             }
             let plan = plan(&name)?;
@@ -163,14 +163,14 @@ fn plan(name: &str) -> Result<Plan> {
 }
 
 fn title(name: &str) -> Result<String> {
-    if let Some(own) = Own::read(name, &text(name)?) {
+    if let Some(own) = stored::read(name, &text(name)?) {
         return Ok(own?.title().to_owned());
     }
     if name == surface::NAME { Ok(surface::Plan::read(&text(name)?)?.title) } else { Ok(plan(name)?.title) }
 }
 
 fn draw(name: &str) -> Result<()> {
-    if name == surface::NAME || Own::read(name, &text(name)?).is_some() {
+    if name == surface::NAME || stored::read(name, &text(name)?).is_some() {
         println!("{name}: its pictures and tables are made by running it");
         return Ok(());
     }
@@ -189,7 +189,7 @@ fn one(name: &str, run: &Run) -> Result<()> {
     if name == surface::NAME {
         return surface::run(&surface::Plan::read(&text(name)?)?, run.out.as_deref().unwrap_or(&folder), run.check);
     }
-    if let Some(own) = Own::read(name, &text(name)?) {
+    if let Some(own) = stored::read(name, &text(name)?) {
         return own?.run(&folder, run);
     }
     let mut plan = plan(name)?;

@@ -32,7 +32,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
     };
     let selection = command.input.columns.selection();
     let mut lines = Lines::open(&command.input.file)?;
-    let (table, source) = lines.start(rows)?;
+    let table = lines.start(rows)?;
     let record = Record::from_table(&table, &selection)?;
     print::notes(&record, talk);
     let reader = RowReader::after(&table, &selection)?;
@@ -51,6 +51,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
     }
     // What was read so far is out before the next row is waited for.
     out.flush()?;
+    let source = table.source();
     let mut bad = Bad::default();
     let (mut is_beyond, mut is_wider) = (false, false);
     while let Some((number, line)) = lines.next()? {
@@ -131,8 +132,8 @@ impl Lines {
         Ok(read > 0)
     }
 
-    /// The first lines, until `rows` of them are rows, and the name for messages.
-    fn start(&mut self, rows: usize) -> Result<(Table, String), Failure> {
+    /// The first lines, until `rows` of them are rows.
+    fn start(&mut self, rows: usize) -> Result<Table, Failure> {
         let mut text = Vec::new();
         let mut wanted = rows;
         loop {
@@ -142,7 +143,7 @@ impl Lines {
             }
             let table = Table::read(&text, &self.name)?;
             if table.rows() >= rows {
-                return Ok((table, self.name.clone()));
+                return Ok(table);
             }
             if !goes_on {
                 let (name, got) = (&self.name, table.rows());

@@ -35,8 +35,8 @@ fn tracked(record: &Answer) -> Vec<Tracked> {
     (0..SAMPLES).map(|k| push([Some(record.t1_c[k]), Some(record.t2_c[k])])).collect()
 }
 
-/// A change that is smoother than a random walk is followed by one with a band that is too wide rather than too narrow. Its error is well
-/// below the change: the noise lets a window of 0.3 s, in which that changes by 3 % at most, tell some 3 %.
+/// A change that is smoother than a random walk is followed by one with a band that is too wide rather than too narrow. Its error is a
+/// tenth of the change at most.
 #[test]
 fn a_slow_change_is_followed() {
     let flow = Flow::Sine(FlowSine::new(0.3, 20.0, 0.0));

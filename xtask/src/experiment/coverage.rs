@@ -10,11 +10,12 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use twinlag::compensation::Form;
 use twinlag::cross_relation::Parameter;
-use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal, Simulated};
+use twinlag::signal::{Record as Sampling, Rig, Simulated};
 use twinlag::{CompensateOptions, DiagnoseOptions, Known, Model, Options, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
-use super::stored::Stored;
+use super::pair::{self, Named};
+use super::stored::{Head, Stored};
 
 pub(super) const NAME: &str = "reconstruction-coverage";
 
@@ -39,31 +40,18 @@ pub(super) struct Plan {
     gases: Vec<Named>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Named {
-    name: String,
-    #[serde(flatten)]
-    signal: Signal,
-}
-
 /// What is asked of each record, by name.
 const CASES: [&str; 5] = ["smoother, all known", "smoother", "smoother, readings missing", "fixed lag", "filter"];
 /// A standard deviation that nothing sees: both time constants cannot be held.
 const AS_GOOD_AS_EXACT: f64 = 1e-6;
+/// Records that a gas's standard deviation is taken from.
+const RECORDS: u64 = 20;
 /// Share of the instants at which the gas moves most.
 const LIVELY: f64 = 0.1;
 
 impl Plan {
     pub(super) fn read(text: &str) -> Result<Self> {
         toml::from_str(text).context("the plan of a reconstruction's coverage")
-    }
-
-    /// One gas, short.
-    pub(super) fn shorten(&mut self) {
-        self.trials = 1;
-        self.samples.truncate(1);
-        self.gases.truncate(1);
-        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
     }
 
     /// Gas, noise in per cent and samples of a cell.
@@ -74,26 +62,8 @@ impl Plan {
 
     fn rig(&self, cell: usize, noise_std_k: f64) -> Result<Rig, Failure> {
         let (gas, _, samples) = self.place(cell);
-        let sensors = [0, 1].map(|i| {
-            let mut sensor = Sensor::new(["T1", "T2"][i], self.tau_s[i]);
-            sensor.noise = Some(Noise::white(noise_std_k));
-            sensor
-        });
-        let mut signal = Gas::new(300.0, self.gases[gas].signal.clone());
-        signal.per_trial = true;
-        Ok(Rig::new(self.seed + cell as u64, Sampling::new(samples, self.sample_period_s), signal, sensors)?)
-    }
-
-    /// Standard deviation of the gas, K, of records that no trial is of.
-    fn gas_std_k(&self, cell: usize) -> Result<f64, Failure> {
-        const RECORDS: u64 = 20;
-        let rig = self.rig(cell, 1.0)?;
-        let mut squares = 0.0;
-        for record in 0..RECORDS {
-            let gas_c = rig.simulate_trial((1 << 40) + record)?.gas_c;
-            squares += gas_c.iter().map(|c| (c - 300.0).powi(2)).sum::<f64>() / gas_c.len() as f64;
-        }
-        Ok((squares / RECORDS as f64).sqrt())
+        let sampling = Sampling::new(samples, self.sample_period_s);
+        pair::rig(self.seed + cell as u64, sampling, &self.gases[gas], self.tau_s, Some(noise_std_k))
     }
 }
 
@@ -122,7 +92,7 @@ impl Study for Plan {
     }
 
     fn scratch(&self, cell: usize) -> std::result::Result<f64, Failure> {
-        Ok(0.01 * self.place(cell).1 * self.gas_std_k(cell)?)
+        Ok(0.01 * self.place(cell).1 * pair::gas_std_k(&self.rig(cell, 1.0)?, RECORDS)?)
     }
 
     fn trial(
@@ -194,28 +164,22 @@ fn inside(truth: &[f64], gas_c: &[f64], std_k: &[f64]) -> [f64; 2] {
 }
 
 impl Stored for Plan {
-    fn name(&self) -> &str {
-        &self.name
+    fn head(&self) -> Head<'_> {
+        let Plan { name, title, seed, .. } = self;
+        Head { name, title, seed: *seed }
     }
 
-    fn title(&self) -> &str {
-        &self.title
+    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
+        self.trials = trials.unwrap_or(self.trials);
+        self.seed = seed.unwrap_or(self.seed);
     }
 
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn set_seed(&mut self, seed: u64) {
-        self.seed = seed;
-    }
-
-    fn set_trials(&mut self, trials: u64) {
-        self.trials = trials;
-    }
-
+    /// One gas, short.
     fn shorten(&mut self) {
-        Plan::shorten(self);
+        self.trials = 1;
+        self.samples.truncate(1);
+        self.gases.truncate(1);
+        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
     }
 
     fn cell_name(&self, cell: usize) -> String {

@@ -15,7 +15,7 @@ use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
-use super::stored::Stored;
+use super::stored::{Head, Stored};
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,13 +41,6 @@ impl Plan {
     pub(super) fn read(text: &str) -> Option<Result<Self>> {
         let is_one = text.lines().any(|l| l.starts_with("sets"));
         is_one.then(|| toml::from_str(text).context("the plan of the closed loop"))
-    }
-
-    /// One record of the first set, of the two largest sizes.
-    pub(super) fn shorten(&mut self) {
-        self.records = 1;
-        self.sets.truncate(1);
-        self.size_factors.drain(..self.size_factors.len().saturating_sub(2));
     }
 
     fn cells(&self) -> Vec<(&[Kind], f64)> {
@@ -202,28 +195,21 @@ fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
 }
 
 impl Stored for Plan {
-    fn name(&self) -> &str {
-        &self.name
+    fn head(&self) -> Head<'_> {
+        let Plan { name, title, seed, .. } = self;
+        Head { name, title, seed: *seed }
     }
 
-    fn title(&self) -> &str {
-        &self.title
+    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
+        self.records = trials.unwrap_or(self.records);
+        self.seed = seed.unwrap_or(self.seed);
     }
 
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn set_seed(&mut self, seed: u64) {
-        self.seed = seed;
-    }
-
-    fn set_trials(&mut self, trials: u64) {
-        self.records = trials;
-    }
-
+    /// One record of the first set, of the two largest sizes.
     fn shorten(&mut self) {
-        Plan::shorten(self);
+        self.records = 1;
+        self.sets.truncate(1);
+        self.size_factors.drain(..self.size_factors.len().saturating_sub(2));
     }
 
     fn cell_name(&self, cell: usize) -> String {

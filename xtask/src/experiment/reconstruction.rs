@@ -13,11 +13,12 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
-use twinlag::signal::{Gas, Noise, Record as Sampling, Rig, Sensor, Signal};
+use twinlag::signal::{Record as Sampling, Rig};
 use twinlag::{CompensateOptions, Estimator, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 
-use super::stored::Stored;
+use super::pair::{self, LEVEL_C, Named, OTHERS};
+use super::stored::{Head, Stored};
 
 pub(super) const NAME: &str = "reconstruction";
 
@@ -37,13 +38,6 @@ pub(super) struct Plan {
     gases: Vec<Named>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Named {
-    name: String,
-    #[serde(flatten)]
-    signal: Signal,
-}
-
 /// Samples of a noise-free record that correlations are taken from, in records of a trial, and how many of these.
 const LONGER: usize = 8;
 const RECORDS: u64 = 400;
@@ -58,22 +52,9 @@ impl Plan {
         toml::from_str(text).context("the plan of a reconstruction")
     }
 
-    /// One gas with the most noise, short.
-    pub(super) fn shorten(&mut self) {
-        (self.trials, self.samples) = (1, 300);
-        self.gases.truncate(1);
-        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
-    }
-
     fn rig(&self, gas: usize, noise_std_k: Option<f64>, samples: usize) -> Result<Rig, Failure> {
-        let sensors = [0, 1].map(|i| {
-            let mut sensor = Sensor::new(["T1", "T2"][i], self.tau_s[i]);
-            sensor.noise = noise_std_k.map(Noise::white);
-            sensor
-        });
-        let mut signal = Gas::new(300.0, self.gases[gas].signal.clone());
-        signal.per_trial = true;
-        Ok(Rig::new(self.seed + gas as u64, Sampling::new(samples, self.sample_period_s), signal, sensors)?)
+        let sampling = Sampling::new(samples, self.sample_period_s);
+        pair::rig(self.seed + gas as u64, sampling, &self.gases[gas], self.tau_s, noise_std_k)
     }
 }
 
@@ -137,10 +118,9 @@ impl Moments {
         let (forward, inverse) = (planner.plan_fft_forward(2 * m), planner.plan_fft_inverse(2 * m));
         let mut sums: [[Vec<_>; 3]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| inverse.make_input_vec()));
         for record in 0..RECORDS {
-            // Other records than those of the trials.
-            let simulated = rig.simulate_trial((1 << 40) + record)?;
+            let simulated = rig.simulate_trial(OTHERS + record)?;
             let spectra = [&simulated.gas_c, &simulated.t1_c, &simulated.t2_c].map(|values| {
-                let mut padded: Vec<f64> = values.iter().map(|v| v - 300.0).collect();
+                let mut padded: Vec<f64> = values.iter().map(|v| v - LEVEL_C).collect();
                 padded.resize(2 * m, 0.0);
                 let mut out = forward.make_output_vec();
                 forward.process(&mut padded, &mut out).expect("lengths agree");
@@ -208,10 +188,10 @@ impl Study for Reconstruction {
         let truth = simulated.gas_c.clone();
         let mean_square =
             |values: &[f64]| values.iter().zip(&truth).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / n as f64;
-        let about = |values: &[f64]| values.iter().map(|v| v - 300.0).collect::<Vec<f64>>();
+        let about = |values: &[f64]| values.iter().map(|v| v - LEVEL_C).collect::<Vec<f64>>();
         let readings = [about(&simulated.t1_c), about(&simulated.t2_c)].concat();
         let by_oracle = self.oracle(cell) * Mat::from_fn(2 * n, 1, |k, _| readings[k]);
-        let by_oracle: Vec<f64> = (0..n).map(|k| 300.0 + by_oracle[(k, 0)]).collect();
+        let by_oracle: Vec<f64> = (0..n).map(|k| LEVEL_C + by_oracle[(k, 0)]).collect();
         outcome.value(0, mean_square(&by_oracle));
         let faster = simulated.t1_c.clone();
         let record = super::record_of(simulated)?;
@@ -250,29 +230,23 @@ fn inverse(reading_c: &[f64], tau_s: f64, period_s: f64) -> Vec<f64> {
 }
 
 impl Stored for Reconstruction {
-    fn name(&self) -> &str {
-        &self.plan.name
+    fn head(&self) -> Head<'_> {
+        let Plan { name, title, seed, .. } = &self.plan;
+        Head { name, title, seed: *seed }
     }
 
-    fn title(&self) -> &str {
-        &self.plan.title
+    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
+        let plan = &mut self.plan;
+        plan.trials = trials.unwrap_or(plan.trials);
+        plan.seed = seed.unwrap_or(plan.seed);
     }
 
-    fn seed(&self) -> u64 {
-        self.plan.seed
-    }
-
-    fn set_seed(&mut self, seed: u64) {
-        self.plan.seed = seed;
-    }
-
-    fn set_trials(&mut self, trials: u64) {
-        self.plan.trials = trials;
-    }
-
+    /// One gas with the most noise, short.
     fn shorten(&mut self) {
         let mut plan = self.plan.clone();
-        plan.shorten();
+        (plan.trials, plan.samples) = (1, 300);
+        plan.gases.truncate(1);
+        plan.noise_percent.drain(..plan.noise_percent.len().saturating_sub(1));
         *self = Self::new(plan);
     }
 

@@ -13,11 +13,12 @@ use std::sync::OnceLock;
 
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
-use twinlag::signal::{Flow, FlowSine, FlowStep, Gas, Noise, Record as Sampling, Rig, Sensor, Signal, Simulated};
+use twinlag::signal::{Flow, FlowSine, FlowStep, Record as Sampling, Rig, Simulated};
 use twinlag::{Track, TrackOptions, track};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
-use super::stored::Stored;
+use super::pair::{self, Named};
+use super::stored::{Head, Stored};
 use bound::{Bound, Spread};
 
 pub(super) const NAME: &str = "tracking";
@@ -44,13 +45,6 @@ pub(super) struct Plan {
     /// The noise that is drawn.
     pictured_percent: f64,
     gases: Vec<Named>,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Named {
-    name: String,
-    #[serde(flatten)]
-    signal: Signal,
 }
 
 /// What the flow does.
@@ -108,30 +102,14 @@ impl Plan {
         toml::from_str(text).context("the plan of changing flow")
     }
 
-    /// One gas with the most noise, short.
-    pub(super) fn shorten(&mut self) {
-        (self.trials, self.samples) = (1, 600);
-        self.gases.truncate(1);
-        for levels in [&mut self.noise_percent, &mut self.other_noise_percent] {
-            levels.drain(..levels.len().saturating_sub(1));
-        }
-    }
-
     fn noise_percent(&self, kind: Kind) -> &[f64] {
         if kind == Kind::Swing { &self.noise_percent } else { &self.other_noise_percent }
     }
 
     /// - `seed`: added to the plan's
     fn rig(&self, seed: u64, gas: usize, flow: Option<Flow>, noise_std_k: Option<f64>) -> Result<Rig, Failure> {
-        let sensors = [0, 1].map(|i| {
-            let mut sensor = Sensor::new(["T1", "T2"][i], self.tau_s[i]);
-            sensor.noise = noise_std_k.map(Noise::white);
-            sensor
-        });
-        let mut signal = Gas::new(300.0, self.gases[gas].signal.clone());
-        signal.per_trial = true;
         let sampling = Sampling::new(self.samples, self.sample_period_s);
-        let rig = Rig::new(self.seed + seed, sampling, signal, sensors)?;
+        let rig = pair::rig(self.seed + seed, sampling, &self.gases[gas], self.tau_s, noise_std_k)?;
         Ok(if let Some(flow) = flow { rig.with_flow(flow)? } else { rig })
     }
 
@@ -194,13 +172,8 @@ impl Tracking {
             return Ok(*std_k);
         }
         let rig = self.plan.rig(gas as u64, gas, None, None)?;
-        let mut sum = 0.0;
-        for record in 0..RECORDS {
-            // Other records than those of the trials.
-            let gas_c = rig.simulate_trial((1 << 40) + record)?.gas_c;
-            sum += gas_c.iter().map(|x| (x - 300.0).powi(2)).sum::<f64>() / gas_c.len() as f64;
-        }
-        Ok(*self.gas_std_k[gas].get_or_init(|| (sum / RECORDS as f64).sqrt()))
+        let std_k = pair::gas_std_k(&rig, RECORDS)?;
+        Ok(*self.gas_std_k[gas].get_or_init(|| std_k))
     }
 
     fn run(&self, cell: usize, index: u64) -> Result<Trial, Failure> {
@@ -344,29 +317,25 @@ fn fixed(size: usize) -> String {
 }
 
 impl Stored for Tracking {
-    fn name(&self) -> &str {
-        &self.plan.name
+    fn head(&self) -> Head<'_> {
+        let Plan { name, title, seed, .. } = &self.plan;
+        Head { name, title, seed: *seed }
     }
 
-    fn title(&self) -> &str {
-        &self.plan.title
+    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
+        let plan = &mut self.plan;
+        plan.trials = trials.unwrap_or(plan.trials);
+        plan.seed = seed.unwrap_or(plan.seed);
     }
 
-    fn seed(&self) -> u64 {
-        self.plan.seed
-    }
-
-    fn set_seed(&mut self, seed: u64) {
-        self.plan.seed = seed;
-    }
-
-    fn set_trials(&mut self, trials: u64) {
-        self.plan.trials = trials;
-    }
-
+    /// One gas with the most noise, short.
     fn shorten(&mut self) {
         let mut plan = self.plan.clone();
-        plan.shorten();
+        (plan.trials, plan.samples) = (1, 600);
+        plan.gases.truncate(1);
+        for levels in [&mut plan.noise_percent, &mut plan.other_noise_percent] {
+            levels.drain(..levels.len().saturating_sub(1));
+        }
         *self = Self::new(plan);
     }
 
