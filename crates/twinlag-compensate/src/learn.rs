@@ -1,8 +1,8 @@
 //! What the gas is like, from the readings themselves.
 //!
 //! Whittle's likelihood of the periodogram, `−Σ ln P + I/P`, `P` the power that a prior and the noise are expected to give: parts are
-//! added one at a time, each where it explains most, as long as the likelihood gains more than the numbers cost (Akaike's
-//! criterion; a line costs the choice of its frequency among all bins as well).
+//! added one at a time, each where it explains most, and exchanged for others, as long as the readings become more probable, the
+//! numbers integrated out (MacKay 2003, chapter 28).
 
 mod holes;
 mod part;
@@ -34,6 +34,15 @@ const BINS_PER_ONE: f64 = 1.944;
 const HARMONIC_GAIN: f64 = 1.0;
 /// Step of a logarithm in differences.
 const STEP: f64 = 1e-4;
+/// Candidates that are fitted to the end, after all were begun.
+const PROMISING: usize = 4;
+/// Differences of scores: what fits that end early leave; beyond which fitting all numbers together is not tried; and within which parts
+/// of other kinds are nearly as likely, one to twenty.
+const NOTHING_GAINED: f64 = 0.5;
+const HOPELESS: f64 = 15.0;
+const NEARLY: f64 = 6.0;
+/// Priors beside the best one, at most.
+const MOST_OTHERS: usize = 4;
 /// Standard deviation of the logarithm of each number before the readings are looked at: what they do not tell is known within a factor
 /// of e.
 const LOG_STD: f64 = 1.0;
@@ -45,6 +54,9 @@ pub struct Learned {
     pub prior: Prior,
     /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky factor at a time.
     pub deviations: Vec<Prior>,
+    /// Priors of other kinds that the readings do not tell from it, and their weights; its own weight is what is left to one. Where a
+    /// spectrum sinks below the noise, how it goes on is not in the readings.
+    pub others: Vec<(f64, Prior)>,
 }
 
 /// The prior that `readings` of `rig` support, the covariance of its numbers the inverse of Fisher's information.
@@ -70,14 +82,25 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
     let search = Search { periodogram: &periodogram, limits, room };
-    let mut parts = search.run();
+    let (best, mut others) = search.run();
+    let score = best.score();
+    let mut parts = best.parts;
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > FEW_MISSING;
     if missing > FEW_MISSING || is_uneven {
         parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
+        others.clear();
     }
     let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
-    Ok(Learned { prior: prior(&parts), deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect() })
+    // Kinds were equally probable before the readings.
+    let weights: Vec<f64> = others.iter().map(|o| (0.5 * (score - o.score())).exp()).collect();
+    let all = 1.0 + weights.iter().sum::<f64>();
+    let others = weights.iter().zip(&others).map(|(weight, other)| (weight / all, prior(&other.parts))).collect();
+    Ok(Learned {
+        prior: prior(&parts),
+        deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect(),
+        others,
+    })
 }
 
 struct Search<'a> {
@@ -92,63 +115,138 @@ struct Search<'a> {
 struct Fitted {
     parts: Vec<Part>,
     deviance: f64,
+    /// Twice the logarithm of how much more there was to choose from than the readings leave.
+    cost: f64,
 }
 
 impl Fitted {
-    /// Twice the negative logarithm of the likelihood, and what the numbers cost. A part of a periodogram of `bins` independent bins.
-    fn score(&self, bins: f64) -> f64 {
-        self.deviance / BINS_PER_ONE + self.parts.iter().map(|p| p.cost(bins)).sum::<f64>()
+    /// Parts that are yet to be fitted.
+    const fn unknown(parts: Vec<Part>) -> Self {
+        Self { parts, deviance: f64::INFINITY, cost: 0.0 }
+    }
+
+    /// Minus twice the logarithm of the probability of the readings, the numbers integrated out by Laplace's method.
+    fn score(&self) -> f64 {
+        self.deviance / BINS_PER_ONE + self.cost
     }
 }
 
 impl Search<'_> {
-    /// Independent bins.
-    fn bins(&self) -> f64 {
-        self.periodogram.power.len() as f64 / BINS_PER_ONE
+    /// The likeliest parts: they are added, and then each is exchanged for what explains more in its place, until neither gains. With
+    /// those of other kinds that came up on the way and are nearly as likely.
+    fn run(&self) -> (Fitted, Vec<Fitted>) {
+        let nothing = Fitted::unknown(Vec::new());
+        let mut seen = self.grown(self.best(&nothing, self.kinds().concat()));
+        let mut current = self.likeliest(&seen);
+        loop {
+            let others = self.exchanged(&current);
+            seen.extend(others.iter().cloned());
+            let better = self.likeliest(&others);
+            if better.score() >= current.score() - NOTHING_GAINED {
+                break;
+            }
+            seen.extend(self.grown(better));
+            current = self.likeliest(&seen);
+        }
+        let mut told = vec![kinds(&current.parts)];
+        seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        seen.retain(|other| {
+            let kinds = kinds(&other.parts);
+            let is_new = !told.contains(&kinds) && other.score() < current.score() + NEARLY;
+            told.push(kinds);
+            is_new
+        });
+        seen.truncate(MOST_OTHERS);
+        (current, seen)
     }
 
-    fn run(&self) -> Vec<Part> {
-        let n = self.bins();
-        let nothing = Fitted { parts: Vec::new(), deviance: f64::INFINITY };
-        let mut current = self.best(&nothing, self.first());
+    /// The one of `all` with the least score.
+    fn likeliest(&self, all: &[Fitted]) -> Fitted {
+        let best = all.iter().min_by(|a, b| a.score().total_cmp(&b.score()));
+        best.cloned().unwrap_or(Fitted::unknown(Vec::new()))
+    }
+
+    /// `from`, and then with more parts, as long as each gains more than it costs.
+    fn grown(&self, from: Fitted) -> Vec<Fitted> {
+        let mut out = vec![from];
         loop {
-            let room = self.room.saturating_sub(states(&current.parts));
-            let candidates = self.more(&current).into_iter().filter(|p| states(std::slice::from_ref(p)) <= room);
-            let mut next = self.best(&current, candidates.collect());
-            if next.parts.len() > 1 {
-                next = self.fit(&next.parts, &self.periodogram.noise, 25);
-                next.parts.retain(|p| !p.is_nothing(&self.limits));
+            let current = &out[out.len() - 1];
+            let next = self.jointly(self.best(current, self.within(&current.parts, self.more(current))));
+            if next.score() >= current.score() - NOTHING_GAINED {
+                return out;
             }
-            if next.score(n) >= current.score(n) {
-                return current.parts;
-            }
-            current = next;
+            out.push(next);
         }
+    }
+
+    /// `current` with one part left out, or one of each kind in its place, or a comb that ends elsewhere.
+    fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
+        let mut out = Vec::new();
+        for i in 0..current.parts.len() {
+            let mut parts = current.parts.clone();
+            parts.remove(i);
+            let others = self.jointly(Fitted::unknown(parts));
+            for kind in self.kinds() {
+                let other = self.best(&others, self.within(&others.parts, kind));
+                if other.score() < current.score() + HOPELESS {
+                    out.push(self.jointly(other));
+                }
+            }
+            if !others.parts.is_empty() {
+                out.push(others);
+            }
+            if let Some(otherwise) = current.parts[i].otherwise() {
+                let mut parts = current.parts.clone();
+                parts[i] = otherwise;
+                out.push(self.jointly(Fitted::unknown(parts)));
+            }
+        }
+        out
+    }
+
+    /// All numbers fitted together, parts that come to nothing left out.
+    fn jointly(&self, current: Fitted) -> Fitted {
+        if current.parts.is_empty() || (current.parts.len() == 1 && current.deviance.is_finite()) {
+            return current;
+        }
+        let mut fitted = self.fit(&current.parts, &self.periodogram.noise, 25);
+        fitted.parts.retain(|p| !p.is_nothing(&self.limits));
+        fitted
+    }
+
+    /// Those of `candidates` for which `parts` leave room.
+    fn within(&self, parts: &[Part], candidates: Vec<Part>) -> Vec<Part> {
+        let room = self.room.saturating_sub(states(parts));
+        candidates.into_iter().filter(|p| states(std::slice::from_ref(p)) <= room).collect()
     }
 
     /// `current` with the one of `candidates` that explains most beside it.
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
         let others = self.expected(&current.parts);
-        let added = candidates.into_iter().map(|part| self.fit(&[part], &others, 12));
-        let n = self.bins();
-        match added.min_by(|a, b| a.score(n).total_cmp(&b.score(n))) {
-            Some(added) => {
-                Fitted { parts: current.parts.iter().cloned().chain(added.parts).collect(), deviance: added.deviance }
-            }
+        let mut begun: Vec<Fitted> = candidates.into_iter().map(|part| self.fit(&[part], &others, 3)).collect();
+        begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        begun.truncate(PROMISING);
+        let added = begun.into_iter().map(|begun| self.fit(&begun.parts, &others, 12));
+        match added.min_by(|a, b| a.score().total_cmp(&b.score())) {
+            Some(added) => Fitted {
+                parts: current.parts.iter().cloned().chain(added.parts).collect(),
+                deviance: added.deviance,
+                cost: current.cost + added.cost,
+            },
             None => current.clone(),
         }
     }
 
+    /// What the choice of the numbers of `parts` costs.
+    fn cost(&self, parts: &[Part]) -> f64 {
+        Whittle { periodogram: self.periodogram, others: &self.periodogram.noise, parts }.cost()
+    }
+
     /// `parts` with their numbers moved by a standard error, one column at a time.
     fn deviations(&self, parts: &[Part]) -> Vec<Vec<Part>> {
-        let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
         let cost = Whittle { periodogram: self.periodogram, others: &self.periodogram.noise, parts };
-        let Some(derivatives) = cost.derivatives(&values) else { return Vec::new() };
-        // Of the logarithms; the deviance is twice the logarithm of the likelihood.
-        let information = DMatrix::from_fn(values.len(), values.len(), |a, b| {
-            let told = derivatives.curvature[a][b] * values[a] * values[b] / (2.0 * BINS_PER_ONE);
-            told + if a == b { 1.0 / (LOG_STD * LOG_STD) } else { 0.0 }
-        });
+        let Some(information) = cost.information() else { return Vec::new() };
+        let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
         let Some(factor) = information.cholesky() else { return Vec::new() };
         let columns = factor.l().transpose().try_inverse().unwrap_or_default();
         let moved = columns.column_iter().map(|column| {
@@ -158,13 +256,9 @@ impl Search<'_> {
         moved.collect()
     }
 
-    fn first(&self) -> Vec<Part> {
-        self.kinds().concat()
-    }
-
     /// Of each kind of single part the one that explains most.
     fn best_of_each_kind(&self) -> Vec<Part> {
-        let nothing = Fitted { parts: Vec::new(), deviance: f64::INFINITY };
+        let nothing = Fitted::unknown(Vec::new());
         self.kinds().into_iter().flat_map(|kind| self.best(&nothing, kind).parts).collect()
     }
 
@@ -207,15 +301,17 @@ impl Search<'_> {
             let quality = (hz * self.limits.span_s / width).max(0.5);
             out.push(Part::Single(Term::Resonance { std_k: excess_k(j, half), frequency_hz: hz, quality }));
             if half >= 16 {
-                out.push(Part::Single(Term::Rough { std_k: excess_k(j, half), corner_hz: hz }));
+                let std_k = excess_k(j, half);
+                out.push(Part::Single(Term::Rough { std_k, corner_hz: hz }));
+                out.push(Part::Turbulent { std_k, corner_hz: hz, fastest_hz: 0.5 / self.limits.period_s });
             }
         }
-        out.extend(self.comb(&ratio, excess_k));
+        out.extend(self.combs(&ratio, excess_k));
         out
     }
 
-    /// The comb whose harmonics stick out most.
-    fn comb(&self, ratio: &[f64], excess_k: impl Fn(usize, usize) -> f64) -> Option<Part> {
+    /// The comb whose harmonics stick out most: one that ends with them, and one that goes on.
+    fn combs(&self, ratio: &[f64], excess_k: impl Fn(usize, usize) -> f64) -> Vec<Part> {
         let gain = |j: usize| {
             let r = ratio[j];
             if r > 1.0 { self.periodogram.pieces * (r - 1.0 - r.ln()) } else { 0.0 }
@@ -235,16 +331,17 @@ impl Search<'_> {
             sums.enumerate().map(|(m, sum)| (sum, m + 1)).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
         };
         let steps = 3 * per_bin..(bins / FEWEST_HARMONICS as f64) as usize * per_bin;
-        let (first, (_, harmonics)) = steps
+        let best = steps
             .map(|s| s as f64 / per_bin as f64)
             .map(|first| (first, total(first)))
-            .max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+            .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let Some((first, (_, harmonics))) = best else { return Vec::new() };
         let std_k = (1..=harmonics).map_while(|m| Some(excess_k(at(first, m)?, 2))).collect::<Vec<f64>>();
-        (std_k.len() >= FEWEST_HARMONICS).then(|| Part::Comb {
-            frequency_hz: first / self.limits.span_s,
-            width_hz: 0.1 / self.limits.span_s,
-            std_k,
-        })
+        if std_k.len() < FEWEST_HARMONICS {
+            return Vec::new();
+        }
+        let [frequency_hz, width_hz] = [first / self.limits.span_s, 0.1 / self.limits.span_s];
+        [false, true].map(|goes_on| Part::Comb { frequency_hz, width_hz, std_k: std_k.clone(), goes_on }).to_vec()
     }
 
     fn expected(&self, parts: &[Part]) -> Vec<f64> {
@@ -266,10 +363,21 @@ impl Search<'_> {
             optimiser.minimise(&problem, &values, &Budget { iterations, ..Budget::default() }).ok()
         });
         match fit {
-            Some(fit) => Fitted { parts: part::with(parts, &fit.x), deviance: fit.value },
-            None => Fitted { parts: parts.to_vec(), deviance: f64::INFINITY },
+            Some(fit) => {
+                let parts = part::with(parts, &fit.x);
+                let cost = Whittle { parts: &parts, ..cost }.cost();
+                Fitted { parts, deviance: fit.value, cost }
+            }
+            None => Fitted::unknown(parts.to_vec()),
         }
     }
+}
+
+/// What `parts` are, in the order of the alphabet.
+fn kinds(parts: &[Part]) -> Vec<&'static str> {
+    let mut kinds: Vec<&str> = parts.iter().map(Part::kind).collect();
+    kinds.sort_unstable();
+    kinds
 }
 
 fn states(parts: &[Part]) -> usize {
@@ -285,6 +393,22 @@ struct Whittle<'a> {
 }
 
 impl Whittle<'_> {
+    /// Of the logarithms of the numbers, with what was known of them before; the deviance is twice the logarithm of the likelihood.
+    fn information(&self) -> Option<DMatrix<f64>> {
+        let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
+        let derivatives = self.derivatives(&values)?;
+        Some(DMatrix::from_fn(values.len(), values.len(), |a, b| {
+            let told = derivatives.curvature[a][b] * values[a] * values[b] / (2.0 * BINS_PER_ONE);
+            told + if a == b { 1.0 / (LOG_STD * LOG_STD) } else { 0.0 }
+        }))
+    }
+
+    /// `ln det(1 + σ² I)`, `I` the information, `σ` how well each logarithm was known before.
+    fn cost(&self) -> f64 {
+        let Some(factor) = self.information().and_then(DMatrix::cholesky) else { return f64::INFINITY };
+        2.0 * factor.l_dirty().diagonal().iter().map(|d| (d * LOG_STD).ln()).sum::<f64>()
+    }
+
     fn deviance(&self, expected: &[f64]) -> f64 {
         let sum: f64 = expected.iter().zip(&self.periodogram.power).map(|(e, i)| e.ln() + i / e).sum();
         2.0 * self.periodogram.pieces * sum

@@ -229,13 +229,15 @@ impl Found {
             Ok(gas)
         };
         let (readings, rig) = rig(theta)?;
-        let Learned { prior, deviations } = learn(&readings, &rig)?;
+        let Learned { prior, deviations, others: unlike } = learn(&readings, &rig)?;
         let gas = with(theta, &prior)?;
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
         let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
         let of_model: Vec<(Vec<f64>, &Prior)> = moved.map(|moved| (moved, &prior)).collect();
         let of_prior: Vec<(Vec<f64>, &Prior)> = deviations.iter().map(|prior| (theta.to_vec(), prior)).collect();
-        let others = in_parallel(&[of_model, of_prior].concat(), watch, |(theta, prior)| with(theta, prior).ok());
+        let of_unlike: Vec<(Vec<f64>, &Prior)> = unlike.iter().map(|(_, prior)| (theta.to_vec(), prior)).collect();
+        let cases = [of_model, of_prior, of_unlike].concat();
+        let others = in_parallel(&cases, watch, |(theta, prior)| with(theta, prior).ok());
         let variance = |others: &[Option<Gas>]| {
             let mut variance = vec![0.0; gas.gas_c.len()];
             for other in others.iter().flatten() {
@@ -245,16 +247,32 @@ impl Found {
             }
             variance
         };
-        let (of_model, of_prior) = others.split_at(columns.len());
+        let (of_model, rest) = others.split_at(columns.len());
+        let (of_prior, of_unlike) = rest.split_at(deviations.len());
         let (of_model, of_prior) = (variance(of_model), variance(of_prior));
         let excess = gas.innovation_energy - 1.0 > CLEARLY * (2.0 / gas.innovations as f64).sqrt();
         let widened_by = if excess { gas.innovation_energy.sqrt() } else { 1.0 };
         let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it is, by as much as it moves it.
         let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
+        let gas = averaged(gas, unlike.iter().map(|(weight, _)| *weight).zip(of_unlike));
         let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
+}
+
+/// The mean of `gas` and of those by other priors, with the variance of the mixture.
+fn averaged<'a>(gas: Gas, others: impl Iterator<Item = (f64, &'a Option<Gas>)>) -> Gas {
+    let others: Vec<(f64, &Gas)> = others.filter_map(|(weight, other)| Some((weight, other.as_ref()?))).collect();
+    let own = 1.0 - others.iter().map(|(weight, _)| weight).sum::<f64>();
+    let of = |k: usize| {
+        let all = || others.iter().copied().chain([(own, &gas)]);
+        let mean_c: f64 = all().map(|(w, g)| w * g.gas_c[k]).sum();
+        let variance: f64 = all().map(|(w, g)| w * (g.std_k[k].powi(2) + (g.gas_c[k] - mean_c).powi(2))).sum();
+        (mean_c, variance.sqrt())
+    };
+    let (gas_c, std_k) = (0..gas.gas_c.len()).map(of).unzip();
+    Gas { gas_c, std_k, ..gas }
 }
 
 /// The work on each of `cases`, in their order whatever the number of threads.

@@ -22,7 +22,7 @@ const EVALUATIONS: u64 = 120;
 const EDGE: f64 = 0.25;
 const SPREAD: f64 = 0.05;
 
-/// Of `found` and each kind of single part the one that is likeliest, their costs counted, with numbers of its own.
+/// Of `found` and each kind of single part the one that is likeliest, the choice of their numbers counted, with numbers of its own.
 pub(super) fn choose(
     search: &Search<'_>,
     readings: &Readings,
@@ -32,12 +32,11 @@ pub(super) fn choose(
     is_uneven: bool,
 ) -> Vec<Part> {
     let readings = readings.first(if is_uneven { MOST_UNEVEN } else { MOST });
-    let bins = search.bins();
     let singles = search.best_of_each_kind().into_iter().map(|part| vec![part]);
     let candidates = singles.chain([found.clone()]).map(|parts| {
         let cost = Exact { readings: &readings, rig, level_c, parts: &parts };
         let (parts, deviance) = cost.fit(search);
-        let score = deviance + parts.iter().map(|p| p.cost(bins)).sum::<f64>();
+        let score = deviance + search.cost(&parts);
         (parts, score)
     });
     candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |best| best.0)

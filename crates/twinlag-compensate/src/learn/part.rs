@@ -37,13 +37,15 @@ pub(super) enum Part {
         corner_hz: f64,
         fastest_hz: f64,
     },
-    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first. Beyond the last one
-    /// that is seen they are taken to fall as `1/m²`, as those of a pulse with a kink do: a band with their power.
+    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first.
     Comb {
         frequency_hz: f64,
         /// Half width of the first line.
         width_hz: f64,
         std_k: Vec<f64>,
+        /// Whether there are more beyond the last one that is seen: they then fall as `1/m²`, as those of a pulse with a kink do, and a band
+        /// has their power.
+        goes_on: bool,
     },
 }
 
@@ -63,13 +65,13 @@ impl Part {
                     })
                     .collect()
             }
-            Self::Comb { frequency_hz, width_hz, std_k } => {
+            Self::Comb { frequency_hz, width_hz, std_k, goes_on } => {
                 let lines = (1..).zip(std_k).map(|(m, std_k)| {
                     let m = f64::from(m);
                     let quality = (0.5 * frequency_hz / (width_hz * m)).max(0.5);
                     Term::Resonance { std_k: *std_k, frequency_hz: m * frequency_hz, quality }
                 });
-                lines.chain(tail(*frequency_hz, std_k)).collect()
+                lines.chain(goes_on.then(|| tail(*frequency_hz, std_k)).flatten()).collect()
             }
         }
     }
@@ -79,9 +81,28 @@ impl Part {
         self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
     }
 
-    /// What it costs: its numbers, and of a line the choice of its frequency among `bins`.
-    pub(super) fn cost(&self, bins: f64) -> f64 {
-        2.0 * self.values().len() as f64 + if self.is_line() { 2.0 * bins.ln() } else { 0.0 }
+    pub(super) fn kind(&self) -> &'static str {
+        match self {
+            Self::Single(Term::Resonance { .. }) if self.is_line() => "line",
+            Self::Single(Term::Resonance { .. }) => "smooth",
+            Self::Single(Term::Rough { .. }) => "rough",
+            Self::Turbulent { .. } => "turbulent",
+            Self::Comb { goes_on: false, .. } => "comb",
+            Self::Comb { goes_on: true, .. } => "endless comb",
+        }
+    }
+
+    /// A comb that ends in place of one that goes on, and the other way about.
+    pub(super) fn otherwise(&self) -> Option<Self> {
+        match self {
+            Self::Comb { frequency_hz, width_hz, std_k, goes_on } => Some(Self::Comb {
+                frequency_hz: *frequency_hz,
+                width_hz: *width_hz,
+                std_k: std_k.clone(),
+                goes_on: !goes_on,
+            }),
+            _ => None,
+        }
     }
 
     /// Whether it has a frequency of its own.
@@ -100,7 +121,7 @@ impl Part {
                 vec![*std_k, *corner_hz]
             }
             Self::Single(Term::Resonance { std_k, frequency_hz, quality }) => vec![*std_k, *frequency_hz, *quality],
-            Self::Comb { frequency_hz, width_hz, std_k } => {
+            Self::Comb { frequency_hz, width_hz, std_k, .. } => {
                 std_k.iter().copied().chain([*frequency_hz, *width_hz]).collect()
             }
         }
@@ -112,8 +133,8 @@ impl Part {
             Self::Single(_) => 1,
             // It is in all of its terms.
             Self::Turbulent { .. } => 0,
-            // The last two are in what goes on above them.
-            Self::Comb { std_k, .. } => std_k.len().saturating_sub(2),
+            // The last two are in what goes on above them, if anything does.
+            Self::Comb { std_k, goes_on, .. } => std_k.len().saturating_sub(if *goes_on { 2 } else { 0 }),
         };
         (a < sizes).then_some(a)
     }
@@ -162,9 +183,10 @@ pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
                 Part::Turbulent { fastest_hz, .. } => {
                     Part::Turbulent { std_k: own[0], corner_hz: own[1], fastest_hz: *fastest_hz }
                 }
-                Part::Comb { std_k, .. } => {
+                Part::Comb { std_k, goes_on, .. } => {
                     let (std_k, shared) = own.split_at(std_k.len());
-                    Part::Comb { frequency_hz: shared[0], width_hz: shared[1], std_k: std_k.to_vec() }
+                    let [frequency_hz, width_hz] = [shared[0], shared[1]];
+                    Part::Comb { frequency_hz, width_hz, std_k: std_k.to_vec(), goes_on: *goes_on }
                 }
             }
         })
