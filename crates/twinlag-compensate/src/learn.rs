@@ -2,7 +2,7 @@
 //!
 //! Whittle's likelihood of the periodogram, `−Σ ln P + I/P`, `P` the power that a prior and the noise are expected to give: parts are
 //! added one at a time, each where it explains most, and exchanged for others, as long as the readings become more probable, the
-//! numbers integrated out (MacKay 2003, chapter 28).
+//! numbers integrated out (`MacKay` 2003, chapter 28).
 
 mod holes;
 mod part;
@@ -137,16 +137,16 @@ impl Search<'_> {
     fn run(&self) -> (Fitted, Vec<Fitted>) {
         let nothing = Fitted::unknown(Vec::new());
         let mut seen = self.grown(self.best(&nothing, self.kinds().concat()));
-        let mut current = self.likeliest(&seen);
+        let mut current = likeliest(&seen);
         loop {
             let others = self.exchanged(&current);
             seen.extend(others.iter().cloned());
-            let better = self.likeliest(&others);
+            let better = likeliest(&others);
             if better.score() >= current.score() - NOTHING_GAINED {
                 break;
             }
             seen.extend(self.grown(better));
-            current = self.likeliest(&seen);
+            current = likeliest(&seen);
         }
         let mut told = vec![kinds(&current.parts)];
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -158,12 +158,6 @@ impl Search<'_> {
         });
         seen.truncate(MOST_OTHERS);
         (current, seen)
-    }
-
-    /// The one of `all` with the least score.
-    fn likeliest(&self, all: &[Fitted]) -> Fitted {
-        let best = all.iter().min_by(|a, b| a.score().total_cmp(&b.score()));
-        best.cloned().unwrap_or(Fitted::unknown(Vec::new()))
     }
 
     /// `from`, and then with more parts, as long as each gains more than it costs.
@@ -198,7 +192,9 @@ impl Search<'_> {
             if let Some(otherwise) = current.parts[i].otherwise() {
                 let mut parts = current.parts.clone();
                 parts[i] = otherwise;
-                out.push(self.jointly(Fitted::unknown(parts)));
+                if states(&parts) <= self.room {
+                    out.push(self.jointly(Fitted::unknown(parts)));
+                }
             }
         }
         out
@@ -371,6 +367,12 @@ impl Search<'_> {
             None => Fitted::unknown(parts.to_vec()),
         }
     }
+}
+
+/// The one of `all` with the least score.
+fn likeliest(all: &[Fitted]) -> Fitted {
+    let best = all.iter().min_by(|a, b| a.score().total_cmp(&b.score()));
+    best.cloned().unwrap_or(Fitted::unknown(Vec::new()))
 }
 
 /// What `parts` are, in the order of the alphabet.

@@ -29,6 +29,7 @@
 //! ```
 
 mod chain;
+mod confirm;
 mod defects;
 mod dense;
 mod diagnose;

@@ -3,6 +3,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::confirm::is_confirmed;
 use crate::defects::{line_channel, lines};
 use crate::dense;
 use crate::diagnosis::Limit;
@@ -574,7 +575,9 @@ impl Search<'_> {
             if !first.effect.is_noise() {
                 first.held_out_nats = held_out_gain(self.observations, self.selection, current, &first.fitted);
             }
-            if first.held_out_nats > 0.0 {
+            let is_there = first.held_out_nats > 0.0
+                && is_confirmed(first.effect.identifier(), first.added, current, &first.fitted, self.observations);
+            if is_there {
                 let is_other = |t: &Tried| {
                     t.effect.identifier() != first.effect.identifier() || t.effect.channel() != first.effect.channel()
                 };
