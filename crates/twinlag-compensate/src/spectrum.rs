@@ -13,6 +13,8 @@ use crate::rig::Rig;
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what lasts longer the smoother sees
 /// all the same.
 const LONGEST: usize = 16384;
+/// Multiples of the sampling frequency from which power folds back; what is farther away is taken as if the gas were sampled.
+const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 /// Distance from critical damping below which both exponentials of a resonance cancel.
 const NEARLY_CRITICAL: f64 = 1e-3;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
@@ -32,6 +34,9 @@ pub(crate) struct Periodogram {
     /// Two-sided, K²/Hz.
     pub(crate) power: Vec<f64>,
     pub(crate) noise: Vec<f64>,
+    /// Of power that the gas has beyond the sampling and folds back, what the sensors take off, in each bin: by multiples of the sampling
+    /// frequency.
+    flattened: Vec<(f64, Vec<f64>)>,
     /// Autocorrelation of the taper.
     taper: Vec<f64>,
     /// The transform of twice the length.
@@ -72,9 +77,21 @@ impl Periodogram {
             .collect();
         let bins = 1..samples.div_ceil(2);
         let frequency_hz: Vec<f64> = bins.clone().map(|j| j as f64 / (samples as f64 * period_s)).collect();
+        let weights_at = |hz: f64| rig.sensors.map(|s| s.response(hz).conj() / s.noise_density_k2_per_hz(hz, period_s));
+        let seen = |hz: f64, weights: &[Complex64; 2]| -> Complex64 {
+            weights.iter().zip(&rig.sensors).map(|(w, s)| w * s.response(hz)).sum()
+        };
+        let flattened = FOLDS.map(|fold| {
+            let away_hz = fold / period_s;
+            let taken_off = |hz: &f64| {
+                let weights = weights_at(*hz);
+                1.0 - (seen(hz + away_hz, &weights) / seen(*hz, &weights)).norm_sqr()
+            };
+            (away_hz, frequency_hz.iter().map(taken_off).collect())
+        });
         let power = bins.zip(&frequency_hz).map(|(j, &hz)| {
-            let weights = rig.sensors.map(|s| s.response(hz).conj() / s.noise_density_k2_per_hz(hz, period_s));
-            let information: f64 = weights.iter().zip(&rig.sensors).map(|(w, s)| (w * s.response(hz)).re).sum();
+            let weights = weights_at(hz);
+            let information = seen(hz, &weights).re;
             let of = |piece: &[Vec<Complex64>; 2]| (weights[0] * piece[0][j] + weights[1] * piece[1][j]).norm_sqr();
             pieces.iter().map(of).sum::<f64>() / (information * information * count as f64) * period_s
         });
@@ -83,11 +100,13 @@ impl Periodogram {
         let taper = autocorrelation(&window);
         let plan = planner.plan_fft_forward(2 * samples);
         let pieces = if count > 1 { OVERLAP * count as f64 } else { 1.0 };
-        Self { period_s, all, samples, pieces, frequency_hz, power, noise, taper, plan }
+        Self { period_s, all, samples, pieces, frequency_hz, power, noise, flattened: flattened.to_vec(), taper, plan }
     }
 
     /// What the periodogram of a gas with these terms is expected to be: `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's
-    /// autocorrelation, which is exact for a record of any length (Sykulski et al. 2019).
+    /// autocorrelation, which is exact for a record of any length (Sykulski et al. 2019). That is the gas as if it were sampled itself;
+    /// what it has above the sampling folds back through sensors that have flattened it, so `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)`
+    /// comes off, `G` what both sensors together make of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
         let n = self.samples;
         let plan = &self.plan;
@@ -100,7 +119,14 @@ impl Periodogram {
         mirrored[1..].iter_mut().rev().zip(&lags[1..]).for_each(|(to, from)| *to = *from);
         let mut out = plan.make_output_vec();
         plan.process(&mut input, &mut out).expect("lengths agree");
-        (1..=self.frequency_hz.len()).map(|j| (out[2 * j].re * self.period_s).max(0.0)).collect()
+        let mut expected: Vec<f64> = (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect();
+        for (away_hz, taken_off) in &self.flattened {
+            for ((sum, hz), share) in expected.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
+                *sum -= share * terms.iter().map(|t| t.density_k2_per_hz(hz + away_hz)).sum::<f64>();
+            }
+        }
+        expected.iter_mut().for_each(|sum| *sum = sum.max(0.0));
+        expected
     }
 }
 

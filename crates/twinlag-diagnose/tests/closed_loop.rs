@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::{NOISE_K, PERIOD_S, SEED, TAU_S, found, found_without, limited, record, recovers, told};
+use common::{
+    NOISE_K, PERIOD_S, SEED, TAU_S, even, found, found_without, limited, ramps, readings, record, recovers, told,
+};
 use twinlag_diagnose::{Diagnosis, Found, Identifier, KnownEffect, Observations, Settings, Verdict, fit_with};
 use twinlag_signal::{ColouredNoise, Sensor, Spikes};
 
@@ -98,6 +100,25 @@ fn two_lags_in_white_noise_are_adequate() {
         !d.limits.is_empty() && !d.not_testable.is_empty(),
         "what was looked for in vain, and what cannot be: {told}"
     );
+}
+
+/// Where the gas has no power, noise of both channels happens to cancel at some angle, which a delay or a second lag can turn to: at
+/// most one alarm in a thousand is asked for, and none in eight is what that gives.
+#[test]
+fn chance_alignments_of_noise_are_no_delay() {
+    for seed in 0..8 {
+        let simulated = readings(SEED + seed, ramps(SEED + seed), |_| ());
+        let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+        assert_eq!(d.verdict, Verdict::Adequate, "seed {seed}: {}", told(&d));
+    }
+}
+
+/// In the same gas a delay that is there is found.
+#[test]
+fn a_delay_in_ramps_is_found() {
+    let simulated = readings(SEED, ramps(SEED), |sensors| sensors[0].delay_s = 5.0 * DELAY_S);
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    assert_eq!(d.effects[0].effect, Identifier::Delay, "{}", told(&d));
 }
 
 #[test]

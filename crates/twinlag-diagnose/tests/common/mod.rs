@@ -5,7 +5,7 @@
 use twinlag_diagnose::{
     DiagnoseError, Diagnosis, Identifier, ModelFit, Observations, Settings, Stretch, TimeConstant, diagnose,
 };
-use twinlag_signal::{Adc, Gas, Noise, Record, Rig, Sensor, Signal, Simulated, Turbulence};
+use twinlag_signal::{Adc, Gas, Noise, Record, Rig, Sensor, Series, Signal, Simulated, Turbulence};
 
 pub(crate) const SAMPLES: usize = 3000;
 pub(crate) const PERIOD_S: f64 = 0.001;
@@ -20,6 +20,13 @@ pub(crate) const SEED: u64 = 20;
 /// Turbulence about 300 °C with a corner at 2.4 Hz, which excites both sensors (13 Hz and 2.7 Hz) over the 3 s of the record.
 pub(crate) fn turbulence() -> Signal {
     Signal::Turbulence(Turbulence { std_k: GAS_K, corner_hz: 2.4, cutoff_hz: 200.0 })
+}
+
+/// Straight lines between temperatures that multiples of the golden ratio give, 57 or 93 K apart: a gas whose spectrum falls as `f⁻⁴`,
+/// below the noise from some 10 Hz on, of the 500 Hz that are sampled.
+pub(crate) fn ramps(seed: u64) -> Signal {
+    let values_c = (0..11).map(|k| 150.0 * ((11 * seed + k) as f64 * 0.618_034).fract()).collect();
+    Signal::Series(Series::Inline { values_c, period_s: 0.1 * SAMPLES as f64 * PERIOD_S })
 }
 
 /// The readings of the rig with whatever `change` does to its sensors.
