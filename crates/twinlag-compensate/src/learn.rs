@@ -57,6 +57,8 @@ pub struct Learned {
     /// Priors of other kinds that the readings do not tell from it, and their weights; its own weight is what is left to one. Where a
     /// spectrum sinks below the noise, how it goes on is not in the readings.
     pub others: Vec<(f64, Prior)>,
+    /// What the standard deviations of both channels' noise are to be multiplied by; 1 where they are known.
+    pub noise_factor: [f64; 2],
 }
 
 /// The prior that `readings` of `rig` support, the covariance of its numbers the inverse of Fisher's information.
@@ -67,6 +69,19 @@ pub struct Learned {
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
 pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
+    learned(readings, rig, true)
+}
+
+/// The same where the noise of `rig` was found from the readings without regard to what the gas is like: gas that is rough from one
+/// sample to the next is taken for noise then, so both levels are found once more, together with the prior.
+///
+/// # Errors
+/// As [`learn`].
+pub fn learn_with_noise(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
+    learned(readings, rig, false)
+}
+
+fn learned(readings: &Readings, rig: &Rig, is_noise_known: bool) -> Result<Learned, CompensateError> {
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());
     let got = (0..readings.len()).filter(both).count();
@@ -81,13 +96,14 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
-    let search = Search { periodogram: &periodogram, limits, room };
+    let search = Search { periodogram: &periodogram, limits, room, is_noise_known };
     let (best, mut others) = search.run();
     let score = best.score();
     let mut parts = best.parts;
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > FEW_MISSING;
     if missing > FEW_MISSING || is_uneven {
+        parts.retain(|part| part.noise().is_none());
         parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
         others.clear();
     }
@@ -100,6 +116,7 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
         prior: prior(&parts),
         deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect(),
         others,
+        noise_factor: parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt)),
     })
 }
 
@@ -108,6 +125,7 @@ struct Search<'a> {
     limits: Limits,
     /// States that the gas may have.
     room: usize,
+    is_noise_known: bool,
 }
 
 /// Parts with what they leave unlikely.
@@ -135,8 +153,9 @@ impl Search<'_> {
     /// The likeliest parts: they are added, and then each is exchanged for what explains more in its place, until neither gains. With
     /// those of other kinds that came up on the way and are nearly as likely.
     fn run(&self) -> (Fitted, Vec<Fitted>) {
-        let nothing = Fitted::unknown(Vec::new());
-        let mut seen = self.grown(self.best(&nothing, self.kinds().concat()));
+        let noise = if self.is_noise_known { Vec::new() } else { vec![Part::Noise([1.0; 2])] };
+        let first = self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()));
+        let mut seen = self.grown(first);
         let mut current = likeliest(&seen);
         loop {
             let others = self.exchanged(&current);
@@ -176,7 +195,7 @@ impl Search<'_> {
     /// `current` with one part left out, or one of each kind in its place, or a comb that ends elsewhere.
     fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
         let mut out = Vec::new();
-        for i in 0..current.parts.len() {
+        for i in (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none()) {
             let mut parts = current.parts.clone();
             parts.remove(i);
             let others = self.jointly(Fitted::unknown(parts));
@@ -186,7 +205,7 @@ impl Search<'_> {
                     out.push(self.jointly(other));
                 }
             }
-            if !others.parts.is_empty() {
+            if has_gas(&others.parts) {
                 out.push(others);
             }
             if let Some(otherwise) = current.parts[i].otherwise() {
@@ -202,10 +221,10 @@ impl Search<'_> {
 
     /// All numbers fitted together, parts that come to nothing left out.
     fn jointly(&self, current: Fitted) -> Fitted {
-        if current.parts.is_empty() || (current.parts.len() == 1 && current.deviance.is_finite()) {
+        if !has_gas(&current.parts) || (current.parts.len() == 1 && current.deviance.is_finite()) {
             return current;
         }
-        let mut fitted = self.fit(&current.parts, &self.periodogram.noise, 25);
+        let mut fitted = self.fit(&current.parts, &self.beside(&current.parts), 25);
         fitted.parts.retain(|p| !p.is_nothing(&self.limits));
         fitted
     }
@@ -222,11 +241,13 @@ impl Search<'_> {
         let mut begun: Vec<Fitted> = candidates.into_iter().map(|part| self.fit(&[part], &others, 3)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
         begun.truncate(PROMISING);
+        let noise = current.parts.iter().filter_map(Part::noise);
+        let of_noise: f64 = noise.map(|factors| self.periodogram.of_factors(factors).0).sum();
         let added = begun.into_iter().map(|begun| self.fit(&begun.parts, &others, 12));
         match added.min_by(|a, b| a.score().total_cmp(&b.score())) {
             Some(added) => Fitted {
                 parts: current.parts.iter().cloned().chain(added.parts).collect(),
-                deviance: added.deviance,
+                deviance: added.deviance + of_noise,
                 cost: current.cost + added.cost,
             },
             None => current.clone(),
@@ -235,12 +256,12 @@ impl Search<'_> {
 
     /// What the choice of the numbers of `parts` costs.
     fn cost(&self, parts: &[Part]) -> f64 {
-        Whittle { periodogram: self.periodogram, others: &self.periodogram.noise, parts }.cost()
+        Whittle { periodogram: self.periodogram, others: &self.beside(parts), parts }.cost()
     }
 
     /// `parts` with their numbers moved by a standard error, one column at a time.
     fn deviations(&self, parts: &[Part]) -> Vec<Vec<Part>> {
-        let cost = Whittle { periodogram: self.periodogram, others: &self.periodogram.noise, parts };
+        let cost = Whittle { periodogram: self.periodogram, others: &self.beside(parts), parts };
         let Some(information) = cost.information() else { return Vec::new() };
         let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
         let Some(factor) = information.cholesky() else { return Vec::new() };
@@ -341,12 +362,17 @@ impl Search<'_> {
     }
 
     fn expected(&self, parts: &[Part]) -> Vec<f64> {
-        let mut out = self.periodogram.noise.clone();
-        if !parts.is_empty() {
-            let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
-            out.iter_mut().zip(self.periodogram.expected(&terms)).for_each(|(sum, p)| *sum += p);
-        }
+        let mut out = self.beside(parts);
+        out.iter_mut().zip(self.periodogram.of_parts(parts)).for_each(|(sum, p)| *sum += p);
         out
+    }
+
+    /// What is expected beside `parts`: noise, unless that is one of them.
+    fn beside(&self, parts: &[Part]) -> Vec<f64> {
+        if parts.iter().any(|part| part.noise().is_some()) {
+            return vec![0.0; self.periodogram.power.len()];
+        }
+        self.periodogram.of_noise([1.0; 2])
     }
 
     /// The numbers of `parts` that are likeliest beside `others`.
@@ -380,6 +406,10 @@ fn kinds(parts: &[Part]) -> Vec<&'static str> {
     let mut kinds: Vec<&str> = parts.iter().map(Part::kind).collect();
     kinds.sort_unstable();
     kinds
+}
+
+fn has_gas(parts: &[Part]) -> bool {
+    parts.iter().any(|part| part.noise().is_none())
 }
 
 fn states(parts: &[Part]) -> usize {
@@ -417,11 +447,50 @@ impl Whittle<'_> {
     }
 }
 
+impl Periodogram {
+    /// What `parts` add to it.
+    fn of_parts(&self, parts: &[Part]) -> Vec<f64> {
+        let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
+        let mut out = if terms.is_empty() { vec![0.0; self.power.len()] } else { self.expected(&terms) };
+        for factors in parts.iter().filter_map(Part::noise) {
+            out.iter_mut().zip(self.of_noise(factors)).for_each(|(sum, noise)| *sum += noise);
+        }
+        out
+    }
+
+    fn of_noise(&self, [first, second]: [f64; 2]) -> Vec<f64> {
+        self.noise[0].iter().zip(&self.noise[1]).map(|(a, b)| first * a + second * b).collect()
+    }
+
+    /// Of what both sensors disagree on, and of what was known of the noise before: the deviance of `factors` of the noise with gradient
+    /// and curvature.
+    fn of_factors(&self, factors: [f64; 2]) -> (f64, [f64; 2], [[f64; 2]; 2]) {
+        let prior = BINS_PER_ONE / (LOG_STD * LOG_STD);
+        let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();
+        let mut gradient = factors.map(|v| 2.0 * prior * v.ln() / v);
+        let mut curvature = [[2.0 * prior / factors[0].powi(2), 0.0], [0.0, 2.0 * prior / factors[1].powi(2)]];
+        for &[power, first] in &self.disagreement {
+            let shares = [first, 1.0 - first];
+            let expected = shares[0] * factors[0] + shares[1] * factors[1];
+            value += 2.0 * self.pieces * (expected.ln() + power / expected);
+            let slopes = shares.map(|s| s / expected);
+            for a in 0..2 {
+                gradient[a] += 2.0 * self.pieces * slopes[a] * (1.0 - power / expected);
+                for b in 0..2 {
+                    curvature[a][b] += 2.0 * self.pieces * slopes[a] * slopes[b];
+                }
+            }
+        }
+        (value, gradient, curvature)
+    }
+}
+
 impl Cost for Whittle<'_> {
     fn value(&self, x: &[f64]) -> f64 {
-        let terms: Vec<Term> = part::with(self.parts, x).iter().flat_map(Part::terms).collect();
-        let own = self.periodogram.expected(&terms);
-        self.deviance(&self.others.iter().zip(own).map(|(a, b)| a + b).collect::<Vec<f64>>())
+        let parts = part::with(self.parts, x);
+        let own = self.periodogram.of_parts(&parts);
+        let of_noise: f64 = parts.iter().filter_map(Part::noise).map(|f| self.periodogram.of_factors(f).0).sum();
+        of_noise + self.deviance(&self.others.iter().zip(own).map(|(a, b)| a + b).collect::<Vec<f64>>())
     }
 
     /// Fisher's scoring: the curvature is its expectation, `2 Σ ∂_a ln P ∂_b ln P`.
@@ -431,6 +500,11 @@ impl Cost for Whittle<'_> {
         let mut expected = self.others.to_vec();
         let mut slopes: Vec<Vec<f64>> = Vec::new();
         for part in &parts {
+            if let Some(factors) = part.noise() {
+                expected.iter_mut().zip(p.of_noise(factors)).for_each(|(sum, noise)| *sum += noise);
+                slopes.extend(p.noise.clone());
+                continue;
+            }
             let each: Vec<Vec<f64>> = part.terms().iter().map(|t| p.expected(&[*t])).collect();
             let mut own = vec![0.0; expected.len()];
             for line in &each {
@@ -454,10 +528,25 @@ impl Cost for Whittle<'_> {
         }
         let residual: Vec<f64> = p.power.iter().zip(&expected).map(|(i, e)| 1.0 - i / e).collect();
         let dot = |a: &[f64], b: &[f64]| 2.0 * p.pieces * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        Some(Derivatives {
+        let mut out = Derivatives {
             value: self.deviance(&expected),
             gradient: slopes.iter().map(|s| dot(s, &residual)).collect(),
             curvature: slopes.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
-        })
+        };
+        let mut at = 0;
+        for part in &parts {
+            if let Some(factors) = part.noise() {
+                let (value, gradient, curvature) = p.of_factors(factors);
+                out.value += value;
+                for a in 0..2 {
+                    out.gradient[at + a] += gradient[a];
+                    for b in 0..2 {
+                        out.curvature[at + a][at + b] += curvature[a][b];
+                    }
+                }
+            }
+            at += part.values().len();
+        }
+        Some(out)
     }
 }

@@ -33,7 +33,11 @@ pub(crate) struct Periodogram {
     pub(crate) frequency_hz: Vec<f64>,
     /// Two-sided, K²/Hz.
     pub(crate) power: Vec<f64>,
-    pub(crate) noise: Vec<f64>,
+    /// What the noise of each channel adds to it.
+    pub(crate) noise: [Vec<f64>; 2],
+    /// The periodogram of what both sensors disagree on, `H₂ Y₁ − H₁ Y₂`, which the gas is not in, over what it is expected to be, and the
+    /// share of the first channel in that; the lowest bins are left out, where the taper lets the gas through.
+    pub(crate) disagreement: Vec<[f64; 2]>,
     /// Of power that the gas has beyond the sampling and folds back, what the sensors take off, in each bin: by multiples of the sampling
     /// frequency.
     flattened: Vec<(f64, Vec<f64>)>,
@@ -96,11 +100,28 @@ impl Periodogram {
             pieces.iter().map(of).sum::<f64>() / (information * information * count as f64) * period_s
         });
         let power = power.collect();
-        let noise = frequency_hz.iter().map(|&hz| rig.noise_density_k2_per_hz(hz, period_s)).collect();
+        let noise = [0, 1].map(|i| {
+            let of = |hz: &f64| {
+                let weights = weights_at(*hz);
+                let density = rig.sensors[i].noise_density_k2_per_hz(*hz, period_s);
+                weights[i].norm_sqr() * density / seen(*hz, &weights).norm_sqr()
+            };
+            frequency_hz.iter().map(of).collect()
+        });
+        let disagreement = frequency_hz.iter().enumerate().skip(frequency_hz.len() / 8).map(|(k, &hz)| {
+            let [h1, h2] = rig.sensors.map(|s| s.response(hz));
+            let [n1, n2] = rig.sensors.map(|s| s.noise_density_k2_per_hz(hz, period_s));
+            let [first, second] = [h2.norm_sqr() * n1, h1.norm_sqr() * n2];
+            let of = |piece: &[Vec<Complex64>; 2]| (h2 * piece[0][k + 1] - h1 * piece[1][k + 1]).norm_sqr();
+            let power = pieces.iter().map(of).sum::<f64>() / count as f64 * period_s;
+            [power / (first + second), first / (first + second)]
+        });
+        let disagreement = disagreement.collect();
         let taper = autocorrelation(&window);
         let plan = planner.plan_fft_forward(2 * samples);
         let pieces = if count > 1 { OVERLAP * count as f64 } else { 1.0 };
-        Self { period_s, all, samples, pieces, frequency_hz, power, noise, flattened: flattened.to_vec(), taper, plan }
+        let flattened = flattened.to_vec();
+        Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
     }
 
     /// What the periodogram of a gas with these terms is expected to be: `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's

@@ -4,7 +4,9 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
-use twinlag_compensate::{Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, reconstruct};
+use twinlag_compensate::{
+    Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, learn_with_noise, reconstruct,
+};
 use twinlag_diagnose::{ModelFit, Verdict};
 use twinlag_record::Record;
 
@@ -214,12 +216,19 @@ impl Found {
     fn of(fit: &ModelFit, options: &CompensateOptions, watch: DiagnoseWatch<'_>) -> Result<Self, Error> {
         let extended = fit.extended.as_ref().expect("a fit of a record");
         let theta = extended.parameters();
-        let rig = |theta: &[f64]| -> Result<(Readings, Rig), Error> {
-            let (readings, rig) = extended.rig(theta)?;
+        let rig = |theta: &[f64], noise_factor: [f64; 2]| -> Result<(Readings, Rig), Error> {
+            let (readings, mut rig) = extended.rig(theta)?;
+            rig.sensors.iter_mut().zip(noise_factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
             Ok((readings, Rig { clock: options.trusted, ..rig }))
         };
+        let (readings, nominal) = rig(theta, [1.0; 2])?;
+        let Learned { prior, deviations, others: unlike, noise_factor } = if is_noise_found(options, &nominal) {
+            learn_with_noise(&readings, &nominal)?
+        } else {
+            learn(&readings, &nominal)?
+        };
         let with = |theta: &[f64], prior: &Prior| -> Result<Gas, Error> {
-            let (readings, rig) = rig(theta)?;
+            let (readings, rig) = rig(theta, noise_factor)?;
             let mut gas = reconstruct(&readings, &rig, prior, options.form)?;
             if options.trusted == 1 {
                 let [gain, offset_k] = extended.calibration(theta);
@@ -228,8 +237,7 @@ impl Found {
             }
             Ok(gas)
         };
-        let (readings, rig) = rig(theta)?;
-        let Learned { prior, deviations, others: unlike } = learn(&readings, &rig)?;
+        let (readings, rig) = rig(theta, noise_factor)?;
         let gas = with(theta, &prior)?;
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
         let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
@@ -259,6 +267,13 @@ impl Found {
         let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
+}
+
+/// Whether the white noise of both channels is what the record itself seemed to say.
+fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
+    let given = &options.diagnose.characterise;
+    let is_white = rig.mismatch.is_none() && rig.sensors.iter().all(|s| s.coloured.is_none());
+    is_white && options.model.is_none() && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
 }
 
 /// The mean of `gas` and of those by other priors, with the variance of the mixture.

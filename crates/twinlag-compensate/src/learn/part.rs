@@ -15,6 +15,9 @@ const WIDEST: f64 = 0.2;
 /// Rough terms of a turbulent part.
 const CASCADE: usize = 4;
 
+/// Noise has at least this share of the variance that it was thought to have.
+const LEAST_NOISE: f64 = 1e-3;
+
 /// A part of the swing that is none.
 const NOTHING: f64 = 1e-5;
 
@@ -29,6 +32,8 @@ pub(super) struct Limits {
 /// One part of the gas's motion.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Part {
+    /// No part of the gas: what the variances of both channels' noise are multiplied by.
+    Noise([f64; 2]),
     Single(Term),
     /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms with corners evenly spaced in their
     /// logarithm from that one to the fastest that is sampled, their variances as `f^(−2/3)`.
@@ -52,6 +57,7 @@ pub(super) enum Part {
 impl Part {
     pub(super) fn terms(&self) -> Vec<Term> {
         match self {
+            Self::Noise(_) => Vec::new(),
             Self::Single(term) => vec![*term],
             Self::Turbulent { std_k, corner_hz, fastest_hz } => {
                 let step = (fastest_hz / corner_hz).powf(1.0 / (CASCADE - 1) as f64);
@@ -78,11 +84,21 @@ impl Part {
 
     /// Whether it has shrunk to less than anything that matters.
     pub(super) fn is_nothing(&self, limits: &Limits) -> bool {
-        self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
+        self.noise().is_none()
+            && self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
+    }
+
+    /// What the variances of both channels' noise are multiplied by.
+    pub(super) const fn noise(&self) -> Option<[f64; 2]> {
+        match self {
+            Self::Noise(factors) => Some(*factors),
+            _ => None,
+        }
     }
 
     pub(super) fn kind(&self) -> &'static str {
         match self {
+            Self::Noise(_) => "noise",
             Self::Single(Term::Resonance { .. }) if self.is_line() => "line",
             Self::Single(Term::Resonance { .. }) => "smooth",
             Self::Single(Term::Rough { .. }) => "rough",
@@ -109,7 +125,7 @@ impl Part {
     fn is_line(&self) -> bool {
         match self {
             Self::Single(Term::Resonance { quality, .. }) => *quality > 1.0,
-            Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => false,
+            Self::Noise(_) | Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => false,
             Self::Comb { .. } => true,
         }
     }
@@ -117,6 +133,7 @@ impl Part {
     /// The numbers that are fitted.
     pub(super) fn values(&self) -> Vec<f64> {
         match self {
+            Self::Noise(factors) => factors.to_vec(),
             Self::Single(Term::Rough { std_k, corner_hz }) | Self::Turbulent { std_k, corner_hz, .. } => {
                 vec![*std_k, *corner_hz]
             }
@@ -131,8 +148,8 @@ impl Part {
     pub(super) fn size_of(&self, a: usize) -> Option<usize> {
         let sizes = match self {
             Self::Single(_) => 1,
-            // It is in all of its terms.
-            Self::Turbulent { .. } => 0,
+            // It is in none, or in all of its terms.
+            Self::Noise(_) | Self::Turbulent { .. } => 0,
             // The last two are in what goes on above them, if anything does.
             Self::Comb { std_k, goes_on, .. } => std_k.len().saturating_sub(if *goes_on { 2 } else { 0 }),
         };
@@ -144,6 +161,7 @@ impl Part {
         let std = || Variable::logarithmic("std", 1e-7 * swing_k, 1e3 * swing_k);
         let frequency = || Variable::logarithmic("frequency", SLOWEST / span_s, FASTEST / period_s);
         match self {
+            Self::Noise(_) => vec![Variable::logarithmic("noise", LEAST_NOISE, 1.0 / LEAST_NOISE); 2],
             Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => vec![std(), frequency()],
             Self::Single(Term::Resonance { .. }) => {
                 vec![std(), frequency(), Variable::logarithmic("quality", QUALITY[0], QUALITY[1])]
@@ -176,6 +194,7 @@ pub(super) fn with(like: &[Part], x: &[f64]) -> Vec<Part> {
             let (own, others) = rest.split_at(part.values().len());
             rest = others;
             match part {
+                Part::Noise(_) => Part::Noise([own[0], own[1]]),
                 Part::Single(Term::Rough { .. }) => Part::Single(Term::Rough { std_k: own[0], corner_hz: own[1] }),
                 Part::Single(Term::Resonance { .. }) => {
                     Part::Single(Term::Resonance { std_k: own[0], frequency_hz: own[1], quality: own[2] })
