@@ -29,6 +29,9 @@ pub(crate) struct Levels {
     pub(crate) step_k: [Option<f64>; 2],
 }
 
+/// Rows of a stretch that levels of noise can be found in.
+pub(crate) const SHORTEST: usize = 8;
+
 impl Levels {
     /// Step of each converter where it is coarse beside the noise, K.
     pub(crate) fn coarse_step_k(&self) -> [Option<f64>; 2] {
@@ -53,7 +56,7 @@ pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
             if k < s.len() && !is_masked(k) {
                 continue;
             }
-            if k >= from + 8 {
+            if k >= from + SHORTEST {
                 let steps = match observations.period_s {
                     Some(period_s) => Steps::Even(period_s),
                     None => Steps::Uneven(s.time_s[from..k].windows(2).map(|t| t[1] - t[0]).collect()),

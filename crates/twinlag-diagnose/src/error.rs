@@ -12,6 +12,10 @@ pub enum DiagnoseError {
         "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record for longer, or ask for the time constants alone (`characterise`)"
     )]
     TooShort { samples: usize, needed: usize },
+    #[error(
+        "a diagnosis needs stretches of at least {needed} rows without a missing reading, and of the {samples} rows of this record too few lie in any: see to what drops readings, or ask for the time constants alone (`characterise`)"
+    )]
+    InShreds { samples: usize, needed: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,
     #[error("expected a positive flow at every sample, as many as there are readings")]

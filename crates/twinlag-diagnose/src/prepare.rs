@@ -54,7 +54,8 @@ impl Prepared {
         }
         let mut observations = observations.clone();
         let samples = observations.samples();
-        let mut levels = defects::levels(&observations).ok_or(DiagnoseError::TooShort { samples, needed: 60 })?;
+        let mut levels =
+            defects::levels(&observations).ok_or(DiagnoseError::InShreds { samples, needed: defects::SHORTEST })?;
         if let Some(std_k) = settings.noise_std_k {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];

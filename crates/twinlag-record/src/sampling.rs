@@ -39,6 +39,11 @@ pub struct Sampling {
     pub kind: SamplingKind,
 }
 
+/// A beat is at least one in so many steps: a logger's period is not off its clock's unit by less.
+const RAREST: usize = 50;
+/// Departure, in periods, that is none.
+const EXACT: f64 = 0.01;
+
 impl Sampling {
     /// The step beyond which two rows do not belong together: 1.5 periods and the rounding of two stamps if evenly
     /// spaced, 5 median steps if irregular.
@@ -49,9 +54,11 @@ impl Sampling {
         }
     }
 
-    /// How much longer than true a step may seem: less than one unit of the grid, if that is finer than the period.
+    /// How much longer than true a step may seem: less than one unit of the grid, if that is finer than the period and stamps depart
+    /// from even ones at all.
     fn rounding_s(&self) -> f64 {
-        self.stamp_resolution_s.filter(|&unit_s| unit_s < self.period_s).unwrap_or(0.0)
+        let is_exact = self.kind == SamplingKind::Uniform && self.largest_departure_s <= EXACT * self.period_s;
+        self.stamp_resolution_s.filter(|&unit_s| unit_s < self.period_s && !is_exact).unwrap_or(0.0)
     }
 }
 
@@ -63,7 +70,8 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
     let steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let median = median(&steps);
     let grid = unit_s.and_then(|unit_s| grid(time_s, &steps, unit_s));
-    let rounding = grid.filter(|&unit| unit < median * 1.5).unwrap_or(0.0);
+    let may_be_rounded = |unit: &f64| *unit < median * 1.5 && !are_skips(&steps, median);
+    let rounding = grid.filter(may_be_rounded).unwrap_or(0.0);
     let limit = 1.5 * median + rounding;
     let (low, high) = steps
         .iter()
@@ -89,6 +97,19 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
     };
     let Line { jitter_s, largest_departure_s, .. } = line;
     Sampling { period_s, jitter_s, largest_departure_s, stamp_resolution_s: grid, kind }
+}
+
+/// Whether the longer ones of `steps` are rows that were skipped: multiples of the median step, which do not come in the even beat of a
+/// period that is a little longer than the unit it is rounded to.
+fn are_skips(steps: &[f64], median: f64) -> bool {
+    if steps.iter().any(|step| off_grid(step / median) > EXACT) {
+        return false;
+    }
+    let long: Vec<usize> = steps.iter().enumerate().filter(|(_, step)| **step > 1.5 * median).map(|(k, _)| k).collect();
+    let between = || long.windows(2).map(|pair| pair[1] - pair[0]);
+    let is_even = between().max().unwrap_or(0) - between().min().unwrap_or(0) <= 1;
+    let is_beat = long.len() > 2 && is_even && steps.len() < RAREST * long.len();
+    !long.is_empty() && !is_beat
 }
 
 /// A clock whose rate changes is not merely rounded: over blocks of 64 steps the mean step must stay within 2 % and the
@@ -228,6 +249,32 @@ mod tests {
         }
         let got = auto(&time_s);
         assert_eq!((got.kind, got.period_s), (SamplingKind::Irregular, 10.0));
+    }
+
+    /// A period that is itself a unit of the clock: rows are missing, one at a time, and stamps are as exact as before.
+    #[test]
+    fn single_missing_rows_are_gaps_whatever_the_period() {
+        for (period_s, places) in [(0.01, 2), (0.02, 2), (0.005, 3), (1.0, 0)] {
+            let round = |t: f64| format!("{t:.places$}").parse::<f64>().unwrap();
+            let missing = [100, 190, 313];
+            for count in 1..=3 {
+                let left = (0..500).filter(|k| !missing[..count].contains(k));
+                let time_s: Vec<f64> = left.map(|k| round(f64::from(k) * period_s)).collect();
+                let got = auto(&time_s);
+                assert_eq!(got.kind, SamplingKind::Uniform, "{period_s} s, {count} missing");
+                assert!((got.period_s - period_s).abs() < 1e-12 * period_s, "got {}, want {period_s}", got.period_s);
+                assert_eq!(runs(&time_s, got.gap_s()).count(), count + 1, "{period_s} s");
+            }
+        }
+    }
+
+    /// 1.04 s in whole seconds: every 25th step is 2 s, which is a beat and no gap.
+    #[test]
+    fn a_beat_of_longer_steps_is_rounding() {
+        let time_s: Vec<f64> = (0..2000).map(|k| (f64::from(k) * 1.04).floor()).collect();
+        let got = auto(&time_s);
+        assert_eq!(got.kind, SamplingKind::Rounded);
+        assert!((got.period_s - 1.04).abs() < 1.0 / 2000.0, "got {}", got.period_s);
     }
 
     #[test]

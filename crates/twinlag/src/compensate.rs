@@ -130,7 +130,9 @@ pub fn compensate(
         warnings,
         rig: None,
     };
-    if fit.time_constants.iter().any(|t| t.value_s.is_none()) || verdict == Some(Verdict::Refused) {
+    let is_unknown =
+        fit.time_constants.iter().any(|t| t.value_s.is_none()) || out.last.status == Status::NotIdentifiable;
+    if is_unknown || verdict == Some(Verdict::Refused) {
         out.warnings.push(
             "the record does not determine both time constants, so it has no gas temperature: say what is known of one (--known \
              T1.time_constant_s=VALUE), or take a model from another record (--model)"
