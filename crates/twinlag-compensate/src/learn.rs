@@ -6,9 +6,9 @@
 
 mod holes;
 mod part;
+mod whittle;
 
-use nalgebra::DMatrix;
-use twinlag_optimise::{Budget, Cost, Derivatives, Minimiser, Optimiser, Problem};
+use twinlag_optimise::{Budget, Minimiser, Optimiser, Problem};
 
 use crate::error::CompensateError;
 use crate::prior::{Prior, Term};
@@ -18,6 +18,7 @@ use crate::rig::Rig;
 use crate::spectrum::Periodogram;
 use crate::system::states as states_of;
 use part::{Limits, Part};
+use whittle::{BINS_PER_ONE, Whittle};
 
 /// Most states of the gas.
 const MOST_OF_GAS: usize = 20;
@@ -28,12 +29,8 @@ const FEWEST_HARMONICS: usize = 3;
 const FEWEST: usize = 32;
 /// Share of instants that may be missing, and by which steps may differ, before the lines between them matter.
 const FEW_MISSING: f64 = 0.01;
-/// Neighbouring bins of a periodogram with Hann's taper go together: this many are worth one, `1 + 2 ((2/3)² + (1/6)²)`.
-const BINS_PER_ONE: f64 = 1.944;
 /// What a harmonic must gain to count as one: chance gains less, 19 times in 20.
 const HARMONIC_GAIN: f64 = 1.0;
-/// Step of a logarithm in differences.
-const STEP: f64 = 1e-4;
 /// Candidates that are fitted to the end, after all were begun.
 const PROMISING: usize = 4;
 /// Differences of scores: what fits that end early leave; beyond which fitting all numbers together is not tried; and within which parts
@@ -43,9 +40,6 @@ const HOPELESS: f64 = 15.0;
 const NEARLY: f64 = 6.0;
 /// Priors beside the best one, at most.
 const MOST_OTHERS: usize = 4;
-/// Standard deviation of the logarithm of each number before the readings are looked at: what they do not tell is known within a factor
-/// of e.
-const LOG_STD: f64 = 1.0;
 
 /// A prior, and how well the readings tell it.
 #[derive(Clone, Debug, PartialEq)]
@@ -414,139 +408,4 @@ fn has_gas(parts: &[Part]) -> bool {
 
 fn states(parts: &[Part]) -> usize {
     parts.iter().flat_map(Part::terms).map(|t| t.states()).sum()
-}
-
-/// Twice the negative logarithm of Whittle's likelihood.
-struct Whittle<'a> {
-    periodogram: &'a Periodogram,
-    /// Power that is expected of everything else.
-    others: &'a [f64],
-    parts: &'a [Part],
-}
-
-impl Whittle<'_> {
-    /// Of the logarithms of the numbers, with what was known of them before; the deviance is twice the logarithm of the likelihood.
-    fn information(&self) -> Option<DMatrix<f64>> {
-        let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
-        let derivatives = self.derivatives(&values)?;
-        Some(DMatrix::from_fn(values.len(), values.len(), |a, b| {
-            let told = derivatives.curvature[a][b] * values[a] * values[b] / (2.0 * BINS_PER_ONE);
-            told + if a == b { 1.0 / (LOG_STD * LOG_STD) } else { 0.0 }
-        }))
-    }
-
-    /// `ln det(1 + σ² I)`, `I` the information, `σ` how well each logarithm was known before.
-    fn cost(&self) -> f64 {
-        let Some(factor) = self.information().and_then(DMatrix::cholesky) else { return f64::INFINITY };
-        2.0 * factor.l_dirty().diagonal().iter().map(|d| (d * LOG_STD).ln()).sum::<f64>()
-    }
-
-    fn deviance(&self, expected: &[f64]) -> f64 {
-        let sum: f64 = expected.iter().zip(&self.periodogram.power).map(|(e, i)| e.ln() + i / e).sum();
-        2.0 * self.periodogram.pieces * sum
-    }
-}
-
-impl Periodogram {
-    /// What `parts` add to it.
-    fn of_parts(&self, parts: &[Part]) -> Vec<f64> {
-        let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
-        let mut out = if terms.is_empty() { vec![0.0; self.power.len()] } else { self.expected(&terms) };
-        for factors in parts.iter().filter_map(Part::noise) {
-            out.iter_mut().zip(self.of_noise(factors)).for_each(|(sum, noise)| *sum += noise);
-        }
-        out
-    }
-
-    fn of_noise(&self, [first, second]: [f64; 2]) -> Vec<f64> {
-        self.noise[0].iter().zip(&self.noise[1]).map(|(a, b)| first * a + second * b).collect()
-    }
-
-    /// Of what both sensors disagree on, and of what was known of the noise before: the deviance of `factors` of the noise with gradient
-    /// and curvature.
-    fn of_factors(&self, factors: [f64; 2]) -> (f64, [f64; 2], [[f64; 2]; 2]) {
-        let prior = BINS_PER_ONE / (LOG_STD * LOG_STD);
-        let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();
-        let mut gradient = factors.map(|v| 2.0 * prior * v.ln() / v);
-        let mut curvature = [[2.0 * prior / factors[0].powi(2), 0.0], [0.0, 2.0 * prior / factors[1].powi(2)]];
-        for &[power, first] in &self.disagreement {
-            let shares = [first, 1.0 - first];
-            let expected = shares[0] * factors[0] + shares[1] * factors[1];
-            value += 2.0 * self.pieces * (expected.ln() + power / expected);
-            let slopes = shares.map(|s| s / expected);
-            for a in 0..2 {
-                gradient[a] += 2.0 * self.pieces * slopes[a] * (1.0 - power / expected);
-                for b in 0..2 {
-                    curvature[a][b] += 2.0 * self.pieces * slopes[a] * slopes[b];
-                }
-            }
-        }
-        (value, gradient, curvature)
-    }
-}
-
-impl Cost for Whittle<'_> {
-    fn value(&self, x: &[f64]) -> f64 {
-        let parts = part::with(self.parts, x);
-        let own = self.periodogram.of_parts(&parts);
-        let of_noise: f64 = parts.iter().filter_map(Part::noise).map(|f| self.periodogram.of_factors(f).0).sum();
-        of_noise + self.deviance(&self.others.iter().zip(own).map(|(a, b)| a + b).collect::<Vec<f64>>())
-    }
-
-    /// Fisher's scoring: the curvature is its expectation, `2 Σ ∂_a ln P ∂_b ln P`.
-    fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
-        let p = self.periodogram;
-        let parts = part::with(self.parts, x);
-        let mut expected = self.others.to_vec();
-        let mut slopes: Vec<Vec<f64>> = Vec::new();
-        for part in &parts {
-            if let Some(factors) = part.noise() {
-                expected.iter_mut().zip(p.of_noise(factors)).for_each(|(sum, noise)| *sum += noise);
-                slopes.extend(p.noise.clone());
-                continue;
-            }
-            let each: Vec<Vec<f64>> = part.terms().iter().map(|t| p.expected(&[*t])).collect();
-            let mut own = vec![0.0; expected.len()];
-            for line in &each {
-                own.iter_mut().zip(line).for_each(|(sum, p)| *sum += p);
-            }
-            expected.iter_mut().zip(&own).for_each(|(sum, p)| *sum += p);
-            let values = part.values();
-            for (a, value) in values.iter().enumerate() {
-                slopes.push(if let Some(term) = part.size_of(a) {
-                    each[term].iter().map(|p| 2.0 * p / value).collect()
-                } else {
-                    let mut moved = values.clone();
-                    moved[a] *= STEP.exp();
-                    let moved = p.expected(&part::with(std::slice::from_ref(part), &moved)[0].terms());
-                    moved.iter().zip(&own).map(|(b, a)| (b - a) / (STEP.exp_m1() * value)).collect()
-                });
-            }
-        }
-        for slope in &mut slopes {
-            slope.iter_mut().zip(&expected).for_each(|(s, e)| *s /= e);
-        }
-        let residual: Vec<f64> = p.power.iter().zip(&expected).map(|(i, e)| 1.0 - i / e).collect();
-        let dot = |a: &[f64], b: &[f64]| 2.0 * p.pieces * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let mut out = Derivatives {
-            value: self.deviance(&expected),
-            gradient: slopes.iter().map(|s| dot(s, &residual)).collect(),
-            curvature: slopes.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
-        };
-        let mut at = 0;
-        for part in &parts {
-            if let Some(factors) = part.noise() {
-                let (value, gradient, curvature) = p.of_factors(factors);
-                out.value += value;
-                for a in 0..2 {
-                    out.gradient[at + a] += gradient[a];
-                    for b in 0..2 {
-                        out.curvature[at + a][at + b] += curvature[a][b];
-                    }
-                }
-            }
-            at += part.values().len();
-        }
-        Some(out)
-    }
 }

@@ -1,7 +1,7 @@
 //! That what is learned of the gas is what the simulation put there, and that bands hold the gas as often as they say. The gases are
 //! none of the prior's own: a Kolmogorov spectrum, smoothed steps, pulses of varying height and period.
 
-use twinlag_compensate::{CompensateError, Form, Readings, Rig, Sensor, Term, learn, reconstruct};
+use twinlag_compensate::{CompensateError, Form, Readings, Rig, Sensor, Term, learn, learn_with_noise, reconstruct};
 use twinlag_signal::{Engine, Gas, Noise, Plunge, Record, Rig as Simulation, Sensor as Simulated, Signal, Turbulence};
 
 const TAU_S: [f64; 2] = [0.0238, 0.1168];
@@ -73,6 +73,20 @@ fn bands_hold_what_they_say() {
         // Innovations are white: their energy has a standard error of √(2/n), 2.2 %; what is learned takes some of it off.
         assert!((gas.innovation_energy - 1.0).abs() < 0.1, "{signal:?}: energy {}", gas.innovation_energy);
     }
+}
+
+/// Levels that are wrong by factors of 2 and 0.7 are found again. Of 1000 bins half are noise alone and a pair is worth one: their mean
+/// power has a relative standard error of `1/√250`, the level half of that, 3.2 %; four of these.
+#[test]
+fn levels_of_noise_are_found_with_the_gas() {
+    let case = case(Signal::Turbulence(Turbulence { std_k: 10.0, corner_hz: 3.0, cutoff_hz: 240.0 }));
+    let wrong = [2.0, 0.7];
+    let rig = Rig::new([0, 1].map(|i| Sensor::new(TAU_S[i], wrong[i] * NOISE_K)));
+    let learned = learn_with_noise(&case.readings, &rig).expect("long enough");
+    for (factor, wrong) in learned.noise_factor.iter().zip(wrong) {
+        assert!((factor * wrong - 1.0).abs() < 0.13, "{:?}", learned.noise_factor);
+    }
+    assert_eq!(learn(&case.readings, &rig).expect("long enough").noise_factor, [1.0; 2]);
 }
 
 /// More readings know more: the smoother is never less certain than a fixed lag, and that never less than the filter.
