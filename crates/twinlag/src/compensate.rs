@@ -18,6 +18,10 @@ use crate::profile::Z_975;
 /// Standard errors by which innovations may be larger than expected before bands are widened.
 const CLEARLY: f64 = 4.0;
 
+/// Factor by which noise is made louder, so many times at most, as long as readings become more probable.
+const LOUDER: f64 = 1.05;
+const TIMES_LOUDER: usize = 6;
+
 /// What a compensation may assume.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompensateOptions {
@@ -224,12 +228,7 @@ impl Found {
             Ok((readings, Rig { clock: options.trusted, ..rig }))
         };
         let (readings, nominal) = rig(theta, [1.0; 2])?;
-        let Learned { prior, deviations, others: unlike, noise_factor } = if is_noise_found(options, &nominal) {
-            learn_with_noise(&readings, &nominal)?
-        } else {
-            learn(&readings, &nominal)?
-        };
-        let with = |theta: &[f64], prior: &Prior| -> Result<Gas, Error> {
+        let with = |theta: &[f64], prior: &Prior, noise_factor: [f64; 2]| -> Result<Gas, Error> {
             let (readings, rig) = rig(theta, noise_factor)?;
             let mut gas = reconstruct(&readings, &rig, prior, options.form)?;
             if options.trusted == 1 {
@@ -239,15 +238,29 @@ impl Found {
             }
             Ok(gas)
         };
-        let (readings, rig) = rig(theta, noise_factor)?;
-        let gas = with(theta, &prior)?;
+        let is_found = is_noise_found(options, &nominal);
+        let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
+        let Learned { prior, deviations, others: unlike, mut noise_factor } = learned;
+        let mut gas = with(theta, &prior, noise_factor)?;
+        if is_found && is_excessive(&gas) {
+            // Where the prior's spectrum does not end as the gas's does, it has pushed the noise aside: as much as the readings say.
+            for _ in 0..TIMES_LOUDER {
+                let louder = noise_factor.map(|factor| factor * LOUDER);
+                let other = with(theta, &prior, louder)?;
+                if other.log_likelihood <= gas.log_likelihood {
+                    break;
+                }
+                (noise_factor, gas) = (louder, other);
+            }
+        }
+        let (_, rig) = rig(theta, noise_factor)?;
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
         let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
         let of_model: Vec<(Vec<f64>, &Prior)> = moved.map(|moved| (moved, &prior)).collect();
         let of_prior: Vec<(Vec<f64>, &Prior)> = deviations.iter().map(|prior| (theta.to_vec(), prior)).collect();
         let of_unlike: Vec<(Vec<f64>, &Prior)> = unlike.iter().map(|(_, prior)| (theta.to_vec(), prior)).collect();
         let cases = [of_model, of_prior, of_unlike].concat();
-        let others = in_parallel(&cases, watch, |(theta, prior)| with(theta, prior).ok());
+        let others = in_parallel(&cases, watch, |(theta, prior)| with(theta, prior, noise_factor).ok());
         let variance = |others: &[Option<Gas>]| {
             let mut variance = vec![0.0; gas.gas_c.len()];
             for other in others.iter().flatten() {
@@ -260,8 +273,7 @@ impl Found {
         let (of_model, rest) = others.split_at(columns.len());
         let (of_prior, of_unlike) = rest.split_at(deviations.len());
         let (of_model, of_prior) = (variance(of_model), variance(of_prior));
-        let excess = gas.innovation_energy - 1.0 > CLEARLY * (2.0 / gas.innovations as f64).sqrt();
-        let widened_by = if excess { gas.innovation_energy.sqrt() } else { 1.0 };
+        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
         let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it is, by as much as it moves it.
         let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
@@ -269,6 +281,11 @@ impl Found {
         let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
+}
+
+/// Whether readings are clearly farther from what the others led to expect than they should be.
+fn is_excessive(gas: &Gas) -> bool {
+    gas.innovation_energy - 1.0 > CLEARLY * (2.0 / gas.innovations as f64).sqrt()
 }
 
 /// Whether the white noise of both channels is what the record itself seemed to say.
