@@ -64,7 +64,7 @@ mod tracker;
 #[cfg(feature = "std")]
 pub use error::CompensateError;
 #[cfg(feature = "std")]
-pub use learn::{Learned, learn, learn_with_noise};
+pub use learn::{Learned, learn, learn_quickly, learn_with_noise};
 #[cfg(feature = "std")]
 pub use prior::Prior;
 pub use prior::Term;

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{
-    Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, learn_with_noise, reconstruct,
+    Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, learn_quickly, learn_with_noise, reconstruct,
 };
 use twinlag_diagnose::{ModelFit, Verdict};
 use twinlag_record::Record;
@@ -277,7 +277,7 @@ impl Found {
         let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it is, by as much as it moves it.
         let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
-        let gas = averaged(gas, unlike.iter().map(|(weight, _)| *weight).zip(of_unlike));
+        let gas = averaged(&gas, unlike.iter().map(|(weight, _)| *weight).zip(of_unlike));
         let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
@@ -296,17 +296,17 @@ fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
 }
 
 /// The mean of `gas` and of those by other priors, with the variance of the mixture.
-fn averaged<'a>(gas: Gas, others: impl Iterator<Item = (f64, &'a Option<Gas>)>) -> Gas {
+fn averaged<'a>(gas: &Gas, others: impl Iterator<Item = (f64, &'a Option<Gas>)>) -> Gas {
     let others: Vec<(f64, &Gas)> = others.filter_map(|(weight, other)| Some((weight, other.as_ref()?))).collect();
     let own = 1.0 - others.iter().map(|(weight, _)| weight).sum::<f64>();
     let of = |k: usize| {
-        let all = || others.iter().copied().chain([(own, &gas)]);
+        let all = || others.iter().copied().chain([(own, gas)]);
         let mean_c: f64 = all().map(|(w, g)| w * g.gas_c[k]).sum();
         let variance: f64 = all().map(|(w, g)| w * (g.std_k[k].powi(2) + (g.gas_c[k] - mean_c).powi(2))).sum();
         (mean_c, variance.sqrt())
     };
     let (gas_c, std_k) = (0..gas.gas_c.len()).map(of).unzip();
-    Gas { gas_c, std_k, ..gas }
+    Gas { gas_c, std_k, ..gas.clone() }
 }
 
 /// The work on each of `cases`, in their order whatever the number of threads.
@@ -342,7 +342,7 @@ fn in_parallel<Case: Sync>(
 pub(crate) fn gas(fit: &ModelFit) -> Option<Gas> {
     let extended = fit.extended.as_ref()?;
     let (readings, rig) = extended.rig(extended.parameters()).ok()?;
-    let prior = learn(&readings, &rig).ok()?.prior;
+    let prior = learn_quickly(&readings, &rig).ok()?.prior;
     reconstruct(&readings, &rig, &prior, Form::Smoother).ok()
 }
 
