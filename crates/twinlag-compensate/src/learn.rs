@@ -63,15 +63,15 @@ pub struct Learned {
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
 pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, true, true)
+    learned(readings, rig, Ask::Gas)
 }
 
-/// The same in a tenth of the time: parts are added and not exchanged. For a gas temperature without bands.
+/// The same in less time: parts are added and not exchanged. For a gas temperature without bands.
 ///
 /// # Errors
 /// As [`learn`].
 pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, true, false)
+    learned(readings, rig, Ask::GasQuickly)
 }
 
 /// The same where the noise of `rig` was found from the readings without regard to what the gas is like: gas that is rough from one
@@ -80,15 +80,19 @@ pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, Compensa
 /// # Errors
 /// As [`learn`].
 pub fn learn_with_noise(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, false, true)
+    learned(readings, rig, Ask::GasAndNoise)
 }
 
-fn learned(
-    readings: &Readings,
-    rig: &Rig,
-    is_noise_known: bool,
-    is_thorough: bool,
-) -> Result<Learned, CompensateError> {
+/// What is asked of the readings.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ask {
+    Gas,
+    /// Parts are added and not exchanged.
+    GasQuickly,
+    GasAndNoise,
+}
+
+fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, CompensateError> {
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());
     let got = (0..readings.len()).filter(both).count();
@@ -103,7 +107,7 @@ fn learned(
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
-    let search = Search { periodogram: &periodogram, limits, room, is_noise_known, is_thorough };
+    let search = Search { periodogram: &periodogram, limits, room, ask };
     let (best, mut others) = search.run();
     let score = best.score();
     let mut parts = best.parts;
@@ -132,9 +136,7 @@ struct Search<'a> {
     limits: Limits,
     /// States that the gas may have.
     room: usize,
-    is_noise_known: bool,
-    /// Whether parts are exchanged as well as added.
-    is_thorough: bool,
+    ask: Ask,
 }
 
 /// Parts with what they leave unlikely.
@@ -162,12 +164,12 @@ impl Search<'_> {
     /// The likeliest parts: they are added, and then each is exchanged for what explains more in its place, until neither gains. With
     /// those of other kinds that came up on the way and are nearly as likely.
     fn run(&self) -> (Fitted, Vec<Fitted>) {
-        let noise = if self.is_noise_known { Vec::new() } else { vec![Part::Noise([1.0; 2])] };
+        let noise = if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() };
         let first = self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()));
         let mut seen = self.grown(first);
         let mut current = likeliest(&seen);
         loop {
-            let others = if self.is_thorough { self.exchanged(&current) } else { Vec::new() };
+            let others = if self.ask == Ask::GasQuickly { Vec::new() } else { self.exchanged(&current) };
             seen.extend(others.iter().cloned());
             let better = likeliest(&others);
             if better.score() >= current.score() - NOTHING_GAINED {

@@ -169,9 +169,8 @@ impl Stored for Plan {
         Head { name, title, seed: *seed }
     }
 
-    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
-        self.trials = trials.unwrap_or(self.trials);
-        self.seed = seed.unwrap_or(self.seed);
+    fn trials_and_seed(&mut self) -> [&mut u64; 2] {
+        [&mut self.trials, &mut self.seed]
     }
 
     /// One gas, short.

@@ -200,9 +200,8 @@ impl Stored for Plan {
         Head { name, title, seed: *seed }
     }
 
-    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
-        self.records = trials.unwrap_or(self.records);
-        self.seed = seed.unwrap_or(self.seed);
+    fn trials_and_seed(&mut self) -> [&mut u64; 2] {
+        [&mut self.records, &mut self.seed]
     }
 
     /// One record of the first set, of the two largest sizes.

@@ -22,8 +22,8 @@ pub(super) struct Head<'a> {
 pub(super) trait Stored: Study {
     fn head(&self) -> Head<'_>;
 
-    /// Others than the plan's, where they are given.
-    fn set(&mut self, trials: Option<u64>, seed: Option<u64>);
+    /// Both numbers of the plan that may be given beside it.
+    fn trials_and_seed(&mut self) -> [&mut u64; 2];
 
     /// A few cells alone.
     fn shorten(&mut self);
@@ -97,7 +97,9 @@ impl<S: Stored> Own for S {
     }
 
     fn run(mut self: Box<Self>, folder: &Path, run: &Run) -> Result<()> {
-        self.set(run.trials, run.seed);
+        let [trials, seed] = self.trials_and_seed();
+        *trials = run.trials.unwrap_or(*trials);
+        *seed = run.seed.unwrap_or(*seed);
         if run.quick {
             self.shorten();
         }
@@ -124,7 +126,8 @@ impl<S: Stored> Own for S {
     }
 
     fn merge(mut self: Box<Self>, results: &Results, out: &Path) -> Result<()> {
-        self.set(Some(results.header().trials()), None);
+        let [trials, _] = self.trials_and_seed();
+        *trials = results.header().trials();
         write_stored(&*self, results, out)
     }
 }

@@ -322,10 +322,8 @@ impl Stored for Tracking {
         Head { name, title, seed: *seed }
     }
 
-    fn set(&mut self, trials: Option<u64>, seed: Option<u64>) {
-        let plan = &mut self.plan;
-        plan.trials = trials.unwrap_or(plan.trials);
-        plan.seed = seed.unwrap_or(plan.seed);
+    fn trials_and_seed(&mut self) -> [&mut u64; 2] {
+        [&mut self.plan.trials, &mut self.plan.seed]
     }
 
     /// One gas with the most noise, short.

@@ -99,7 +99,7 @@ impl Part {
     pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Noise(_) => "noise",
-            Self::Single(Term::Resonance { .. }) if self.is_line() => "line",
+            Self::Single(Term::Resonance { quality, .. }) if *quality > 1.0 => "line",
             Self::Single(Term::Resonance { .. }) => "smooth",
             Self::Single(Term::Rough { .. }) => "rough",
             Self::Turbulent { .. } => "turbulent",
@@ -118,15 +118,6 @@ impl Part {
                 goes_on: !goes_on,
             }),
             _ => None,
-        }
-    }
-
-    /// Whether it has a frequency of its own.
-    fn is_line(&self) -> bool {
-        match self {
-            Self::Single(Term::Resonance { quality, .. }) => *quality > 1.0,
-            Self::Noise(_) | Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => false,
-            Self::Comb { .. } => true,
         }
     }
 
