@@ -39,6 +39,7 @@ mod clock;
 mod dialect;
 mod encoding;
 mod error;
+mod grid;
 mod layout;
 mod note;
 mod number;
@@ -54,6 +55,7 @@ mod write;
 
 pub use dialect::{Decimal, Delimiter};
 pub use error::{Place, RecordError};
+pub use grid::{Grid, Stretch};
 pub use note::Note;
 pub use record::{Channels, Record};
 pub use rows::{Row, RowReader};
