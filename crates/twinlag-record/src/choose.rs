@@ -3,9 +3,10 @@
 
 use crate::RecordError;
 use crate::clock;
+use crate::column::{Column, Kind};
 use crate::note::Note;
 use crate::selection::Selection;
-use crate::table::{Column, Kind, Table};
+use crate::table::Table;
 use crate::time_axis::TimeColumns;
 use crate::unit::Unit;
 

@@ -78,15 +78,15 @@ pub enum RecordError {
     #[error("{file}: line {line}: a quotation mark is opened and not closed; close it or remove it")]
     OpenQuote { file: String, line: usize },
     #[error(
-        "{file}: line {line}, column {column}: expected a number or a word for a missing one (empty, NaN, NA, null, ---, \
+        "{file}: {at}, column {column}: expected a number or a word for a missing one (empty, NaN, NA, null, ---, \
          OL, OPEN, Over, inf), found '{cell}'; mend the cell or empty it"
     )]
-    NotANumber { file: String, line: usize, column: String, cell: String },
+    NotANumber { file: String, at: Place, column: String, cell: String },
     #[error(
-        "{file}: line {line}, column {column}: expected numbers, found mostly text (first '{cell}'); \
+        "{file}: {at}, column {column}: expected numbers, found mostly text (first '{cell}'); \
          choose another column with --t1, --t2, --reference, --flow or --time (NAME or number)"
     )]
-    TextColumn { file: String, line: usize, column: String, cell: String },
+    TextColumn { file: String, at: Place, column: String, cell: String },
     #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example --t1 2")]
     UnknownColumn { file: String, wanted: String, columns: String },
     #[error(
@@ -117,13 +117,13 @@ pub enum RecordError {
     BadPeriod { file: String, period_s: f64 },
     #[error("{file}: both a time column ({column}) and a sample period ({period_s} s) were given; give one of them")]
     TimeAndPeriod { file: String, column: String, period_s: f64 },
-    #[error("{file}: line {line}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
-    NotATime { file: String, line: usize, column: String, cell: String, expected: &'static str },
+    #[error("{file}: {at}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
+    NotATime { file: String, at: Place, column: String, cell: String, expected: &'static str },
     #[error(
-        "{file}: line {line}, column {column}: '{cell}' may be day/month or month/day, and no date in the file tells \
+        "{file}: {at}, column {column}: '{cell}' may be day/month or month/day, and no date in the file tells \
          which; write dates as YYYY-MM-DD"
     )]
-    AmbiguousDate { file: String, line: usize, column: String, cell: String },
+    AmbiguousDate { file: String, at: Place, column: String, cell: String },
     #[error("{file}: {at}, column {column}: the time is missing or not finite; mend or remove the row")]
     MissingTime { file: String, at: Place, column: String },
     #[error(

@@ -8,10 +8,11 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::choose::{Chosen, choose};
+use crate::column::Column;
 use crate::note::Note;
 use crate::sampling::{self, Sampling, SamplingKind};
 use crate::selection::{SamplingChoice, Selection};
-use crate::table::{Column, Table, shortened};
+use crate::table::{Table, shortened};
 use crate::time_axis::{self, TimeAxis};
 use crate::unit::Unit;
 use crate::wording::plain;
@@ -82,7 +83,7 @@ struct Origin<'a> {
 
 impl Origin<'_> {
     fn place(&self, row: usize) -> Place {
-        self.table.map_or(Place::Sample(row + 1), |(table, _)| Place::Line(table.line_of(row)))
+        self.table.map_or(Place::Sample(row + 1), |(table, _)| table.place_of(row))
     }
 
     /// A stamp as the file has it.
@@ -160,7 +161,7 @@ impl Record {
         all.append(&mut notes);
         let record = Self::build(channels, selection.sampling, unit_s, all, &origin)?;
         let Some(index) = chosen.flow else { return Ok(record) };
-        let at = |row: usize| Place::Line(table.line_of(row));
+        let at = |row: usize| table.place_of(row);
         record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at)
     }
 

@@ -2,12 +2,13 @@
 
 use crate::cells::{is_idle, split};
 use crate::choose::choose;
+use crate::column::Kind;
 use crate::dialect::{Decimal, Delimiter};
 use crate::note::Note;
 use crate::number::{self, Value};
 use crate::record::{ABSOLUTE_ZERO_C, HOTTEST_C};
 use crate::selection::Selection;
-use crate::table::{Kind, Table, shortened};
+use crate::table::{Table, shortened};
 use crate::time_axis::{TimeColumns, seconds};
 use crate::unit::Unit;
 use crate::{Place, RecordError};
@@ -101,7 +102,7 @@ impl RowReader {
                 Value::Number(value) => value,
                 Value::Other => {
                     let cell = shortened(cell);
-                    return Err(RecordError::NotANumber { file: file(), line: number, column, cell });
+                    return Err(RecordError::NotANumber { file: file(), at: Place::Line(number), column, cell });
                 }
             };
             match channel.unit.to_celsius(value) {

@@ -5,143 +5,29 @@ use std::fs;
 use std::path::Path;
 
 use crate::cells::{is_idle, lines, lines_from_end, split};
+use crate::column::{Column, Kind};
 use crate::dialect::{Decimal, Delimiter, Evidence, Unclear};
 use crate::layout::Layout;
 use crate::note::Note;
-use crate::number::{self, Value};
 use crate::selection::ColumnRef;
-use crate::unit::Unit;
-use crate::{RecordError, clock, encoding};
-
-/// What the cells of a column are for the most part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Kind {
-    /// Numbers.
-    Number,
-    /// Dates, times of day, or both.
-    Stamp,
-    /// Anything else.
-    Text,
-    /// Nothing at all: every cell is missing.
-    Empty,
-}
-
-/// One column.
-#[derive(Clone, Debug)]
-pub struct Column {
-    name: String,
-    label: String,
-    unit: Unit,
-    kind: Kind,
-    values: Vec<f64>,
-    missing: usize,
-    texts: Texts,
-    /// Numbers too large for a double: as infinities they do not say what stood there.
-    beyond: Texts,
-}
-
-impl Column {
-    /// The name as in the header; empty if there is none.
-    pub fn name(&self) -> &str {
-        &self.name
-    }
-
-    /// The name without its unit: `T1` for `T1 [°C]` and for `T1_C`.
-    pub fn label(&self) -> &str {
-        &self.label
-    }
-
-    /// The unit from the header or the unit row.
-    pub fn unit(&self) -> &Unit {
-        &self.unit
-    }
-
-    /// What the cells are for the most part.
-    pub fn kind(&self) -> Kind {
-        self.kind
-    }
-
-    /// How many cells are missing.
-    pub fn missing(&self) -> usize {
-        self.missing
-    }
-
-    /// The numbers, one per row, in the file's unit; NaN where the cell is missing or is no number.
-    pub(crate) fn raw(&self) -> &[f64] {
-        &self.values
-    }
-
-    /// The text of a cell that is neither a number nor missing.
-    pub(crate) fn text(&self, row: usize) -> Option<&str> {
-        self.texts.get(row)
-    }
-
-    /// The text of a cell that is a number too large for a double.
-    pub(crate) fn beyond(&self, row: usize) -> Option<&str> {
-        self.beyond.get(row)
-    }
-
-    fn push(&mut self, row: usize, cell: &str, decimal: Decimal) {
-        let value = number::read(cell, decimal);
-        self.values.push(if let Value::Number(number) = value { number } else { f64::NAN });
-        match value {
-            Value::Number(number) if number.is_infinite() => self.beyond.push(row, cell),
-            Value::Number(_) => {}
-            Value::Missing => self.missing += 1,
-            Value::Other => self.texts.push(row, cell),
-        }
-    }
-
-    fn judge(&mut self) {
-        let texts = self.texts.places.len();
-        let numbers = self.values.len() - self.missing - texts;
-        let stamps = self.texts.iter().take(100).filter(|(_, text)| clock::parse(text).is_some()).count();
-        self.kind = match numbers + texts {
-            0 => Kind::Empty,
-            _ if numbers >= texts => Kind::Number,
-            _ if 2 * stamps > texts.min(100) => Kind::Stamp,
-            _ => Kind::Text,
-        };
-    }
-}
-
-/// Texts of some rows, in one piece of memory: a column of a million stamps is one allocation, not a million.
-#[derive(Clone, Debug, Default)]
-struct Texts {
-    arena: String,
-    /// Row, and where its text ends; it begins where the one before ends.
-    places: Vec<(usize, usize)>,
-}
-
-impl Texts {
-    fn push(&mut self, row: usize, text: &str) {
-        self.arena.push_str(text);
-        self.places.push((row, self.arena.len()));
-    }
-
-    fn at(&self, index: usize) -> &str {
-        let start = index.checked_sub(1).map_or(0, |before| self.places[before].1);
-        &self.arena[start..self.places[index].1]
-    }
-
-    fn get(&self, row: usize) -> Option<&str> {
-        self.places.binary_search_by_key(&row, |place| place.0).ok().map(|index| self.at(index))
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (usize, &str)> {
-        self.places.iter().enumerate().map(|(index, place)| (place.0, self.at(index)))
-    }
-}
+use crate::{Place, RecordError, encoding};
 
 /// Delimited text as loggers write it, taken apart: columns of numbers, of date-times, of text.
 #[derive(Clone, Debug)]
 pub struct Table {
-    source: String,
-    columns: Vec<Column>,
-    /// Line of each row, from 1.
-    row_lines: Vec<usize>,
-    notes: Vec<Note>,
+    pub(crate) source: String,
+    pub(crate) columns: Vec<Column>,
+    pub(crate) places: Places,
+    pub(crate) notes: Vec<Note>,
+}
+
+/// Where the rows of a table are from.
+#[derive(Clone, Debug)]
+pub(crate) enum Places {
+    /// Line of each row in the file, from 1.
+    Lines(Vec<usize>),
+    /// That many rows of columns that never were in a file.
+    Samples(usize),
 }
 
 impl Table {
@@ -180,16 +66,10 @@ impl Table {
         let Layout { delimiter, header_line, .. } = layout;
         let format = Note::Format { delimiter, decimal, encoding, header_line };
         let columns = (0..layout.width).map(|index| {
-            let name = layout.names.get(index).cloned().unwrap_or_default();
-            let (label, unit) = Unit::split_header(&name);
-            let row_unit = layout.units[index].clone();
-            // A suffix such as `_C` may be part of the name; the unit row is never.
-            let unit = if row_unit == Unit::Unstated { unit } else { row_unit };
-            let (values, texts, beyond) = (Vec::new(), Texts::default(), Texts::default());
-            Column { name, label, unit, kind: Kind::Empty, values, missing: 0, texts, beyond }
+            Column::new(layout.names.get(index).cloned().unwrap_or_default(), layout.units[index].clone())
         });
-        let (columns, row_lines) = (columns.collect(), Vec::new());
-        let mut table = Self { source: source.to_owned(), columns, row_lines, notes: vec![format] };
+        let (columns, places) = (columns.collect(), Places::Lines(Vec::new()));
+        let mut table = Self { source: source.to_owned(), columns, places, notes: vec![format] };
         table.fill(&text, &layout, decimal)?;
         for column in &mut table.columns {
             column.judge();
@@ -200,7 +80,7 @@ impl Table {
     fn fill(&mut self, text: &str, layout: &Layout, decimal: Decimal) -> Result<(), RecordError> {
         let file = || self.source.clone();
         let width = layout.width;
-        let mut cells = Vec::new();
+        let (mut cells, mut row_lines) = (Vec::new(), Vec::new());
         let (mut repeated, mut first_repeated) = (0, 0);
         let mut rows = lines(text).skip(layout.first_line - 1).filter(|(_, line)| !is_idle(line)).peekable();
         while let Some((line, content)) = rows.next() {
@@ -234,9 +114,9 @@ impl Table {
                 });
             }
             for (column, cell) in self.columns.iter_mut().zip(&cells) {
-                column.push(self.row_lines.len(), cell, decimal);
+                column.push(row_lines.len(), cell, decimal);
             }
-            self.row_lines.push(line);
+            row_lines.push(line);
             if is_last && lines_from_end(text).next() == Some(content) {
                 self.notes.push(Note::NoFinalLineBreak { line });
             }
@@ -244,6 +124,7 @@ impl Table {
         if repeated > 0 {
             self.notes.push(Note::RepeatedHeader { lines: repeated, first_line: first_repeated });
         }
+        self.places = Places::Lines(row_lines);
         Ok(())
     }
 
@@ -259,12 +140,20 @@ impl Table {
 
     /// Number of rows.
     pub fn rows(&self) -> usize {
-        self.row_lines.len()
+        match &self.places {
+            Places::Lines(lines) => lines.len(),
+            Places::Samples(rows) => *rows,
+        }
     }
 
-    /// Line of a row in the file, from 1. Panics if there is no such row.
-    pub fn line_of(&self, row: usize) -> usize {
-        self.row_lines[row]
+    /// Where a row is from: its line in the file, or its number from 1 if the table never was a file.
+    ///
+    /// - `row`: from 0. Panics if a file has no such row.
+    pub fn place_of(&self, row: usize) -> Place {
+        match &self.places {
+            Places::Lines(lines) => Place::Line(lines[row]),
+            Places::Samples(_) => Place::Sample(row + 1),
+        }
     }
 
     /// What was understood of the file so far.
@@ -284,12 +173,12 @@ impl Table {
         let Some((row, cell)) = column.texts.iter().next() else {
             return Ok(&column.values);
         };
-        let (file, line) = (self.source.clone(), self.row_lines[row]);
+        let (file, at) = (self.source.clone(), self.place_of(row));
         let (name, cell) = (self.title(index), shortened(cell));
         Err(if column.kind == Kind::Number {
-            RecordError::NotANumber { file, line, column: name, cell }
+            RecordError::NotANumber { file, at, column: name, cell }
         } else {
-            RecordError::TextColumn { file, line, column: name, cell }
+            RecordError::TextColumn { file, at, column: name, cell }
         })
     }
 

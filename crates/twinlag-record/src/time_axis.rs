@@ -1,11 +1,12 @@
 //! From a column (or two) to seconds since the first sample.
 
+use crate::RecordError;
 use crate::clock::{self, DAY_NS, Day, Stamp};
+use crate::column::Kind;
 use crate::note::Note;
-use crate::table::{Kind, Table};
+use crate::table::Table;
 use crate::unit::Unit;
 use crate::wording::plain;
-use crate::{Place, RecordError};
 
 /// Seconds since the first row, and the time unit that the stamps were printed in.
 pub(crate) struct TimeAxis {
@@ -55,7 +56,7 @@ fn numeric(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<TimeAxi
         }
     };
     if let Some(row) = values.iter().position(|value| !value.is_finite()) {
-        let (file, at) = (table.source().to_owned(), Place::Line(table.line_of(row)));
+        let (file, at) = (table.source().to_owned(), table.place_of(row));
         return Err(RecordError::MissingTime { file, at, column: table.title(index) });
     }
     let to = (symbol != "s").then_some("s");
@@ -77,7 +78,7 @@ fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {
         .map(|row| match column.text(row) {
             Some(cell) => clock::parse(cell).ok_or_else(|| not_a_time(table, index, row, "a date-time or time of day")),
             None if column.raw()[row].is_nan() => {
-                let (file, at) = (table.source().to_owned(), Place::Line(table.line_of(row)));
+                let (file, at) = (table.source().to_owned(), table.place_of(row));
                 Err(RecordError::MissingTime { file, at, column: table.title(index) })
             }
             None => Err(not_a_time(table, index, row, "a date-time or time of day as in the other rows")),
@@ -88,8 +89,8 @@ fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {
 fn not_a_time(table: &Table, index: usize, row: usize, expected: &'static str) -> RecordError {
     let column = &table.columns()[index];
     let cell = column.text(row).map_or_else(|| plain(column.raw()[row]), str::to_owned);
-    let (file, line) = (table.source().to_owned(), table.line_of(row));
-    RecordError::NotATime { file, line, column: table.title(index), cell, expected }
+    let (file, at) = (table.source().to_owned(), table.place_of(row));
+    RecordError::NotATime { file, at, column: table.title(index), cell, expected }
 }
 
 /// Which of two open numbers is the day.
@@ -167,8 +168,8 @@ fn order(table: &Table, index: usize, stamps: &[Stamp]) -> Result<Order, RecordE
         (false, true) => Ok(Order::MonthFirst),
         _ => {
             let cell = table.columns()[index].text(first_row).unwrap_or("").to_owned();
-            let (file, line) = (table.source().to_owned(), table.line_of(first_row));
-            Err(RecordError::AmbiguousDate { file, line, column: table.title(index), cell })
+            let (file, at) = (table.source().to_owned(), table.place_of(first_row));
+            Err(RecordError::AmbiguousDate { file, at, column: table.title(index), cell })
         }
     }
 }

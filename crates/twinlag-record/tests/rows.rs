@@ -1,6 +1,6 @@
 //! That further lines are read as the first ones were, and that a bad one is named and harms no other.
 
-use twinlag_record::{RecordError, Row, RowReader, Selection, Table};
+use twinlag_record::{Place, RecordError, Row, RowReader, Selection, Table};
 
 const START: &str = "\
 Zeit [ms];T1 [°C];Sonde;T2 [K]
@@ -33,7 +33,7 @@ fn bad_lines_are_named() {
     let reader = reader();
     let error = |line: &str| reader.read(line, 7).expect_err("a bad line");
     assert!(matches!(error("104;21,0"), RecordError::CellCount { line: 7, expected: 4, found: 2, .. }));
-    assert!(matches!(error("104;warm;c;293,65"), RecordError::NotANumber { line: 7, .. }));
+    assert!(matches!(error("104;warm;c;293,65"), RecordError::NotANumber { at: Place::Line(7), .. }));
     assert!(matches!(error("104;21,0;c;-5,0"), RecordError::OutOfRange { .. }));
     assert!(matches!(error("104;\"21,0;c;293,65"), RecordError::OpenQuote { line: 7, .. }));
 }
