@@ -33,11 +33,11 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
-            output::write(path, twinlag::gas_picture(&record, &answer).map_err(twinlag::Error::from)?)?;
+            output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
         }
     }
     if let Some(path) = views.report {
-        let report = twinlag::gas_report(&record, &answer, &output::command_line()).map_err(twinlag::Error::from)?;
+        let report = twinlag_pages::gas_report(&record, &answer, &output::command_line())?;
         output::write(path, report)?;
     }
     print::compensation(&answer, &command.out, to_stdout, talk)?;

@@ -2,7 +2,8 @@
 
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
-use twinlag::{DiagnoseOptions, Diagnosis, ReportContext};
+use twinlag::{DiagnoseOptions, Diagnosis};
+use twinlag_pages::{ReportContext, diagnosis_report};
 
 use crate::arguments::{Diagnose, Talk};
 use crate::characterise::read;
@@ -55,5 +56,5 @@ fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String
         version: answer.base.made_by.version.clone(),
         notes: answer.base.notes.clone(),
     };
-    Ok(twinlag::report(core, &context).map_err(twinlag::Error::from)?)
+    Ok(diagnosis_report(core, &context)?)
 }

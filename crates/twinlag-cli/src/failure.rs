@@ -3,6 +3,7 @@
 use std::fmt;
 
 use twinlag::record::RecordError;
+use twinlag_pages::ReportError;
 
 /// An error with the exit code that it means.
 #[derive(Debug)]
@@ -48,6 +49,13 @@ impl From<twinlag::Error> for Failure {
             error if error.is_usage() => Self::Usage(error.to_string()),
             error => Self::File(error.to_string()),
         }
+    }
+}
+
+/// Something that cannot be drawn is of the file: nothing in it can be shown.
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        Self::File(error.to_string())
     }
 }
 

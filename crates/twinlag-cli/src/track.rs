@@ -45,11 +45,11 @@ pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
-            output::write(path, twinlag::track_picture(&answer).map_err(twinlag::Error::from)?)?;
+            output::write(path, twinlag_pages::track_picture(&answer)?)?;
         }
     }
     if let Some(path) = views.report {
-        let report = twinlag::track_report(&record, &answer, &output::command_line()).map_err(twinlag::Error::from)?;
+        let report = twinlag_pages::track_report(&record, &answer, &output::command_line())?;
         output::write(path, report)?;
     }
     print::track(&answer, &command.out, to_stdout, talk)?;

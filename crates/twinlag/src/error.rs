@@ -7,8 +7,6 @@ use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
 use twinlag_signal::SignalError;
 
-use twinlag_report::ReportError;
-
 /// Why a question could not be put to a record. A fit that ran is never an error: see [`crate::Status`].
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
@@ -26,8 +24,6 @@ pub enum Error {
     Noise(#[from] NoiseError),
     #[error(transparent)]
     Optimiser(#[from] ProblemError),
-    #[error(transparent)]
-    Report(#[from] ReportError),
     #[error(transparent)]
     Signal(#[from] SignalError),
     #[error("{option}: expected {expected}, got \"{got}\"")]

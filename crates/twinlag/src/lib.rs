@@ -70,7 +70,6 @@ mod objective;
 mod options;
 mod profile;
 mod question;
-mod report;
 mod second_lag;
 mod starts;
 mod track;
@@ -91,7 +90,6 @@ pub use levels::{NoiseColour, NoiseSource};
 pub use live::{Live, LiveAnswer, LiveOptions};
 pub use options::{Estimator, Hold, Intervals, Known, Options};
 pub use question::Watch;
-pub use report::{ReportContext, gas_picture, gas_report, report, residual_picture, track_picture, track_report};
 pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
 pub use twinlag_bias as bias;

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use twinlag::diagnosis::Value;
-use twinlag::{Diagnosis, residual_picture};
+use twinlag::Diagnosis;
+use twinlag_pages::residual_picture;
 
 /// Everything that is written of the records.
 #[derive(Default)]

@@ -1,25 +1,25 @@
 //! Words and numbers of the report.
 
-use twinlag_diagnose::{Identifier, TimeConstant};
+use twinlag::diagnosis::{Identifier, TimeConstant};
 use twinlag_report::{between, plus_minus};
 
-pub(super) const ABSENT: &str = "not determined";
+pub(crate) const ABSENT: &str = "not determined";
 
 /// A name for scripts as words.
-pub(super) fn words_of(name: &str) -> String {
+pub(crate) fn words_of(name: &str) -> String {
     name.replace('-', " ")
 }
 
-pub(super) fn words(effect: Identifier) -> String {
+pub(crate) fn words(effect: Identifier) -> String {
     words_of(effect.name())
 }
 
-pub(super) fn identifiers(effects: &[Identifier]) -> String {
+pub(crate) fn identifiers(effects: &[Identifier]) -> String {
     effects.iter().map(|e| words(*e)).collect::<Vec<_>>().join(", ")
 }
 
 /// `a`, `a and b`, `a, b and c`.
-pub(super) fn listed(items: &[String]) -> String {
+pub(crate) fn listed(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [one] => one.clone(),
@@ -27,47 +27,47 @@ pub(super) fn listed(items: &[String]) -> String {
     }
 }
 
-pub(super) fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut chars = text.chars();
     chars.next().map_or(String::new(), |first| first.to_uppercase().chain(chars).collect())
 }
 
 /// With a capital and a full stop; nothing stays nothing.
-pub(super) fn sentence(text: &str) -> String {
+pub(crate) fn sentence(text: &str) -> String {
     let text = text.trim();
     if text.is_empty() || text.ends_with(['.', '!', '?']) { capital(text) } else { format!("{}.", capital(text)) }
 }
 
 /// A name that does not fill a legend.
-pub(super) fn short(name: &str) -> String {
+pub(crate) fn short(name: &str) -> String {
     const MOST: usize = 28;
     if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
 }
 
 /// A unit as it is printed: numbers without one have `1`.
-pub(super) fn unit(unit: &str) -> &str {
+pub(crate) fn unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
-pub(super) fn with_unit(number: &str, of: &str) -> String {
+pub(crate) fn with_unit(number: &str, of: &str) -> String {
     if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
 }
 
-pub(super) fn parameter(value: &twinlag_diagnose::Value) -> String {
+pub(crate) fn parameter(value: &twinlag::diagnosis::Value) -> String {
     let number = plus_minus(value.value, value.standard_error);
     format!("{} {}", value.name.replace('_', " "), with_unit(&number, &value.unit))
 }
 
-pub(super) fn estimate(of: &TimeConstant) -> String {
+pub(crate) fn estimate(of: &TimeConstant) -> String {
     of.value_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
 }
 
-pub(super) fn interval(of: &TimeConstant) -> String {
+pub(crate) fn interval(of: &TimeConstant) -> String {
     of.interval_95_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
 }
 
 /// What a test asks, by its name.
-pub(super) fn question(test: &str) -> &'static str {
+pub(crate) fn question(test: &str) -> &'static str {
     match test {
         "total-energy" => "Is its energy that of the noise?",
         "band-energy" => "Has every band of frequencies its share of the energy?",

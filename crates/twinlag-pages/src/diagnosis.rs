@@ -1,22 +1,14 @@
 //! A diagnosis as a page: what was found, how well it is shown, what it changes, and what stays open, with pictures.
 
-mod figures;
-mod gas;
-mod pages;
-mod words;
-
 use std::ops::Range;
 
-use twinlag_diagnose::{Diagnosis, Found, Identifier, ModelFit, TimeConstant, Trace, Verdict};
+use twinlag::diagnosis::{Diagnosis, Found, Identifier, ModelFit, TimeConstant, Trace, Verdict};
 use twinlag_report::{
     Axis, Chart, Colour, Document, Figure, ReportError, Series, Table, between, plus_minus, probability, rounded,
 };
 
-pub use gas::{gas_picture, track_picture};
-pub use pages::{gas_report, track_report};
-
-use figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
-use words::{
+use crate::figures::{WIDTH_PX, chart, frequency_figure, pairs, time_figure, trace};
+use crate::words::{
     ABSENT, capital, estimate, identifiers, interval, listed, parameter, question, sentence, short, unit, with_unit,
     words, words_of,
 };
@@ -55,7 +47,7 @@ pub struct ReportContext<'a> {
 /// # Errors
 /// [`ReportError::LengthMismatch`] if readings, reference and instants differ in number. What a diagnosis does not
 /// determine, up to one that was refused, is said in the report and is no error.
-pub fn report(diagnosis: &Diagnosis, context: &ReportContext<'_>) -> Result<String, ReportError> {
+pub fn diagnosis_report(diagnosis: &Diagnosis, context: &ReportContext<'_>) -> Result<String, ReportError> {
     let expected = context.time_s.len();
     let columns = [Some(context.t1_c), Some(context.t2_c), context.reference_c];
     let names = [context.channels[0].as_str(), context.channels[1].as_str(), "reference"];
@@ -83,7 +75,7 @@ pub fn report(diagnosis: &Diagnosis, context: &ReportContext<'_>) -> Result<Stri
 /// # Errors
 /// [`ReportError`] if it cannot be drawn.
 pub fn residual_picture(diagnosis: &Diagnosis) -> Result<Option<String>, ReportError> {
-    figures::frequency_figure(&models(diagnosis)).map(|figure| figure.to_svg()).transpose()
+    frequency_figure(&models(diagnosis)).map(|figure| figure.to_svg()).transpose()
 }
 
 /// The models to be shown: one, if no effect was added.
@@ -101,11 +93,11 @@ struct Page<'a> {
 }
 
 /// A model with its name in pictures and in tables.
-struct Model<'a> {
-    name: &'static str,
-    column: &'static str,
-    fit: &'a ModelFit,
-    colour: Colour,
+pub(crate) struct Model<'a> {
+    pub(crate) name: &'static str,
+    pub(crate) column: &'static str,
+    pub(crate) fit: &'a ModelFit,
+    pub(crate) colour: Colour,
 }
 
 impl Page<'_> {
@@ -595,12 +587,12 @@ fn against_reference(trace: &Trace, time_s: &[f64], reference_c: &[f64]) -> f64 
 
 #[cfg(test)]
 mod tests {
-    use super::{ReportContext, report};
-    use twinlag_diagnose::{
+    use super::{ReportContext, diagnosis_report};
+    use twinlag::diagnosis::{
         BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Identifier, ModelFit, TimeConstant, Trace, Unexplained,
         Value, Verdict,
     };
-    use twinlag_optimise::{End, Evaluations, Fit};
+    use twinlag::optimise::{End, Evaluations, Fit};
     use twinlag_report::ReportError;
 
     const SECTIONS: [&str; 10] = [
@@ -703,7 +695,7 @@ mod tests {
                 for (t, y) in [(&time_s, &gaps), (&time_s, &time_s), (&vec![], &vec![])] {
                     let mut context = context(t, y, y);
                     context.reference_c = Some(y);
-                    let page = report(&diagnosis, &context).expect("a report");
+                    let page = diagnosis_report(&diagnosis, &context).expect("a report");
                     assert!(!page.contains("NaN") && !page.contains("inf "), "{verdict:?}");
                     assert!(page.contains("not determined") && page.contains("a &lt;b&gt;.csv"));
                     let mut rest = page.as_str();
@@ -718,7 +710,7 @@ mod tests {
 
     #[test]
     fn readings_of_another_length_are_refused() {
-        let got = report(&nothing(Verdict::Refused), &context(&[0.0, 1.0], &[1.0, 2.0], &[1.0]));
+        let got = diagnosis_report(&nothing(Verdict::Refused), &context(&[0.0, 1.0], &[1.0, 2.0], &[1.0]));
         let series = "T2 & more".into();
         assert_eq!(got, Err(ReportError::LengthMismatch { series, quantity: "readings", expected: 2, got: 1 }));
     }

@@ -1,14 +1,12 @@
 //! A gas temperature, and time constants along a record, as pages.
 
-use twinlag_record::Record;
+use twinlag::record::Record;
 use twinlag_report::{Document, Figure, ReportError, Table, between, plus_minus, probability, rounded};
 
-use super::figures::WIDTH_PX;
-use super::gas::{spectra, temperature_figure, track_picture};
-use super::words::{ABSENT, listed, sentence, with_unit, words};
-use crate::characterisation::Characterisation;
-use crate::compensate::Compensation;
-use crate::track::Track;
+use crate::figures::WIDTH_PX;
+use crate::pictures::{spectra, temperature_figure, track_picture};
+use crate::words::{ABSENT, listed, sentence, with_unit, words};
+use twinlag::{Characterisation, Compensation, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. The same answer gives the same bytes.
 ///

@@ -1,13 +1,14 @@
 //! Pictures of the gas temperature, and of time constants along a record.
 
-use twinlag_compensate::power_spectrum;
-use twinlag_record::Record;
+use twinlag::compensation::power_spectrum;
+use twinlag::record::Record;
 use twinlag_report::{Axis, Chart, Colour, Figure, Reference, ReportError, Series};
 
-use super::figures::{WIDTH_PX, trace};
-use crate::compensate::Compensation;
-use crate::profile::Z_975;
-use crate::track::Track;
+use crate::figures::{WIDTH_PX, trace};
+use twinlag::{Compensation, Track};
+
+/// Half width of a 95 % interval of a normal distribution, in standard deviations.
+const Z_975: f64 = 1.959_963_984_540_054;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
@@ -24,7 +25,7 @@ pub fn gas_picture(record: &Record, answer: &Compensation) -> Result<String, Rep
 }
 
 /// Readings and gas temperature with its band, over the record and where it moves most.
-pub(super) fn temperature_figure(record: &Record, answer: &Compensation) -> Figure {
+pub(crate) fn temperature_figure(record: &Record, answer: &Compensation) -> Figure {
     let n = answer.time_s.len();
     let length = (n / EXCERPT).max(50).min(n);
     let swing = |from: usize| {
@@ -66,7 +67,7 @@ fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std:
     chart.series(gas.band(band(-1.0), band(1.0)))
 }
 
-pub(super) fn spectra(record: &Record, answer: &Compensation) -> Chart {
+pub(crate) fn spectra(record: &Record, answer: &Compensation) -> Chart {
     let period_s = record.sampling.period_s;
     let faster = answer.rig.is_some_and(|rig| rig.sensors[1].tau_s < rig.sensors[0].tau_s);
     let (name, raw) = if faster { (&record.channels[1], &record.t2_c) } else { (&record.channels[0], &record.t1_c) };

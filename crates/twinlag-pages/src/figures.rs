@@ -3,17 +3,17 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twinlag_report::{Axis, Chart, Colour, Figure, Series};
 
-use super::Model;
+use crate::diagnosis::Model;
 
 const NOISE: &str = "95 % of white noise";
-pub(super) const WIDTH_PX: f64 = 900.0;
+pub(crate) const WIDTH_PX: f64 = 900.0;
 /// Parts of the record whose mean energies are shown.
 const PARTS: usize = 100;
 /// A step so many times the usual one is a gap.
 const GAP: f64 = 10.0;
 
 /// A chart of the series that there are; `None` if there is none.
-pub(super) fn chart(
+pub(crate) fn chart(
     title: impl Into<String>,
     [x, y]: [Axis; 2],
     series: impl IntoIterator<Item = Option<Series>>,
@@ -24,7 +24,7 @@ pub(super) fn chart(
 }
 
 /// A trace, if it has a point that can be drawn. It has gaps where the record has.
-pub(super) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colour) -> Option<Series> {
+pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colour) -> Option<Series> {
     let drawn = x.iter().zip(y).any(|(x, y)| x.is_finite() && y.is_finite());
     let mut steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
@@ -42,7 +42,7 @@ pub(super) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
 }
 
 /// The residual of each model along the record, and its root mean square in parts of the record.
-pub(super) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
+pub(crate) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
     let largest: Vec<f64> = models
         .iter()
         .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
@@ -102,7 +102,7 @@ pub(super) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
 }
 
 /// Power of the residual of each model against frequency.
-pub(super) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
+pub(crate) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
     let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
     let mut series = Vec::new();
     let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
@@ -127,13 +127,13 @@ pub(super) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
 }
 
 /// The range that holds the mean square of so many values of white noise of unit variance in 95 % of all cases.
-pub(super) fn white_noise(dof: f64) -> Option<[f64; 2]> {
+pub(crate) fn white_noise(dof: f64) -> Option<[f64; 2]> {
     let chi_square = ChiSquared::new(dof).ok()?;
     Some([0.025, 0.975].map(|p| chi_square.inverse_cdf(p) / dof))
 }
 
 /// Values of a trace from one instant to another.
-pub(super) fn pairs<'a>(
+pub(crate) fn pairs<'a>(
     time_s: &'a [f64],
     values: &'a [f64],
     from: f64,

@@ -1,0 +1,18 @@
+//! Answers of `twinlag` as pages and pictures: one HTML file that needs no other, or one SVG.
+//!
+//! For whoever shows an answer to people: what a diagnosis found and how well it is shown
+//! ([`diagnosis_report`]), a gas temperature with its band ([`gas_report`]), time constants along a
+//! record ([`track_report`]), and the pictures of each alone. A page computes nothing that an answer
+//! says: every number on it is a field of the answer that it shows. Numbers alone need `twinlag`, and
+//! no crate of pictures; figures of other data need `twinlag-report`.
+
+mod diagnosis;
+mod figures;
+mod gas;
+mod pictures;
+mod words;
+
+pub use diagnosis::{ReportContext, diagnosis_report, residual_picture};
+pub use gas::{gas_report, track_report};
+pub use pictures::{gas_picture, track_picture};
+pub use twinlag_report::ReportError;
