@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use twinlag::diagnosis::Value;
 use twinlag::Diagnosis;
+use twinlag::diagnosis::Value;
 use twinlag_pages::residual_picture;
 
 /// Everything that is written of the records.
