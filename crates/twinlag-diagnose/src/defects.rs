@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use twinlag_bias::estimate_noise;
 use twinlag_cross_relation::{Readings, Segment, Steps};
+use twinlag_transform::Forward;
 
 use crate::observations::Observations;
 use crate::plant::{Evaluation, Part};
@@ -247,11 +248,7 @@ pub(crate) fn lines(observations: &Observations, evaluation: &Evaluation, holds:
     if count < 64 {
         return Vec::new();
     }
-    let mut planner = realfft::RealFftPlanner::<f64>::new();
-    let plan = planner.plan_fft_forward(n);
-    let mut input = run;
-    let mut spectrum = plan.make_output_vec();
-    plan.process(&mut input, &mut spectrum).expect("lengths agree");
+    let spectrum = Forward::of(n).transform(&run);
     let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / count as f64).collect();
     let mut found: HashMap<usize, f64> = HashMap::new();
     for bin in 3..power.len().saturating_sub(1) {

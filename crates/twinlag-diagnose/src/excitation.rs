@@ -1,6 +1,6 @@
 //! What the gas does: how many tones there are to learn from.
 
-use realfft::RealFftPlanner;
+use twinlag_transform::Tapered;
 
 use crate::defects::levels;
 use crate::observations::Observations;
@@ -32,12 +32,9 @@ pub(crate) fn tones(observations: &Observations) -> Option<usize> {
         let x = std::f64::consts::TAU * (k as f64 + 0.5) / n as f64;
         0.35875 - 0.48829 * x.cos() + 0.14128 * (2.0 * x).cos() - 0.01168 * (3.0 * x).cos()
     };
-    let mut input: Vec<f64> = y[..n].iter().enumerate().map(|(k, y)| (y - mean) * window(k)).collect();
-    let scale: f64 = (0..n).map(|k| window(k) * window(k)).sum();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let plan = planner.plan_fft_forward(n);
-    let mut spectrum = plan.make_output_vec();
-    plan.process(&mut input, &mut spectrum).ok()?;
+    let tapered = Tapered::new((0..n).map(window).collect());
+    let scale = tapered.energy();
+    let spectrum = tapered.transform(y[..n].iter().map(|y| y - mean));
     let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = (CLEAR * noise_k * noise_k).max(1e-9 * largest);

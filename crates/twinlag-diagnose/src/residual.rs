@@ -4,9 +4,9 @@
 //! stands for the input is a reading with its estimated noise taken off, `ŷ = y − Σ Bᵀ V⁻¹ u`: the projection that makes it
 //! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
-use realfft::RealFftPlanner;
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use twinlag_cross_relation::ResidualTest;
+use twinlag_transform::{Complex64, Forward, Tapered, hann};
 
 use crate::dense;
 use crate::model::{Fitted, Selection};
@@ -133,42 +133,27 @@ fn two_sided(deviate: f64) -> f64 {
 /// segments exceeds `c` with probability `(1 − c)^(L − 1)`. Elsewhere the estimated input is noise, and a level that is a little off
 /// leaves some of the residual's in it.
 fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
-    let mut planner = RealFftPlanner::<f64>::new();
-    let plan = planner.plan_fft_forward(SEGMENT);
-    let window: Vec<f64> =
-        (0..SEGMENT).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / SEGMENT as f64).cos()).collect();
+    let tapered = Tapered::new(hann(SEGMENT));
     let bins = SEGMENT / 2 - 2;
-    let mut cross = vec![num_complex::Complex64::default(); bins];
+    let mut cross = vec![Complex64::default(); bins];
     let (mut of_r, mut of_x) = (vec![0.0; bins], vec![0.0; bins]);
     let mut count = 0.0_f64;
     for (r, x) in &pairs.runs {
-        let mut from = 0;
-        while from + SEGMENT <= r.len() {
+        for (r, x) in tapered.halves(r).zip(tapered.halves(x)) {
             let transform = |v: &[f64]| {
                 // Both ends on a straight line: a slope would leak into every bin.
                 let (a, b) = (v[0], v[SEGMENT - 1]);
                 let mean = v.iter().sum::<f64>() / SEGMENT as f64;
-                let mut input: Vec<f64> = v
-                    .iter()
-                    .zip(&window)
-                    .enumerate()
-                    .map(|(k, (v, w))| {
-                        let line = (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
-                        (v - mean - line) * w
-                    })
-                    .collect();
-                let mut spectrum = plan.make_output_vec();
-                plan.process(&mut input, &mut spectrum).expect("lengths agree");
-                spectrum
+                let line = |k: usize| (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
+                tapered.transform(v.iter().enumerate().map(|(k, v)| v - mean - line(k)))
             };
-            let (fr, fx) = (transform(&r[from..from + SEGMENT]), transform(&x[from..from + SEGMENT]));
+            let (fr, fx) = (transform(r), transform(x));
             for j in 0..bins {
                 cross[j] += fr[j + 2] * fx[j + 2].conj();
                 of_r[j] += fr[j + 2].norm_sqr();
                 of_x[j] += fx[j + 2].norm_sqr();
             }
             count += 1.0;
-            from += SEGMENT / 2;
         }
     }
     // Half overlapping segments under Hann's window share a thirty-sixth of their power.
@@ -176,7 +161,7 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     if independent < 4.0 {
         return None;
     }
-    let noise = STANDS_OUT * pairs.noise_std_k.powi(2) * dense::dot(&window, &window) * count;
+    let noise = STANDS_OUT * pairs.noise_std_k.powi(2) * tapered.energy() * count;
     let coherence = |j: usize| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300);
     let of_gas: Vec<f64> = (0..bins).filter(|j| of_x[*j] > noise).map(coherence).collect();
     let largest = of_gas.iter().copied().reduce(f64::max)?;
@@ -257,10 +242,8 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(run.len());
-    let mut spectrum = plan.make_output_vec();
-    plan.process(&mut run.clone(), &mut spectrum).expect("lengths agree");
-    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(num_complex::Complex::norm_sqr).collect();
+    let spectrum = Forward::of(run.len()).transform(run);
+    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(Complex64::norm_sqr).collect();
     let half = NEIGHBOURS / 2;
     let bins = half + 1..power.len().saturating_sub(half + 1);
     let ratio = |j: usize| {

@@ -3,11 +3,9 @@
 //! Blocks of the residual are transformed one by one, so that parts of the record can be held out. The power of white noise of
 //! unit variance is 1 in every band.
 
-use std::collections::HashMap;
-
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
+use twinlag_transform::Forward;
 
 use crate::effect::coloured_noise::{LONGEST, SHORTEST};
 use crate::observations::Observations;
@@ -76,15 +74,11 @@ impl Bands {
                 dof: [0.0; 2],
             })
             .collect();
-        let mut planner = RealFftPlanner::<f64>::new();
-        let mut plans = HashMap::new();
+        let plan = Forward::of(block);
         let mut index = 0;
         for run in runs {
             for piece in run.chunks_exact(block) {
-                let plan = plans.entry(block).or_insert_with(|| planner.plan_fft_forward(block));
-                let mut input = piece.to_vec();
-                let mut spectrum = plan.make_output_vec();
-                plan.process(&mut input, &mut spectrum).expect("lengths agree");
+                let spectrum = plan.transform(piece);
                 for (band, e) in bands.iter_mut().zip(edges.windows(2)) {
                     for (bin, x) in spectrum.iter().enumerate().take(e[1]).skip(e[0]) {
                         let dof = if bin == 0 || 2 * bin == block { 1.0 } else { 2.0 };

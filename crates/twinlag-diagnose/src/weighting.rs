@@ -7,7 +7,7 @@
 //! `1/(1/SNR₁ + 1/SNR₂)` of the channels.
 
 use num_complex::Complex64;
-use realfft::RealFftPlanner;
+use twinlag_transform::{Inverse, Tapered, hann};
 
 use crate::dense;
 use crate::observations::Observations;
@@ -71,11 +71,7 @@ impl Weighting {
         if gain.iter().all(|g| *g > 0.9) {
             return Self::default();
         }
-        let mut planner = RealFftPlanner::<f64>::new();
-        let plan = planner.plan_fft_inverse(POINTS);
-        let mut input: Vec<Complex64> = gain.iter().map(|g| Complex64::new(*g, 0.0)).collect();
-        let mut response = plan.make_output_vec();
-        plan.process(&mut input, &mut response).expect("lengths agree");
+        let response = Inverse::of(POINTS).transform(gain.iter().map(|g| Complex64::new(*g, 0.0)).collect());
         let taps = (0..=2 * HALF)
             .map(|j| {
                 let lag = j.abs_diff(HALF);
@@ -195,19 +191,14 @@ impl Weighting {
 
 /// Mean power of a channel, white noise of unit variance having 1, in `POINTS/2 + 1` bins: Hann's window.
 fn spectrum(observations: &Observations, channel: usize) -> Vec<f64> {
-    let mut planner = RealFftPlanner::<f64>::new();
-    let plan = planner.plan_fft_forward(POINTS);
-    let window: Vec<f64> =
-        (0..POINTS).map(|k| 0.5 - 0.5 * (std::f64::consts::TAU * (k as f64 + 0.5) / POINTS as f64).cos()).collect();
-    let scale: f64 = window.iter().map(|w| w * w).sum();
+    let tapered = Tapered::new(hann(POINTS));
+    let scale = tapered.energy();
     let mut sum = vec![0.0; POINTS / 2 + 1];
     let mut count = 0.0_f64;
     for stretch in &observations.stretches {
-        for piece in stretch.reading_c[channel].windows(POINTS).step_by(POINTS / 2) {
+        for piece in tapered.halves(&stretch.reading_c[channel]) {
             let mean = piece.iter().sum::<f64>() / POINTS as f64;
-            let mut input: Vec<f64> = piece.iter().zip(&window).map(|(y, w)| (y - mean) * w).collect();
-            let mut spectrum = plan.make_output_vec();
-            plan.process(&mut input, &mut spectrum).expect("lengths agree");
+            let spectrum = tapered.transform(piece.iter().map(|y| y - mean));
             sum.iter_mut().zip(&spectrum).for_each(|(s, x)| *s += x.norm_sqr() / scale);
             count += 1.0;
         }
