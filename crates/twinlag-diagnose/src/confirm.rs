@@ -6,11 +6,8 @@
 //! it does not depend on the sensors.
 
 use twinlag_compensate::{Form, learn, reconstruct};
+use twinlag_model::{Extended, Fitted, Identifier, Observations};
 
-use crate::effect::Identifier;
-use crate::extended::Extended;
-use crate::model::Fitted;
-use crate::observations::Observations;
 use crate::search::{FALSE_ALARM, FAR_OFF, threshold};
 
 /// Effects that turn phases at frequencies where the gas may not be.

@@ -1,17 +1,14 @@
 //! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by what has seen none of it.
 
-use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Limit, ModelFit, Verdict};
-use crate::effect::Identifier;
-use crate::error::DiagnoseError;
+use twinlag_model::{
+    DiagnoseError, Effort, Fitted, Identifier, LEFT_OVER, ModelFit, Observations, Prepared, Settings, Watch, Weighting,
+    is_unresolved, summarise,
+};
+
+use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Verdict};
 use crate::excitation::tones;
-use crate::model::{Effort, Fitted};
-use crate::naming::{name, not_testable, what_is_left, widen};
-use crate::observations::Observations;
-use crate::prepare::Prepared;
+use crate::naming::{name, not_testable, of_defect, what_is_left, widen};
 use crate::search::{FALSE_ALARM, FAR_OFF, Search, TIE, Tried, threshold};
-use crate::settings::{Settings, Watch};
-use crate::summary::{LEFT_OVER, is_unresolved, summarise};
-use crate::weighting::Weighting;
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 4;
@@ -33,7 +30,8 @@ pub fn diagnose(
     let tones = tones(observations);
     let is_refused = tones == Some(SINGLE);
     let mut prepared = Prepared::new(observations, settings)?;
-    let base = prepared.base(settings, watch);
+    watch("two lags", 0, 1);
+    let base = prepared.base(settings);
     let mut state = State { current: base.clone(), base, steps: Vec::new(), remarks: Vec::new(), is_reweighed: false };
     while state.steps.len() < MOST_EFFECTS
         && !is_refused
@@ -41,7 +39,7 @@ pub fn diagnose(
             || state.lower_noise(&mut prepared, settings)
             || state.reweigh(&mut prepared))
     {}
-    let limits = prepared.search(settings, watch).limits(&state.current);
+    let limits = Search::of(&prepared, settings, watch).limits(&state.current);
     Ok(state.conclude(&prepared, tones, limits))
 }
 
@@ -61,7 +59,7 @@ struct State {
 impl State {
     /// Adds an effect. Whether to go on.
     fn step(&mut self, prepared: &mut Prepared, settings: &Settings, watch: Watch<'_>) -> bool {
-        let mut search = prepared.search(settings, watch);
+        let mut search = Search::of(prepared, settings, watch);
         search.look(&self.current);
         let tried = search.try_all(&self.current, self.current.mean_energy() > FAR_OFF);
         let Some((chosen, ties)) = search.choose(&self.current, &tried) else { return false };
@@ -78,7 +76,7 @@ impl State {
             // What imitates a time constant that is not resolved can be refined at will.
             return false;
         }
-        let search = prepared.search(settings, watch);
+        let search = Search::of(prepared, settings, watch);
         self.drop_needless(&search);
         self.grow(&search);
         self.think_again(&search);
@@ -227,7 +225,7 @@ impl State {
         widen(&mut last_fit, ties, observations, everything, &mut self.remarks);
         let before = unmasked.as_ref().map_or((&self.base, observations), |unmasked| (unmasked, &prepared.raw.0));
         let error = self.errors(prepared, before, [&base_fit, &last_fit]);
-        let mut found = prepared.found.clone();
+        let mut found: Vec<Found> = prepared.found.iter().map(of_defect).collect();
         found.extend(
             self.steps.iter().enumerate().map(|(index, (tried, ties))| name(index, tried, ties, &last, &last_fit)),
         );

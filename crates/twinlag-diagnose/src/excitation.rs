@@ -1,9 +1,7 @@
 //! What the gas does: how many tones there are to learn from.
 
+use twinlag_model::{Observations, levels};
 use twinlag_transform::Tapered;
-
-use crate::defects::levels;
-use crate::observations::Observations;
 
 /// A bin counts if it has this many times the power of the noise.
 const CLEAR: f64 = 30.0;

@@ -28,44 +28,16 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod chain;
 mod confirm;
-mod defects;
-mod dense;
 mod diagnose;
 mod diagnosis;
-mod effect;
-mod error;
 mod excitation;
-mod extended;
-mod flow;
-mod held_out;
-mod known;
-mod model;
 mod naming;
-mod observations;
-mod plant;
-mod prepare;
-mod residual;
 mod search;
-mod settings;
-mod spectrum;
-mod spline;
-mod summary;
-mod track;
-mod weighting;
-mod whitening;
 
 pub use diagnose::diagnose;
-pub use diagnosis::{
-    BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, KnownFit, Limit, ModelFit, TimeConstant, Trace, Unexplained,
-    Value, Verdict,
+pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, Unexplained, Verdict};
+pub use twinlag_model::{
+    About, Change, ChangePoint, DiagnoseError, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, ModelFit,
+    Observations, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
 };
-pub use effect::{About, Identifier};
-pub use error::DiagnoseError;
-pub use extended::Extended;
-pub use known::fit_with;
-pub use model::KnownTimeConstant;
-pub use observations::{Observations, Stretch};
-pub use settings::{KnownEffect, Settings, Watch};
-pub use track::{Change, ChangePoint, RatioTest, Track, track};

@@ -2,13 +2,12 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twinlag_cross_relation::ResidualTest;
+use twinlag_model::{
+    Defect, Effect, Effort, Fitted, Identifier, LEFT_OVER, ModelFit, Observations, Selection, Value, Z_975, covariance,
+};
 
-use crate::diagnosis::{Evidence, Found, ModelFit, Unexplained, Value};
-use crate::effect::{Effect, Identifier};
-use crate::model::{Effort, Fitted, Selection};
-use crate::observations::Observations;
+use crate::diagnosis::{Evidence, Found, Unexplained};
 use crate::search::Tried;
-use crate::summary::{LEFT_OVER, Z_975, covariance};
 
 /// Tones of the gas up to which equations are counted.
 const FEW_TONES: usize = 4;
@@ -60,6 +59,19 @@ pub(crate) fn name(index: usize, tried: &Tried, ties: &[Tried], last: &Fitted, f
         }),
         alternatives,
         seen: None,
+    }
+}
+
+/// A defect of the data as an effect.
+pub(crate) fn of_defect(defect: &Defect) -> Found {
+    Found {
+        effect: defect.effect,
+        channel: Some(defect.channel),
+        fitted_in: Some(defect.channel),
+        parameters: Vec::new(),
+        evidence: None,
+        alternatives: Vec::new(),
+        seen: Some(defect.seen.clone()),
     }
 }
 

@@ -3,17 +3,14 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::confirm::is_confirmed;
-use crate::defects::{line_channel, lines};
-use crate::dense;
-use crate::diagnosis::Limit;
-use crate::effect::{Context, Identifier, Parameter, Shared, candidates};
-use crate::held_out::held_out_gain;
-use crate::model::{Effort, Fitted, Linearised, Model, Selection};
-use crate::observations::{Observations, Stretch};
-use crate::plant::Place;
-use crate::spectrum::{Bands, fit_noise, runs};
+use twinlag_model::{
+    Bands, Context, Effort, Fitted, Identifier, Linearised, Model, Observations, Parameter, Place, Prepared, Selection,
+    Settings, Shared, Stretch, Watch, candidates, dense, fit_noise, held_out_gain, line_channel, lines, runs,
+};
 use twinlag_optimise::{End, Scale, Variable};
+
+use crate::confirm::is_confirmed;
+use crate::diagnosis::Limit;
 
 /// Probability, over all candidates of a round, of taking one that is not there.
 pub(crate) const FALSE_ALARM: f64 = 1e-3;
@@ -81,7 +78,19 @@ pub(crate) struct Search<'a> {
     pub(crate) excerpt: (Observations, Selection),
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// A search of `prepared`.
+    pub(crate) fn of(prepared: &'a Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
+        Self {
+            observations: &prepared.observations,
+            selection: &prepared.searched,
+            context: prepared.context.clone(),
+            allowed: &settings.effects,
+            watch,
+            excerpt: prepared.excerpt(),
+        }
+    }
+
     pub(crate) fn bands(&self, fitted: &Fitted) -> Bands {
         let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
         Bands::of(&runs(&evaluation, |s| self.selection.holds(s)))
@@ -97,45 +106,6 @@ impl Search<'_> {
 
     fn robust(&self, fitted: &Fitted) -> f64 {
         self.bands(fitted).robust(|omega| self.selection.weighting.at(omega))
-    }
-
-    /// The best fit of the model without effects, from a grid of time constants.
-    pub(crate) fn base(&self, model: &Model) -> Fitted {
-        self.over_grid(model, &[], 3)
-    }
-
-    /// The best fit with effect values as given, from the best points of a grid of time constants.
-    pub(crate) fn over_grid(&self, model: &Model, rest: &[f64], most: usize) -> Fitted {
-        let step_s = self.context.step_s;
-        let span_s = self.context.span_s();
-        let (low, high) = (1.5 * step_s, 0.1 * span_s);
-        let points = 7;
-        let at = |i: usize| low * (high / low).powf(i as f64 / (points - 1) as f64);
-        let mut starts = Vec::new();
-        for i in 0..points {
-            for j in 0..points {
-                if i != j {
-                    let mut theta = vec![at(i), at(j)];
-                    theta.extend_from_slice(rest);
-                    let energy = model.energy(&theta, self.observations, self.selection);
-                    starts.push((energy, theta));
-                }
-            }
-        }
-        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Of either order the best.
-        let is_first_faster = |theta: &[f64]| theta[0] < theta[1];
-        let mut chosen: Vec<Vec<f64>> = starts.iter().take(most).map(|s| s.1.clone()).collect();
-        let order = is_first_faster(&chosen[0]);
-        if let Some(other) = starts.iter().find(|s| is_first_faster(&s.1) != order) {
-            chosen.push(other.1.clone());
-        }
-        chosen
-            .iter()
-            .map(|start| model.fit(start, self.observations, self.selection, Effort::Look))
-            .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-            .map(|best| model.fit(&best.theta, self.observations, self.selection, Effort::Finish))
-            .expect("at least one start")
     }
 
     /// `−2 ln L` saved by going from `before` to `after`, the level of the noise free.

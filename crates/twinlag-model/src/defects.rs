@@ -1,0 +1,290 @@
+//! Defects of the data, which come before every model: readings at the end of the range, coarse steps, isolated wrong readings.
+
+use std::collections::HashMap;
+
+use twinlag_bias::estimate_noise;
+use twinlag_cross_relation::{Readings, Segment, Steps};
+use twinlag_transform::Forward;
+
+use crate::observations::Observations;
+use crate::plant::{Evaluation, Part};
+
+/// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
+const COARSE: f64 = 0.5;
+/// Readings at an extreme value that two in a row of which no noise explains.
+const FEWEST_AT_END: usize = 8;
+/// How much farther than others a reading must stick out of its neighbours that the residual hardly shows.
+const PLAIN: f64 = 1.7;
+/// Bins beside a line that it is held against: beyond the window's main lobe.
+const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
+/// More of the readings than this are no single ones.
+const MOST_SPIKES: f64 = 0.05;
+
+/// Noise of the channels as third differences show it.
+#[derive(Clone, Copy, Debug)]
+pub struct Levels {
+    pub std_k: [f64; 2],
+    /// Standard error of the logarithm.
+    pub log_error: [f64; 2],
+    /// Step of each converter, where there is one, K.
+    pub step_k: [Option<f64>; 2],
+}
+
+/// Rows of a stretch that levels of noise can be found in.
+pub const SHORTEST: usize = 8;
+
+impl Levels {
+    /// Step of each converter where it is coarse beside the noise, K.
+    pub fn coarse_step_k(&self) -> [Option<f64>; 2] {
+        [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE * self.std_k[i]))
+    }
+
+    /// Both times `factor`; none becomes less than its converter's own noise.
+    pub fn scale(&mut self, factor: f64) {
+        for (std_k, step_k) in self.std_k.iter_mut().zip(self.step_k) {
+            *std_k = (*std_k * factor).max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*std_k));
+        }
+    }
+}
+
+/// The channels as the costs of the other layers take them, without what is masked.
+pub fn readings(observations: &Observations) -> Option<Readings> {
+    let mut segments = Vec::new();
+    for s in &observations.stretches {
+        let is_masked = |k: usize| s.masked[0][k] || s.masked[1][k];
+        let mut from = 0;
+        for k in 0..=s.len() {
+            if k < s.len() && !is_masked(k) {
+                continue;
+            }
+            if k >= from + SHORTEST {
+                let steps = match observations.period_s {
+                    Some(period_s) => Steps::Even(period_s),
+                    None => Steps::Uneven(s.time_s[from..k].windows(2).map(|t| t[1] - t[0]).collect()),
+                };
+                let cut = |i: usize| s.reading_c[i][from..k].to_vec();
+                segments.push(Segment::new(cut(0), cut(1), steps).ok()?);
+            }
+            from = k + 1;
+        }
+    }
+    Readings::new(segments).ok()
+}
+
+/// Levels from third differences.
+pub fn levels(observations: &Observations) -> Option<Levels> {
+    let found = estimate_noise(&readings(observations)?).ok()?;
+    let nothing = 1e-5 * observations.swing_k();
+    Some(Levels {
+        std_k: found.map(|l| l.std_k.max(nothing)),
+        log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
+        step_k: found.map(|l| l.quantisation_step_k),
+    })
+}
+
+/// Masks readings that lie at an extreme of their channel again and again, one after the other. Returns how many in each
+/// channel.
+///
+/// - `steps_k`: of a coarse converter, whose every value comes again and again
+pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2]) -> [usize; 2] {
+    let mut out = [0; 2];
+    for i in 0..2 {
+        let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
+        let highest = observations.channel(i).fold(f64::NEG_INFINITY, f64::max);
+        if lowest == highest {
+            continue;
+        }
+        for end in [lowest, highest] {
+            let at = |y: &f64| *y == end;
+            let count = observations.channel(i).filter(|y| at(y)).count();
+            // On a coarse grid every value comes again and again.
+            let crowded = steps_k[i].is_none() && count >= FEWEST_AT_END;
+            let pairs: usize = observations
+                .stretches
+                .iter()
+                .map(|s| s.reading_c[i].windows(2).filter(|w| at(&w[0]) && at(&w[1])).count())
+                .sum();
+            if !crowded || 2 * pairs < count {
+                continue;
+            }
+            for stretch in &mut observations.stretches {
+                for (masked, y) in stretch.masked[i].iter_mut().zip(&stretch.reading_c[i]) {
+                    *masked |= *y == end;
+                }
+            }
+            out[i] += count;
+        }
+    }
+    out
+}
+
+/// What the best single change of each reading would take off, in robust standard deviations.
+fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
+    let weighted = part.whitened.weighted();
+    let rows = &part.sources[channel].rows;
+    let mut out = vec![0.0; samples];
+    for (k, w) in weighted.iter().enumerate() {
+        for (j, c) in rows.at(k).iter().enumerate() {
+            if let Some(s) = out.get_mut(rows.start + k + j) {
+                *s += c * w;
+            }
+        }
+    }
+    let scale = 1.4826 * median(out.iter().map(|s| s.abs()));
+    out.iter().map(|s| if scale > 0.0 { s / scale } else { 0.0 }).collect()
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    if all.is_empty() {
+        return 0.0;
+    }
+    let middle = all.len() / 2;
+    *all.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
+/// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
+/// particular.
+pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) -> [Vec<usize>; 2] {
+    let mut out = [Vec::new(), Vec::new()];
+    for channel in 0..2 {
+        let mut found: Vec<usize> = Vec::new();
+        let mut ranks = Vec::new();
+        for part in &evaluation.parts {
+            let stretch = &observations.stretches[part.stretch];
+            let n = stretch.len();
+            if n < 16 {
+                continue;
+            }
+            let scores = scores(part, channel, n);
+            let y = &stretch.reading_c[channel];
+            let beside: Vec<f64> = (0..n)
+                .map(|k| {
+                    if k < 2 || k + 2 >= n {
+                        return 0.0;
+                    }
+                    y[k] - (4.0 * (y[k - 1] + y[k + 1]) - y[k - 2] - y[k + 2]) / 6.0
+                })
+                .collect();
+            let scale = 1.4826 * median(beside.iter().map(|b| b.abs()));
+            let other = &stretch.reading_c[1 - channel];
+            let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
+            let mut slopes: Vec<f64> = (0..n).map(slope).collect();
+            slopes.sort_by(f64::total_cmp);
+            for k in 0..n {
+                let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
+                let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
+                // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
+                let is_far = (scores[k].abs() > far && sticks_out > far)
+                    || (scores[k].abs() > 0.5 * far && sticks_out > PLAIN * far);
+                if is_peak && is_far && !stretch.masked[channel][k] {
+                    found.push(part.first_sample + k);
+                    ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
+                }
+            }
+        }
+        let m = found.len() as f64;
+        let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
+        if found.len() >= 2 && m < MOST_SPIKES * observations.samples() as f64 && related < 3.5 {
+            out[channel] = found;
+        }
+    }
+    out
+}
+
+/// Masks `samples` of `channel`.
+pub fn mask(observations: &mut Observations, channel: usize, samples: &[usize]) {
+    let mut first = 0;
+    for stretch in &mut observations.stretches {
+        for sample in samples {
+            if let Some(masked) = sample.checked_sub(first).and_then(|k| stretch.masked[channel].get_mut(k)) {
+                *masked = true;
+            }
+        }
+        first += stretch.len();
+    }
+}
+
+/// The channel in whose own readings the line at `hz` sticks out most of what is beside it: pick-up comes after the lag, and the other
+/// channel does not show it.
+pub fn line_channel(observations: &Observations, hz: f64) -> usize {
+    let Some(stretch) = observations.stretches.iter().max_by_key(|s| s.len()) else { return 0 };
+    let span_s = stretch.len() as f64 * observations.step_s();
+    let sticks_out = |i: usize| {
+        let power = |hz: f64| tone_power(&stretch.time_s, &stretch.reading_c[i], hz);
+        let beside = BESIDE.map(|bins| power((hz + bins / span_s).abs())).iter().sum::<f64>() / BESIDE.len() as f64;
+        power(hz) / beside.max(f64::MIN_POSITIVE)
+    };
+    usize::from(sticks_out(1) > sticks_out(0))
+}
+
+/// Power of `values` at `hz` under Hann's window.
+fn tone_power(time_s: &[f64], values: &[f64], hz: f64) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let sum = time_s.iter().zip(values).enumerate().fold((0.0, 0.0), |(c, s), (k, (t, y))| {
+        let window = (std::f64::consts::PI * (k as f64 + 0.5) / n).sin().powi(2);
+        let (sine, cosine) = (std::f64::consts::TAU * hz * (t - time_s[0])).sin_cos();
+        (c + window * (y - mean) * cosine, s + window * (y - mean) * sine)
+    });
+    sum.0 * sum.0 + sum.1 * sum.1
+}
+
+/// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
+pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<f64> {
+    let Some(period_s) = observations.period_s else { return Vec::new() };
+    // What does not count is zero; twice the length, so that no frequency is far from a bin.
+    let Some(last) = evaluation.sample.iter().max() else { return Vec::new() };
+    let n = 2 * (last + 1);
+    let mut run = vec![0.0; n];
+    let mut count = 0usize;
+    for (r, sample) in evaluation.residual.iter().zip(&evaluation.sample) {
+        if holds(*sample) {
+            run[*sample] = *r;
+            count += 1;
+        }
+    }
+    if count < 64 {
+        return Vec::new();
+    }
+    let spectrum = Forward::of(n).transform(&run);
+    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / count as f64).collect();
+    let mut found: HashMap<usize, f64> = HashMap::new();
+    for bin in 3..power.len().saturating_sub(1) {
+        let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];
+        // Around it, the peak itself left out.
+        let (from, to) = (bin.saturating_sub(60).max(1), (bin + 61).min(power.len()));
+        let around = (from..to).filter(|j| j.abs_diff(bin) > 5).map(|j| power[j]);
+        let level = median(around) / std::f64::consts::LN_2;
+        if is_peak && level > 0.0 {
+            let ratio = power[bin] / level;
+            // Of exponentially distributed powers the largest of all exceeds this once in a thousand records.
+            if ratio > (power.len() as f64 / 1e-3).ln() + 3.0 {
+                found.insert(bin, ratio);
+            }
+        }
+    }
+    let mut out: Vec<(usize, f64)> = found
+        .into_iter()
+        .filter(|(bin, _)| !is_in_the_gas(evaluation, std::f64::consts::TAU * *bin as f64 / n as f64))
+        .collect();
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
+}
+
+/// Whether both sensors see a line at `omega` radians per sample, as they do of the gas: what one of them alone sees is as large
+/// in their difference as in their mean.
+fn is_in_the_gas(evaluation: &Evaluation, omega: f64) -> bool {
+    let amplitude = |values: &[f64]| -> f64 {
+        let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
+        let (mut re, mut im) = (0.0, 0.0);
+        for (v, sample) in values.iter().zip(&evaluation.sample) {
+            let (s, c) = (omega * *sample as f64).sin_cos();
+            re += (v - mean) * c;
+            im += (v - mean) * s;
+        }
+        re.hypot(im)
+    };
+    amplitude(&evaluation.disagreement_k) < 0.7 * amplitude(&evaluation.gas_c)
+}

@@ -1,0 +1,58 @@
+//! Small dense linear algebra, by faer.
+
+use faer::prelude::Solve;
+use faer::{Mat, Side};
+
+/// `Σ a b`, in four sums side by side.
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 4;
+    let n = a.len().min(b.len());
+    let (a, b) = (&a[..n], &b[..n]);
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let done = n - n % LANES;
+    let rest: f64 = a[done..].iter().zip(&b[done..]).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without
+/// any weight stay zero. `None` where it is singular.
+pub fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = matrix.len();
+    let used: Vec<usize> = (0..n).filter(|&i| matrix[i][i] > 0.0).collect();
+    let scale: Vec<f64> = used.iter().map(|&i| matrix[i][i].sqrt()).collect();
+    let scaled = Mat::from_fn(used.len(), used.len(), |p, q| matrix[used[p]][used[q]] / (scale[p] * scale[q]));
+    let factor = scaled.llt(Side::Lower).ok()?;
+    let identity = Mat::<f64>::identity(used.len(), used.len());
+    let solved = factor.solve(&identity);
+    let mut out = vec![vec![0.0; n]; n];
+    for (p, &i) in used.iter().enumerate() {
+        for (q, &j) in used.iter().enumerate() {
+            out[i][j] = solved[(p, q)] / (scale[p] * scale[q]);
+            // A diagonal this large after scaling is a direction that the data do not see.
+            if !out[i][j].is_finite() || (p == q && solved[(p, q)] > 1e12) {
+                return None;
+            }
+        }
+    }
+    Some(out)
+}
+
+/// Logarithm of the determinant of a positive definite matrix; `None` for another.
+pub fn log_determinant(matrix: &[Vec<f64>]) -> Option<f64> {
+    let n = matrix.len();
+    let factor = Mat::from_fn(n, n, |p, q| matrix[p][q]).llt(Side::Lower).ok()?;
+    Some((0..n).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum())
+}
+
+pub fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
+    matrix.iter().map(|row| dot(row, vector)).collect()
+}
+
+pub fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    (0..a.len()).map(|i| (0..b.len()).map(|j| (0..b.len()).map(|k| a[i][k] * b[k][j]).sum()).collect()).collect()
+}

@@ -1,0 +1,11 @@
+//! A reading that stays at an end of its range: those samples say no more than that, and are masked.
+
+use crate::effect::About;
+
+pub const ABOUT: About = About {
+    name: "saturation",
+    explanation: "one channel sticks at an end of its range: the amplifier or the converter is at its limit",
+    advice: "widen the input range; the readings at the limit are left out of the fit",
+    confusable: &[],
+    unseen: "what the temperature was beyond the limit, except as the other sensor tells",
+};

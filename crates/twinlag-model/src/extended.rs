@@ -1,0 +1,124 @@
+//! A fitted model as a compensation takes it: the sensors' own temperatures, and what each sensor does.
+
+use std::fmt;
+use std::sync::Arc;
+
+use twinlag_compensate::{Coloured, Local, Readings, Rig, Sensor, SlowPath};
+
+use crate::error::DiagnoseError;
+use crate::model::{Fitted, Model};
+use crate::observations::Observations;
+use crate::plant::{Place, Plant, ZERO_CELSIUS_K};
+
+/// Two lags and the effects that were found, with the record that they were fitted to.
+#[derive(Clone)]
+pub struct Extended {
+    model: Model,
+    theta: Vec<f64>,
+    observations: Arc<Observations>,
+}
+
+impl fmt::Debug for Extended {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let effects: Vec<&str> = self.model.effects.iter().map(|e| e.identifier().name()).collect();
+        f.debug_struct("Extended").field("effects", &effects).field("parameters", &self.theta).finish_non_exhaustive()
+    }
+}
+
+impl PartialEq for Extended {
+    fn eq(&self, other: &Self) -> bool {
+        self.theta == other.theta && self.observations == other.observations
+    }
+}
+
+impl Extended {
+    pub fn new(fitted: &Fitted, observations: &Observations) -> Self {
+        let observations = Arc::new(observations.clone());
+        Self { model: fitted.model.clone(), theta: fitted.theta.clone(), observations }
+    }
+
+    /// The parameters, time constants first, as [`crate::ModelFit::covariance`] has them.
+    pub fn parameters(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// Both time constants at `time_s` with other `parameters`, s: where they change along the record, as they do then.
+    pub fn time_constants_s(&self, parameters: &[f64], time_s: &[f64]) -> [Vec<f64>; 2] {
+        let plant = self.model.plant(parameters, &self.observations);
+        [0, 1].map(|i| time_s.iter().map(|t| plant.sensors[i].tau_s * (1.0 + plant.change(i, *t)).max(0.02)).collect())
+    }
+
+    /// Gain and offset of the second channel against the first, 1 and K.
+    pub fn calibration(&self, parameters: &[f64]) -> [f64; 2] {
+        let plant = self.model.plant(parameters, &self.observations);
+        let [first, second] = [0, 1].map(|i| &plant.sensors[i].reading);
+        [second.gain / first.gain, second.offset_k - first.offset_k * second.gain / first.gain]
+    }
+
+    /// The sensors' temperatures at every sample of the record, and the sensors, with other `parameters`.
+    ///
+    /// Readings are taken back through their calibration; what masks a reading, and missing samples of a grid, is missing. Of noise
+    /// that is not white, and of crosstalk, the first order is there: that of a channel is its own.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Compensate`] for parameters with which there is no rig.
+    pub fn rig(&self, parameters: &[f64]) -> Result<(Readings, Rig), DiagnoseError> {
+        let plant = self.model.plant(parameters, &self.observations);
+        let mut time_s = Vec::new();
+        let mut temperature_c: [Vec<f64>; 2] = Default::default();
+        let mut missing: [Vec<bool>; 2] = Default::default();
+        for stretch in &self.observations.stretches {
+            let [one, two] = plant.temperatures(stretch);
+            temperature_c[0].extend(one);
+            temperature_c[1].extend(two);
+            time_s.extend_from_slice(&stretch.time_s);
+            for (all, masked) in missing.iter_mut().zip(&stretch.masked) {
+                all.extend_from_slice(masked);
+            }
+        }
+        let locals = locals(&plant, &time_s, &temperature_c);
+        let readings = Readings::with_missing(time_s, temperature_c, missing)?;
+        Ok((if let Some(locals) = locals { readings.with_locals(locals)? } else { readings }, rig(&plant)))
+    }
+}
+
+fn rig(plant: &Plant) -> Rig {
+    let extra = |place: Place| {
+        let found = plant.extra.iter().find(|e| e.place == place)?;
+        Some(Coloured { std_k: found.std_k, correlation_s: found.correlation_s })
+    };
+    let sensors = [0, 1].map(|i| {
+        let sensor = &plant.sensors[i];
+        let gain = sensor.reading.gain.abs();
+        Sensor {
+            tau_s: sensor.tau_s,
+            second_tau_s: sensor.second_tau_s,
+            slow: sensor.slow.map(|[share, tau_s]| SlowPath { share, tau_s }),
+            noise_std_k: plant.noise_std_k[i] / gain,
+            coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
+        }
+    });
+    Rig { sensors, delay_s: plant.delay_s.unwrap_or(0.0), clock: 0, mismatch: extra(Place::Gas) }
+}
+
+/// What each sensor does at each instant, where that changes.
+fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<Local>; 2]> {
+    let changes = plant.changes(1) || plant.sensors.iter().any(|s| s.radiation.is_some() || s.exponent.is_some());
+    changes.then(|| {
+        [0, 1].map(|i| {
+            let sensor = &plant.sensors[i];
+            let each = time_s.iter().zip(&temperature_c[i]).map(|(&time_s, &c)| {
+                let change = plant.change(i, time_s);
+                let with_temperature = sensor
+                    .exponent
+                    .map_or(1.0, |[p, reference_k]| ((c + ZERO_CELSIUS_K).max(1.0) / reference_k).powf(p));
+                let (loss_k, loss_slope) = sensor.radiation.map_or((0.0, 0.0), |radiation| {
+                    let (with, slope) = radiation.add_to(c);
+                    (with - c, slope - 1.0)
+                });
+                Local { tau_factor: (1.0 + change).max(0.02) * with_temperature, loss_k, loss_slope }
+            });
+            each.collect()
+        })
+    })
+}

@@ -1,0 +1,106 @@
+//! A fitted model in numbers.
+
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::ResidualTest;
+use twinlag_optimise::Fit;
+
+use crate::effect::Identifier;
+use crate::extended::Extended;
+use crate::summary::LEFT_OVER;
+
+/// A fitted number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Value {
+    /// Its name.
+    pub name: String,
+    /// The number.
+    pub value: f64,
+    /// Its standard error; `None` where the record does not determine it.
+    pub standard_error: Option<f64>,
+    /// Its 95 % interval.
+    pub interval_95: Option<[f64; 2]>,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// A time constant.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TimeConstant {
+    /// The estimate, s; `None` where the record does not determine it.
+    pub value_s: Option<f64>,
+    /// Its standard error, s.
+    pub standard_error_s: Option<f64>,
+    /// Its 95 % interval, s.
+    pub interval_95_s: Option<[f64; 2]>,
+}
+
+/// A fit as a picture needs it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Instants, s.
+    pub time_s: Vec<f64>,
+    /// Whitened residual.
+    pub residual: Vec<f64>,
+    /// The sample, counted through the stretches, that each belongs to.
+    pub sample: Vec<usize>,
+    /// Whether the sample is of the blocks that judge.
+    pub is_judge: Vec<bool>,
+    /// Estimated gas temperature, °C: both inferred inputs together, without the frequencies in which there is only noise.
+    pub gas_c: Vec<f64>,
+    /// Difference of both, K.
+    pub disagreement_k: Vec<f64>,
+    /// Power of the residual in bands: frequency in Hz, power, degrees of freedom.
+    pub bands: Vec<[f64; 3]>,
+}
+
+/// One model of the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelFit {
+    /// Both time constants.
+    pub time_constants: [TimeConstant; 2],
+    /// `τ₂ − τ₁`.
+    pub difference: TimeConstant,
+    /// How the fit ended.
+    pub fit: Fit,
+    /// Noise of the channels, K.
+    pub noise_std_k: [f64; 2],
+    /// Tests of what it leaves over.
+    pub tests: Vec<ResidualTest>,
+    /// Energy of the residual per degree of freedom.
+    pub chi2_per_dof: f64,
+    /// Whether intervals rest on the residual's own spectrum.
+    pub is_weighted_by_residual: bool,
+    /// For pictures.
+    pub trace: Trace,
+    /// Covariance of the parameters, in their units, where there is one; the time constants come first.
+    pub covariance: Option<Vec<Vec<f64>>>,
+    /// The model itself, for a compensation; `None` in a fit that was put together for its picture.
+    pub extended: Option<Extended>,
+}
+
+impl ModelFit {
+    /// Whether a test of what it leaves over says that this is not noise of the levels found.
+    pub fn is_contradicted(&self) -> bool {
+        self.tests.iter().any(|t| t.p_value < LEFT_OVER)
+    }
+}
+
+/// A fit with effects that were known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownFit {
+    /// The fit.
+    pub fit: ModelFit,
+    /// Effects whose parameters belong to a record and not to the rig, and were fitted again: a line, a function of time.
+    pub fitted_again: Vec<Identifier>,
+}
+
+/// A defect of the data: seen, not inferred.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Defect {
+    /// Which.
+    pub effect: Identifier,
+    /// Its channel, 0 or 1.
+    pub channel: usize,
+    /// What was seen: a count, a step.
+    pub seen: String,
+}

@@ -1,0 +1,41 @@
+//! Two first-order sensors with any physical effects beside: the inverse of the whole rig with its noise, and its fit.
+
+mod chain;
+mod defects;
+pub mod dense;
+mod effect;
+mod error;
+mod extended;
+mod fitted;
+mod flow;
+mod held_out;
+mod known;
+mod model;
+mod observations;
+mod plant;
+mod prepare;
+mod residual;
+mod settings;
+mod spectrum;
+mod spline;
+mod summary;
+mod track;
+mod weighting;
+mod whitening;
+
+pub use defects::{Levels, levels, line_channel, lines};
+pub use effect::{About, Context, Derived, Effect, Identifier, OfParameters, Parameter, Shared, candidates};
+pub use error::DiagnoseError;
+pub use extended::Extended;
+pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Trace, Value};
+pub use held_out::{held_out_energy, held_out_gain};
+pub use known::fit_with;
+pub use model::{Effort, Fitted, KnownTimeConstant, Linearised, Model, Selection};
+pub use observations::{Observations, Stretch};
+pub use plant::{Evaluation, Place, Plant};
+pub use prepare::Prepared;
+pub use settings::{KnownEffect, Settings, Watch};
+pub use spectrum::{Bands, fit_noise, runs};
+pub use summary::{LEFT_OVER, Z_975, covariance, is_unresolved, summarise};
+pub use track::{Change, ChangePoint, RatioTest, Track, track};
+pub use weighting::Weighting;

@@ -1,0 +1,178 @@
+//! The two channels as the diagnosis takes them: absolute temperatures in unbroken stretches.
+
+use std::sync::Arc;
+
+use crate::error::DiagnoseError;
+use crate::flow::Flow;
+
+/// Fewest samples of a stretch that is used.
+const SHORTEST: usize = 8;
+/// Fewest samples of a record that can be diagnosed: fewer leave no blocks to be held out.
+const FEWEST: usize = 60;
+
+/// An unbroken stretch of both channels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// Sample instants, s, rising.
+    pub time_s: Vec<f64>,
+    /// Readings of channels 1 and 2, °C.
+    pub reading_c: [Vec<f64>; 2],
+    /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
+    pub masked: [Vec<bool>; 2],
+    /// Flow velocity or density, in any unit.
+    flow: Option<Vec<f64>>,
+}
+
+impl Stretch {
+    /// A stretch of which every sample counts.
+    pub fn new(time_s: Vec<f64>, reading_c: [Vec<f64>; 2]) -> Self {
+        let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
+        Self { time_s, reading_c, masked, flow: None }
+    }
+
+    /// The same with readings of either channel that say nothing: missing ones, in whose place is some value between their
+    /// neighbours.
+    #[must_use]
+    pub fn with_missing(self, masked: [Vec<bool>; 2]) -> Self {
+        Self { masked, ..self }
+    }
+
+    /// The same with a measured flow velocity or density at each sample, in any unit, positive.
+    #[must_use]
+    pub fn with_flow(self, flow: Vec<f64>) -> Self {
+        Self { flow: Some(flow), ..self }
+    }
+
+    /// The mean of the first readings, °C.
+    pub fn start_c(&self) -> f64 {
+        0.5 * (self.reading_c[0][0] + self.reading_c[1][0])
+    }
+
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+}
+
+/// Both channels of a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observations {
+    pub stretches: Vec<Stretch>,
+    pub period_s: Option<f64>,
+    /// Standard deviation of the more lively channel, K.
+    swing_k: f64,
+    /// Flow, where it was measured.
+    flow: Option<Arc<Flow>>,
+}
+
+impl Observations {
+    /// - `stretches`: in order of time; those of fewer than 8 samples are left out
+    /// - `period_s`: the sample period where samples are evenly spaced within each stretch, s
+    ///
+    /// # Errors
+    /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`]; [`DiagnoseError::Flow`] for a flow that is
+    /// not positive everywhere, or of another length.
+    pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, DiagnoseError> {
+        stretches.retain(|s| s.len() >= SHORTEST);
+        let samples: usize = stretches.iter().map(Stretch::len).sum();
+        if samples < FEWEST {
+            return Err(DiagnoseError::TooShort { samples, needed: FEWEST });
+        }
+        let is_sound = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
+        if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {
+            return Err(DiagnoseError::NotFinite);
+        }
+        let flows: Option<Vec<(&[f64], &[f64])>> =
+            stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s[..], &flow[..]))).collect();
+        let flow = flows.map(|flows| Flow::new(&flows).map(Arc::new)).transpose()?;
+        let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
+        out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);
+        Ok(out)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.stretches.iter().map(Stretch::len).sum()
+    }
+
+    /// First and last instant, s.
+    pub fn ends_s(&self) -> [f64; 2] {
+        let first = self.stretches.first().map_or(0.0, |s| s.time_s[0]);
+        let last = self.stretches.last().map_or(1.0, |s| s.time_s[s.len() - 1]);
+        [first, last]
+    }
+
+    /// Time from the first to the last sample, s.
+    pub fn span_s(&self) -> f64 {
+        let [first_s, last_s] = self.ends_s();
+        last_s - first_s
+    }
+
+    /// Mean time from sample to sample, s.
+    pub fn step_s(&self) -> f64 {
+        self.period_s.unwrap_or_else(|| {
+            let (sum, count) = self
+                .stretches
+                .iter()
+                .fold((0.0, 0), |(sum, count), s| (sum + s.time_s[s.len() - 1] - s.time_s[0], count + s.len() - 1));
+            sum / count as f64
+        })
+    }
+
+    /// Every reading of a channel.
+    pub fn channel(&self, i: usize) -> impl Iterator<Item = f64> + '_ {
+        self.stretches.iter().flat_map(move |s| s.reading_c[i].iter().copied())
+    }
+
+    /// Mean and standard deviation of a channel.
+    pub fn mean_and_std(&self, i: usize) -> [f64; 2] {
+        let n = self.samples() as f64;
+        let mean = self.channel(i).sum::<f64>() / n;
+        [mean, (self.channel(i).map(|y| (y - mean) * (y - mean)).sum::<f64>() / n).sqrt()]
+    }
+
+    /// Mean, variance and third central moment over variance of the mean of both channels.
+    pub fn moments(&self) -> [f64; 3] {
+        let level = || self.channel(0).zip(self.channel(1)).map(|(a, b)| 0.5 * (a + b));
+        let n = self.samples() as f64;
+        let mean = level().sum::<f64>() / n;
+        let second = level().map(|y| (y - mean).powi(2)).sum::<f64>() / n;
+        let third = level().map(|y| (y - mean).powi(3)).sum::<f64>() / n;
+        [mean, second, if second > 0.0 { third / second } else { 0.0 }]
+    }
+
+    /// Flow, where it was measured in all stretches.
+    pub fn flow(&self) -> Option<&Arc<Flow>> {
+        self.flow.as_ref()
+    }
+
+    /// The standard deviation of the more lively channel, K.
+    pub fn swing_k(&self) -> f64 {
+        self.swing_k
+    }
+
+    /// Pieces of `length` samples from each of `starts` on, counted through the stretches; those that would reach over the end of a
+    /// stretch are left out.
+    pub fn excerpt(&self, starts: impl Iterator<Item = usize>, length: usize) -> Self {
+        let mut stretches = Vec::new();
+        for mut from in starts {
+            for stretch in &self.stretches {
+                let n = stretch.len();
+                if from >= n {
+                    from -= n;
+                    continue;
+                }
+                if from + length <= n {
+                    let cut = from..from + length;
+                    stretches.push(Stretch {
+                        time_s: stretch.time_s[cut.clone()].to_vec(),
+                        reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
+                        masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
+                        flow: None,
+                    });
+                }
+                break;
+            }
+        }
+        if stretches.is_empty() { self.clone() } else { Self { stretches, ..self.clone() } }
+    }
+}

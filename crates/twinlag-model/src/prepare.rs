@@ -1,0 +1,270 @@
+//! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
+
+use crate::defects::{self, Levels};
+use crate::fitted::Defect;
+use crate::effect::{Context, Identifier};
+use crate::error::DiagnoseError;
+use crate::model::{Effort, Fitted, Model, Selection};
+use crate::observations::Observations;
+use crate::plant::reach;
+use crate::settings::Settings;
+use crate::spectrum::runs;
+use crate::weighting::Weighting;
+
+/// Blocks along the record, of which every eighth is kept for the judgement at the end.
+const BLOCKS: usize = 80;
+/// Samples of a record that is looked at through excerpts first, and of each of these.
+const LONG: usize = 7000;
+const EXCERPT: usize = 500;
+/// Robust standard deviations beyond which a single reading is wrong, and where others are.
+const SPIKE: f64 = 6.0;
+const SPIKE_AMONG_OTHERS: f64 = 4.5;
+
+/// Starts of the two-lag fit that the best points of a grid of time constants give.
+pub const GRID_STARTS: usize = 3;
+/// Times that spikes are looked for.
+const SPIKE_ROUNDS: usize = 3;
+/// Standard errors by which less is clearly less.
+const CLEARLY: f64 = 4.0;
+
+/// A record with its defects masked, and the two-lag model of it.
+pub struct Prepared {
+    pub observations: Observations,
+    pub levels: Levels,
+    pub context: Context,
+    /// Defects of the data.
+    pub found: Vec<Defect>,
+    /// Single wrong readings of each channel.
+    spikes: [usize; 2],
+    /// The record as it came, and its noise.
+    pub raw: (Observations, Levels),
+    /// Residuals of the whole record.
+    pub everything: Selection,
+    /// Those without the blocks that judge.
+    pub searched: Selection,
+}
+
+impl Prepared {
+    /// The record with saturation and coarse steps dealt with.
+    pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
+        for i in 0..2 {
+            let first = observations.channel(i).next();
+            if observations.channel(i).all(|y| Some(y) == first) {
+                return Err(DiagnoseError::Constant { channel: i + 1 });
+            }
+        }
+        let mut observations = observations.clone();
+        let samples = observations.samples();
+        let mut levels =
+            defects::levels(&observations).ok_or(DiagnoseError::InShreds { samples, needed: defects::SHORTEST })?;
+        if let Some(std_k) = settings.noise_std_k {
+            levels.std_k = std_k;
+            levels.log_error = [0.0; 2];
+        }
+        let raw = (observations.clone(), levels);
+        let found = data_defects(&mut observations, &levels, &settings.effects);
+        let weighting = Weighting::of(&observations, levels.std_k);
+        Ok(Self {
+            everything: selection(&observations, false, &weighting),
+            searched: selection(&observations, true, &weighting),
+            context: context(&observations, &levels),
+            observations,
+            levels,
+            found,
+            spikes: [0; 2],
+            raw,
+        })
+    }
+
+    /// The two-lag model, isolated wrong readings, which show once there is one, masked.
+    pub fn base(&mut self, settings: &Settings) -> Fitted {
+        let model = Model::new(&settings.known, self.levels.std_k);
+        let mut base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
+        // A wrong reading hides its neighbours: once more where there were some.
+        for _ in 0..SPIKE_ROUNDS {
+            if !settings.effects.contains(&Identifier::Spikes) || !self.mask_spikes(&base) {
+                break;
+            }
+            base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
+        }
+        if !self.found.is_empty() {
+            self.find_levels(&base, settings);
+            base = self.refit(&base);
+        }
+        base
+    }
+
+    /// The two-lag model of the record as it came, where `base` is that of the record with defects masked; none where none is.
+    pub fn unmasked(&self, base: &Fitted) -> Option<Fitted> {
+        if self.found.iter().all(|f| f.effect == Identifier::Quantisation) {
+            return None;
+        }
+        let (observations, levels) = &self.raw;
+        let model = base.model.clone().with_noise(levels.std_k);
+        Some(model.fit(&base.theta, observations, &self.searched, Effort::Finish))
+    }
+
+    pub fn mask_spikes(&mut self, base: &Fitted) -> bool {
+        let evaluation = base.model.plant(&base.theta, &self.observations).whitened(&self.observations, true);
+        let mut counts = [0; 2];
+        for far in [SPIKE, SPIKE_AMONG_OTHERS] {
+            let spikes = defects::spikes(&self.observations, &evaluation, far);
+            for i in 0..2 {
+                // Where there are some there are smaller ones.
+                if far == SPIKE || counts[i] > 0 {
+                    defects::mask(&mut self.observations, i, &spikes[i]);
+                    counts[i] += spikes[i].len();
+                }
+            }
+        }
+        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
+            self.spikes[i] += count;
+            self.found.retain(|f| f.effect != Identifier::Spikes || f.channel != i);
+            self.found.push(defect(Identifier::Spikes, i, format!("{} single readings", self.spikes[i])));
+        }
+        counts != [0; 2]
+    }
+
+    /// Levels again, without what is masked and without the lines of `fitted`, unless they were given.
+    pub fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
+        let found = defects::levels(&fitted.model.without_lines(&fitted.theta, &self.observations));
+        if let (None, Some(found)) = (settings.noise_std_k, found) {
+            self.levels = Levels { step_k: self.levels.step_k, ..found };
+        }
+    }
+
+    /// Lowers levels that were found rather than given to what `fitted` leaves over, where that is less than levels as uncertain as
+    /// these allow: the disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. May
+    /// show that a converter is coarse. Whether they were lowered.
+    pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) -> bool {
+        let energy = fitted.mean_energy();
+        let level_std = 2.0 * self.levels.log_error[0].max(self.levels.log_error[1]);
+        let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
+        let is_clearly_less = energy.ln() < -CLEARLY * (2.0 / fitted.count + level_std * level_std).sqrt();
+        if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse || !is_clearly_less {
+            return false;
+        }
+        self.levels.scale(energy.sqrt());
+        self.context = context(&self.observations, &self.levels);
+        if settings.effects.contains(&Identifier::Quantisation) {
+            self.found.extend(coarse_steps(&self.levels));
+        }
+        true
+    }
+
+    /// From here on frequencies count by the spectrum of what `fitted` leaves over.
+    pub fn weigh_by(&mut self, fitted: &Fitted) {
+        let evaluation = fitted.model.evaluate(&fitted.theta, &self.observations);
+        let left = runs(&evaluation, |s| self.searched.holds(s));
+        self.searched.weighting = self.searched.weighting.by_residual(&left);
+        self.everything.weighting = self.searched.weighting.clone();
+    }
+
+    /// The same model with the levels that there are now.
+    pub fn refit(&self, fitted: &Fitted) -> Fitted {
+        let model = fitted.model.clone().with_noise(self.levels.std_k);
+        model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Finish)
+    }
+
+    /// Pieces of a long record, for a quick look, and what counts of them; all of a short one.
+    pub fn excerpt(&self) -> (Observations, Selection) {
+        let samples = self.observations.samples();
+        if samples < LONG {
+            return (self.observations.clone(), self.searched.clone());
+        }
+        // After each block that judges.
+        let starts = (0..BLOCKS).step_by(8).map(|block| (block + 5) * samples / BLOCKS + 20);
+        let excerpt = self.observations.excerpt(starts, EXCERPT);
+        let whole = selection(&excerpt, false, &self.searched.weighting);
+        (excerpt, whole)
+    }
+
+    /// All residuals of models without a delay, which is what takes most of those at the ends.
+    pub fn without_delay(&self) -> Selection {
+        away_from_ends(&self.observations, 0, &self.everything.weighting)
+    }
+
+    /// Whether a sample is of the blocks that judge.
+    pub fn judges(&self, sample: usize) -> bool {
+        self.everything.holds(sample) && is_judge(sample, self.observations.samples())
+    }
+}
+
+/// Saturation and coarse converters, masked and named.
+fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Identifier]) -> Vec<Defect> {
+    let mut out = Vec::new();
+    if allowed.contains(&Identifier::Saturation) {
+        let counts = defects::mask_saturation(observations, levels.coarse_step_k());
+        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
+            out.push(defect(Identifier::Saturation, i, format!("{count} readings at an end of the range")));
+        }
+    }
+    if allowed.contains(&Identifier::Quantisation) {
+        out.extend(coarse_steps(levels));
+    }
+    out
+}
+
+fn coarse_steps(levels: &Levels) -> impl Iterator<Item = Defect> {
+    let steps = levels.coarse_step_k().into_iter().enumerate();
+    steps.filter_map(|(i, step)| Some(defect(Identifier::Quantisation, i, format!("steps of {:.4} K", step?))))
+}
+
+fn defect(effect: Identifier, channel: usize, seen: String) -> Defect {
+    Defect { effect, channel, seen }
+}
+
+pub fn is_judge(sample: usize, samples: usize) -> bool {
+    (sample * BLOCKS / samples.max(1)) % 8 == 4
+}
+
+/// All residuals away from the ends; without the blocks that judge, and their surroundings, if these are to be kept.
+fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weighting) -> Selection {
+    let samples = observations.samples();
+    let gap = (samples / BLOCKS / 10).min(20);
+    let mut out = away_from_ends(observations, reach(observations), weighting);
+    if keeps_judges {
+        for (k, counts) in out.counts.iter_mut().enumerate() {
+            let near = [k.saturating_sub(gap), k, (k + gap).min(samples - 1)];
+            *counts &= !near.iter().any(|s| is_judge(*s, samples));
+        }
+    }
+    out
+}
+
+/// All residuals away from the ends, where delays may reach so many samples.
+fn away_from_ends(observations: &Observations, reach: usize, weighting: &Weighting) -> Selection {
+    let samples = observations.samples();
+    let margin = 8 + reach + weighting.half();
+    let mut counts = vec![true; samples];
+    let mut first = 0;
+    for stretch in &observations.stretches {
+        let n = stretch.len();
+        // Every model of a stretch has residuals for these, whatever factors it needs.
+        let inside = if n > 4 * margin { margin..n - margin } else { n / 8 + 1..n - n / 8 - 1 };
+        for k in (0..n).filter(|k| !inside.contains(k)) {
+            counts[first + k] = false;
+        }
+        first += n;
+    }
+    Selection { counts, weighting: weighting.clone() }
+}
+
+fn context(observations: &Observations, levels: &Levels) -> Context {
+    let step_s = observations.step_s();
+    Context {
+        ends_s: observations.ends_s(),
+        step_s,
+        is_even: observations.period_s.is_some(),
+        samples: observations.samples(),
+        reach: reach(observations),
+        mean_c: [0, 1].map(|i| observations.mean_and_std(i)[0]),
+        moments: observations.moments(),
+        swing_k: observations.swing_k(),
+        noise_std_k: levels.std_k,
+        is_coarse: levels.coarse_step_k().map(|q| q.is_some()),
+        tau_s: [10.0 * step_s; 2],
+        flow: observations.flow().filter(|flow| flow.changes()).cloned(),
+        lines: Vec::new(),
+    }
+}

@@ -1,0 +1,300 @@
+//! Tests of what a model leaves over, beside those of its energy and whiteness.
+//!
+//! The residual is tested against the *estimated* input, not against a channel: each channel's noise is in the residual as well. What
+//! stands for the input is a reading with its estimated noise taken off, `ŷ = y − Σ Bᵀ V⁻¹ u`: the projection that makes it
+//! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
+
+use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
+use twinlag_cross_relation::ResidualTest;
+use twinlag_transform::{Complex64, Forward, Tapered, hann};
+
+use crate::dense;
+use crate::model::{Fitted, Selection};
+use crate::observations::Observations;
+use crate::plant::Place;
+use crate::weighting::Weighting;
+
+/// Points of a segment for the coherence.
+const SEGMENT: usize = 256;
+/// Power over that of the noise from which on a frequency is the gas's.
+const STANDS_OUT: f64 = 3.0;
+/// Parts of the record whose energies are compared.
+const PARTS: usize = 20;
+
+/// Residual and estimated input where they count, in unbroken runs.
+struct Pairs {
+    runs: Vec<(Vec<f64>, Vec<f64>)>,
+    /// White noise of the reading that stands for the input, K.
+    noise_std_k: f64,
+}
+
+impl Pairs {
+    fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Self {
+        let plant = fitted.model.plant(&fitted.theta, observations);
+        let evaluation = plant.whitened(observations, true);
+        // A channel without noise of its own beside the white.
+        let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
+        let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s < plant.sensors[0].tau_s));
+        let mut cleaned = vec![f64::NAN; observations.samples()];
+        for part in &evaluation.parts {
+            let stretch = &observations.stretches[part.stretch];
+            let noise = part.noise_of(channel, stretch.len());
+            for (k, (y, n)) in stretch.reading_c[channel].iter().zip(noise).enumerate() {
+                cleaned[part.first_sample + k] = y - n;
+            }
+        }
+        let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+        let mut last = None;
+        for (k, sample) in evaluation.sample.iter().enumerate().filter(|(_, s)| selection.holds(**s)) {
+            if last.is_none_or(|l| *sample != l + 1) {
+                runs.push((Vec::new(), Vec::new()));
+            }
+            last = Some(*sample);
+            if evaluation.is_informed[k] {
+                let run = runs.last_mut().expect("begun");
+                run.0.push(evaluation.residual[k]);
+                run.1.push(cleaned[*sample]);
+            }
+        }
+        Self { runs, noise_std_k: plant.noise_std_k[channel] }
+    }
+
+    fn residual(&self) -> impl Iterator<Item = f64> + '_ {
+        self.runs.iter().flat_map(|r| r.0.iter().copied())
+    }
+
+    fn input(&self) -> impl Iterator<Item = f64> + '_ {
+        self.runs.iter().flat_map(|r| r.1.iter().copied())
+    }
+}
+
+/// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
+pub fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
+    let plant = fitted.model.plant(&fitted.theta, observations);
+    let evaluation = plant.whitened(observations, true);
+    let filter = Weighting::of_gas(observations, plant.noise_std_k);
+    let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
+    let mut out = Vec::with_capacity(evaluation.residual.len());
+    for part in &evaluation.parts {
+        let stretch = &observations.stretches[part.stretch];
+        let noise = part.noise_of(channel, stretch.len());
+        let chain = &part.inferred[channel];
+        let mut gas: Vec<f64> = (0..part.whitened.residual.len())
+            .map(|k| {
+                let k = k + part.skipped;
+                let first = chain.rows.start + k;
+                let taken = chain.rows.at(k).iter().enumerate();
+                let taken: f64 = taken.map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum();
+                chain.value[k] - taken
+            })
+            .collect();
+        plant.undo_slow(&mut gas, stretch.start_c(), observations.step_s());
+        out.extend(filter.smooth(&gas));
+    }
+    out
+}
+
+/// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
+///
+/// - `is_coarse`: whether a converter is, whose rounding has no tails
+pub fn tests(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    is_coarse: bool,
+) -> Vec<ResidualTest> {
+    let pairs = Pairs::of(fitted, observations, selection);
+    let r: Vec<f64> = pairs.residual().collect();
+    if r.len() < 100 {
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    out.extend(coherence(&pairs));
+    out.extend(level(&pairs, &r));
+    out.push(rate(&pairs, &r));
+    out.push(time(&r));
+    if !is_coarse {
+        out.push(tails(&r));
+    }
+    out.extend(lines(&pairs));
+    out.extend(repeated_values(observations, fitted.model.noise_std_k()));
+    out
+}
+
+fn test(name: &str, statistic: f64, degrees_of_freedom: Option<f64>, p_value: f64) -> ResidualTest {
+    ResidualTest { test: name.into(), statistic, degrees_of_freedom, p_value: p_value.clamp(0.0, 1.0) }
+}
+
+fn two_sided(deviate: f64) -> f64 {
+    2.0 * Normal::new(0.0, 1.0).expect("the standard normal exists").sf(deviate.abs())
+}
+
+/// Largest coherence of the frequencies in which the gas stands out of the noise: under a right model that of `L` independent
+/// segments exceeds `c` with probability `(1 − c)^(L − 1)`. Elsewhere the estimated input is noise, and a level that is a little off
+/// leaves some of the residual's in it.
+fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
+    let tapered = Tapered::new(hann(SEGMENT));
+    let bins = SEGMENT / 2 - 2;
+    let mut cross = vec![Complex64::default(); bins];
+    let (mut of_r, mut of_x) = (vec![0.0; bins], vec![0.0; bins]);
+    let mut count = 0.0_f64;
+    for (r, x) in &pairs.runs {
+        for (r, x) in tapered.halves(r).zip(tapered.halves(x)) {
+            let transform = |v: &[f64]| {
+                // Both ends on a straight line: a slope would leak into every bin.
+                let (a, b) = (v[0], v[SEGMENT - 1]);
+                let mean = v.iter().sum::<f64>() / SEGMENT as f64;
+                let line = |k: usize| (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
+                tapered.transform(v.iter().enumerate().map(|(k, v)| v - mean - line(k)))
+            };
+            let (fr, fx) = (transform(r), transform(x));
+            for j in 0..bins {
+                cross[j] += fr[j + 2] * fx[j + 2].conj();
+                of_r[j] += fr[j + 2].norm_sqr();
+                of_x[j] += fx[j + 2].norm_sqr();
+            }
+            count += 1.0;
+        }
+    }
+    // Half overlapping segments under Hann's window share a thirty-sixth of their power.
+    let independent = count / (1.0 + 2.0 / 36.0);
+    if independent < 4.0 {
+        return None;
+    }
+    let noise = STANDS_OUT * pairs.noise_std_k.powi(2) * tapered.energy() * count;
+    let coherence = |j: usize| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300);
+    let of_gas: Vec<f64> = (0..bins).filter(|j| of_x[*j] > noise).map(coherence).collect();
+    let largest = of_gas.iter().copied().reduce(f64::max)?;
+    let of_one = (1.0 - largest).max(0.0).powf(independent - 1.0);
+    let p = -((of_gas.len() as f64) * (-of_one).ln_1p()).exp_m1();
+    Some(test("coherence", largest, Some(independent), p))
+}
+
+/// The residual itself against the level of the input, in ten classes of equal size: a static error shows as a mean that differs.
+fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
+    const CLASSES: usize = 10;
+    let x: Vec<f64> = pairs.input().collect();
+    let mut order: Vec<usize> = (0..x.len()).collect();
+    order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
+    let variance = dense::dot(r, r) / r.len() as f64;
+    let size = r.len() / CLASSES;
+    if variance <= 0.0 || size < 10 {
+        return None;
+    }
+    let statistic: f64 = order
+        .chunks(size)
+        .take(CLASSES)
+        .map(|class| {
+            let sum: f64 = class.iter().map(|&k| r[k]).sum();
+            sum * sum / (class.len() as f64 * variance)
+        })
+        .sum();
+    let p = ChiSquared::new(CLASSES as f64).ok()?.sf(statistic);
+    Some(test("level", statistic, Some(CLASSES as f64), p))
+}
+
+/// Correlation of the residual's energy with how fast the input changes.
+fn rate(pairs: &Pairs, r: &[f64]) -> ResidualTest {
+    let slope: Vec<f64> = pairs
+        .runs
+        .iter()
+        .flat_map(|(_, x)| (0..x.len()).map(|k| (x[(k + 4).min(x.len() - 1)] - x[k.saturating_sub(4)]).abs()))
+        .collect();
+    let energy: Vec<f64> = r.iter().map(|r| r * r).collect();
+    let z = correlation(&energy, &slope) * (r.len() as f64).sqrt();
+    test("rate", z, None, two_sided(z))
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len() as f64;
+    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+    let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b) {
+        ab += (a - ma) * (b - mb);
+        aa += (a - ma) * (a - ma);
+        bb += (b - mb) * (b - mb);
+    }
+    ab / (aa * bb).sqrt().max(1e-300)
+}
+
+/// Energies of twenty parts of the record against each other.
+fn time(r: &[f64]) -> ResidualTest {
+    let size = r.len() / PARTS;
+    let mean = dense::dot(r, r) / r.len() as f64;
+    let statistic: f64 = r
+        .chunks(size)
+        .take(PARTS)
+        .map(|part| {
+            let n = part.len() as f64;
+            let z = (dense::dot(part, part) / (n * mean) - 1.0) * (0.5 * n).sqrt();
+            z * z
+        })
+        .sum();
+    let dof = (PARTS - 1) as f64;
+    test("time", statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
+}
+
+/// Largest power of a single frequency over the mean of its neighbours', in the longest run: among `m` neighbours of the same
+/// expectation it exceeds `x` times their mean with probability `(1 + x/m)^−m`.
+fn lines(pairs: &Pairs) -> Option<ResidualTest> {
+    const NEIGHBOURS: usize = 30;
+    let run = pairs.runs.iter().map(|r| &r.0).max_by_key(|r| r.len())?;
+    if run.len() < 4 * NEIGHBOURS {
+        return None;
+    }
+    let spectrum = Forward::of(run.len()).transform(run);
+    let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(Complex64::norm_sqr).collect();
+    let half = NEIGHBOURS / 2;
+    let bins = half + 1..power.len().saturating_sub(half + 1);
+    let ratio = |j: usize| {
+        // A line between two frequencies is in both.
+        let below: f64 = power[j - half - 1..j - 1].iter().sum();
+        let above: f64 = power[j + 2..j + 2 + half].iter().sum();
+        power[j] / ((below + above) / NEIGHBOURS as f64).max(f64::MIN_POSITIVE)
+    };
+    let count = bins.len();
+    let largest = bins.filter(|j| j + 2 + half <= power.len()).map(ratio).fold(0.0, f64::max);
+    let of_one = (1.0 + largest / NEIGHBOURS as f64).powi(-(NEIGHBOURS as i32));
+    let p = -((count as f64) * (-of_one).ln_1p()).exp_m1();
+    Some(test("lines", largest, Some(NEIGHBOURS as f64), p))
+}
+
+/// Readings that equal the one before them, more often than noise `σ` on a grid of step `q` makes them, `q/(2 √π σ)`: a logger that
+/// repeats what it last read. None where the grid is coarser than the noise.
+fn repeated_values(observations: &Observations, noise_std_k: [f64; 2]) -> Option<ResidualTest> {
+    let of_channel = |i: usize| -> Option<(f64, f64)> {
+        let mut values: Vec<f64> = observations.channel(i).collect();
+        values.sort_by(f64::total_cmp);
+        let apart = values.windows(2).map(|w| w[1] - w[0]);
+        let step_k = apart.filter(|d| *d > 1e-9 * observations.swing_k()).fold(f64::INFINITY, f64::min);
+        if step_k > noise_std_k[i] {
+            return None;
+        }
+        let share = step_k / (2.0 * std::f64::consts::PI.sqrt() * noise_std_k[i]);
+        let pairs = || {
+            observations.stretches.iter().flat_map(|s| {
+                let masked = &s.masked[i];
+                s.reading_c[i].windows(2).enumerate().filter(|(k, _)| !masked[*k] && !masked[k + 1]).map(|(_, w)| w)
+            })
+        };
+        let count = pairs().count() as u64;
+        let equal = pairs().filter(|w| w[0] == w[1]).count() as u64;
+        if equal == 0 {
+            return Some((0.0, 1.0));
+        }
+        // As many or more.
+        let p = Binomial::new(share, count).ok()?.sf(equal - 1);
+        Some((equal as f64 / count as f64, p))
+    };
+    let found = (0..2).filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(test("repeated-values", found.0, None, 2.0 * found.1))
+}
+
+/// Kurtosis: Gaussian noise has 3 with standard error `√(24/n)`.
+fn tails(r: &[f64]) -> ResidualTest {
+    let n = r.len() as f64;
+    let second = dense::dot(r, r) / n;
+    let fourth = r.iter().map(|r| r.powi(4)).sum::<f64>() / n;
+    let z = (fourth / (second * second).max(1e-300) - 3.0) / (24.0 / n).sqrt();
+    test("tails", z, None, two_sided(z))
+}

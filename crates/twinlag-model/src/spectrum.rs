@@ -1,0 +1,302 @@
+//! The spectrum of a whitened residual in bands, and models of noise fitted to it.
+//!
+//! Blocks of the residual are transformed one by one, so that parts of the record can be held out. The power of white noise of
+//! unit variance is 1 in every band.
+
+use num_complex::Complex64;
+use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
+use twinlag_transform::Forward;
+
+use crate::effect::coloured_noise::{LONGEST, SHORTEST};
+use crate::observations::Observations;
+use crate::plant::{Evaluation, Extra, Place, Plant};
+
+/// Longest block, samples.
+const LONGEST_BLOCK: usize = 1024;
+/// Fewest blocks.
+const FEWEST_BLOCKS: usize = 8;
+
+/// One band: its frequency in radians per sample, and power and degrees of freedom in the blocks of either half.
+#[derive(Clone, Debug)]
+pub struct Band {
+    pub omega: f64,
+    /// Sum of powers over the bins of either half.
+    sum: [f64; 2],
+    /// Degrees of freedom of either half.
+    dof: [f64; 2],
+}
+
+impl Band {
+    pub fn dof(&self) -> f64 {
+        self.dof[0] + self.dof[1]
+    }
+
+    /// Mean power.
+    pub fn power(&self) -> f64 {
+        (self.sum[0] + self.sum[1]) / self.dof().max(1.0)
+    }
+}
+
+/// Power in bands of growing width.
+#[derive(Clone, Debug)]
+pub struct Bands(pub Vec<Band>);
+
+/// Which blocks.
+#[derive(Clone, Copy)]
+pub enum Half {
+    Both,
+    Even,
+    Odd,
+}
+
+impl Half {
+    fn of(self, sums: [f64; 2]) -> f64 {
+        match self {
+            Self::Both => sums[0] + sums[1],
+            Self::Even => sums[0],
+            Self::Odd => sums[1],
+        }
+    }
+}
+
+impl Bands {
+    /// - `runs`: unbroken stretches of the residual
+    pub fn of(runs: &[Vec<f64>]) -> Self {
+        let total: usize = runs.iter().map(Vec::len).sum();
+        let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
+        let block = (total / FEWEST_BLOCKS).min(longest / 2).clamp(8, LONGEST_BLOCK) & !1;
+        let edges = edges(block / 2);
+        let mut bands: Vec<Band> = edges
+            .windows(2)
+            .map(|e| Band {
+                omega: std::f64::consts::TAU * (e[0] + e[1] - 1) as f64 * 0.5 / block as f64,
+                sum: [0.0; 2],
+                dof: [0.0; 2],
+            })
+            .collect();
+        let plan = Forward::of(block);
+        let mut index = 0;
+        for run in runs {
+            for piece in run.chunks_exact(block) {
+                let spectrum = plan.transform(piece);
+                for (band, e) in bands.iter_mut().zip(edges.windows(2)) {
+                    for (bin, x) in spectrum.iter().enumerate().take(e[1]).skip(e[0]) {
+                        let dof = if bin == 0 || 2 * bin == block { 1.0 } else { 2.0 };
+                        band.sum[index % 2] += dof * x.norm_sqr() / block as f64;
+                        band.dof[index % 2] += dof;
+                    }
+                }
+                index += 1;
+            }
+        }
+        bands.retain(|b| b.dof() > 0.0);
+        Self(bands)
+    }
+
+    /// `−2 ln L` with a free level in every band, each with its weight: what is left however the noise is coloured.
+    pub fn robust(&self, weight: impl Fn(f64) -> f64) -> f64 {
+        self.0.iter().map(|b| weight(b.omega) * b.dof() * b.power().max(1e-300).ln()).sum()
+    }
+
+    /// `−2 ln L` of noise whose power is `ratio` times that of the whitening, band by band, less its value for white noise of unit
+    /// power.
+    fn likelihood(&self, half: Half, ratio: impl Fn(usize, f64) -> f64) -> f64 {
+        self.0
+            .iter()
+            .enumerate()
+            .map(|(index, b)| {
+                let ratio = ratio(index, b.omega).max(1e-12);
+                half.of(b.dof) * ratio.ln() + half.of(b.sum) / ratio
+            })
+            .sum()
+    }
+}
+
+/// Bins of bands a quarter of an octave wide, the first of them alone.
+fn edges(bins: usize) -> Vec<usize> {
+    let mut out = vec![0, 1];
+    while *out.last().expect("not empty") <= bins {
+        let last = *out.last().expect("not empty");
+        let next = ((last as f64 * 1.19).ceil() as usize).max(last + 1);
+        out.push(next.min(bins + 1));
+    }
+    out
+}
+
+/// Power of each path of noise into the disagreement, per unit variance: both channels, the gas.
+struct Paths {
+    rows: [Vec<f64>; 3],
+    base: [f64; 2],
+    extra: Vec<Extra>,
+    step_s: f64,
+}
+
+fn power(row: &[f64], omega: f64) -> f64 {
+    row.iter().enumerate().map(|(j, c)| c * Complex64::cis(-omega * j as f64)).sum::<Complex64>().norm_sqr()
+}
+
+/// What first-order autoregressive noise of unit variance has.
+fn autoregressive(correlation_s: f64, step_s: f64, omega: f64) -> f64 {
+    let rho = (-step_s / correlation_s).exp();
+    (1.0 - rho * rho) / (1.0 - 2.0 * rho * omega.cos() + rho * rho)
+}
+
+impl Paths {
+    fn of(plant: &Plant, observations: &Observations) -> Self {
+        Self {
+            rows: plant.noise_paths(observations),
+            base: plant.noise_std_k.map(|s| s * s),
+            extra: plant.extra.clone(),
+            step_s: observations.step_s(),
+        }
+    }
+
+    fn through(&self, place: Place) -> &[f64] {
+        match place {
+            Place::Reading(i) => &self.rows[i],
+            Place::Gas => &self.rows[2],
+        }
+    }
+
+    /// Power of the disagreement.
+    fn total(&self, variance: [f64; 2], extra: &[Extra], omega: f64) -> f64 {
+        let white: f64 = (0..2).map(|i| variance[i] * power(&self.rows[i], omega)).sum();
+        let coloured: f64 = extra
+            .iter()
+            .map(|e| {
+                e.std_k
+                    * e.std_k
+                    * autoregressive(e.correlation_s, self.step_s, omega)
+                    * power(self.through(e.place), omega)
+            })
+            .sum();
+        white + coloured
+    }
+}
+
+/// Levels of the channels' white noise, and with them one more source of noise if there is one.
+pub struct NoiseFit {
+    /// White noise, K.
+    pub noise_std_k: [f64; 2],
+    pub extra: Option<Extra>,
+    /// `−2 ln L`.
+    pub likelihood: f64,
+    /// The same in each half with what the other half said, summed.
+    pub held_out: f64,
+}
+
+/// Standard deviations of the logarithm of levels from third differences: below, since these see coloured noise and what is left
+/// of the gas as well; above, where nothing but scatter is.
+const LEVELS_LOOSE: f64 = 0.3;
+const LEVELS_TIGHT: f64 = 0.03;
+
+struct NoiseCost<'a> {
+    bands: &'a Bands,
+    paths: &'a Paths,
+    /// Power of the whitening in each band.
+    base: &'a [f64],
+    place: Option<Place>,
+    half: Half,
+    /// Channels whose converter is coarse: third differences may say anything.
+    is_coarse: [bool; 2],
+}
+
+impl NoiseCost<'_> {
+    fn parts(&self, x: &[f64]) -> ([f64; 2], Vec<Extra>) {
+        let variance = [0, 1].map(|i| self.paths.base[i] * x[i] * x[i]);
+        let mut extra = self.paths.extra.clone();
+        if let Some(place) = self.place {
+            extra.push(Extra { place, std_k: x[2], correlation_s: x[3] });
+        }
+        (variance, extra)
+    }
+
+    fn likelihood(&self, x: &[f64], half: Half) -> f64 {
+        let (variance, extra) = self.parts(x);
+        self.bands.likelihood(half, |index, omega| self.paths.total(variance, &extra, omega) / self.base[index])
+    }
+}
+
+impl Cost for NoiseCost<'_> {
+    fn value(&self, x: &[f64]) -> f64 {
+        let prior = |(factor, is_coarse): (&f64, &bool)| {
+            let above = if *is_coarse { LEVELS_LOOSE } else { LEVELS_TIGHT };
+            let scatter = if *factor > 1.0 { above } else { LEVELS_LOOSE };
+            (factor.ln() / scatter).powi(2)
+        };
+        self.likelihood(x, self.half) + x[..2].iter().zip(&self.is_coarse).map(prior).sum::<f64>()
+    }
+}
+
+/// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
+///
+/// - `is_coarse`: channels whose levels third differences do not tell
+pub fn fit_noise(
+    plant: &Plant,
+    observations: &Observations,
+    bands: &Bands,
+    place: Option<Place>,
+    starts: &[[f64; 2]],
+    is_coarse: [bool; 2],
+) -> NoiseFit {
+    let paths = Paths::of(plant, observations);
+    let base: Vec<f64> =
+        bands.0.iter().map(|b| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE)).collect();
+    let [first, last] = observations.ends_s();
+    let solve = |half: Half| -> (Vec<f64>, f64) {
+        let cost = NoiseCost { bands, paths: &paths, base: &base, place, half, is_coarse };
+        let mut variables =
+            vec![Variable::logarithmic("level 1", 0.2, 5.0), Variable::logarithmic("level 2", 0.2, 5.0)];
+        let mut all = vec![vec![1.0, 1.0]];
+        if place.is_some() {
+            let swing = observations.swing_k();
+            variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
+            variables.push(Variable::logarithmic(
+                "correlation time",
+                SHORTEST * observations.step_s(),
+                LONGEST * (last - first),
+            ));
+            all = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
+        }
+        let problem = Problem::new(&cost, variables).expect("bounds are in order");
+        let simplex = Optimiser::NelderMead { spread_tolerance: 1e-7, edge: 0.5 };
+        all.iter()
+            .map(|start| {
+                let fit = simplex.minimise(&problem, start, &Budget { iterations: 300, evaluations: 600 });
+                let fit = fit.expect("the start is finite");
+                (fit.x, fit.value)
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("at least one start")
+    };
+    let (x, _) = solve(Half::Both);
+    let cost = NoiseCost { bands, paths: &paths, base: &base, place, half: Half::Both, is_coarse };
+    let (even, odd) = (solve(Half::Even).0, solve(Half::Odd).0);
+    let held_out = cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even);
+    NoiseFit {
+        noise_std_k: [0, 1].map(|i| plant.noise_std_k[i] * x[i]),
+        extra: place.map(|place| Extra { place, std_k: x[2], correlation_s: x[3] }),
+        likelihood: cost.likelihood(&x, Half::Both),
+        held_out,
+    }
+}
+
+/// Unbroken runs of the residuals that count and say anything.
+pub fn runs(evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+    let mut out: Vec<Vec<f64>> = Vec::new();
+    let mut last = None;
+    for (k, sample) in evaluation.sample.iter().enumerate() {
+        if !holds(*sample) {
+            continue;
+        }
+        if last.is_none_or(|l| *sample != l + 1) {
+            out.push(Vec::new());
+        }
+        last = Some(*sample);
+        // A masked reading takes one residual away; those around it are white all the same.
+        if evaluation.is_informed[k] {
+            out.last_mut().expect("begun").push(evaluation.residual[k]);
+        }
+    }
+    out
+}

@@ -1,0 +1,195 @@
+//! A fitted model in numbers: time constants with their intervals, tests, and what pictures need.
+
+use twinlag_cross_relation::residual_tests;
+
+use crate::defects::Levels;
+use crate::dense;
+use crate::fitted::{ModelFit, TimeConstant, Trace};
+use crate::effect::Identifier;
+use crate::extended::Extended;
+use crate::model::{Effort, Fitted, LONGEST, Selection};
+use crate::observations::Observations;
+use crate::prepare::is_judge;
+use crate::spectrum::{Bands, runs};
+
+/// 97.5 % point of the normal distribution.
+pub const Z_975: f64 = 1.959_963_984_540_054;
+/// A time constant shorter than this share of a sample period is none.
+const UNRESOLVED: f64 = 0.2;
+/// A time constant whose logarithm is less certain than this is none either: its interval spans a factor of seven.
+const VAGUE: f64 = 0.5;
+/// Relative standard error up to which a time constant is not doubted.
+const CERTAIN: f64 = 0.03;
+/// 95 % point of chi-square with one degree of freedom.
+const CHI2_95: f64 = 3.841_458_820_694_124;
+/// Below this p-value of any test something is left over.
+pub const LEFT_OVER: f64 = 1e-4;
+
+/// Whether a time constant is shorter than the samples tell, or as long as the record.
+pub fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
+    let [first, last] = observations.ends_s();
+    let seen = UNRESOLVED * observations.step_s()..0.9 * LONGEST * (last - first);
+    (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
+}
+
+/// Whether half or twice a time constant fits as well, the other parameters free: then it is not determined, whatever the curvature
+/// at the minimum says, as with two equal sensors. A curvature that is certain to a few per cent is believed.
+fn is_flat(fitted: &Fitted, observations: &Observations, selection: &Selection, variance: Option<f64>) -> bool {
+    // One that is known ties the other down.
+    if (0..2).any(|i| fitted.model.knows(i)) {
+        return false;
+    }
+    let tau_s = fitted.theta[0];
+    if variance.is_some_and(|v| v.sqrt() < CERTAIN * tau_s) {
+        return false;
+    }
+    [0.5, 2.0].into_iter().any(|factor| {
+        let model = fitted.model.clone().holding(0, factor * tau_s);
+        let mut theta = fitted.theta.clone();
+        // Along the ridge of equal sensors.
+        theta[0] = factor * tau_s;
+        theta[1] = (fitted.theta[1] + (factor - 1.0) * tau_s).max(0.5 * observations.step_s());
+        let other = model.fit(&theta, observations, selection, Effort::Finish);
+        other.chi2 - fitted.chi2 < CHI2_95 * fitted.mean_energy().max(1.0)
+    })
+}
+
+/// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
+/// ones, for white noise or, where the residual is not that, with its own autocorrelation.
+pub fn covariance(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    by_residual: bool,
+) -> Option<Vec<Vec<f64>>> {
+    let lin = fitted.model.linearised(&fitted.theta, observations, selection);
+    let p = lin.columns.len();
+    let inverse = fitted.model.curvature(&fitted.theta, observations, selection, &lin)?;
+    let n = lin.samples.len();
+    // Filtered once more: the score is that of the residual before the filter.
+    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|c| selection.weighting.apply(&c[..n])).collect();
+    let mut middle: Vec<Vec<f64>> =
+        (0..p).map(|a| (0..p).map(|b| dense::dot(&filtered[a], &filtered[b])).collect()).collect();
+    for (a, row) in middle.iter_mut().enumerate() {
+        for (b, m) in row.iter_mut().enumerate() {
+            *m += dense::dot(&lin.columns[a][n..], &lin.columns[b][n..]);
+        }
+    }
+    if by_residual {
+        // Bartlett's window over the lags in which the residual remembers.
+        let lags = (2.0 * (n as f64).sqrt()) as usize;
+        let r = &lin.residual[..n];
+        let correlation = |lag: usize| (lag..n).map(|k| r[k] * r[k - lag]).sum::<f64>() / n as f64;
+        let products: Vec<Vec<f64>> =
+            (0..p).map(|a| (0..p).map(|b| dense::dot(&lin.columns[a][..n], &lin.columns[b][..n])).collect()).collect();
+        let energy = correlation(0);
+        let mut coloured: Vec<Vec<f64>> = products.iter().map(|row| row.iter().map(|m| m * energy).collect()).collect();
+        for lag in 1..=lags.min(n / 4) {
+            let weight = (1.0 - lag as f64 / (lags + 1) as f64) * correlation(lag);
+            for a in 0..p {
+                for b in 0..=a {
+                    let (x, y) = (&lin.columns[a][..n], &lin.columns[b][..n]);
+                    let product = dense::dot(&x[lag..], &y[..n - lag]) + dense::dot(&x[..n - lag], &y[lag..]);
+                    coloured[a][b] += weight * product;
+                    if a != b {
+                        coloured[b][a] += weight * product;
+                    }
+                }
+            }
+        }
+        // No less than white noise alone.
+        for a in 0..p {
+            let ratio = (coloured[a][a] / middle[a][a].max(f64::MIN_POSITIVE)).max(0.0);
+            if ratio < 1.0 {
+                coloured[a][a] = middle[a][a];
+            }
+        }
+        middle = coloured;
+    }
+    Some(dense::product(&dense::product(&inverse, &middle), &inverse))
+}
+
+pub fn summarise(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    levels: &Levels,
+) -> ModelFit {
+    let evaluation = fitted.model.evaluate(&fitted.theta, observations);
+    let residual_runs = runs(&evaluation, |s| selection.holds(s));
+    let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
+    let mut tests = residual_tests(&residual_runs, fitted.model.fitted(), level_std);
+    let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
+    tests.extend(crate::residual::tests(fitted, observations, selection, is_coarse));
+    let count: usize = residual_runs.iter().map(Vec::len).sum();
+    let dof = count.saturating_sub(fitted.model.fitted()).max(1);
+    let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
+    let rejects = tests.iter().any(|t| t.p_value < LEFT_OVER);
+    let covariance = covariance(fitted, observations, selection, rejects);
+    let time_constant = |value: f64, variance: Option<f64>, is_log: bool| {
+        let se = variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt);
+        let interval = se.map(|se| {
+            if is_log {
+                let f = (Z_975 * se / value).exp();
+                [value / f, value * f]
+            } else {
+                [value - Z_975 * se, value + Z_975 * se]
+            }
+        });
+        // A factor of seven either way is no estimate.
+        let known = !is_log || se.is_some_and(|se| se / value < VAGUE);
+        let held = variance == Some(0.0);
+        TimeConstant {
+            value_s: (known || held).then_some(value),
+            standard_error_s: se.filter(|_| known),
+            interval_95_s: interval.filter(|_| known),
+        }
+    };
+    let theta = &fitted.theta;
+    // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
+    let c = covariance.as_ref();
+    let variance = |i: usize| c.map(|c| c[i][i]);
+    let unresolved = is_unresolved(fitted, observations) || is_flat(fitted, observations, selection, variance(0));
+    // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
+    let delay = fitted.model.effects.iter().position(|e| e.identifier() == Identifier::Delay);
+    let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
+        Some(index) => vec![(0, -1.0), (1, 1.0), (fitted.model.range(index).start, 1.0)],
+        None => vec![(0, -1.0), (1, 1.0)],
+    };
+    let difference_value: f64 = lag.iter().map(|(i, s)| s * theta[*i]).sum();
+    let difference =
+        c.map(|c| lag.iter().map(|(i, s)| lag.iter().map(|(j, t)| s * t * c[*i][*j]).sum::<f64>()).sum::<f64>());
+    let bands = Bands::of(&residual_runs);
+    let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
+    ModelFit {
+        time_constants: [0, 1].map(|i| {
+            let out = time_constant(theta[i], variance(i), true);
+            if unresolved && !fitted.model.knows(i) {
+                TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None }
+            } else {
+                out
+            }
+        }),
+        difference: time_constant(difference_value, difference, false),
+        fit: fitted.report.clone(),
+        noise_std_k: fitted.model.noise_std_k(),
+        tests,
+        chi2_per_dof,
+        is_weighted_by_residual: rejects,
+        covariance,
+        extended: Some(Extended::new(fitted, observations)),
+        trace: Trace {
+            time_s: evaluation.time_s,
+            residual: evaluation.residual,
+            gas_c: crate::residual::estimated_gas(fitted, observations),
+            is_judge: evaluation
+                .sample
+                .iter()
+                .map(|s| selection.holds(*s) && is_judge(*s, observations.samples()))
+                .collect(),
+            sample: evaluation.sample,
+            disagreement_k: evaluation.disagreement_k,
+            bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
+        },
+    }
+}

@@ -1,0 +1,301 @@
+//! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::dense;
+use crate::fitted::ModelFit;
+use crate::effect::{Context, Identifier, Shared, varying};
+use crate::error::DiagnoseError;
+use crate::known::Known;
+use crate::model::{Effort, Fitted, Selection};
+use crate::observations::Observations;
+use crate::prepare::Prepared;
+use crate::settings::{KnownEffect, Settings, Watch};
+use crate::summary::summarise;
+
+/// Most coefficients of the shared change, and samples for each.
+const COEFFICIENTS: usize = 32;
+const SAMPLES_EACH: usize = 60;
+const LEAST_COEFFICIENTS: usize = 3;
+/// Strengths of its curvature that are tried: the least lets it change by a tenth along the record, each is twice the one before.
+const CURVATURE: f64 = 0.25;
+const STRENGTHS: i32 = 12;
+/// A strength this much less likely than the best, in `−2 ln L`, ends the search.
+const HOPELESS: f64 = 20.0;
+/// Instants at which a step is looked for, and times that the best is looked around.
+const INSTANTS: usize = 40;
+const ROUNDS: usize = 4;
+/// Halvings by which the ends of its interval are found.
+const HALVINGS: usize = 5;
+/// Share of the record at either end in which a step is not told from a slope of the start.
+const MARGIN: f64 = 0.05;
+/// Part of a standard error by which a parameter is moved for derivatives.
+const SMALL: f64 = 0.01;
+/// 95 % point of the evidence against the true instant of a step, `(1 − exp(−x/2))² = 0.95`: the likelihood of instants is a random walk
+/// with a drift away from it on either side, and no parabola (Yao 1987, Hansen 2000).
+const INSTANT_95: f64 = 7.352_277;
+
+/// How time constants change along a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Change {
+    /// They do not, as far as the record tells.
+    Constant,
+    /// Smoothly, with this many coefficients: the effective number of a smoothing spline.
+    Smooth(usize),
+    /// At one instant.
+    Step,
+}
+
+/// A step of both time constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChangePoint {
+    /// When, s.
+    pub at_s: f64,
+    /// 95 % interval, s: no shorter than a sample.
+    pub interval_95_s: [f64; 2],
+    /// Time constants after over those before.
+    pub factor: f64,
+    /// What it takes off `−2 ln L` against constant ones.
+    pub evidence: f64,
+}
+
+/// Whether the ratio of the time constants stays while they change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RatioTest {
+    /// What a changing ratio takes off `−2 ln L`.
+    pub statistic: f64,
+    /// Coefficients that it takes.
+    pub degrees_of_freedom: usize,
+    /// Chance of that where the ratio stays.
+    pub p_value: f64,
+}
+
+/// Time constants along a record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Track {
+    /// How they change.
+    pub change: Change,
+    /// Sample instants, s.
+    pub time_s: Vec<f64>,
+    /// Both time constants there, s.
+    pub tau_s: [Vec<f64>; 2],
+    /// Standard errors of their logarithms; `None` where the record does not determine them.
+    pub log_error: Option<[Vec<f64>; 2]>,
+    /// The step that explains most, whether or not it is what is taken.
+    pub step: Option<ChangePoint>,
+    /// Whether the ratio stays.
+    pub ratio: RatioTest,
+    /// The fit that this is of.
+    pub fit: ModelFit,
+}
+
+/// Both time constants along `observations`, `effects` in the model as they are: of a shared smooth change, a step and none the one that
+/// Schwarz's criterion prefers.
+///
+/// The smooth change is a smoothing spline: its curvature is white noise beforehand, of the strength under which the record is most
+/// likely. So it is determined where the record says little, and its bands hold what smoothing may have left out (Wahba 1983).
+///
+/// # Errors
+/// As [`crate::fit_with`].
+pub fn track(
+    observations: &Observations,
+    settings: &Settings,
+    effects: &[KnownEffect],
+    watch: Watch<'_>,
+) -> Result<Track, DiagnoseError> {
+    let others: Vec<KnownEffect> =
+        effects.iter().filter(|e| e.effect != Identifier::VaryingTimeConstant).cloned().collect();
+    let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others)?;
+    let has_delay = constant.model.effects.iter().any(|e| e.identifier() == Identifier::Delay);
+    let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
+    let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);
+    let search = Tracker { prepared: &prepared, selection: &selection };
+    let mut best = (Change::Constant, constant.clone(), score(&constant, 0.0));
+    let mut consider = |change: Change, fitted: Fitted, numbers: f64| {
+        // Without what is known of its shape, which the others have nothing like.
+        let known: f64 = fitted.model.prior(&fitted.theta).iter().map(|p| p * p).sum();
+        let data = Fitted { chi2: fitted.chi2 - known, count: constant.count, ..fitted.clone() };
+        let score = score(&data, numbers);
+        if score < best.2 && fitted.end.is_usable() {
+            best = (change, fitted, score);
+        }
+    };
+    if let Some((coefficients, fitted)) = search.smooth(&constant, watch) {
+        consider(Change::Smooth(coefficients.round() as usize), fitted, coefficients);
+    }
+    let step = search.step(&constant, watch);
+    if let Some((_, fitted)) = &step {
+        // Its size, its instant, and the choice of that.
+        consider(Change::Step, fitted.clone(), 3.0);
+    }
+    let (change, fitted, _) = best;
+    let ratio = search.ratio(&fitted);
+    let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels);
+    let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+    let [tau_s, log_error] = along(&fit, &time_s);
+    let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
+    let log_error = is_determined.then_some(log_error);
+    Ok(Track { change, time_s, tau_s, log_error, step: step.map(|s| s.0), ratio, fit })
+}
+
+/// Both time constants at `time_s`, and the standard errors of their logarithms.
+fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
+    let extended = fit.extended.as_ref().expect("a fit of a record");
+    let theta = extended.parameters();
+    let tau_s = extended.time_constants_s(theta, time_s);
+    let nothing = vec![vec![0.0; theta.len()]; theta.len()];
+    let covariance = fit.covariance.as_ref().unwrap_or(&nothing);
+    let slopes: Vec<[Vec<f64>; 2]> = (0..theta.len())
+        .map(|a| {
+            let by = SMALL * covariance[a][a].max(0.0).sqrt().max(1e-6 * theta[a].abs()).max(1e-9);
+            let mut moved = theta.to_vec();
+            moved[a] += by;
+            let other = extended.time_constants_s(&moved, time_s);
+            [0, 1].map(|i| other[i].iter().zip(&tau_s[i]).map(|(b, a)| (b / a).ln() / by).collect())
+        })
+        .collect();
+    let error = [0, 1].map(|i| {
+        (0..time_s.len())
+            .map(|k| {
+                let pairs = (0..slopes.len()).flat_map(|a| (0..slopes.len()).map(move |b| (a, b)));
+                let variance: f64 = pairs.map(|(a, b)| slopes[a][i][k] * covariance[a][b] * slopes[b][i][k]).sum();
+                variance.max(0.0).sqrt()
+            })
+            .collect()
+    });
+    [tau_s, error]
+}
+
+/// `−2 ln L`, the level of the noise free, and what the numbers cost.
+fn score(fitted: &Fitted, numbers: f64) -> f64 {
+    fitted.count * fitted.mean_energy().ln() + numbers * fitted.count.ln()
+}
+
+struct Tracker<'a> {
+    prepared: &'a Prepared,
+    selection: &'a Selection,
+}
+
+impl Tracker<'_> {
+    fn fit(&self, from: &Fitted, effect: Shared, start: &[f64], effort: Effort) -> Fitted {
+        let mut theta = from.theta.clone();
+        theta.extend_from_slice(start);
+        let model = from.model.with(effect);
+        model.fit(&theta, &self.prepared.observations, self.selection, effort)
+    }
+
+    /// The smooth change under which the record is most likely, and its effective number of coefficients.
+    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(f64, Fitted)> {
+        let Context { ends_s, samples, .. } = self.prepared.context;
+        let size = COEFFICIENTS.min(samples / SAMPLES_EACH);
+        if size < LEAST_COEFFICIENTS {
+            return None;
+        }
+        let mut start = vec![0.0; size];
+        let mut best: Option<(f64, f64, Fitted)> = None;
+        for done in 0..STRENGTHS {
+            watch("smooth changes", done as usize, STRENGTHS as usize);
+            let curvature = CURVATURE * 2.0_f64.powi(done);
+            let fitted = self.fit(constant, varying::smooth(size, ends_s, samples, curvature)?, &start, Effort::Finish);
+            start = fitted.theta[constant.theta.len()..].to_vec();
+            let Some((evidence, coefficients)) = self.evidence(&fitted, size, curvature) else { break };
+            let so_far = best.as_ref().map_or(f64::INFINITY, |b| b.0);
+            if evidence > so_far + HOPELESS {
+                break;
+            }
+            if evidence < so_far && fitted.end.is_usable() {
+                best = Some((evidence, coefficients, fitted));
+            }
+        }
+        best.map(|(_, coefficients, fitted)| (coefficients, fitted))
+    }
+
+    /// `−2 ln` of the likelihood with the coefficients integrated out (Laplace's approximation), but for a constant, and how many of
+    /// the coefficients the record determines: all but the trace of the prior's share of the information.
+    fn evidence(&self, fitted: &Fitted, size: usize, curvature: f64) -> Option<(f64, f64)> {
+        let lin = fitted.model.linearised(&fitted.theta, &self.prepared.observations, self.selection);
+        let p = lin.columns.len();
+        let products = |from: usize| -> Vec<Vec<f64>> {
+            let dot = |a: usize, b: usize| dense::dot(&lin.columns[a][from..], &lin.columns[b][from..]);
+            (0..p).map(|a| (0..p).map(|b| dot(a, b)).collect()).collect()
+        };
+        let (all, prior) = (products(0), products(lin.samples.len()));
+        // Time constants that are held have no column.
+        let free: Vec<usize> = (0..p).filter(|&i| all[i][i] > 0.0).collect();
+        let of_free = free.iter().map(|&a| free.iter().map(|&b| all[a][b]).collect()).collect::<Vec<Vec<f64>>>();
+        // A straight line has no curvature: its coefficient has no prior.
+        let of_prior = 2.0 * (size - 1) as f64 * curvature.ln();
+        let evidence = fitted.chi2 + dense::log_determinant(&of_free)? + of_prior;
+        let inverse = dense::inverse(&all)?;
+        let known: f64 = (0..p).map(|a| dense::dot(&inverse[a], &prior[a])).sum();
+        Some((evidence, size as f64 - known))
+    }
+
+    /// The step that takes most off, and the fit with it.
+    fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(ChangePoint, Fitted)> {
+        let [first_s, last_s] = self.prepared.observations.ends_s();
+        let span_s = last_s - first_s;
+        let mut from_s = first_s + MARGIN * span_s;
+        let mut apart_s = (1.0 - 2.0 * MARGIN) * span_s / (INSTANTS - 1) as f64;
+        let mut tried: Vec<(f64, Fitted)> = Vec::new();
+        for round in 0..ROUNDS {
+            watch("steps", round, ROUNDS);
+            let instants: Vec<f64> = (0..INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
+            for at_s in instants.into_iter().filter(|t| *t > first_s && *t < last_s) {
+                tried.push((at_s, self.fit(constant, varying::step(at_s), &[0.0], Effort::Look)));
+            }
+            let best_s = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.0;
+            from_s = best_s - apart_s;
+            apart_s *= 2.0 / (INSTANTS - 1) as f64;
+            if apart_s < 0.25 * self.prepared.context.step_s {
+                break;
+            }
+        }
+        let (at_s, looked) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.clone();
+        let fitted = self.fit(constant, varying::step(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
+        let limit = INSTANT_95 * fitted.mean_energy().max(1.0);
+        let half_s = 0.5 * self.prepared.context.step_s;
+        // All instants that are as likely, also those that others lie before, and from the best one on until none is.
+        let within = tried.iter().filter(|t| t.1.chi2 - looked.chi2 < limit).map(|t| t.0);
+        let ends = [-1.0, 1.0].map(|sign| self.farthest(constant, &fitted, at_s, sign, limit));
+        let [low, high] = within.chain(ends).fold([at_s, at_s], |[low, high], t| [low.min(t), high.max(t)]);
+        let point = ChangePoint {
+            at_s,
+            interval_95_s: [low - half_s, high + half_s],
+            factor: 1.0 + fitted.theta[constant.theta.len()],
+            evidence: score(constant, 0.0) - score(&fitted, 0.0),
+        };
+        Some((point, fitted))
+    }
+
+    /// The last instant before or after `at_s` up to which a step takes as much off as the `best` one, but for `limit`.
+    fn farthest(&self, constant: &Fitted, best: &Fitted, at_s: f64, sign: f64, limit: f64) -> f64 {
+        let [first_s, last_s] = self.prepared.observations.ends_s();
+        let n = constant.theta.len();
+        let from = Fitted { theta: best.theta[..n].to_vec(), ..constant.clone() };
+        let is_within = |t: f64| {
+            let is_one = t > first_s && t < last_s;
+            is_one && self.fit(&from, varying::step(t), &best.theta[n..], Effort::Look).chi2 - best.chi2 < limit
+        };
+        let mut inside_s = 0.0;
+        let mut outside_s = 0.25 * self.prepared.context.step_s;
+        while is_within(at_s + sign * outside_s) {
+            inside_s = outside_s;
+            outside_s *= 2.0;
+        }
+        for _ in 0..HALVINGS {
+            let middle_s = 0.5 * (inside_s + outside_s);
+            if is_within(at_s + sign * middle_s) { inside_s = middle_s } else { outside_s = middle_s }
+        }
+        at_s + sign * inside_s
+    }
+
+    fn ratio(&self, fitted: &Fitted) -> RatioTest {
+        let effect = varying::ratio(self.prepared.context.ends_s);
+        let other = self.fit(fitted, effect, &[0.0; varying::RATIO], Effort::Finish);
+        let statistic = (score(fitted, 0.0) - score(&other, 0.0)).max(0.0);
+        let chi2 = ChiSquared::new(varying::RATIO as f64).expect("a positive number of degrees of freedom");
+        RatioTest { statistic, degrees_of_freedom: varying::RATIO, p_value: chi2.sf(statistic) }
+    }
+}
