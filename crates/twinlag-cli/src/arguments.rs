@@ -1,4 +1,4 @@
-//! What can be asked on the command line, and the help that teaches it.
+//! The command-line arguments and their help texts.
 
 use std::path::PathBuf;
 
@@ -12,24 +12,25 @@ use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise:
 use crate::failure::Failure;
 use crate::study::Study;
 
-/// Tells two temperature sensors' dynamics from their readings alone.
+/// Identifies the dynamics of two temperature sensors from their readings alone.
 ///
-/// Two thermocouples of different thickness in the same gas lag differently. From how they disagree twinlag finds the time
-/// constant of each, without knowing the gas temperature, with intervals that account for the noise it finds.
+/// Two thermocouples of different thickness in the same gas lag differently. From how their readings
+/// differ, twinlag estimates the time constant of each without knowing the gas temperature. The
+/// confidence intervals account for the noise in the readings.
 #[derive(Debug, Parser)]
 #[command(
     version,
     after_help = "\
-Try it without a file:   twinlag demo
-On a logger file:        twinlag characterise run.csv
-With named columns:      twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
-What the model lacks:    twinlag diagnose run.csv --report run.html
-The gas temperature:     twinlag compensate run.csv --out gas.csv
-In changing flow:        twinlag track run.csv --out tau.csv
-For a script:            twinlag characterise run.csv --json
+Try it without a file:    twinlag demo
+Analyse a logger file:    twinlag characterise run.csv
+Name the columns:         twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
+Find missing effects:     twinlag diagnose run.csv --report run.html
+Get the gas temperature:  twinlag compensate run.csv --out gas.csv
+Follow changing flow:     twinlag track run.csv --out tau.csv
+Use it in a script:       twinlag characterise run.csv --json
 
-Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer, 75 try again (a shard of a
-study is missing), 1 anything else."
+Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer the question,
+75 try again (a shard of a study is missing), 1 any other error."
 )]
 pub(crate) struct Arguments {
     #[command(subcommand)]
@@ -37,12 +38,12 @@ pub(crate) struct Arguments {
     /// Print one JSON object to standard output instead of text.
     #[arg(long, global = true)]
     json: bool,
-    /// No notes and no progress on standard error; errors are still printed.
+    /// Print no notes and no progress on standard error; errors are still printed.
     #[arg(long, global = true)]
     quiet: bool,
 }
 
-/// How the program talks.
+/// Which output the user wants: text or JSON, with or without notes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Talk {
     pub(crate) json: bool,
@@ -50,7 +51,7 @@ pub(crate) struct Talk {
 }
 
 impl Talk {
-    /// A line on standard error, unless the program is to be quiet.
+    /// Prints a line on standard error, unless `--quiet` was given.
     pub(crate) fn say(self, text: impl FnOnce() -> String) {
         if !self.quiet {
             eprintln!("{}", text());
@@ -66,164 +67,167 @@ impl Arguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Both time constants of a record, with intervals, noise levels and residual tests.
+    /// Estimate both time constants of a record, with intervals, noise levels and residual tests.
     Characterise(Box<Characterise>),
-    /// The closed loop: what two first-order lags leave over, which physical effect accounts for it, and the error before and
-    /// after it is in the model.
+    /// Find the physical effects that two first-order lags fail to describe, add them to the model, and compare the errors
+    /// before and after.
     Diagnose(Box<Diagnose>),
-    /// The gas temperature at every sample, with its standard deviation.
+    /// Reconstruct the gas temperature at every sample, with its standard deviation.
     Compensate(Box<Compensate>),
-    /// Both time constants along the record, in flow that changes, with bands.
+    /// Follow both time constants along a record taken in changing flow, with confidence bands.
     Track(Box<Track>),
-    /// A record from a described rig: gas, sensors, noise, converter.
+    /// Simulate a record from the description of a rig: gas, sensors, noise, converter.
     Simulate(Simulate),
-    /// Monte-Carlo studies of estimators, described by a plan: run, in shards if need be, and merge.
+    /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the results.
     #[command(subcommand)]
     Study(Study),
-    /// Simulates an embedded rig with an effect that the estimator is not told of, and diagnoses it: no file needed.
+    /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no file.
     Demo(Demo),
 }
 
-/// Both time constants of a record.
+/// Estimate both time constants of a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The file: delimited text as loggers write it (comma, semicolon, tab; decimal comma; units in the header; comments; ISO or
+FILE is delimited text as loggers write it (comma, semicolon or tab; decimal comma; units in the header; comments; ISO or
 numeric time; gaps and missing values). Columns are guessed from the header, and the guess is printed.
 
-What the status says:
-  ok                 both time constants are determined and only noise is left over
-  not-identifiable   the record does not tell both; the difference may still be known
-  at-bound           the best fit lies on a bound: no estimate
-  model-rejected     more than noise is left over: two first-order lags do not explain the record
+Status:
+  ok                 both time constants are determined, and the residual is consistent with noise
+  not-identifiable   the record does not determine both; it may still determine their difference
+  at-bound           the best fit lies on a bound, so it is not an estimate
+  model-rejected     the residual is more than noise: two first-order lags do not explain the record
 
-Thermometers rarely agree at rest: if the model is rejected, try --free gain,offset first, then --second-order T1,T2. A
-data-sheet value of one sensor often decides: --known T1.time_constant_s=0.5+-0.05. If the gas rests for a while, say when:
---quiet-segment 0..2.5.
+Two thermometers rarely agree at rest. If the model is rejected, try --free gain,offset first, then --second-order T1,T2.
+A data-sheet value for one sensor often settles the rest: --known T1.time_constant_s=0.5+-0.05. If the gas temperature is
+steady for a while, say when: --quiet-segment 0..2.5.
 
-Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
+Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
 pub(crate) struct Characterise {
     #[command(flatten)]
     pub(crate) input: Input,
-    /// A model that `twinlag diagnose --save` wrote: its effects stay as they are, the time constants are fitted.
+    /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time constants are fitted.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
 }
 
-/// What two first-order lags leave over, and why.
+/// Find which physical effects two first-order lags fail to describe.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-What the verdict says:
-  adequate          two first-order lags leave nothing but noise
-  explained         with the effects that are named, nothing but noise is left
-  partly-explained  the effects that are named explain a part, something else is left
-  unexplained       something is left that no known effect accounts for
-  refused           the record cannot be diagnosed, such as one with a single tone
+Verdict:
+  adequate          two first-order lags leave only noise in the residual
+  explained         with the effects that are named, only noise is left
+  partly-explained  the effects that are named explain part of the residual, but more than noise is left
+  unexplained       more than noise is left, and no known effect explains it
+  refused           the record cannot be diagnosed, for example because the gas has a single tone
 
-An effect is named if it explains the residual whatever the colour of the noise, on blocks of the record that were left out of
-the fit as well; errors before and after are those of other blocks, which neither chose the effects nor were fitted. Effects that
-explain the record as well are named as alternatives.
+An effect is named if it explains the residual whatever the colour of the noise, and also on blocks of the record that were
+left out of the fit. The errors before and after are measured on other blocks, used neither to choose effects nor to fit.
+Other effects that explain the record equally well are named as alternatives.
 
-Exit codes: 0 diagnosed, 4 refused, 2 wrong usage, 3 the file cannot be used, 1 anything else.")]
+Exit codes: 0 diagnosed, 4 refused, 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
 pub(crate) struct Diagnose {
     #[command(flatten)]
     pub(crate) input: Input,
-    /// Writes a report to look at: one HTML file that needs nothing else.
+    /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
-    /// Writes the model with its effects, for `twinlag characterise --model`.
+    /// Save the model with its effects, for `--model` of other commands.
     #[arg(long, value_name = "JSON")]
     pub(crate) save: Option<PathBuf>,
-    /// An effect that is not to be considered; may be given several times.
+    /// Do not consider this effect; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     pub(crate) without: Vec<Identifier>,
-    /// Overwrite outputs that exist.
+    /// Overwrite output files that exist.
     #[arg(long)]
     pub(crate) force: bool,
 }
 
-/// The gas temperature of a record.
+/// Reconstruct the gas temperature of a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-OUT.csv has the columns time_s, gas_C and gas_std_K: at every sample, and at those that are missing in an even grid. The standard
-deviation is of noise, of what the readings cannot say at high frequencies, and of the uncertainty of the model's parameters.
+The output has the columns time_s, gas_C and gas_std_K, with a row for every sample and, on an even grid, for every missing
+one. The standard deviation covers the noise, the high frequencies that the readings do not determine, and the uncertainty
+of the model's parameters.
 
-The model is the one that `twinlag diagnose` finds, or that of --model. Of the gas it is taken that it goes on as it has done:
-how much it moves, and how fast, is found from the readings. The bandwidth that is printed says up to which frequency they decide.
+The model is the one that `twinlag diagnose` finds, or the one given with --model. The gas is assumed to keep fluctuating as
+it did in the record; how strongly and how fast is estimated. Up to the printed bandwidth the readings determine the answer;
+above it, that assumption does.
 
 Exit codes: 0 compensated, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
-1 anything else.")]
+1 any other error.")]
 pub(crate) struct Compensate {
     #[command(flatten)]
     pub(crate) input: Input,
-    /// Where the gas temperature goes; `-` is standard output.
+    /// Write the gas temperature to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
-    /// Draws readings, gas temperature with its band, and spectra: one SVG.
+    /// Draw the readings, the gas temperature with its band, and the spectra, as one SVG file.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,
-    /// Writes a report to look at: one HTML file that needs nothing else.
+    /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
-    /// A model that `twinlag diagnose --save` wrote, instead of a diagnosis of this record: its effects stay as they are.
+    /// Use a model written by `twinlag diagnose --save` instead of diagnosing this record; its effects stay fixed.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
-    /// What the answer for an instant may rest on: smoother (the whole record), filter (what was read by then), or lag:N (that and N
-    /// samples more).
+    /// Which readings each answer may use: smoother (the whole record), filter (those up to that instant), or lag:N (those and
+    /// the next N samples).
     #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]
     pub(crate) form: Form,
-    /// The channel that is right where gain, offset or delay differ: no record of two sensors tells.
+    /// The channel to trust where gain, offset or delay differ; two sensors alone cannot reveal which one is right.
     #[arg(long, value_name = "CHANNEL", default_value = "T1", ignore_case = true)]
     pub(crate) trust: Trust,
-    /// An effect that is not to be considered; may be given several times.
+    /// Do not consider this effect; may be given several times.
     #[arg(long, value_name = "EFFECT")]
     pub(crate) without: Vec<Identifier>,
-    /// Overwrite outputs that exist.
+    /// Overwrite output files that exist.
     #[arg(long)]
     pub(crate) force: bool,
 }
 
-/// Time constants along a record.
+/// Follow both time constants along a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-OUT.csv has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s and tau2_high_s: each time constant with its
-pointwise 95 % band. Both change by the same share, as they do in flow that changes: as a smooth function of time with as many
-coefficients as the record supports, in one step, or not at all, whichever Schwarz's criterion prefers. Whether their ratio stays is
-tested.
+The output has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s and tau2_high_s: each time constant
+with its pointwise 95 % band. Both time constants are assumed to change by the same factor, as they do when the flow
+changes. Schwarz's criterion (BIC) chooses among a smooth change with as many coefficients as the record supports, a single
+step, and no change. Whether the ratio of the two stays constant is tested.
 
-With --window each window is characterised by itself, the published way: wider bands, and nothing is shared.
+With --window each window is characterised separately, as in published work: the bands are wider, and nothing is shared.
 
-With --live rows are answered as they come, from a pipe that need not end: logger | twinlag track - --live 2000 --out -
-The first rows are waited for, and tell what sensors, noise and gas are like; then each row gives the gas temperature, its standard
-deviation and both time constants with their bands, from what was read by then: time_s, gas_C, gas_std_K, tau1_s, tau1_low_s, ...
+With --live rows are processed as they arrive, from a pipe that need not end: logger | twinlag track - --live 2000 --out -
+The program first collects that many rows and estimates sensors, noise and gas from them. It then writes for each row, using
+only the rows read so far, the gas temperature with its standard deviation and both time constants with their bands:
+time_s, gas_C, gas_std_K, tau1_s, tau1_low_s, ...
 
 Exit codes: 0 tracked, 4 the record does not determine the time constants, 2 wrong usage, 3 the file cannot be used,
-1 anything else.")]
+1 any other error.")]
 pub(crate) struct Track {
     #[command(flatten)]
     pub(crate) input: Input,
-    /// Where the time constants go; `-` is standard output.
+    /// Write the time constants to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
-    /// Draws both time constants with their bands: one SVG.
+    /// Draw both time constants with their bands, as one SVG file.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,
-    /// Writes a report to look at: one HTML file that needs nothing else.
+    /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
-    /// A model that `twinlag diagnose --save` wrote: its other effects stay as they are.
+    /// Use a model written by `twinlag diagnose --save`; its other effects stay fixed.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
-    /// Length of a sliding window.
+    /// Characterise sliding windows of this length instead.
     #[arg(long, value_name = "SECONDS")]
     pub(crate) window: Option<f64>,
-    /// Answers rows as they come, once so many have.
+    /// Process rows as they arrive, after learning from this many.
     #[arg(long, value_name = "ROWS", conflicts_with_all = ["window", "picture", "report"], value_parser = clap::value_parser!(u32).range(200..))]
     pub(crate) live: Option<u32>,
-    /// With --live: by what share the time constants may change in a second (standard deviation; it grows as the root of time) [default:
-    /// a tenth in ten time constants of the slower sensor].
+    /// With --live: how far the time constants may change within one second, as a fraction (standard deviation; it grows with
+    /// the square root of time) [default: 0.1 within ten time constants of the slower sensor].
     #[arg(long, value_name = "SHARE", requires = "live")]
     pub(crate) change: Option<f64>,
-    /// Overwrite outputs that exist.
+    /// Overwrite output files that exist.
     #[arg(long)]
     pub(crate) force: bool,
 }
@@ -246,10 +250,10 @@ fn form(text: &str) -> Result<Form, String> {
     }
 }
 
-/// The record, and how it is asked.
+/// The record and how to analyse it.
 #[derive(Debug, Args)]
 pub(crate) struct Input {
-    /// The record; `-` reads standard input.
+    /// The logger file; `-` reads standard input.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) columns: Columns,
@@ -257,29 +261,29 @@ pub(crate) struct Input {
     pub(crate) method: Method,
 }
 
-/// Which columns, and how time is meant.
+/// Which columns to use and how to read time.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Columns")]
 pub(crate) struct Columns {
-    /// Time column: name, or number from 1.
+    /// Time column: its name, or its number counted from 1.
     #[arg(long, value_name = "COL")]
     time: Option<ColumnRef>,
-    /// First sensor: name, or number from 1.
+    /// First sensor: column name, or number counted from 1.
     #[arg(long, value_name = "COL")]
     t1: Option<ColumnRef>,
-    /// Second sensor: name, or number from 1.
+    /// Second sensor: column name, or number counted from 1.
     #[arg(long, value_name = "COL")]
     t2: Option<ColumnRef>,
-    /// A trusted temperature, for scoring only: no estimate uses it.
+    /// A trusted temperature, used for scoring only and never in an estimate.
     #[arg(long, value_name = "COL")]
     reference: Option<ColumnRef>,
-    /// A flow velocity or density, in any unit: `diagnose` tries time constants that go with a power of it.
+    /// A flow velocity or density, in any unit: `diagnose` tries time constants proportional to a power of it.
     #[arg(long, value_name = "COL")]
     flow: Option<ColumnRef>,
-    /// Time from row to row, for files without a time column; a guessed time column is then not used.
+    /// Time from row to row, for files without a time column; a guessed time column is then ignored.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
-    /// How time stamps are meant: auto, uniform (evenly spaced whatever they say), as-stamped.
+    /// How to read the time stamps: auto, uniform (evenly spaced, whatever they say) or as-stamped.
     #[arg(long, value_name = "HOW", default_value = "auto", value_parser = sampling)]
     sampling: SamplingChoice,
 }
@@ -311,32 +315,32 @@ impl Columns {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct Method {
-    /// Noise standard deviations of the two channels in K, both positive; found from the data if left out.
+    /// Noise standard deviations of the two channels in K, both positive; estimated from the data if left out.
     #[arg(long, value_name = "S1,S2", value_parser = pair, allow_hyphen_values = true, help_heading = "Noise")]
     noise: Option<Pair>,
-    /// Ratio S2/S1 of the noise levels, where only that is known.
+    /// Ratio S2/S1 of the noise levels, if only the ratio is known.
     #[arg(long, value_name = "R", allow_hyphen_values = true, help_heading = "Noise")]
     noise_ratio: Option<f64>,
-    /// A stretch in which the gas is at rest, in seconds from the start: noise is taken from its scatter. May be given several
+    /// A stretch of steady gas temperature, in seconds from the start: its scatter gives the noise levels. May be given several
     /// times.
     #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, help_heading = "Noise")]
     quiet_segment: Vec<Stretch>,
-    /// What noise is like where it is found: white, or autoregressive (each sample carries a share of the last one's).
+    /// Model of the noise that is estimated: white, or autoregressive (each sample keeps a share of the previous one's).
     #[arg(long, value_name = "KIND", default_value = "white", help_heading = "Noise")]
     noise_colour: NoiseColour,
-    /// whitened, cross-relation, bias-compensated, normalised, hybrid, difference-equation-ls, difference-equation-tls or
+    /// One of whitened, cross-relation, bias-compensated, normalised, hybrid, difference-equation-ls, difference-equation-tls,
     /// difference-equation-gtls.
     #[arg(long, value_name = "NAME", default_value = "whitened")]
     estimator: Estimator,
     #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt", help = optimisers())]
     optimiser: String,
-    /// Relative calibration of channel 2 to fit as well: gain, offset or gain,offset.
+    /// Also fit the calibration of channel 2 relative to channel 1: gain, offset or gain,offset.
     #[arg(long, value_name = "LIST")]
     free: Option<String>,
-    /// Sensors with a second lag in series, to fit as well: T1, T2 or T1,T2.
+    /// Also fit a second lag in series in these sensors: T1, T2 or T1,T2.
     #[arg(long, value_name = "LIST")]
     second_order: Option<String>,
-    /// A parameter known beforehand, exactly or with a standard deviation; may be given once for each of
+    /// A parameter that is already known, exactly or with a standard deviation; may be given once for each of
     /// `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`, `T1.second_time_constant_s`,
     /// `T2.second_time_constant_s`.
     #[arg(long, value_name = "NAME=VALUE[+-SD]", allow_hyphen_values = true)]
@@ -345,14 +349,14 @@ pub(crate) struct Method {
     /// unbroken stretch.
     #[arg(long, value_name = "K0")]
     discard: Option<usize>,
-    /// What the gas does between samples: auto, zero-order-hold, first-order-hold or bilinear.
+    /// How the gas is assumed to move between samples: auto, zero-order-hold, first-order-hold or bilinear.
     #[arg(long, value_name = "HOW", default_value = "auto")]
     hold: Hold,
-    /// What 95 % intervals are made of: auto (standard errors, or the profile of the cost where these do not describe it),
-    /// profile, or bootstrap (the same estimator on simulated records).
+    /// How to find 95 % intervals: auto (from standard errors, or from the profile of the cost where standard errors do not
+    /// describe it), profile, or bootstrap (by repeating the estimate on simulated records).
     #[arg(long, value_name = "HOW", default_value = "auto", value_parser = ["auto", "profile", "bootstrap"])]
     intervals: String,
-    /// Simulated records of the bootstrap, at least 39 [default: 199].
+    /// Number of simulated records of the bootstrap, at least 39 [default: 199].
     #[arg(long, value_name = "N")]
     replicates: Option<usize>,
     /// Seed of the bootstrap [default: 1].
@@ -365,7 +369,7 @@ fn optimisers() -> String {
     format!("One of {}", names.join(", "))
 }
 
-/// A stretch of time, in a type of its own for the same reason as [`Pair`].
+/// A stretch of time. It has its own type because clap takes a list to mean a repeated option.
 #[derive(Clone, Copy, Debug)]
 struct Stretch([f64; 2]);
 
@@ -377,7 +381,7 @@ fn stretch(text: &str) -> Result<Stretch, String> {
     if from_s < to_s { Ok(Stretch([from_s, to_s])) } else { Err(wrong()) }
 }
 
-/// Two numbers, in a type of their own: a list would mean an option given twice.
+/// Two numbers. They have their own type because clap takes a list to mean a repeated option.
 #[derive(Clone, Copy, Debug)]
 struct Pair([f64; 2]);
 
@@ -431,10 +435,10 @@ impl Method {
     }
 }
 
-/// A record from a described rig.
+/// Simulate a record from the description of a rig.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-A rig, in TOML:
+SPEC is a TOML file such as:
 
   seed = 1
   [record]
@@ -456,14 +460,14 @@ A rig, in TOML:
 
 The record has the columns time_s,T1,T2,Tref; Tref is the true gas temperature, for scoring.
 
-Exit codes: 0 written, 2 wrong usage, 3 the rig cannot be used, 1 anything else.")]
+Exit codes: 0 written, 2 wrong usage, 3 the rig cannot be used, 1 any other error.")]
 pub(crate) struct Simulate {
-    /// The rig.
+    /// The description of the rig, a TOML file.
     pub(crate) spec: PathBuf,
-    /// The record to write; `-` writes standard output.
+    /// Write the record to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
-    /// Seed of all random numbers, in place of the rig's own.
+    /// Seed for all random numbers, in place of the one in the rig.
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Overwrite the output if it exists.
@@ -471,11 +475,11 @@ pub(crate) struct Simulate {
     pub(crate) force: bool,
 }
 
-/// The embedded rig.
+/// Simulate a built-in rig and diagnose it.
 #[derive(Debug, Args)]
-#[command(after_help = "Exit codes: 0 diagnosed, 4 refused, 1 anything else.")]
+#[command(after_help = "Exit codes: 0 diagnosed, 4 refused, 1 any other error.")]
 pub(crate) struct Demo {
-    /// Seed of all random numbers, in place of the rig's own.
+    /// Seed for all random numbers, in place of the one in the rig.
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
 }

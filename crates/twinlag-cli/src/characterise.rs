@@ -38,7 +38,7 @@ pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
     let wrong = |what: String| Failure::File(format!("{}: {what}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
     let model: Model = serde_json::from_str(&text)
-        .map_err(|e| wrong(format!("expected a model as `twinlag diagnose --save` writes it: {e}")))?;
+        .map_err(|e| wrong(format!("expected a model written by `twinlag diagnose --save`: {e}")))?;
     if model.schema == Model::SCHEMA {
         Ok(model)
     } else {
@@ -52,7 +52,7 @@ pub(crate) fn characterise(record: &Record, options: &Options, talk: Talk) -> Re
     Ok(twinlag::characterise_watched(record, options, &watch)?)
 }
 
-/// 0 for an answer; 4 where the data were read but do not give one.
+/// The exit code: 0 for an answer, 4 if the data were read but do not give one.
 pub(crate) fn exit_code(status: Status) -> u8 {
     if status == Status::Ok { 0 } else { 4 }
 }

@@ -1,4 +1,4 @@
-//! `twinlag demo`: a record of an embedded rig with an effect that the estimator is not told of, and what it finds.
+//! `twinlag demo`: simulates a built-in rig with an effect unknown to the estimator, and diagnoses the record.
 
 use twinlag::DiagnoseOptions;
 use twinlag::record::{Channels, Record, SamplingChoice};
@@ -18,7 +18,7 @@ pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
     }
     let simulated = rig.simulate().map_err(twinlag::Error::from)?;
     let channels = Channels {
-        source: "the embedded rig".into(),
+        source: "built-in rig".into(),
         names: simulated.channels,
         time_s: simulated.time_s,
         t1_c: simulated.t1_c,
@@ -27,7 +27,7 @@ pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
     };
     let record = Record::from_channels(channels, SamplingChoice::Auto)?;
     if !talk.json && !talk.quiet {
-        eprintln!("# the rig: two thermocouples in an engine's exhaust; the estimator is told none of this");
+        eprintln!("# the rig: two thermocouples in an engine's exhaust; the estimator knows none of this");
         RIG.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).for_each(|l| eprintln!("#   {l}"));
     }
     let answer = diagnose(&record, &DiagnoseOptions::default(), talk)?;
@@ -37,7 +37,7 @@ pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
         for (sensor, truth) in answer.last.sensors.iter().zip(rig.sensors()) {
             let inside = match sensor.interval_95_s {
                 Some([low, high]) if (low..=high).contains(&truth.time_constant_s) => "inside the interval",
-                Some(_) => "outside the interval, as one in twenty is",
+                Some(_) => "outside the interval, as happens once in twenty",
                 None => "not determined",
             };
             println!("truth: {} {} s, {inside}", sensor.channel, truth.time_constant_s);

@@ -22,7 +22,7 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     let answer = diagnose(&record, &options, talk)?;
     if let Some(path) = &command.save {
         let model = serde_json::to_string_pretty(&answer.model())
-            .map_err(|e| Failure::Other(format!("the model has no JSON: {e}")))?;
+            .map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?;
         output::write(path, &model)?;
     }
     if let Some(path) = &command.report {
@@ -38,7 +38,7 @@ pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -
     Ok(twinlag::diagnose(record, options, &watch)?)
 }
 
-/// 0 for an answer; 4 where the data were read but do not give one.
+/// The exit code: 0 for an answer, 4 if the data were read but do not give one.
 pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
     u8::from(answer.verdict == Verdict::Refused) * 4
 }

@@ -1,19 +1,19 @@
-//! What can go wrong, as an exit code.
+//! Errors and their exit codes.
 
 use std::fmt;
 
 use twinlag::record::RecordError;
 use twinlag_pages::ReportError;
 
-/// An error with the exit code that it means.
+/// An error, by its exit code.
 #[derive(Debug)]
 pub(crate) enum Failure {
     Usage(String),
     File(String),
     Other(String),
-    /// The data were read, and do not tell.
+    /// The data were read, but cannot answer the question.
     Undetermined(String),
-    /// It will work once something else has: a shard is missing.
+    /// Something else has to be done first: a shard is missing.
     NotYet(String),
 }
 

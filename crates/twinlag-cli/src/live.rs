@@ -1,4 +1,4 @@
-//! `twinlag track - --live ROWS --out -`: rows answered as they come.
+//! `twinlag track - --live ROWS --out -`: rows are processed as they arrive.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write, stdin, stdout};
@@ -13,17 +13,17 @@ use crate::failure::Failure;
 use crate::print;
 
 const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
-/// Warnings of bad rows that are printed one by one.
+/// Number of warnings about bad rows that are printed one by one.
 const SHOWN: usize = 5;
 
 pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> Result<u8, Failure> {
     if talk.json {
         return Err(Failure::Usage(
-            "--live answers in rows, and --json in one object at the end: leave out one".into(),
+            "--live writes rows and --json writes one object at the end: leave out one of them".into(),
         ));
     }
     if let Some(change) = command.change.filter(|c| !(c.is_finite() && *c > 0.0)) {
-        return Err(Failure::Usage(format!("--change {change}: expected a share above 0, for example 0.1")));
+        return Err(Failure::Usage(format!("--change {change}: expected a fraction above 0, for example 0.1")));
     }
     let options = LiveOptions {
         characterise: command.input.method.options()?,
@@ -67,7 +67,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
         if answer.is_none() {
             bad.say(
                 &format!(
-                    "{source}: line {number}: expected a time soon after that of the row before; the row is left out"
+                    "{source}: line {number}: expected a time shortly after that of the previous row; this row is left out"
                 ),
                 talk,
             );
@@ -76,7 +76,8 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
             is_beyond = true;
             talk.say(|| {
                 format!(
-                    "warning: at {} s the time constants may have left the range in view, 0.4 to 2.5 times those of the start: start again there",
+                    "warning: at {} s the time constants may have left the range that is tracked, 0.4 to 2.5 times their \
+                     values at the start: restart from there",
                     now.time_s
                 )
             });
@@ -85,8 +86,8 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
             is_wider = true;
             talk.say(|| {
                 format!(
-                    "warning: at {} s readings differ from what the start led to expect by {:.1} times what it explains: the gas, or a sensor, is not \
-                     what it was; bands are widened while that is so",
+                    "warning: at {} s the readings deviate from their predictions {:.1} times as far as expected: the gas \
+                     or a sensor has changed since the start; the bands are widened while this lasts",
                     now.time_s, now.widened_by
                 )
             });
@@ -104,10 +105,10 @@ fn started(live: &Live) -> String {
         let sensor = &live.start.sensors[i];
         format!("{} {:.4} s", sensor.channel, sensor.time_constant_s.unwrap_or(f64::NAN))
     };
-    format!("started: time constants {}, {}; rows are answered as they come", sensor(0), sensor(1))
+    format!("started: time constants {}, {}; rows are now processed as they arrive", sensor(0), sensor(1))
 }
 
-/// Lines of a file or of standard input, as they come.
+/// Lines of a file or of standard input, as they arrive.
 struct Lines {
     from: Box<dyn BufRead>,
     name: String,
@@ -132,7 +133,7 @@ impl Lines {
         Ok(read > 0)
     }
 
-    /// The first lines, until `rows` of them are rows.
+    /// Reads lines until `rows` of them hold data.
     fn start(&mut self, rows: usize) -> Result<Table, Failure> {
         let mut text = Vec::new();
         let mut wanted = rows;
@@ -148,7 +149,7 @@ impl Lines {
             if !goes_on {
                 let (name, got) = (&self.name, table.rows());
                 return Err(Failure::File(format!(
-                    "{name}: --live waits for {rows} rows, and there are {got}: ask for fewer, or leave out --live"
+                    "{name}: --live needs {rows} rows to start, but there are only {got}: ask for fewer, or leave out --live"
                 )));
             }
             wanted = rows - table.rows();
@@ -163,7 +164,7 @@ impl Lines {
     }
 }
 
-/// Where answers go.
+/// The output for the rows of the answer.
 struct Out {
     to: Box<dyn Write>,
     name: String,
@@ -183,7 +184,7 @@ impl Out {
         Ok(out)
     }
 
-    /// `false` where nobody reads any more.
+    /// Writes one line; `false` if the reader has closed the pipe.
     fn line(&mut self, line: &str) -> Result<bool, Failure> {
         let written = writeln!(self.to, "{line}");
         self.done(written)
@@ -211,7 +212,7 @@ impl Out {
     }
 }
 
-/// Rows that could not be used.
+/// Count of the rows that could not be used.
 #[derive(Default)]
 struct Bad {
     count: usize,

@@ -1,4 +1,4 @@
-//! Files that are written: checked before the work, never over something else unless asked.
+//! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
 use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::failure::Failure;
 /// A file to be written, and the option that names it.
 pub(crate) type Output<'a> = (&'static str, &'a Path);
 
-/// What would fail after minutes of work, or lose something, is refused before.
+/// Refuses, before any work, outputs that could not be written or would overwrite something.
 pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Result<(), Failure> {
     let usage = |text: String| Err(Failure::Usage(text));
     let mut seen: Vec<(&str, PathBuf)> = Vec::new();
@@ -20,7 +20,7 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
             return usage(format!("{} is a folder: name a file in it", path.display()));
         };
         if path.as_os_str() == "-" {
-            return usage(format!("standard output is for the answer: name a file for {option}"));
+            return usage(format!("standard output is reserved for the answer: name a file for {option}"));
         }
         let whole = folder.join(name);
         if record.canonicalize().is_ok_and(|record| whole.canonicalize().is_ok_and(|out| out == record)) {
@@ -37,13 +37,14 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     Ok(())
 }
 
-/// What is drawn of a table of numbers.
+/// The picture and the report that go with a table of numbers.
 pub(crate) struct Views<'a> {
     pub(crate) picture: Option<&'a Path>,
     pub(crate) report: Option<&'a Path>,
 }
 
-/// The same for a table of numbers, which may go to standard output, `-`, and what is drawn of it: whether it does.
+/// Checks the outputs of a table of numbers, its picture and its report. Returns whether the table goes
+/// to standard output, `-`.
 pub(crate) fn check_data(
     record: &Path,
     out: &Path,
@@ -53,7 +54,7 @@ pub(crate) fn check_data(
 ) -> Result<bool, Failure> {
     let to_stdout = out == Path::new("-");
     if to_stdout && talk.json {
-        return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
+        return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
     }
     let table = (!to_stdout).then_some(("--out", out));
     let views = [("--picture", views.picture), ("--report", views.report)];
@@ -62,11 +63,11 @@ pub(crate) fn check_data(
     Ok(to_stdout)
 }
 
-/// Writes such a table.
+/// Writes a table of numbers to a file or to standard output.
 pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failure> {
     if to_stdout {
         return match stdout().write_all(text) {
-            // Whoever read has read enough.
+            // The reader has closed the pipe, having read enough.
             Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
             written => written.map_err(|e| Failure::Other(format!("standard output: {e}"))),
         };
@@ -78,7 +79,7 @@ pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> 
     std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
 }
 
-/// The command that is being run, as a shell takes it.
+/// The command line of this run, quoted for a shell.
 pub(crate) fn command_line() -> String {
     let quoted = |argument: String| {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);

@@ -1,4 +1,4 @@
-//! Answers for people and for scripts.
+//! Answers, as text for people and as JSON for scripts.
 
 use std::io::{Write, stdout};
 use std::path::Path;
@@ -14,21 +14,21 @@ use twinlag::{
 use crate::arguments::Talk;
 use crate::failure::Failure;
 
-/// Exactly one JSON object on standard output.
+/// Prints exactly one JSON object on standard output.
 pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
-    let text =
-        serde_json::to_string_pretty(value).map_err(|e| Failure::Other(format!("the answer has no JSON: {e}")))?;
+    let text = serde_json::to_string_pretty(value)
+        .map_err(|e| Failure::Other(format!("the answer cannot be written as JSON: {e}")))?;
     writeln!(stdout(), "{text}").map_err(|e| Failure::Other(format!("standard output: {e}")))
 }
 
-/// How the file was understood, on standard error.
+/// Prints on standard error how the file was read.
 pub(crate) fn notes(record: &Record, talk: Talk) {
     if !talk.quiet {
         record.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
 }
 
-/// The answer, as text or as JSON.
+/// Prints a characterisation, as text or as JSON.
 pub(crate) fn characterisation(answer: &Characterisation, talk: Talk) -> Result<(), Failure> {
     if talk.json {
         return json(answer);
@@ -81,8 +81,8 @@ fn text(answer: &Characterisation) -> String {
     let method = match answer.interval_method {
         IntervalMethod::Information => "95 % intervals from the noise levels",
         IntervalMethod::ResidualSpectrum => "95 % intervals from the spectrum of the residual",
-        IntervalMethod::Profile => "95 % intervals over all that the record allows",
-        IntervalMethod::Bootstrap => "95 % intervals from simulated records",
+        IntervalMethod::Profile => "95 % intervals from every value that the record allows",
+        IntervalMethod::Bootstrap => "95 % intervals from simulated records (bootstrap)",
         IntervalMethod::None => "no intervals",
     };
     let by_profile = answer.sensors.iter().filter(|s| s.interval_basis == Some(IntervalBasis::Profile));
@@ -91,14 +91,14 @@ fn text(answer: &Characterisation) -> String {
     lines.push(format!("{method}{shape}"));
     lines.push(format!("status: {}", status(answer.status)));
     if !answer.not_identifiable.is_empty() {
-        lines.push(format!("this record cannot tell: {}", answer.not_identifiable.join(", ")));
+        lines.push(format!("not determined by this record: {}", answer.not_identifiable.join(", ")));
     }
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
     lines.push(String::new());
     lines.join("\n")
 }
 
-/// The answer of the closed loop, as text or as JSON.
+/// Prints a diagnosis, as text or as JSON.
 pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
     if talk.json {
         return json(answer);
@@ -107,7 +107,8 @@ pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
     stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
 }
 
-/// What there is to say of the gas temperature, as text or as JSON: on standard error where the gas itself is on standard output.
+/// Prints a summary of the gas temperature, as text or as JSON. The text goes to standard error if the
+/// table itself goes to standard output.
 pub(crate) fn compensation(answer: &Compensation, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
     if talk.json {
         return json(answer);
@@ -129,16 +130,20 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     }
     if let Some(gas) = &answer.gas {
         lines.push(String::new());
-        lines.push(format!("gas temperature in {}: {} samples", out.display(), answer.gas_c.len()));
+        lines.push(format!("gas temperature written to {}: {} samples", out.display(), answer.gas_c.len()));
         lines.push(format!("  standard deviation {} K (median)", digits(gas.median_std_k, 3)));
-        lines.push(format!("  of that the model's parameters {} K", digits(gas.parameter_std_k, 3)));
+        lines.push(format!(
+            "  of which {} K from the uncertainty of the model's parameters",
+            digits(gas.parameter_std_k, 3)
+        ));
         lines.push(match gas.bandwidth_hz {
-            Some(hz) => format!("  the readings decide up to {} Hz", digits(hz, 3)),
-            None => "  the readings decide nowhere: the gas moves less than the noise".into(),
+            Some(hz) => format!("  determined by the readings up to {} Hz", digits(hz, 3)),
+            None => "  determined by the readings at no frequency: the gas moves less than the noise".into(),
         });
         if let Some(reference) = &gas.reference {
             lines.push(format!(
-                "  against the reference: {} K rms, the faster sensor as it reads {} K; {:.1} % of it inside the 95 % band",
+                "  error against the reference: {} K rms ({} K for the uncorrected faster sensor); {:.1} % of the \
+                 reference lies inside the 95 % band",
                 digits(reference.rmse_k, 3),
                 digits(reference.raw_rmse_k, 3),
                 100.0 * reference.inside_95
@@ -150,7 +155,8 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     lines.join("\n")
 }
 
-/// What there is to say of time constants along the record, as [`compensation`] does.
+/// Prints a summary of the time constants along the record, as text or as JSON. The text goes to
+/// standard error if the table itself goes to standard output.
 pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
     if talk.json {
         return json(answer);
@@ -170,7 +176,7 @@ fn track_text(answer: &Track, out: &Path) -> String {
             interval(step.at_s, step.interval_95_s[0], step.interval_95_s[1], " s")
         ),
         ("windows", _, _) => format!("{} windows", answer.time_s.len()),
-        _ => "time constants do not change, as far as the record tells".into(),
+        _ => "no change of the time constants is detected".into(),
     });
     for (i, sensor) in answer.last.sensors.iter().enumerate() {
         let range = answer.range_s.map(|r| format!(", from {} to {} s", digits(r[i][0], 4), digits(r[i][1], 4)));
@@ -182,19 +188,19 @@ fn track_text(answer: &Track, out: &Path) -> String {
         ));
     }
     if let Some(ratio) = &answer.ratio {
-        let stays = if ratio.stays { "stays" } else { "changes" };
+        let stays = if ratio.stays { "shows no change" } else { "changes" };
         lines.push(format!("  their ratio {stays}: p = {:.2e}", ratio.p_value));
     }
     lines.push(format!("status: {}", status(answer.status)));
     if !answer.time_s.is_empty() {
-        lines.push(format!("time constants in {}: {} instants", out.display(), answer.time_s.len()));
+        lines.push(format!("time constants written to {}: {} instants", out.display(), answer.time_s.len()));
     }
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
     lines.push(String::new());
     lines.join("\n")
 }
 
-/// Text about data that are in a file, or on standard output.
+/// Prints a summary of data: on standard output if the data are in a file, else on standard error.
 fn about(text: &str, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
     if !to_stdout {
         return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
@@ -226,11 +232,13 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
             lines.push(format!("    {} {number}", p.name.replace('_', " ")));
         }
         if effect.parameters.len() > MOST_PARAMETERS {
-            lines.push(format!("    and {} parameters more (--json)", effect.parameters.len() - MOST_PARAMETERS));
+            lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MOST_PARAMETERS));
         }
         if let Some(e) = &effect.evidence {
+            let plural = if e.dof == 1 { "" } else { "s" };
+            let sign = if e.held_out_gain_nats < 0.0 { "" } else { "+" };
             lines.push(format!(
-                "    evidence: {} for {} parameters; {} nats on blocks that were left out",
+                "    evidence: likelihood-ratio statistic {} ({} parameter{plural}); held-out log-likelihood {sign}{} nats",
                 digits(e.statistic, 3),
                 e.dof,
                 digits(e.held_out_gain_nats, 3)
@@ -238,34 +246,34 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
         }
         if !effect.alternatives.is_empty() {
             let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
-            lines.push(format!("    explained as well by: {}", names.join(", ")));
+            lines.push(format!("    equally well explained by: {}", names.join(", ")));
         }
         lines.push(format!("    at the rig: {}", effect.advice));
     }
     lines.push(String::new());
-    lines.push(format!("  {:34} {:>12} {:>12}", "", "two lags", "with effects"));
-    let width = 34;
-    let mut row = |name: &str, before: String, after: String| {
-        lines.push(format!("  {name:width$} {before:>12} {after:>12}"));
+    let mut row = |name: &str, before: &str, after: &str| {
+        lines.push(format!("  {name:34} {before:>12}  {after:>12}"));
     };
+    row("", "two lags", "with effects");
     let number = |x: f64| digits(x, 4);
     for i in 0..2 {
         let tau =
             |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
-        row(&format!("time constant {}", answer.base.sensors[i].channel), tau(&answer.base), tau(&answer.last));
+        row(&format!("time constant {}", answer.base.sensors[i].channel), &tau(&answer.base), &tau(&answer.last));
         let error = |c: &Characterisation| {
             c.sensors[i].standard_error_s.map_or("-".into(), |t| format!("± {} s", digits(t, 2)))
         };
-        row("", error(&answer.base), error(&answer.last));
+        row("", &error(&answer.base), &error(&answer.last));
     }
     let e = &answer.error;
-    row("energy of the residual / noise", number(e.chi2_per_dof.before), number(e.chi2_per_dof.after));
-    row("rms residual, held out", number(e.held_out_normalised_rms.before), number(e.held_out_normalised_rms.after));
+    row("residual energy / noise energy", &number(e.chi2_per_dof.before), &number(e.chi2_per_dof.after));
+    let rms = e.held_out_normalised_rms;
+    row("rms residual, held out", &number(rms.before), &number(rms.after));
     let k = |x: f64| format!("{} K", digits(x, 3));
     let inputs = e.held_out_input_difference_k;
-    row("inferred inputs apart, held out", k(inputs.before), k(inputs.after));
+    row("rms input difference, held out", &k(inputs.before), &k(inputs.after));
     if let Some(r) = e.reference_rmse_k {
-        row("gas temperature against reference", k(r.before), k(r.after));
+        row("rms gas error against reference", &k(r.before), &k(r.after));
     }
     lines.push(String::new());
     if let Some(left) = &answer.unexplained {
@@ -273,22 +281,24 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     }
     lines.extend(answer.remarks.iter().map(|r| format!("note: {r}")));
     if !answer.last.not_identifiable.is_empty() {
-        lines.push(format!("this record cannot tell: {}", answer.last.not_identifiable.join(", ")));
+        lines.push(format!("not determined by this record: {}", answer.last.not_identifiable.join(", ")));
     }
-    lines.push(format!("no record of two sensors tells: {}", answer.not_testable.join("; ")));
+    lines.push(format!("these readings cannot reveal: {}", answer.not_testable.join("; ")));
     lines.push(String::new());
     lines.join("\n")
 }
 
-/// Parameters of an effect that are printed.
+/// Number of parameters of one effect that are printed.
 const MOST_PARAMETERS: usize = 4;
 
 fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
-        Verdict::Adequate => "adequate: two first-order lags leave nothing but noise",
-        Verdict::Explained => "explained: with these effects nothing but noise is left",
-        Verdict::PartlyExplained => "partly-explained: these effects explain a part, something else is left",
-        Verdict::Unexplained => "unexplained: something is left that no known effect accounts for",
+        Verdict::Adequate => "adequate: two first-order lags leave only noise in the residual",
+        Verdict::Explained => "explained: with these effects only noise is left in the residual",
+        Verdict::PartlyExplained => {
+            "partly-explained: these effects explain part of the residual, but more than noise is left"
+        }
+        Verdict::Unexplained => "unexplained: more than noise is left, and no known effect explains it",
         Verdict::Refused => "refused: this record cannot be diagnosed",
         _ => "unknown",
     }
@@ -316,7 +326,7 @@ fn second_lag(lag: &SecondLag) -> String {
     match (lag.value, lag.interval_95) {
         (Some(value), Some([low, high])) => interval(value, low, high, " s"),
         (Some(value), None) => format!("{} s (given)", digits(value, 5)),
-        (None, Some([0.0, high])) => format!("not seen, at most {} s", digits(high, 3)),
+        (None, Some([0.0, high])) => format!("not detected, at most {} s", digits(high, 3)),
         (None, Some([low, high])) => format!("not determined, from {} to {} s", digits(low, 3), digits(high, 3)),
         (None, None) => "not determined by this record".into(),
     }
@@ -337,7 +347,7 @@ fn noise(sensor: &SensorEstimate) -> String {
 }
 
 fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
-    // Enough digits for the interval to be seen: two more than its width has.
+    // Two digits more than the width of the interval has.
     let width = (high - low).abs();
     let decimals = if width > 0.0 { (2.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 };
     format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}]")

@@ -1,4 +1,4 @@
-//! A sign of life on standard error while something takes long.
+//! Progress on standard error during long work.
 
 use std::time::{Duration, Instant};
 
@@ -6,10 +6,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::arguments::Talk;
 
-/// What takes longer says how far it is.
+/// Work that takes longer than this shows how far it has come.
 const LONG: Duration = Duration::from_secs(2);
 
-/// A spinner with elapsed time that shows only on a terminal, and goes without a trace when dropped.
+/// A spinner with the elapsed time. It shows on a terminal only, and disappears when dropped.
 pub(crate) struct Progress(Option<(ProgressBar, Instant)>);
 
 impl Progress {
@@ -23,7 +23,7 @@ impl Progress {
         Self(Some((bar, Instant::now())))
     }
 
-    /// How far it is, once it has taken two seconds.
+    /// Shows how far the work has come, once it has taken two seconds.
     pub(crate) fn say(&self, message: impl Fn() -> String) {
         if let Some((bar, since)) = &self.0
             && since.elapsed() > LONG

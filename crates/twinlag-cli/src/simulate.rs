@@ -16,7 +16,7 @@ use crate::progress::Progress;
 pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
     let to_stdout = command.out == Path::new("-");
     if to_stdout && talk.json {
-        return Err(Failure::Usage("--out - and --json both want standard output: name a file".into()));
+        return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
     }
     let mut rig = read(&command.spec)?;
     if let Some(seed) = command.seed {
@@ -60,7 +60,7 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The rig in `spec`, relative paths in it taken from where it lies.
+/// Reads the rig in `spec`; relative paths in it are relative to its folder.
 fn read(spec: &Path) -> Result<Rig, Failure> {
     let name = spec.display();
     let text =

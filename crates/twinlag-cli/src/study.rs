@@ -1,7 +1,7 @@
 //! `twinlag study run PLAN.toml --out DIR` and `twinlag study merge DIR`.
 //!
-//! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. Without shards a run merges its
-//! only part itself.
+//! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. A run
+//! without shards merges its only part itself.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -19,32 +19,32 @@ use crate::arguments::Talk;
 use crate::failure::Failure;
 use crate::print;
 
-/// What to do with a study.
+/// What to do with a Monte-Carlo study.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
-    /// Runs a study, or a shard of it; the result has the same bytes on any threads, shards and restarts.
+    /// Run a study, or one shard of it; the result is byte-identical for any number of threads, shards and restarts.
     Run(Run),
-    /// Joins the parts of all shards in a folder into the table and the pictures.
+    /// Join the parts of all shards in a folder into the table and the pictures.
     Merge {
-        /// The folder of the parts.
+        /// The folder that holds the parts.
         dir: PathBuf,
     },
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct Run {
-    /// The plan: a TOML file; see the book's chapter Experiments.
+    /// The plan, a TOML file; the book's chapter Experiments describes it.
     plan: PathBuf,
-    /// The folder of the results, made if need be.
+    /// The folder for the results, created if necessary.
     #[arg(long)]
     out: PathBuf,
-    /// Runs part `k/n` alone, `k` from 0.
+    /// Run only part K of N, with K counted from 0.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Goes on where an interrupted run stopped.
+    /// Continue where an interrupted run stopped.
     #[arg(long)]
     resume: bool,
-    /// Threads; one for each processor if left out. The result does not depend on them.
+    /// Number of threads; one per processor if left out. The result does not depend on it.
     #[arg(long)]
     threads: Option<std::num::NonZeroUsize>,
 }
@@ -67,14 +67,14 @@ fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
     let (plan, text) = read(&run.plan)?;
     let experiment = Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", run.plan.display())))?;
     let out = run.out.display();
-    fs::create_dir_all(&run.out).map_err(|e| Failure::Other(format!("{out}: cannot be made: {e}")))?;
+    fs::create_dir_all(&run.out).map_err(|e| Failure::Other(format!("{out}: cannot be created: {e}")))?;
     if !run.resume && run.shard.is_none() && run.out.join("results.json").exists() {
-        return Err(Failure::Usage(format!("{out}: holds results already; name another folder, or remove them")));
+        return Err(Failure::Usage(format!("{out}: already holds results; name another folder, or remove them")));
     }
     let copy = run.out.join("plan.toml");
     match fs::read_to_string(&copy) {
         Ok(other) if other != text => {
-            return Err(Failure::Usage(format!("{}: another plan lies there; name another folder", copy.display())));
+            return Err(Failure::Usage(format!("{}: holds another plan; name another folder", copy.display())));
         }
         Ok(_) => {}
         Err(_) => {
@@ -103,7 +103,7 @@ fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
     done?;
     if run.shard.is_some() {
         say(talk, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
-            format!("{}: done; when all parts are, twinlag study merge {out}", part.display())
+            format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display())
         })?;
         return Ok(0);
     }
@@ -117,13 +117,13 @@ fn merge(dir: &Path, talk: Talk) -> Result<u8, Failure> {
     let mut parts: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_part(p)).collect();
     parts.sort();
     if parts.is_empty() {
-        return Err(Failure::File(format!("{name}: holds no part of a study: run `twinlag study run` first")));
+        return Err(Failure::File(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
     let results = twinlag_study::merge(&parts)?;
     let experiment = Experiment::new(&plan)?;
     if results.header().plan() != experiment.plan() {
         return Err(Failure::File(format!(
-            "{name}: the parts are of another plan than plan.toml, or of another version"
+            "{name}: the parts belong to a plan other than plan.toml, or to another version"
         )));
     }
     let table = Table::of(&experiment, &results)?;
@@ -157,7 +157,7 @@ impl From<ExperimentError> for Failure {
     }
 }
 
-/// A part that is there already, or is not there yet, is a matter of how the program was called.
+/// A part that already exists, or does not exist yet, depends on how the program was called.
 impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {

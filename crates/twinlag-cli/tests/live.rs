@@ -144,7 +144,7 @@ fn what_cannot_be_answered_live_is_refused() {
     bench.refuses(2, &["track", "run.csv", "--change", "0.1", "--out", "out.csv"], &["--live"]);
     let few = bench.run(&["track", "run.csv", "--live", "6000", "--out", "out.csv"]);
     assert_eq!(few.code, 3, "{few:#?}");
-    few.says(&["waits for 6000 rows", "there are 5000"]);
+    few.says(&["needs 6000 rows", "there are only 5000"]);
     // Gas at rest tells no time constant.
     let mut rest = String::from("time_s,T1,T2\n");
     for k in 0..400 {
