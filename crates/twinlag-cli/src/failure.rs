@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use twinlag::record::RecordError;
+use twinlag::record::{RecordError, Setting};
 use twinlag_pages::ReportError;
 
 /// An error, by its exit code.
@@ -61,12 +61,36 @@ impl From<ReportError> for Failure {
 
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
+        let text = with_options(&error);
         match error {
-            RecordError::CannotWrite { .. } => Self::Other(error.to_string()),
+            RecordError::CannotWrite { .. } => Self::Other(text),
             RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {
-                Self::Usage(error.to_string())
+                Self::Usage(text)
             }
-            _ => Self::File(error.to_string()),
+            _ => Self::File(text),
         }
     }
+}
+
+/// The message, and the options of this program that set what it asks for.
+fn with_options(error: &RecordError) -> String {
+    let options: Vec<&str> = error.settings().iter().filter_map(option).collect();
+    match &options[..] {
+        [] => error.to_string(),
+        [one] => format!("{error} (option {one})"),
+        _ => format!("{error} (options {})", options.join(", ")),
+    }
+}
+
+/// The option for a setting of the reader.
+fn option(setting: &Setting) -> Option<&'static str> {
+    Some(match setting {
+        Setting::Time => "--time",
+        Setting::T1 => "--t1",
+        Setting::T2 => "--t2",
+        Setting::Reference => "--reference",
+        Setting::Flow => "--flow",
+        Setting::Period => "--period",
+        _ => return None,
+    })
 }

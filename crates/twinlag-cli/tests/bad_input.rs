@@ -147,7 +147,7 @@ fn one_column_for_both_sensors_is_wrong_usage() {
 #[test]
 fn a_sensor_as_its_own_reference_is_wrong_usage() {
     let arguments = ["characterise", "run.csv", "--t1", "T1", "--reference", "2"];
-    let want = ["2 'T1'", "twice", "--reference and --flow must be different columns", "cannot be its own reference"];
+    let want = ["2 'T1'", "twice", "must be different columns", "cannot be its own reference", "--t1", "--reference"];
     good("own_reference").refuses(2, &arguments, &want);
 }
 

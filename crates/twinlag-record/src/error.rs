@@ -1,9 +1,11 @@
-//! Why a record could not be had: every message says where, what was expected, what came, and what to do.
+//! Why a record could not be had: every message says where, what was expected, what came, and what
+//! to do.
 
 use std::fmt;
 
 use thiserror::Error;
 
+use crate::selection::Setting;
 use crate::wording::{Counted, plain};
 
 /// Where in the input something is: a line of a file, or a sample of a vector.
@@ -24,7 +26,8 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why a record could not be read, built or written. `file` is the name that the caller gave to the source.
+/// Why a record could not be read, built or written. `file` is the name that the caller gave to the
+/// source.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]
@@ -84,33 +87,33 @@ pub enum RecordError {
     NotANumber { file: String, at: Place, column: String, cell: String },
     #[error(
         "{file}: {at}, column {column}: expected numbers, found mostly text (first '{cell}'); \
-         choose another column with --t1, --t2, --reference, --flow or --time (NAME or number)"
+         choose another column, by name or number"
     )]
     TextColumn { file: String, at: Place, column: String, cell: String },
-    #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example --t1 2")]
+    #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example 2")]
     UnknownColumn { file: String, wanted: String, columns: String },
     #[error(
         "{file}: {at}, column {column}: expected a positive flow velocity or density in every row that is used, found {value}; \
-         leave out --flow, or mend the column"
+         use no flow, or mend the column"
     )]
     BadFlow { file: String, at: Place, column: String, value: f64 },
-    #[error("{file}: column {column}: expected a flow that changes, found {value} throughout; leave out --flow")]
+    #[error("{file}: column {column}: expected a flow that changes, found {value} throughout; use no flow")]
     ConstantFlow { file: String, column: String, value: f64 },
-    #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example --t1 {first}", first = numbers[0])]
+    #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example {first}", first = numbers[0])]
     AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
     #[error(
-        "{file}: column {column} would be used twice; --time, --t1, --t2, --reference and --flow must be different columns (a \
-         sensor cannot be its own reference)"
+        "{file}: column {column} would be used twice; time, both sensors, reference and flow must be different columns \
+         (a sensor cannot be its own reference)"
     )]
     SameColumn { file: String, column: String },
     #[error(
         "{file}: expected exactly two columns that are clearly the sensors, found {found} that may be ({candidates}); \
-         choose with --t1 NAME --t2 NAME (names or numbers); the columns are {columns}"
+         choose both, by name or number; the columns are {columns}"
     )]
     ChannelsUnclear { file: String, found: usize, candidates: String, columns: String },
     #[error(
-        "{file}: no column is recognisably the time; choose it with --time NAME (or number), or, if there is none, give \
-         the sample period in seconds (--period); the columns are {columns}"
+        "{file}: no column is recognisably the time; choose it, by name or number, or, if there is none, give the \
+         sample period in seconds; the columns are {columns}"
     )]
     NoTime { file: String, columns: String },
     #[error("{file}: the sample period must be finite and positive, got {period_s} s")]
@@ -128,7 +131,7 @@ pub enum RecordError {
     MissingTime { file: String, at: Place, column: String },
     #[error(
         "{file}: {at}: time must increase from row to row, but '{now}' follows '{before}'; sort the rows and remove \
-         repeated ones, or, if several samples share one coarse stamp, give the sample period in seconds (--period)"
+         repeated ones, or, if several samples share one coarse stamp, give the sample period in seconds"
     )]
     TimeNotIncreasing { file: String, at: Place, before: String, now: String },
     #[error(
@@ -173,6 +176,34 @@ pub enum RecordError {
     LengthMismatch { file: String, name: String, found: usize, like: String, expected: usize },
     #[error("cannot write the table: {reason}; check the disk and the permissions")]
     CannotWrite { reason: String },
+}
+
+impl RecordError {
+    /// What of a [`Selection`](crate::Selection) to set or to leave out so that the record can be
+    /// read; empty where that mends nothing. Messages are in words; whoever has options of other
+    /// names can add those to them.
+    ///
+    /// ```
+    /// use twinlag_record::{Record, Selection, Setting, Table};
+    ///
+    /// let table = Table::read(b"T1,T2\n20,20\n21,20.5\n", "no-time.csv")?;
+    /// let error = Record::from_table(&table, &Selection::default()).expect_err("no time");
+    /// assert_eq!(error.settings(), [Setting::Time, Setting::Period]);
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    pub fn settings(&self) -> &'static [Setting] {
+        match self {
+            Self::TextColumn { .. }
+            | Self::UnknownColumn { .. }
+            | Self::AmbiguousName { .. }
+            | Self::SameColumn { .. } => &Setting::COLUMNS,
+            Self::BadFlow { .. } | Self::ConstantFlow { .. } => &[Setting::Flow],
+            Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
+            Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],
+            Self::BadPeriod { .. } | Self::TimeNotIncreasing { .. } => &[Setting::Period],
+            _ => &[],
+        }
+    }
 }
 
 /// What to do about too few rows with both temperatures.

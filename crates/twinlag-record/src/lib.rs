@@ -64,7 +64,7 @@ pub use note::Note;
 pub use record::{Channels, Record};
 pub use rows::{Row, RowReader};
 pub use sampling::{Sampling, SamplingKind};
-pub use selection::{ColumnRef, SamplingChoice, Selection};
+pub use selection::{ColumnRef, SamplingChoice, Selection, Setting};
 pub use table::Table;
 pub use unit::Unit;
 pub use write::{Decimals, write_csv};

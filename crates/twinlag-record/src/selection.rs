@@ -67,6 +67,29 @@ pub struct Selection {
     pub sampling: SamplingChoice,
 }
 
+/// One of the things that a [`Selection`] sets and a message may ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Setting {
+    /// [`Selection::time`].
+    Time,
+    /// [`Selection::t1`].
+    T1,
+    /// [`Selection::t2`].
+    T2,
+    /// [`Selection::reference`].
+    Reference,
+    /// [`Selection::flow`].
+    Flow,
+    /// [`Selection::period_s`].
+    Period,
+}
+
+impl Setting {
+    /// All that name a column.
+    pub const COLUMNS: [Self; 5] = [Self::Time, Self::T1, Self::T2, Self::Reference, Self::Flow];
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

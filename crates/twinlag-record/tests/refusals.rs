@@ -43,7 +43,7 @@ fn text_in_a_number_column_is_refused_with_line_column_and_cell() {
 fn a_text_column_cannot_be_a_temperature() {
     let text = rows("time_s,T1,T2,status", |_, t, a, b| format!("{t},{a},{b},OK"));
     let selection = Selection { t2: pick("status"), ..Selection::default() };
-    assert_says(&refusal_with(text.as_bytes(), &selection), &["4 'status'", "'OK'", "--t2"]);
+    assert_says(&refusal_with(text.as_bytes(), &selection), &["4 'status'", "'OK'", "by name or number"]);
 }
 
 #[test]
@@ -79,8 +79,8 @@ fn a_broken_stamp_is_refused() {
 #[test]
 fn no_time_column_needs_a_period() {
     let text = rows("T1,T2", |_, _, a, b| format!("{a},{b}"));
-    assert_says(&refusal(&text), &["--time", "--period", "1 'T1', 2 'T2'"]);
-    assert_says(&refusal(&rows("sample,T1,T2", |k, _, a, b| format!("{k},{a},{b}"))), &["--period"]);
+    assert_says(&refusal(&text), &["choose it", "the sample period", "1 'T1', 2 'T2'"]);
+    assert_says(&refusal(&rows("sample,T1,T2", |k, _, a, b| format!("{k},{a},{b}"))), &["the sample period"]);
     let selection = Selection { period_s: Some(-1.0), ..Selection::default() };
     assert_says(&refusal_with(text.as_bytes(), &selection), &["positive", "-1"]);
     let selection = Selection { period_s: Some(1.0), time: pick("1"), ..Selection::default() };
@@ -94,19 +94,19 @@ fn time_must_increase() {
     }
     assert_says(&refusal(&plain().replace("\n1.5,", "\nNaN,")), &["line 5", "1 'time_s'", "missing"]);
     let text = rows("time,T1,T2", |k, _, a, b| format!("10:00:{:02},{a},{b}", k / 2));
-    assert_says(&refusal(&text), &["line 3", "'10:00:00' follows '10:00:00'", "--period"]);
+    assert_says(&refusal(&text), &["line 3", "'10:00:00' follows '10:00:00'", "the sample period"]);
 }
 
 #[test]
 fn which_columns_are_the_sensors_must_be_clear() {
     for header in ["time_s,a_C,b_C,c_C", "time_s,chamber_C,dut_C,ref_C"] {
         let text = rows(header, |_, t, a, b| format!("{t},{a},{b},{}", a + b));
-        assert_says(&refusal(&text), &["exactly two", "--t1 NAME --t2 NAME", "1 'time_s'", "_C'"]);
+        assert_says(&refusal(&text), &["exactly two", "choose both", "1 'time_s'", "_C'"]);
     }
     let text = rows("time_s,T1,x", |_, t, a, b| format!("{t},{a},{b}"));
     assert_says(&refusal(&text), &["found 1", "2 'T1'", "3 'x'"]);
     let with = |t1, t2| Selection { t1: pick(t1), t2: pick(t2), ..Selection::default() };
-    assert_says(&refusal_with(plain().as_bytes(), &with("T9", "T2")), &["'T9'", "2 'T1'", "--t1"]);
+    assert_says(&refusal_with(plain().as_bytes(), &with("T9", "T2")), &["'T9'", "2 'T1'", "by name or number"]);
     assert_says(&refusal_with(plain().as_bytes(), &with("7", "T2")), &["'7'"]);
     assert_says(&refusal_with(plain().as_bytes(), &with("T2", "3")), &["3 'T2'", "twice"]);
     let text = rows("time_s,T,T", |_, t, a, b| format!("{t},{a},{b}"));
@@ -216,7 +216,7 @@ fn a_flow_that_is_not_positive_or_stands_still_is_refused() {
         refusal_with(text.as_bytes(), &Selection { flow: pick("velocity"), ..Selection::default() })
     };
     for (cell, found) in [("0", "found 0"), ("-2", "found -2"), ("", "found NaN")] {
-        assert_says(&with(cell), &["line 4", "4 'velocity'", "positive", found, "--flow"]);
+        assert_says(&with(cell), &["line 4", "4 'velocity'", "positive", found, "use no flow"]);
     }
     let still = rows("time_s,T1,T2,velocity", |_, t, a, b| format!("{t},{a},{b},3"));
     let selection = Selection { flow: pick("velocity"), ..Selection::default() };

@@ -16,7 +16,12 @@ pub(crate) fn record(text: &str) -> Record {
 pub(crate) fn refusal_with(bytes: &[u8], selection: &Selection) -> String {
     match record_with(bytes, selection) {
         Ok(record) => panic!("read, not refused: {:?}", record.notes),
-        Err(error) => error.to_string(),
+        Err(error) => {
+            let text = error.to_string();
+            let is_option = |(at, _): (usize, &str)| text[at + 2..].starts_with(|c: char| c.is_ascii_alphabetic());
+            assert!(!text.match_indices("--").any(is_option), "an option of a program in: {text}");
+            text
+        }
     }
 }
 
