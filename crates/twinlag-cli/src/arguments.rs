@@ -9,6 +9,7 @@ use twinlag::estimate::Bootstrap;
 use twinlag::record::{ColumnRef, SamplingChoice, Selection};
 use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise::Optimiser};
 
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::study::Study;
 
@@ -43,25 +44,9 @@ pub(crate) struct Arguments {
     quiet: bool,
 }
 
-/// Which output the user wants: text or JSON, with or without notes.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Talk {
-    pub(crate) json: bool,
-    pub(crate) quiet: bool,
-}
-
-impl Talk {
-    /// Prints a line on standard error, unless `--quiet` was given.
-    pub(crate) fn say(self, text: impl FnOnce() -> String) {
-        if !self.quiet {
-            eprintln!("{}", text());
-        }
-    }
-}
-
 impl Arguments {
-    pub(crate) fn talk(&self) -> Talk {
-        Talk { json: self.json, quiet: self.quiet }
+    pub(crate) fn console(&self) -> Console {
+        Console { json: self.json, quiet: self.quiet }
     }
 }
 

@@ -7,18 +7,19 @@ use twinlag::diagnosis::DiagnoseError;
 use twinlag::record::{Record, Selection, Table};
 use twinlag::{Characterisation, Model, Options, Status};
 
-use crate::arguments::{Characterise, Talk};
+use crate::arguments::Characterise;
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 use crate::progress::Progress;
 
-pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failure> {
     let options = command.input.method.options()?;
     let record = read(&command.input.file, &command.input.columns.selection())?;
-    print::notes(&record, talk);
+    print::notes(&record, console);
     let answer = match &command.model {
         Some(path) => {
-            let _progress = Progress::start(talk, format!("characterising {} samples", record.len()));
+            let _progress = Progress::start(console, format!("characterising {} samples", record.len()));
             twinlag::characterise_with(&record, &model(path)?, &options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
@@ -28,9 +29,9 @@ pub(crate) fn run(command: &Characterise, talk: Talk) -> Result<u8, Failure> {
                 e => e.into(),
             })?
         }
-        None => characterise(&record, &options, talk)?,
+        None => characterise(&record, &options, console)?,
     };
-    print::characterisation(&answer, talk)?;
+    print::characterisation(&answer, console)?;
     Ok(exit_code(answer.status))
 }
 
@@ -46,8 +47,8 @@ pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
     }
 }
 
-pub(crate) fn characterise(record: &Record, options: &Options, talk: Talk) -> Result<Characterisation, Failure> {
-    let progress = Progress::start(talk, format!("characterising {} samples", record.len()));
+pub(crate) fn characterise(record: &Record, options: &Options, console: Console) -> Result<Characterisation, Failure> {
+    let progress = Progress::start(console, format!("characterising {} samples", record.len()));
     let watch = |done: usize, of: usize| progress.say(|| format!("bootstrap: {done} of {of} simulated records"));
     Ok(twinlag::characterise_watched(record, options, &watch)?)
 }

@@ -3,16 +3,17 @@
 use twinlag::record::{Decimals, write_csv};
 use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 
-use crate::arguments::{Compensate, Talk, Trust};
+use crate::arguments::{Compensate, Trust};
 use crate::characterise::{model, read};
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
 
-pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure> {
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
-    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, talk)?;
+    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() },
         model: command.model.as_deref().map(model).transpose()?,
@@ -20,9 +21,9 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         trusted: usize::from(command.trust == Trust::T2),
     };
     let record = read(&command.input.file, &command.input.columns.selection())?;
-    print::notes(&record, talk);
+    print::notes(&record, console);
     let answer = {
-        let progress = Progress::start(talk, format!("compensating {} samples", record.len()));
+        let progress = Progress::start(console, format!("compensating {} samples", record.len()));
         let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
         twinlag::compensate(&record, &options, &watch)?
     };
@@ -40,6 +41,6 @@ pub(crate) fn run(command: &Compensate, talk: Talk) -> Result<u8, Failure> {
         let report = twinlag_pages::gas_report(&record, &answer, &output::command_line())?;
         output::write(path, report)?;
     }
-    print::compensation(&answer, &command.out, to_stdout, talk)?;
+    print::compensation(&answer, &command.out, to_stdout, console)?;
     Ok(if answer.status == Status::Ok { 0 } else { 4 })
 }

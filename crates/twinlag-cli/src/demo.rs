@@ -4,14 +4,15 @@ use twinlag::DiagnoseOptions;
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Rig;
 
-use crate::arguments::{Demo, Talk};
+use crate::arguments::Demo;
+use crate::console::Console;
 use crate::diagnose::{diagnose, exit_code};
 use crate::failure::Failure;
 use crate::print;
 
 const RIG: &str = include_str!("demo.toml");
 
-pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Demo, console: Console) -> Result<u8, Failure> {
     let mut rig: Rig = toml::from_str(RIG).expect("the embedded rig is valid");
     if let Some(seed) = command.seed {
         rig = rig.with_seed(seed);
@@ -26,13 +27,13 @@ pub(crate) fn run(command: &Demo, talk: Talk) -> Result<u8, Failure> {
         reference_c: Some(simulated.gas_c),
     };
     let record = Record::from_channels(channels, SamplingChoice::Auto)?;
-    if !talk.json && !talk.quiet {
+    if !console.json && !console.quiet {
         eprintln!("# the rig: two thermocouples in an engine's exhaust; the estimator knows none of this");
         RIG.lines().filter(|l| !l.starts_with('#') && !l.is_empty()).for_each(|l| eprintln!("#   {l}"));
     }
-    let answer = diagnose(&record, &DiagnoseOptions::default(), talk)?;
-    print::diagnosis(&answer, talk)?;
-    if !talk.json {
+    let answer = diagnose(&record, &DiagnoseOptions::default(), console)?;
+    print::diagnosis(&answer, console)?;
+    if !console.json {
         println!();
         for (sensor, truth) in answer.last.sensors.iter().zip(rig.sensors()) {
             let inside = match sensor.interval_95_s {

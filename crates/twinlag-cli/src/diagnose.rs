@@ -5,21 +5,22 @@ use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis};
 use twinlag_pages::{ReportContext, diagnosis_report};
 
-use crate::arguments::{Diagnose, Talk};
+use crate::arguments::Diagnose;
 use crate::characterise::read;
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::output;
 use crate::print;
 use crate::progress::Progress;
 
-pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     let outputs = [("--report", &command.report), ("--save", &command.save)];
     let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
     output::check(&command.input.file, &outputs, command.force)?;
     let options = DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() };
     let record = read(&command.input.file, &command.input.columns.selection())?;
-    print::notes(&record, talk);
-    let answer = diagnose(&record, &options, talk)?;
+    print::notes(&record, console);
+    let answer = diagnose(&record, &options, console)?;
     if let Some(path) = &command.save {
         let model = serde_json::to_string_pretty(&answer.model())
             .map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?;
@@ -28,12 +29,12 @@ pub(crate) fn run(command: &Diagnose, talk: Talk) -> Result<u8, Failure> {
     if let Some(path) = &command.report {
         output::write(path, &report(&record, &answer, output::command_line())?)?;
     }
-    print::diagnosis(&answer, talk)?;
+    print::diagnosis(&answer, console)?;
     Ok(exit_code(&answer))
 }
 
-pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, talk: Talk) -> Result<Diagnosis, Failure> {
-    let progress = Progress::start(talk, format!("diagnosing {} samples", record.len()));
+pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
+    let progress = Progress::start(console, format!("diagnosing {} samples", record.len()));
     let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
     Ok(twinlag::diagnose(record, options, &watch)?)
 }

@@ -7,8 +7,9 @@ use std::path::Path;
 use twinlag::record::{Record, RecordError, RowReader, Table};
 use twinlag::{Live, LiveAnswer, LiveOptions};
 
-use crate::arguments::{Talk, Track};
+use crate::arguments::Track;
 use crate::characterise::model;
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 
@@ -16,8 +17,8 @@ const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_
 /// Number of warnings about bad rows that are printed one by one.
 const SHOWN: usize = 5;
 
-pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> Result<u8, Failure> {
-    if talk.json {
+pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Console) -> Result<u8, Failure> {
+    if console.json {
         return Err(Failure::Usage(
             "--live writes rows and --json writes one object at the end: leave out one of them".into(),
         ));
@@ -34,13 +35,13 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
     let mut lines = Lines::open(&command.input.file)?;
     let table = lines.start(rows)?;
     let record = Record::from_table(&table, &selection)?;
-    print::notes(&record, talk);
+    print::notes(&record, console);
     let reader = RowReader::after(&table, &selection)?;
     let mut live = Live::start(&record, &options)?;
     let mut out = Out::open(&command.out, to_stdout)?;
-    talk.say(|| started(&live));
+    console.note(|| started(&live));
     for warning in &live.start.warnings {
-        talk.say(|| format!("warning: {warning}"));
+        console.note(|| format!("warning: {warning}"));
     }
     let missing = |c: f64| c.is_finite().then_some(c);
     for k in 0..record.len() {
@@ -59,7 +60,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
             Ok(None) => continue,
             Ok(Some(row)) => (row.time_s, row.reading_c),
             Err(error) => {
-                bad.say(&error, talk);
+                bad.say(&error, console);
                 (None, [None, None])
             }
         };
@@ -69,12 +70,12 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
                 &format!(
                     "{source}: line {number}: expected a time shortly after that of the previous row; this row is left out"
                 ),
-                talk,
+                console,
             );
         }
         if let Some(now) = answer.filter(|now| now.is_beyond && !is_beyond) {
             is_beyond = true;
-            talk.say(|| {
+            console.note(|| {
                 format!(
                     "warning: at {} s the time constants may have left the range that is tracked, 0.4 to 2.5 times their \
                      values at the start: restart from there",
@@ -84,7 +85,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
         }
         if let Some(now) = answer.filter(|now| now.widened_by > 1.0 && !is_wider) {
             is_wider = true;
-            talk.say(|| {
+            console.note(|| {
                 format!(
                     "warning: at {} s the readings deviate from their predictions {:.1} times as far as expected: the gas \
                      or a sensor has changed since the start; the bands are widened while this lasts",
@@ -96,7 +97,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, talk: Talk) -> 
             return Ok(0);
         }
     }
-    bad.sum(talk);
+    bad.sum(console);
     Ok(0)
 }
 
@@ -219,16 +220,16 @@ struct Bad {
 }
 
 impl Bad {
-    fn say(&mut self, what: &impl ToString, talk: Talk) {
+    fn say(&mut self, what: &impl ToString, console: Console) {
         self.count += 1;
         if self.count <= SHOWN {
-            talk.say(|| format!("warning: {}", what.to_string()));
+            console.note(|| format!("warning: {}", what.to_string()));
         }
     }
 
-    fn sum(&self, talk: Talk) {
+    fn sum(&self, console: Console) {
         if self.count > SHOWN {
-            talk.say(|| format!("warning: {} rows could not be used", self.count));
+            console.note(|| format!("warning: {} rows could not be used", self.count));
         }
     }
 }

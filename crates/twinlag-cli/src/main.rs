@@ -8,6 +8,7 @@
 mod arguments;
 mod characterise;
 mod compensate;
+mod console;
 mod demo;
 mod diagnose;
 mod failure;
@@ -27,15 +28,15 @@ use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let talk = arguments.talk();
+    let console = arguments.console();
     let result = match arguments.command {
-        Command::Characterise(command) => characterise::run(&command, talk),
-        Command::Diagnose(command) => diagnose::run(&command, talk),
-        Command::Compensate(command) => compensate::run(&command, talk),
-        Command::Simulate(command) => simulate::run(&command, talk),
-        Command::Track(command) => track::run(&command, talk),
-        Command::Study(command) => study::run(&command, talk),
-        Command::Demo(command) => demo::run(&command, talk),
+        Command::Characterise(command) => characterise::run(&command, console),
+        Command::Diagnose(command) => diagnose::run(&command, console),
+        Command::Compensate(command) => compensate::run(&command, console),
+        Command::Simulate(command) => simulate::run(&command, console),
+        Command::Track(command) => track::run(&command, console),
+        Command::Study(command) => study::run(&command, console),
+        Command::Demo(command) => demo::run(&command, console),
     };
     match result {
         Ok(code) => ExitCode::from(code),

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
-use crate::arguments::Talk;
+use crate::console::Console;
 use crate::failure::Failure;
 
 /// A file to be written, and the option that names it.
@@ -50,10 +50,10 @@ pub(crate) fn check_data(
     out: &Path,
     views: &Views<'_>,
     force: bool,
-    talk: Talk,
+    console: Console,
 ) -> Result<bool, Failure> {
     let to_stdout = out == Path::new("-");
-    if to_stdout && talk.json {
+    if to_stdout && console.json {
         return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
     }
     let table = (!to_stdout).then_some(("--out", out));

@@ -11,7 +11,7 @@ use twinlag::{
     Characterisation, Compensation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status, Track,
 };
 
-use crate::arguments::Talk;
+use crate::console::Console;
 use crate::failure::Failure;
 
 /// Prints exactly one JSON object on standard output.
@@ -22,15 +22,15 @@ pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
 }
 
 /// Prints on standard error how the file was read.
-pub(crate) fn notes(record: &Record, talk: Talk) {
-    if !talk.quiet {
+pub(crate) fn notes(record: &Record, console: Console) {
+    if !console.quiet {
         record.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
 }
 
 /// Prints a characterisation, as text or as JSON.
-pub(crate) fn characterisation(answer: &Characterisation, talk: Talk) -> Result<(), Failure> {
-    if talk.json {
+pub(crate) fn characterisation(answer: &Characterisation, console: Console) -> Result<(), Failure> {
+    if console.json {
         return json(answer);
     }
     let text = text(answer);
@@ -99,8 +99,8 @@ fn text(answer: &Characterisation) -> String {
 }
 
 /// Prints a diagnosis, as text or as JSON.
-pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
-    if talk.json {
+pub(crate) fn diagnosis(answer: &Diagnosis, console: Console) -> Result<(), Failure> {
+    if console.json {
         return json(answer);
     }
     let text = diagnosis_text(answer);
@@ -109,11 +109,16 @@ pub(crate) fn diagnosis(answer: &Diagnosis, talk: Talk) -> Result<(), Failure> {
 
 /// Prints a summary of the gas temperature, as text or as JSON. The text goes to standard error if the
 /// table itself goes to standard output.
-pub(crate) fn compensation(answer: &Compensation, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
-    if talk.json {
+pub(crate) fn compensation(
+    answer: &Compensation,
+    out: &Path,
+    to_stdout: bool,
+    console: Console,
+) -> Result<(), Failure> {
+    if console.json {
         return json(answer);
     }
-    about(&compensation_text(answer, out), to_stdout, talk)
+    about(&compensation_text(answer, out), to_stdout, console)
 }
 
 fn compensation_text(answer: &Compensation, out: &Path) -> String {
@@ -157,11 +162,11 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
 
 /// Prints a summary of the time constants along the record, as text or as JSON. The text goes to
 /// standard error if the table itself goes to standard output.
-pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
-    if talk.json {
+pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, console: Console) -> Result<(), Failure> {
+    if console.json {
         return json(answer);
     }
-    about(&track_text(answer, out), to_stdout, talk)
+    about(&track_text(answer, out), to_stdout, console)
 }
 
 fn track_text(answer: &Track, out: &Path) -> String {
@@ -201,11 +206,11 @@ fn track_text(answer: &Track, out: &Path) -> String {
 }
 
 /// Prints a summary of data: on standard output if the data are in a file, else on standard error.
-fn about(text: &str, to_stdout: bool, talk: Talk) -> Result<(), Failure> {
+fn about(text: &str, to_stdout: bool, console: Console) -> Result<(), Failure> {
     if !to_stdout {
         return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
     }
-    if !talk.quiet {
+    if !console.quiet {
         eprint!("{text}");
     }
     Ok(())

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::arguments::Talk;
+use crate::console::Console;
 
 /// Work that takes longer than this shows how far it has come.
 const LONG: Duration = Duration::from_secs(2);
@@ -13,8 +13,8 @@ const LONG: Duration = Duration::from_secs(2);
 pub(crate) struct Progress(Option<(ProgressBar, Instant)>);
 
 impl Progress {
-    pub(crate) fn start(talk: Talk, message: String) -> Self {
-        if talk.quiet {
+    pub(crate) fn start(console: Console, message: String) -> Self {
+        if console.quiet {
             return Self(None);
         }
         let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}").expect("the template is well formed");

@@ -8,14 +8,15 @@ use serde_json::json;
 use twinlag::record::{Decimals, write_csv};
 use twinlag::signal::{Rig, Simulated};
 
-use crate::arguments::{Simulate, Talk};
+use crate::arguments::Simulate;
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 use crate::progress::Progress;
 
-pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
     let to_stdout = command.out == Path::new("-");
-    if to_stdout && talk.json {
+    if to_stdout && console.json {
         return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
     }
     let mut rig = read(&command.spec)?;
@@ -23,7 +24,7 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
         rig = rig.with_seed(seed);
     }
     let record = {
-        let _progress = Progress::start(talk, format!("simulating {} samples", rig.record().samples));
+        let _progress = Progress::start(console, format!("simulating {} samples", rig.record().samples));
         rig.simulate().map_err(|error| Failure::File(format!("{}: {error}", command.spec.display())))?
     };
     if to_stdout {
@@ -40,7 +41,7 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
         })?;
         write(&mut BufWriter::new(file), &record)?;
     }
-    if talk.json {
+    if console.json {
         print::json(&json!({
             "schema": "twinlag.simulation/1",
             "out": command.out,
@@ -49,7 +50,7 @@ pub(crate) fn run(command: &Simulate, talk: Talk) -> Result<u8, Failure> {
             "rig": rig,
             "made_by": {"program": "twinlag", "version": env!("CARGO_PKG_VERSION")},
         }))?;
-    } else if !to_stdout && !talk.quiet {
+    } else if !to_stdout && !console.quiet {
         eprintln!(
             "{}: {} samples, {} s apart",
             command.out.display(),

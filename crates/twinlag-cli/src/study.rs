@@ -15,7 +15,7 @@ use serde_json::json;
 use twinlag_experiment::{Experiment, ExperimentError, Plan, Table, write};
 use twinlag_study::{Options, Shard, Study as _, StudyError};
 
-use crate::arguments::Talk;
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 
@@ -49,10 +49,10 @@ pub(crate) struct Run {
     threads: Option<std::num::NonZeroUsize>,
 }
 
-pub(crate) fn run(command: &Study, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
     match command {
-        Study::Run(run) => start(run, talk),
-        Study::Merge { dir } => merge(dir, talk),
+        Study::Run(run) => start(run, console),
+        Study::Merge { dir } => merge(dir, console),
     }
 }
 
@@ -63,7 +63,7 @@ fn read(path: &Path) -> Result<(Plan, String), Failure> {
     Ok((plan, text))
 }
 
-fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
+fn start(run: &Run, console: Console) -> Result<u8, Failure> {
     let (plan, text) = read(&run.plan)?;
     let experiment = Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", run.plan.display())))?;
     let out = run.out.display();
@@ -91,7 +91,8 @@ fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
         resume: run.resume,
         ..Options::default()
     };
-    let bar = if talk.quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(1) };
+    let bar =
+        if console.quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(1) };
     let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
     bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
     let done = twinlag_study::run(&experiment, &options, |p| {
@@ -102,15 +103,15 @@ fn start(run: &Run, talk: Talk) -> Result<u8, Failure> {
     bar.finish_and_clear();
     done?;
     if run.shard.is_some() {
-        say(talk, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
+        say(console, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
             format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display())
         })?;
         return Ok(0);
     }
-    merge(&run.out, talk)
+    merge(&run.out, console)
 }
 
-fn merge(dir: &Path, talk: Talk) -> Result<u8, Failure> {
+fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     let (plan, _) = read(&dir.join("plan.toml"))?;
     let name = dir.display();
     let entries = fs::read_dir(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
@@ -129,7 +130,7 @@ fn merge(dir: &Path, talk: Talk) -> Result<u8, Failure> {
     let table = Table::of(&experiment, &results)?;
     write(&plan, &table, dir)?;
     let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
-    say(talk, &json!({"schema": "twinlag.study/1", "out": dir, "trials": trials, "rows": table.rows}), || {
+    say(console, &json!({"schema": "twinlag.study/1", "out": dir, "trials": trials, "rows": table.rows}), || {
         format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len())
     })?;
     Ok(0)
@@ -140,11 +141,11 @@ fn is_part(path: &Path) -> bool {
     name.starts_with("part-") && path.extension() == Some(OsStr::new("json"))
 }
 
-fn say(talk: Talk, object: &serde_json::Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
-    if talk.json {
+fn say(console: Console, object: &serde_json::Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
+    if console.json {
         print::json(object)
     } else {
-        if !talk.quiet {
+        if !console.quiet {
             eprintln!("{}", text());
         }
         Ok(())

@@ -3,19 +3,20 @@
 use twinlag::record::{Decimals, write_csv};
 use twinlag::{Status, TrackOptions};
 
-use crate::arguments::{Talk, Track};
+use crate::arguments::Track;
 use crate::characterise::{model, read};
+use crate::console::Console;
 use crate::failure::Failure;
 use crate::live;
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
 
-pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
+pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
-    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, talk)?;
+    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
     if let Some(rows) = command.live {
-        return live::run(command, rows as usize, to_stdout, talk);
+        return live::run(command, rows as usize, to_stdout, console);
     }
     let options = TrackOptions {
         characterise: command.input.method.options()?,
@@ -23,9 +24,9 @@ pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
         window_s: command.window,
     };
     let record = read(&command.input.file, &command.input.columns.selection())?;
-    print::notes(&record, talk);
+    print::notes(&record, console);
     let answer = {
-        let progress = Progress::start(talk, format!("tracking {} samples", record.len()));
+        let progress = Progress::start(console, format!("tracking {} samples", record.len()));
         let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
         twinlag::track(&record, &options, &watch)?
     };
@@ -52,6 +53,6 @@ pub(crate) fn run(command: &Track, talk: Talk) -> Result<u8, Failure> {
         let report = twinlag_pages::track_report(&record, &answer, &output::command_line())?;
         output::write(path, report)?;
     }
-    print::track(&answer, &command.out, to_stdout, talk)?;
+    print::track(&answer, &command.out, to_stdout, console)?;
     Ok(if answer.status == Status::NotIdentifiable { 4 } else { 0 })
 }

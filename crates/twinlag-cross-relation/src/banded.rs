@@ -8,10 +8,10 @@
 use num_dual::{DualNum, DualSVec64};
 
 use crate::inverse::{Row, row};
+use crate::noise_model::Model;
 use crate::parameters::{Pair, parts};
 use crate::polynomial::LONGEST;
 use crate::readings::{Segment, Steps};
-use crate::whitened::Model;
 
 /// Relative difference that rounding makes.
 const SAME: f64 = 4.0 * f64::EPSILON;

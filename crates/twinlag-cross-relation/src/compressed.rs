@@ -13,81 +13,11 @@
 
 use num_dual::DualSVec64;
 
+use crate::bands::NODES;
+use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::spectral::{Sloped, Sums, Weights};
-use crate::transform::{Plan, Transformed};
-use crate::whitened::Model;
-
-/// Points in each band.
-const NODES: usize = 6;
-/// Width of a band in `1 − cos w`.
-const RATIO: f64 = 2.0;
-
-/// How the bins of a segment are gathered. Depends on its length alone.
-pub(crate) struct Bands {
-    bands: Vec<Band>,
-    /// `cos w` at the points of all bands.
-    nodes: Vec<f64>,
-    /// Lagrange's polynomials at the bins of the bands that are interpolated, in order.
-    lagrange: Vec<[f64; NODES]>,
-    /// How many bins each point stands for: Lagrange's polynomials summed.
-    counts: Vec<f64>,
-}
-
-#[derive(Clone, Copy)]
-struct Band {
-    first_bin: usize,
-    bins: usize,
-    first_node: usize,
-    /// Half width in `cos w`; 0 for a band that is a single bin, kept as it is.
-    half_width: f64,
-}
-
-impl Bands {
-    fn new(cosines: &[f64]) -> Self {
-        let mut out = Self { bands: Vec::new(), nodes: Vec::new(), lagrange: Vec::new(), counts: Vec::new() };
-        let mut first_bin = 0;
-        while first_bin < cosines.len() {
-            let edge = RATIO * (1.0 - cosines[first_bin]);
-            let bins = cosines[first_bin..].partition_point(|x| 1.0 - x <= edge).max(1);
-            let first_node = out.nodes.len();
-            if bins <= NODES {
-                out.bands.push(Band { first_bin, bins: 1, first_node, half_width: 0.0 });
-                out.nodes.push(cosines[first_bin]);
-                out.counts.push(1.0);
-                first_bin += 1;
-                continue;
-            }
-            let (high, low) = (cosines[first_bin], cosines[first_bin + bins - 1]);
-            let (middle, half_width) = (0.5 * (high + low), 0.5 * (high - low));
-            let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES as f64;
-            let unit: [f64; NODES] = std::array::from_fn(|q| angle(q).cos());
-            out.nodes.extend(unit.iter().map(|c| middle + half_width * c));
-            out.bands.push(Band { first_bin, bins, first_node, half_width });
-            let mut counts = [0.0; NODES];
-            for x in &cosines[first_bin..first_bin + bins] {
-                let at = (x - middle) / half_width;
-                let lagrange: [f64; NODES] = std::array::from_fn(|q| {
-                    (0..NODES).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
-                });
-                (0..NODES).for_each(|q| counts[q] += lagrange[q]);
-                out.lagrange.push(lagrange);
-            }
-            out.counts.extend(counts);
-            first_bin += bins;
-        }
-        out
-    }
-
-    pub(crate) fn of(plan: &Plan) -> &Self {
-        plan.bands.get_or_init(|| Self::new(&plan.cosines))
-    }
-
-    /// Points `x = cos w` and how many bins each stands for: `Σ_j f(x_j)` over all bins, for an `f` that is smooth in `x`.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.nodes.iter().copied().zip(self.counts.iter().copied())
-    }
-}
+use crate::transform::Transformed;
 
 /// Products of the first `T` series, upper triangle.
 const fn pairs(series: usize) -> usize {
@@ -136,7 +66,7 @@ impl Compressed {
         weights: &Weights<P>,
         sums: &mut Sums<P>,
     ) {
-        let nodes = &Bands::of(&segment.plan).nodes[..];
+        let nodes = &segment.plan.bands().nodes[..];
         let gram: [&[f64]; G] = std::array::from_fn(|g| &self.gram[g][..nodes.len()]);
         let forms = Forms::<P, G>::new(&weights.parts);
         for (j, &x) in nodes.iter().enumerate() {
@@ -175,7 +105,7 @@ impl Compressed {
         weights: &Weights<P>,
         out: &mut [f64; P],
     ) {
-        let bands = Bands::of(&segment.plan);
+        let bands = segment.plan.bands();
         let forms = Forms::<P, G>::new(&weights.parts);
         let beta = &weights.beta;
         for band in bands.bands.iter().filter(|b| b.half_width > 0.0) {
@@ -204,7 +134,7 @@ impl Compressed {
 
 /// `G` sums over the bins at each point, for the products of `T` series.
 fn gather<const T: usize, const G: usize>(segment: &Transformed) -> Vec<Vec<f64>> {
-    let bands = Bands::of(&segment.plan);
+    let bands = segment.plan.bands();
     let all = segment.parts();
     let n = segment.len();
     let series: [&[f64]; T] = std::array::from_fn(|i| &all[i][..n]);

@@ -5,9 +5,9 @@ use twinlag_sensor::Discretisation;
 
 use crate::error::CostError;
 use crate::inverse::{has_inverse, row};
+use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::readings::{Readings, Steps};
-use crate::whitened::Model;
 
 /// What each sensor implies of the gas, behind one common filter: `f_i[k] = Σ_j filter_i[j] y_i[k+j]`.
 ///

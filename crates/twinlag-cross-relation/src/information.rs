@@ -14,7 +14,6 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use rustdct::DctPlanner;
 
-use crate::compressed::Bands;
 use crate::inverse::row;
 use crate::parameters::{Pair, parts};
 use crate::sandwich::{inverse, sandwich};
@@ -162,7 +161,7 @@ impl Whitened<'_> {
         let variance = self.model().white_variance();
         let (mut first, mut all) = (0.0, 0.0);
         for segment in self.readings().segments() {
-            for (cosine, bins) in Bands::of(&Plan::of(segment.len())).points() {
+            for (cosine, bins) in Plan::of(segment.len()).bands().points() {
                 let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
                 let power = |i: usize| {
                     let taps = row.noise[i].as_slice().iter().rev();
@@ -185,7 +184,7 @@ impl Whitened<'_> {
         let mut out = [[0.0; P]; P];
         for segment in self.readings().segments() {
             let plan = Plan::of(segment.len());
-            for (cosine, bins) in Bands::of(&plan).points() {
+            for (cosine, bins) in plan.bands().points() {
                 let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
                 let at = |c: &[(f64, [f64; P])]| {
                     let mut power = Complex::new(1.0, 0.0);

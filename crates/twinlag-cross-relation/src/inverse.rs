@@ -13,9 +13,9 @@
 use num_dual::{DualNum, DualSVec64};
 use twinlag_sensor::Discretisation;
 
+use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::polynomial::Polynomial;
-use crate::whitened::Model;
 
 /// The filters of `u[k] = Σ_j d1[j] y1[k+j] − Σ_j d2[j] (y2[k+j] − o)`, the gain of channel 2 inside `d2`, and those that the
 /// white noise of each channel passes on its way into `u`. Oldest sample first; both `data` filters are equally long.

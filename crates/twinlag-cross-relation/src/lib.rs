@@ -27,6 +27,7 @@
 //! ```
 
 mod banded;
+mod bands;
 mod compressed;
 mod difference_equation;
 mod error;
@@ -34,6 +35,7 @@ mod free_gains;
 mod inferred;
 mod information;
 mod inverse;
+mod noise_model;
 mod parameters;
 mod polynomial;
 mod published;

@@ -9,9 +9,9 @@
 use num_dual::{DualNum, DualSVec64};
 
 use crate::inverse::row;
+use crate::noise_model::Model;
 use crate::parameters::{Pair, parts};
 use crate::transform::Transformed;
-use crate::whitened::Model;
 
 /// Sums of squares and products over the bins: value, gradient and Gauss-Newton matrix of `Σ r²/2`.
 #[derive(Clone, Copy, Debug)]

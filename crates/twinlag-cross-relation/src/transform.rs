@@ -16,7 +16,7 @@ use std::sync::{Arc, OnceLock};
 use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use crate::compressed::Bands;
+use crate::bands::Bands;
 use crate::readings::{Segment, Steps};
 
 /// Lengths whose plans are kept by each thread.
@@ -32,7 +32,7 @@ pub(crate) struct Plan {
     /// The transform of ones.
     ones: OnceLock<Vec<f64>>,
     /// How bins are gathered into bands.
-    pub(crate) bands: OnceLock<Bands>,
+    bands: OnceLock<Bands>,
 }
 
 impl std::fmt::Debug for Plan {
@@ -62,6 +62,11 @@ impl Plan {
         let angles = (1..samples).map(|j| std::f64::consts::PI * j as f64 / samples as f64);
         let (sines, cosines) = angles.map(f64::sin_cos).unzip();
         Self { samples, fourier, cosines, sines, ones: OnceLock::new(), bands: OnceLock::new() }
+    }
+
+    /// How the bins are gathered into bands.
+    pub(crate) fn bands(&self) -> &Bands {
+        self.bands.get_or_init(|| Bands::new(&self.cosines))
     }
 
     fn scale(&self) -> f64 {

@@ -12,6 +12,7 @@ use crate::banded;
 use crate::compressed::Compressed;
 use crate::error::CostError;
 use crate::inverse::{has_inverse, is_one_step, row};
+use crate::noise_model::{Model, check_autoregression, check_noise};
 use crate::parameters::{CostValue, Pair, parts};
 use crate::readings::{Readings, Steps};
 use crate::sandwich::inverse;
@@ -29,45 +30,6 @@ pub enum Form {
     /// The spectral form with its bins gathered into bands: about a hundred terms for records of any length, at a known error
     /// ([`Whitened::shift_bound`]). For what the spectral form takes.
     Compressed,
-}
-
-/// What is taken for granted: hold and noise.
-#[derive(Clone, Debug)]
-pub(crate) struct Model {
-    pub(crate) hold: Discretisation,
-    noise_std: [f64; 2],
-    /// `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]`, for each channel; empty for white noise.
-    autoregression: [Vec<f64>; 2],
-}
-
-impl Model {
-    pub(crate) fn white(hold: Discretisation, noise_std: [f64; 2]) -> Self {
-        Self { hold, noise_std, autoregression: [Vec::new(), Vec::new()] }
-    }
-
-    pub(crate) fn is_white(&self) -> bool {
-        self.autoregression.iter().all(Vec::is_empty)
-    }
-
-    /// Variance of `e`.
-    pub(crate) fn white_variance(&self) -> [f64; 2] {
-        [0, 1].map(|i| {
-            let variance = self.noise_std[i] * self.noise_std[i];
-            match self.autoregression[i][..] {
-                [] => variance,
-                [phi] => variance * (1.0 - phi * phi),
-                [first, second, ..] => {
-                    let rest = 1.0 - second;
-                    variance * (1.0 + second) * (rest * rest - first * first) / rest
-                }
-            }
-        })
-    }
-
-    /// Coefficients of `e = Φ n`: `1, −φ1, −φ2`.
-    pub(crate) fn whitener(&self, channel: usize) -> impl Iterator<Item = f64> {
-        std::iter::once(1.0).chain(self.autoregression[channel].iter().map(|phi| -phi))
-    }
 }
 
 /// Sum of squares of the exactly whitened disagreement of two sensors.
@@ -175,15 +137,7 @@ impl<'a> Whitened<'a> {
     /// [`CostError::Autoregression`] for an order above 2 or noise that is not stationary,
     /// [`CostError::HoldNeedsEvenSampling`] for uneven steps.
     pub fn with_autoregression(mut self, autoregression: [Vec<f64>; 2]) -> Result<Self, CostError> {
-        let is_stationary = |phi: &[f64]| match *phi {
-            [] => true,
-            [phi] => phi.abs() < 1.0,
-            [first, second] => second.abs() < 1.0 && first.abs() < 1.0 - second,
-            _ => false,
-        };
-        if let Some(bad) = autoregression.iter().find(|phi| !is_stationary(phi)) {
-            return Err(CostError::Autoregression { coefficients: bad.clone() });
-        }
+        check_autoregression(&autoregression)?;
         if self.readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_))) {
             return Err(CostError::HoldNeedsEvenSampling);
         }
@@ -331,12 +285,5 @@ impl<'a> Whitened<'a> {
 
     pub(crate) fn model(&self) -> &Model {
         &self.model
-    }
-}
-
-fn check_noise(noise_std: [f64; 2]) -> Result<(), CostError> {
-    match noise_std.iter().find(|s| !(s.is_finite() && **s > 0.0)) {
-        Some(&value) => Err(CostError::NotPositive { name: "noise standard deviation", value }),
-        None => Ok(()),
     }
 }

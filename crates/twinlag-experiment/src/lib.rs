@@ -46,9 +46,9 @@ mod table;
 mod trial;
 
 pub use error::ExperimentError;
-pub use picture::{Drawn, PictureSpec};
-pub use plan::{Bench, Cell, Method, NamedGas, NoiseOf, OptimiserChoice, Plan, Start, Told};
+pub use plan::{
+    Bench, Cell, Drawn, Method, NamedGas, NoiseOf, OptimiserChoice, PictureSpec, Plan, Start, SummarySpec, Told,
+};
 pub use store::write;
-pub use summary::SummarySpec;
 pub use table::{Row, Table};
 pub use trial::{Experiment, Own, Scratch};

@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 use twinlag_study::{Results, Tally, Values};
 
 use crate::error::ExperimentError;
-use crate::plan::{Cell, Plan};
-use crate::trial::{Experiment, quantities};
+use crate::plan::{Cell, LABELS, Plan};
+use crate::trial::Experiment;
 
 /// Significant digits of the numbers in tables.
 const DIGITS: i32 = 7;
@@ -106,7 +106,7 @@ impl Table {
             for (column, value) in ours {
                 let expected = theirs.get(column);
                 if expected != Some(value) {
-                    let label: Vec<String> = ours.iter().take(LABELS).map(|(k, v)| format!("{k} {v}")).collect();
+                    let label: Vec<String> = ours.iter().take(LABELS.len()).map(|(k, v)| format!("{k} {v}")).collect();
                     let expected = expected.unwrap_or(&Value::Null);
                     return Some(format!(
                         "{column} is {value}, the stored table has {expected}, at {}",
@@ -119,40 +119,6 @@ impl Table {
             .then(|| format!("there are {} rows, the stored table has {}", self.rows.len(), other.rows.len()))
     }
 }
-
-/// The columns of the table of `plan`.
-pub(crate) fn columns(plan: &Plan) -> Vec<String> {
-    let mut row = plan.cells().first().map(|cell| labels(plan, cell)).unwrap_or_default();
-    row.insert("method".into(), Value::Null);
-    row.insert("sensor".into(), Value::Null);
-    let method = plan.methods.first().map_or("", |m| m.name.as_str());
-    statistics(&mut row, method, 0, &Tally::new(&quantities(method)), None);
-    row.keys().cloned().collect()
-}
-
-/// Refuses a name that a plan gives to a file, a column or a method, and that is none.
-pub(crate) fn check_names<'n>(
-    plan: &Plan,
-    known: &[String],
-    file: &str,
-    columns: impl IntoIterator<Item = &'n String>,
-    methods: &[String],
-) -> Result<(), ExperimentError> {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-    if file.is_empty() || !file.chars().all(is_plain) {
-        return Err(ExperimentError::Plan(format!("\"{file}\" is no file name: letters, digits, - and _")));
-    }
-    if let Some(column) = columns.into_iter().find(|c| !known.contains(c)) {
-        return Err(ExperimentError::NoColumn { name: file.into(), column: column.clone() });
-    }
-    match methods.iter().find(|m| plan.methods.iter().all(|own| own.name != **m)) {
-        Some(method) => Err(ExperimentError::Plan(format!("{file}: there is no method called \"{method}\""))),
-        None => Ok(()),
-    }
-}
-
-/// Columns that say which row it is.
-const LABELS: usize = 11;
 
 fn labels(plan: &Plan, cell: &Cell) -> Row {
     let mut row = Row::new();
@@ -225,4 +191,32 @@ fn statistics(row: &mut Row, method: &str, sensor: usize, tally: &Tally, bound: 
     put("level_bias_percent", percent(&|v| v.moments().mean(), values(own("level-error"))));
     put("level_std_percent", percent(&|v| v.moments().standard_deviation(), values(own("level-error"))));
     put("evaluations", tally.values(&format!("{method}/evaluations")).and_then(|v| v.moments().mean()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::COLUMNS;
+    use crate::trial::quantities;
+
+    /// A plan is checked against the list of columns before there is a table.
+    #[test]
+    fn a_row_has_the_columns_that_plans_may_name() {
+        let text = r#"
+            name = "columns"
+            title = "no trial is run"
+            seed = 1
+            trials = 1
+            noise_percent = [10]
+            gases = [{ name = "sine", gas = { kind = "sine", mean_c = 50.0, amplitude_k = 10.0, frequency_hz = 10.0 } }]
+            methods = [{ name = "whitened", estimator = "whitened" }]
+        "#;
+        let plan = Plan::from_toml(text).expect("a plan");
+        let mut row = labels(&plan, &plan.cells()[0]);
+        row.insert("method".into(), Value::Null);
+        row.insert("sensor".into(), Value::Null);
+        statistics(&mut row, "whitened", 0, &Tally::new(&quantities("whitened")), None);
+        let columns: Vec<&str> = row.keys().map(String::as_str).collect();
+        assert_eq!(columns, LABELS.into_iter().chain(COLUMNS).collect::<Vec<_>>());
+    }
 }

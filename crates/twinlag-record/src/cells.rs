@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use crate::dialect::Delimiter;
+use crate::sign::Delimiter;
 
 /// Lines of a text with their numbers, from 1; ends are LF, CR LF or, if the text has no LF at all, CR.
 pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {

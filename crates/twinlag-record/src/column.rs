@@ -1,8 +1,8 @@
 //! One column of a table: numbers, and whatever else its cells hold.
 
 use crate::clock;
-use crate::dialect::Decimal;
 use crate::number::{self, Value};
+use crate::sign::Decimal;
 use crate::unit::Unit;
 
 /// What the cells of a column are for the most part.

@@ -8,7 +8,7 @@ use jiff::Timestamp;
 
 use crate::RecordError;
 use crate::column::Column;
-use crate::dialect::Decimal;
+use crate::sign::Decimal;
 use crate::table::{Places, Table};
 use crate::unit::Unit;
 

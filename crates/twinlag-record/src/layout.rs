@@ -7,7 +7,8 @@ use std::borrow::Cow;
 
 use crate::RecordError;
 use crate::cells::{is_idle, lines, lines_from_end, split, uncommented};
-use crate::dialect::{Delimiter, Look, look, sniff_delimiter};
+use crate::dialect::{Look, look, sniff_delimiter};
+use crate::sign::Delimiter;
 use crate::unit::Unit;
 
 /// The layout of a file.

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use crate::Place;
-use crate::dialect::{Decimal, Delimiter};
 use crate::sampling::{Sampling, SamplingKind};
+use crate::sign::{Decimal, Delimiter};
 use crate::wording::{Counted, brief};
 
 /// Stamps closer to even spacing than this part of the period are called uniform without further numbers.

@@ -1,6 +1,6 @@
 //! What one cell says: a number, a word for a missing one, or something else.
 
-use crate::dialect::Decimal;
+use crate::sign::Decimal;
 
 /// The content of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use crate::cells::{is_idle, split};
 use crate::choose::choose;
 use crate::column::Kind;
-use crate::dialect::{Decimal, Delimiter};
 use crate::note::Note;
 use crate::number::{self, Value};
 use crate::record::{ABSOLUTE_ZERO_C, HOTTEST_C};
 use crate::selection::Selection;
+use crate::sign::{Decimal, Delimiter};
 use crate::table::{Table, shortened};
 use crate::time_axis::{TimeColumns, seconds};
 use crate::unit::Unit;

@@ -6,10 +6,11 @@ use std::path::Path;
 
 use crate::cells::{is_idle, lines, lines_from_end, split};
 use crate::column::{Column, Kind};
-use crate::dialect::{Decimal, Delimiter, Evidence, Unclear};
+use crate::dialect::{Evidence, Unclear};
 use crate::layout::Layout;
 use crate::note::Note;
 use crate::selection::ColumnRef;
+use crate::sign::{Decimal, Delimiter};
 use crate::{Place, RecordError, encoding};
 
 /// Delimited text as loggers write it, taken apart: columns of numbers, of date-times, of text.

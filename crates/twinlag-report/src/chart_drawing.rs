@@ -1,10 +1,11 @@
 //! How a chart is drawn: data to pixels, a place for the legend and for the labels of reference lines.
 
+use crate::axes::{draw_axes, draw_grid, rulers};
 use crate::axis::Ruler;
 use crate::canvas::{Anchor, Canvas, Frame, INK, Ink, Outline, Text, text_width};
 use crate::chart::{Chart, Series, Shape};
 use crate::decimate::decimate;
-use crate::figure::{Styles, draw_axes, draw_grid, rulers};
+use crate::styles::Styles;
 
 const LEGEND_SIZE: u32 = 12;
 const ROW_PX: f64 = 17.0;

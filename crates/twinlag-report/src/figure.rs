@@ -1,20 +1,17 @@
 //! Figures: panels in a grid, laid out so that axes align, and written as SVG.
 
 use crate::ReportError;
-use crate::axis::{Axis, Ruler, Spacing, TICK_SIZE, Tick};
-use crate::canvas::{Anchor, Canvas, Frame, GRID, INK, Ink, Text, text_width};
+use crate::axes::{TICK_LINE_PX, x_lines};
+use crate::axis::{Spacing, TICK_SIZE};
+use crate::canvas::{Anchor, Canvas, Frame, Text, text_width};
 use crate::chart::Chart;
 use crate::chart_drawing::{Legend, draw_chart};
-use crate::palette::{CYCLE, Colour};
+use crate::styles::Styles;
 use crate::surface::Surface;
 use crate::surface_drawing::{bar_width, draw_surface};
 
-/// Size of axis labels.
-pub(crate) const LABEL_SIZE: u32 = 13;
 const TITLE_SIZE: u32 = 14;
 const FIGURE_TITLE_SIZE: u32 = 17;
-/// Height of a line of tick labels.
-const LINE_PX: f64 = 14.0;
 
 /// A panel of a figure: a [`Chart`] or a [`Surface`].
 #[derive(Clone, Debug, PartialEq)]
@@ -24,6 +21,16 @@ pub struct Panel(Kind);
 enum Kind {
     Chart(Chart),
     Surface(Surface),
+}
+
+impl Panel {
+    /// The names of its series, if it is a chart.
+    fn series_names(&self) -> Option<Vec<&str>> {
+        match &self.0 {
+            Kind::Chart(chart) => Some(chart.series.iter().map(|s| s.name.as_str()).collect()),
+            Kind::Surface(_) => None,
+        }
+    }
 }
 
 impl From<Chart> for Panel {
@@ -84,7 +91,8 @@ impl Figure {
         if !(160.0..=1e4).contains(&width_px) || !(120.0..=1e4).contains(&height_px) {
             return Err(ReportError::PanelSize { width_px, height_px });
         }
-        let styles = Styles::new(&self.panels);
+        let names = self.panels.iter().filter_map(Panel::series_names);
+        let styles = Styles::new(&names.collect::<Vec<_>>());
         let columns = match self.columns {
             0 => (self.panels.len() as f64).sqrt().ceil().min(3.0) as usize,
             n => n.min(self.panels.len()),
@@ -167,38 +175,6 @@ impl Kind {
     }
 }
 
-/// Colour and marker of each name, by a number: the least that no series has with which the name shares a panel. So names
-/// that never meet may share a colour, and a figure of many panels does not run out of them.
-pub(crate) struct Styles(Vec<(String, usize)>);
-
-impl Styles {
-    fn new(panels: &[Panel]) -> Self {
-        let charts: Vec<Vec<&str>> = panels
-            .iter()
-            .filter_map(|panel| match &panel.0 {
-                Kind::Chart(chart) => Some(chart.series.iter().map(|s| s.name.as_str()).collect()),
-                Kind::Surface(_) => None,
-            })
-            .collect();
-        let mut given: Vec<(String, usize)> = Vec::new();
-        for &name in charts.iter().flatten() {
-            if given.iter().any(|(n, _)| n == name) {
-                continue;
-            }
-            let meets = |other: &str| charts.iter().any(|c| c.contains(&name) && c.contains(&other));
-            let taken: Vec<usize> = given.iter().filter(|(n, _)| meets(n)).map(|(_, k)| *k).collect();
-            let free = (0..=taken.len()).find(|k| !taken.contains(k)).unwrap_or(taken.len());
-            given.push((name.to_owned(), free));
-        }
-        Self(given)
-    }
-
-    pub(crate) fn of(&self, name: &str, own: Option<Colour>) -> (Colour, usize) {
-        let index = self.0.iter().find(|(n, _)| n == name).map_or(0, |(_, k)| *k);
-        (own.unwrap_or(CYCLE[index % CYCLE.len()]), index)
-    }
-}
-
 /// Room around the axes of a panel, in pixels.
 #[derive(Clone, Copy, Debug)]
 struct Margins {
@@ -241,7 +217,7 @@ impl Plan {
         };
         let x_ticks = x.ticks(limits[0], Spacing::Across(width - left - right));
         let lines = x_ticks.iter().map(|t| x_lines(x, t, limits[0], width - left - right).len()).max().unwrap_or(1);
-        let bottom = 14.0 + LINE_PX * lines as f64 + if x.label().is_empty() { 0.0 } else { 22.0 };
+        let bottom = 14.0 + TICK_LINE_PX * lines as f64 + if x.label().is_empty() { 0.0 } else { 22.0 };
         let mut margins = Margins { left, right, top: 28.0, bottom };
         let mut legend_above = false;
         if let Kind::Chart(chart) = kind {
@@ -253,98 +229,5 @@ impl Plan {
             }
         }
         Ok(Self { limits, value_limits, margins, legend_above })
-    }
-}
-
-/// The label of a tick below the axis; names of categories are broken at spaces to fit their places.
-fn x_lines(axis: &Axis, tick: &Tick, (low, high): (f64, f64), width: f64) -> Vec<String> {
-    if !axis.has_categories() {
-        return vec![tick.label.clone()];
-    }
-    let room = width / (high - low) - 6.0;
-    let mut lines: Vec<String> = Vec::new();
-    // A word too long for its place is broken after its hyphens.
-    let words = tick.label.split_whitespace().flat_map(|word| {
-        let broken = text_width(word, TICK_SIZE) > room;
-        word.split_inclusive(move |c| broken && c == '-')
-    });
-    for word in words {
-        match lines.last_mut() {
-            Some(line) if !line.ends_with('-') && text_width(&format!("{line} {word}"), TICK_SIZE) <= room => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
-}
-
-/// The rulers of a frame.
-pub(crate) fn rulers([x, y]: [&Axis; 2], limits: [(f64, f64); 2], frame: &Frame) -> [Ruler; 2] {
-    [Ruler::new(x, limits[0], frame.left, frame.right), Ruler::new(y, limits[1], frame.bottom, frame.top)]
-}
-
-/// Grid lines, to be drawn before the data.
-pub(crate) fn draw_grid(canvas: &mut Canvas, axes: [&Axis; 2], limits: [(f64, f64); 2], frame: &Frame) {
-    let [rx, ry] = rulers(axes, limits, frame);
-    let mut outline = crate::canvas::Outline::default();
-    if !axes[0].has_categories() {
-        for tick in axes[0].ticks(limits[0], Spacing::Across(frame.width())).iter().filter(|t| !t.label.is_empty()) {
-            let x = crisp(rx.px(tick.value));
-            outline.line(&[(x, frame.top), (x, frame.bottom)]);
-        }
-    }
-    for tick in axes[1].ticks(limits[1], Spacing::Down(frame.height())).iter().filter(|t| !t.label.is_empty()) {
-        let y = crisp(ry.px(tick.value));
-        outline.line(&[(frame.left, y), (frame.right, y)]);
-    }
-    canvas.draw(&outline, Ink::stroke(GRID, 1.0));
-}
-
-/// The middle of a pixel, where a thin line is sharp.
-fn crisp(px: f64) -> f64 {
-    px.floor() + 0.5
-}
-
-/// The box, ticks and labels, to be drawn after the data.
-pub(crate) fn draw_axes(canvas: &mut Canvas, axes: [&Axis; 2], limits: [(f64, f64); 2], frame: &Frame) {
-    let [rx, ry] = rulers(axes, limits, frame);
-    let mut outline = crate::canvas::Outline::default();
-    let length = |tick: &Tick| if tick.label.is_empty() { 3.0 } else { 5.0 };
-    let mut lines = 1;
-    for tick in axes[0].ticks(limits[0], Spacing::Across(frame.width())) {
-        let x = crisp(rx.px(tick.value));
-        if !axes[0].has_categories() {
-            outline.line(&[(x, frame.bottom), (x, frame.bottom + length(&tick))]);
-        }
-        let text = x_lines(axes[0], &tick, limits[0], frame.width());
-        lines = lines.max(text.len());
-        for (k, line) in text.iter().enumerate().filter(|(_, line)| !line.is_empty()) {
-            let y = frame.bottom + 18.0 + LINE_PX * k as f64;
-            canvas.text((x, y), line, Text::new(TICK_SIZE, Anchor::Middle));
-        }
-    }
-    let mut widest = 0.0_f64;
-    for tick in axes[1].ticks(limits[1], Spacing::Down(frame.height())) {
-        let y = crisp(ry.px(tick.value));
-        outline.line(&[(frame.left - length(&tick), y), (frame.left, y)]);
-        if !tick.label.is_empty() {
-            widest = widest.max(text_width(&tick.label, TICK_SIZE));
-            canvas.text((frame.left - 8.0, y + 4.0), &tick.label, Text::new(TICK_SIZE, Anchor::End));
-        }
-    }
-    canvas.draw(&outline, Ink::stroke(INK, 1.0));
-    let edge =
-        Frame { left: frame.left + 0.5, top: frame.top + 0.5, right: frame.right + 0.5, bottom: frame.bottom + 0.5 };
-    canvas.frame(&edge, Ink::stroke(INK, 1.0));
-    let label = Text::new(LABEL_SIZE, Anchor::Middle);
-    if !axes[0].label().is_empty() {
-        let y = frame.bottom + 24.0 + LINE_PX * lines as f64;
-        canvas.text((f64::midpoint(frame.left, frame.right), y), axes[0].label(), label);
-    }
-    if !axes[1].label().is_empty() {
-        let x = frame.left - 16.0 - widest;
-        canvas.text((x, f64::midpoint(frame.top, frame.bottom)), axes[1].label(), label.upwards());
     }
 }

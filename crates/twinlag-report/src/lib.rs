@@ -30,6 +30,7 @@
 //! # Ok::<(), twinlag_report::ReportError>(())
 //! ```
 
+mod axes;
 mod axis;
 mod canvas;
 mod chart;
@@ -41,6 +42,7 @@ mod error;
 mod figure;
 mod number;
 mod palette;
+mod styles;
 mod surface;
 mod surface_drawing;
 

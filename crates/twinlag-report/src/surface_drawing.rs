@@ -1,9 +1,9 @@
 //! How a surface is drawn: shades, contour lines, marks, colour bar.
 
+use crate::axes::{LABEL_SIZE, draw_axes, rulers};
 use crate::axis::{Axis, Ruler, Spacing, TICK_SIZE};
 use crate::canvas::{Anchor, Canvas, Frame, INK, Ink, Outline, Text, heat, text_width};
 use crate::contour::contour;
-use crate::figure::{LABEL_SIZE, draw_axes, rulers};
 use crate::palette::Colour;
 use crate::surface::Surface;
 

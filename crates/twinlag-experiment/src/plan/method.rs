@@ -1,0 +1,103 @@
+//! An estimator with all that a plan gives it.
+
+use serde::{Deserialize, Serialize};
+use twinlag::NoiseColour;
+use twinlag::estimate::NoiseKnowledge;
+use twinlag::optimise::Optimiser;
+use twinlag::sensor::Discretisation;
+
+/// What a method is told of the noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Told {
+    /// Both levels and the colour.
+    #[default]
+    Known,
+    /// Nothing; white noise is supposed.
+    Found,
+    /// Nothing; autoregressive noise is supposed.
+    FoundAutoregressive,
+    /// The ratio of the levels.
+    Ratio,
+}
+
+/// Where a method starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// Where it thinks best.
+    #[default]
+    Own,
+    /// At these time constants, s.
+    At([f64; 2]),
+    /// Trial `i` at point `i` of the plan's grid, round and round.
+    Grid,
+}
+
+/// An estimator with all that it is given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
+    /// Name in tables and pictures.
+    pub name: String,
+    /// The estimator, by name: one of the family, or one that the experiment is given.
+    pub estimator: String,
+    /// The optimiser: its name, or its name with options; or the name of one that the experiment is given.
+    #[serde(default)]
+    pub optimiser: OptimiserChoice,
+    /// What it is told of the noise.
+    #[serde(default)]
+    pub noise: Told,
+    /// The levels that it is told are the true ones with their *variances* times these.
+    #[serde(default = "default_factor")]
+    pub variance_factor: [f64; 2],
+    /// Where it starts.
+    #[serde(default)]
+    pub start: Start,
+    /// What it takes the gas to do between samples.
+    #[serde(default)]
+    pub hold: Discretisation,
+    /// Samples that it discards, if it does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub discard: Option<usize>,
+    /// Whether its intervals are wanted.
+    #[serde(default)]
+    pub intervals: bool,
+}
+
+fn default_factor() -> [f64; 2] {
+    [1.0; 2]
+}
+
+/// An optimiser by name, or with options of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum OptimiserChoice {
+    /// By name; one of the registry has its default options.
+    Named(String),
+    /// With options.
+    WithOptions(Optimiser),
+}
+
+impl Default for OptimiserChoice {
+    fn default() -> Self {
+        Self::WithOptions(Optimiser::default())
+    }
+}
+
+impl Method {
+    /// What this method is told of noise that is `std_k` and `ar1`. Noise of zero is told as next to nothing, for the sake of
+    /// weights.
+    pub(crate) fn told(&self, std_k: [f64; 2], ar1: f64) -> NoiseKnowledge {
+        let least = 1e-6;
+        match self.noise {
+            Told::Known => {
+                let stated = |i: usize| (std_k[i] * self.variance_factor[i].sqrt()).max(least);
+                NoiseKnowledge::Known { std_k: [stated(0), stated(1)], ar1: [ar1; 2] }
+            }
+            Told::Found => NoiseKnowledge::Found(NoiseColour::White),
+            Told::FoundAutoregressive => NoiseKnowledge::Found(NoiseColour::Autoregressive),
+            Told::Ratio => NoiseKnowledge::Ratio(if std_k[0] > 0.0 { std_k[1] / std_k[0] } else { 1.0 }),
+        }
+    }
+}
