@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use thiserror::Error;
+use twinlag::estimate::EstimateError;
 use twinlag::optimise::ProblemError;
 use twinlag::signal::SignalError;
 use twinlag_report::ReportError;
@@ -14,7 +15,7 @@ pub enum ExperimentError {
     #[error("the plan: {0}")]
     Plan(String),
     #[error(transparent)]
-    Estimate(#[from] twinlag::Error),
+    Estimate(#[from] EstimateError),
     #[error(transparent)]
     Optimiser(#[from] ProblemError),
     #[error(transparent)]

@@ -2,7 +2,7 @@
 
 use twinlag::Estimator;
 use twinlag::cross_relation::{CostError, Readings, Segment, Steps, Whitened};
-use twinlag::estimate::{Estimate, Task};
+use twinlag::estimate::{Estimate, EstimateError, Task};
 use twinlag::optimise::{Budget, End, Fit, Minimiser, Optimiser, Problem, ProblemError};
 use twinlag::signal::Clean;
 use twinlag_study::{Failure, Outcome, Quantity, Study};
@@ -62,7 +62,7 @@ impl Estimate for Borrowed<'_> {
         self.0.assumes()
     }
 
-    fn estimate(&self, task: &Task<'_>) -> Result<twinlag::estimate::Outcome, twinlag::Error> {
+    fn estimate(&self, task: &Task<'_>) -> Result<twinlag::estimate::Outcome, EstimateError> {
         self.0.estimate(task)
     }
 }
@@ -142,12 +142,12 @@ impl<'a> Experiment<'a> {
             return Ok(None);
         }
         let clean = bench.rig.clean(0)?;
-        let readings = readings(&clean.readings_c[0], &clean.readings_c[1], cell).map_err(twinlag::Error::from)?;
+        let readings = readings(&clean.readings_c[0], &clean.readings_c[1], cell).map_err(EstimateError::from)?;
         let hold = self.plan.methods[0].hold;
-        let mut cost = Whitened::new(&readings, hold, bench.noise_std_k).map_err(twinlag::Error::from)?;
+        let mut cost = Whitened::new(&readings, hold, bench.noise_std_k).map_err(EstimateError::from)?;
         if cell.noise_ar1 != 0.0 {
             cost =
-                cost.with_autoregression([vec![cell.noise_ar1], vec![cell.noise_ar1]]).map_err(twinlag::Error::from)?;
+                cost.with_autoregression([vec![cell.noise_ar1], vec![cell.noise_ar1]]).map_err(EstimateError::from)?;
         }
         let covariance = cost.cramer_rao(&cell.tau_s, &[0, 1]);
         Ok(covariance.map(|c| [0, 1].map(|i| c[i][i].sqrt() / cell.tau_s[i])))
@@ -240,7 +240,7 @@ impl Study for Experiment<'_> {
             task.intervals = method.intervals;
             let at = m * COUNT;
             let found = match self.estimators[m].estimate(&task) {
-                Err(twinlag::Error::Cost(CostError::Singular)) => {
+                Err(EstimateError::Cost(CostError::Singular)) => {
                     (10..13).for_each(|event| out.event(at + event, false));
                     continue;
                 }

@@ -2,11 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
+use twinlag_estimate::{IntervalBasis, NoiseSource};
 use twinlag_optimise::Fit;
 use twinlag_record::Sampling;
 
-use crate::estimate::IntervalBasis;
-use crate::levels::NoiseSource;
 use crate::options::Options;
 
 /// Whether there is an answer.

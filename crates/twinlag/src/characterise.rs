@@ -1,13 +1,14 @@
 //! The question that a record is asked first: both time constants.
 
 use twinlag_cross_relation::{Parameter, Readings, Segment, Steps};
+use twinlag_estimate::{Bootstrap, Estimator, Intervals, Known, Levels, NoiseColour};
 use twinlag_record::{Record, SamplingKind};
 
 use crate::characterisation::Characterisation;
 use crate::error::Error;
-use crate::levels::{Levels, NoiseColour};
-use crate::options::{Estimator, Intervals, Known, Options};
+use crate::options::Options;
 use crate::question::{Question, Watch};
+use crate::quiet;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
@@ -27,7 +28,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     check(options)?;
     let readings = readings(record, options)?;
     check_sampling(&readings, options)?;
-    let levels = Levels::of(record, &readings, options)?;
+    let levels = levels(record, &readings, options)?;
     if options.has_second_lag() != [false; 2] {
         Question::<6>::new(record, &readings, options, levels, watch).answer()
     } else if options.calibrates() {
@@ -57,6 +58,21 @@ pub fn readings(record: &Record, options: &Options) -> Result<Readings, Error> {
         Readings::about(segments, 0.0)?
     } else {
         Readings::new(segments)?
+    })
+}
+
+/// Levels that are given come first, then those of quiet segments, then a ratio, then what the whole record shows.
+fn levels(record: &Record, readings: &Readings, options: &Options) -> Result<Levels, Error> {
+    if let Some(std_k) = options.noise_std_k {
+        return Ok(Levels::given(std_k, [0.0; 2]));
+    }
+    if !options.quiet_segments_s.is_empty() {
+        let runs = quiet::runs(record, &options.quiet_segments_s)?;
+        return Ok(Levels::from_differences(readings)?.at_rest(&runs, options.noise_colour));
+    }
+    Ok(match options.noise_ratio {
+        Some(ratio) => Levels::of_ratio(readings, ratio)?,
+        None => Levels::from_differences(readings)?,
     })
 }
 
@@ -182,7 +198,13 @@ fn check_estimator(options: &Options) -> Result<(), Error> {
             Err(Error::WhitenedOnly { what: "--intervals profile", estimator: name.into() })
         }
         Intervals::Bootstrap(bootstrap) => {
-            bootstrap.check()?;
+            if bootstrap.replicates < Bootstrap::MIN_REPLICATES {
+                return Err(Error::Option {
+                    option: "--replicates",
+                    expected: format!("at least {}", Bootstrap::MIN_REPLICATES),
+                    got: bootstrap.replicates.to_string(),
+                });
+            }
             if options.calibrates() || !options.known.is_empty() {
                 return Err(Error::Option {
                     option: "--intervals",

@@ -13,7 +13,7 @@ use twinlag_record::Record;
 use crate::characterisation::{Characterisation, Status};
 use crate::diagnose::{DiagnoseOptions, DiagnoseWatch, Model, NamedEffect, diagnose, observations, with_model};
 use crate::error::Error;
-use crate::profile::Z_975;
+use twinlag_estimate::Z_975;
 
 /// Standard errors by which innovations may be larger than expected before bands are widened.
 const CLEARLY: f64 = 4.0;

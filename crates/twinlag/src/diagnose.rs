@@ -15,8 +15,8 @@ use crate::characterisation::{
 use crate::characterise::characterise;
 use crate::compensate::gas;
 use crate::error::Error;
-use crate::estimate::IntervalBasis;
-use crate::options::{Known, Options};
+use crate::options::Options;
+use twinlag_estimate::{IntervalBasis, Known};
 
 /// Samples of a stretch below which it is left out.
 const SHORTEST: usize = 8;

@@ -3,6 +3,7 @@ use twinlag_bias::NoiseError;
 use twinlag_compensate::CompensateError;
 use twinlag_cross_relation::CostError;
 use twinlag_diagnose::DiagnoseError;
+use twinlag_estimate::EstimateError;
 use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
 use twinlag_signal::SignalError;
@@ -20,6 +21,8 @@ pub enum Error {
     Cost(#[from] CostError),
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
     #[error(transparent)]
     Noise(#[from] NoiseError),
     #[error(transparent)]
@@ -51,23 +54,19 @@ pub enum Error {
     LiveStart { why: String },
     #[error("the model has {what} {got}: expected a finite number above 0")]
     ModelNumber { what: String, got: f64 },
-    #[error(
-        "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
-         use a longer record, a smaller --discard, or the whitened estimator, which discards none"
-    )]
-    DiscardsAll { discard: usize, longest: usize },
 }
 
 impl Error {
     /// Whether the way the question was put is at fault, rather than the record.
     pub fn is_usage(&self) -> bool {
-        matches!(
-            self,
-            Self::Option { .. }
-                | Self::WhitenedOnly { .. }
-                | Self::NotInClosedForm { .. }
-                | Self::QuietSegment { .. }
-                | Self::Optimiser(_)
-        )
+        matches!(self, Self::Estimate(error) if error.is_usage())
+            || matches!(
+                self,
+                Self::Option { .. }
+                    | Self::WhitenedOnly { .. }
+                    | Self::NotInClosedForm { .. }
+                    | Self::QuietSegment { .. }
+                    | Self::Optimiser(_)
+            )
     }
 }

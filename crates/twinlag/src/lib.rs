@@ -62,16 +62,11 @@ mod characterise;
 mod compensate;
 mod diagnose;
 mod error;
-pub mod estimate;
-mod fitting;
-mod levels;
 mod live;
-mod objective;
 mod options;
-mod profile;
 mod question;
+mod quiet;
 mod second_lag;
-mod starts;
 mod track;
 mod verdict;
 
@@ -86,9 +81,8 @@ pub use diagnose::{
     characterise_with, diagnose,
 };
 pub use error::Error;
-pub use levels::{NoiseColour, NoiseSource};
 pub use live::{Live, LiveAnswer, LiveOptions};
-pub use options::{Estimator, Hold, Intervals, Known, Options};
+pub use options::Options;
 pub use question::Watch;
 pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
@@ -96,6 +90,8 @@ pub use twinlag_bias as bias;
 pub use twinlag_compensate as compensation;
 pub use twinlag_cross_relation as cross_relation;
 pub use twinlag_diagnose as diagnosis;
+pub use twinlag_estimate as estimate;
+pub use twinlag_estimate::{Estimator, Hold, Intervals, Known, NoiseColour, NoiseSource};
 pub use twinlag_optimise as optimise;
 pub use twinlag_record as record;
 pub use twinlag_sensor as sensor;

@@ -8,7 +8,7 @@ use crate::characterisation::{Characterisation, Status};
 use crate::diagnose::{Model, with_model};
 use crate::error::Error;
 use crate::options::Options;
-use crate::profile::Z_975;
+use twinlag_estimate::Z_975;
 
 /// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower sensor, where nothing is said.
 const CHANGE: f64 = 0.1;

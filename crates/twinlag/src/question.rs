@@ -5,22 +5,19 @@ use twinlag_cross_relation::{
     CostError, CrossRelation, Form, Middle, Parameter, Readings, ResidualTest, Segment, Whitened, residual_tests,
     sandwich,
 };
+use twinlag_estimate::parts::{
+    EstimatorCost, Objective, Prior, SETTLED, hold_known, minimise_whitened, noise, profile_level, second_lags, starts,
+    with_level_uncertainty,
+};
+use twinlag_estimate::{Estimate, EstimateError, Estimator, Hold, Known, Levels, NoiseKnowledge, NoiseSource, Task};
 use twinlag_optimise::{Budget, End, Fit, MultiStart, Problem, Variable};
 use twinlag_record::Record;
 use twinlag_sensor::Discretisation;
 
 use crate::characterisation::Characterisation;
 use crate::error::Error;
-use crate::estimate::SETTLED;
-use crate::estimate::intervals::with_level_uncertainty;
-use crate::estimate::published::{noise, profile_level};
-use crate::estimate::{Estimate, NoiseKnowledge, Task};
-use crate::fitting::minimise_whitened;
-use crate::levels::{Levels, NoiseSource};
-use crate::objective::{EstimatorCost, Objective, Prior};
-use crate::options::{Estimator, Hold, Known, Options};
+use crate::options::Options;
 use crate::second_lag::Unseen;
-use crate::starts::{hold_known, second_lags, starts};
 
 /// A residual test below this p-value rejects the model: four tests, so one false alarm in a thousand records.
 pub(crate) const REJECT: f64 = 1e-3 / 4.0;
@@ -265,7 +262,7 @@ impl<'a, const P: usize> Question<'a, P> {
         };
         let task = self.task(whitened.whitened.hold(), noise);
         let outcome = match self.options.estimator.estimate(&task) {
-            Err(Error::Cost(CostError::Singular)) => {
+            Err(EstimateError::Cost(CostError::Singular)) => {
                 whitened.fit = Fit {
                     optimiser: "closed-form".into(),
                     end: End::Stalled(
@@ -326,7 +323,7 @@ impl<'a, const P: usize> Question<'a, P> {
             (SETTLED * whitened.fit.x[0].max(whitened.fit.x[1]) / self.readings.mean_step_s()).ceil() as usize;
         let discard = self.options.discard.unwrap_or(settled.min(longest / 2));
         if discard >= longest {
-            return Err(Error::DiscardsAll { discard, longest });
+            return Err(EstimateError::DiscardsAll { discard, longest }.into());
         }
         let published = CrossRelation::new(self.readings, discard)?;
         let noise = [noise(std_k[0], ar1[0])?, noise(std_k[1], ar1[1])?];
@@ -346,7 +343,7 @@ impl<'a, const P: usize> Question<'a, P> {
         // These costs have lower minima far out, where the filters' unknown initial state still shows after what was
         // discarded. Of several minima the one next to a consistent estimate is the one that is consistent itself.
         let mut starts = 0;
-        let mut run = |cost: &EstimatorCost<'a>, from: &[Vec<f64>]| -> Result<Fit, Error> {
+        let mut run = |cost: &EstimatorCost<'a>, from: &[Vec<f64>]| -> Result<Fit, EstimateError> {
             let mut all = self.minimise_from(cost, from)?;
             if !all.best().end.is_usable() {
                 all = self.minimise(cost)?;
@@ -512,12 +509,12 @@ impl<'a, const P: usize> Question<'a, P> {
         Ok(())
     }
 
-    fn minimise(&self, cost: &EstimatorCost<'a>) -> Result<MultiStart, Error> {
+    fn minimise(&self, cost: &EstimatorCost<'a>) -> Result<MultiStart, EstimateError> {
         let objective = Objective::<P> { cost, priors: &self.priors };
         self.minimise_from(cost, &starts(&objective, self.readings, &self.variables))
     }
 
-    fn minimise_from(&self, cost: &EstimatorCost<'a>, from: &[Vec<f64>]) -> Result<MultiStart, Error> {
+    fn minimise_from(&self, cost: &EstimatorCost<'a>, from: &[Vec<f64>]) -> Result<MultiStart, EstimateError> {
         let objective = Objective::<P> { cost, priors: &self.priors };
         let problem = Problem::new(&objective, self.variables.clone())?;
         Ok(MultiStart::run(&problem, &self.options.optimiser, from, &Budget::default())?)

@@ -4,13 +4,11 @@
 //! it may be: the profile of the cost, upwards. The time constants then hold for every second lag that the record allows.
 
 use twinlag_cross_relation::Middle;
+use twinlag_estimate::parts::{EstimatorCost, FAR_ABOVE, Objective, hold_known};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
 
 use crate::error::Error;
-use crate::objective::{EstimatorCost, Objective};
-use crate::profile::FAR_ABOVE;
 use crate::question::{Fitted, Question};
-use crate::starts::hold_known;
 
 /// 95 % point, one-sided: a second lag is not negative.
 const ONE_SIDED_95: f64 = 2.705_543_454_095_404;

@@ -13,7 +13,7 @@ use crate::diagnose::{
 };
 use crate::error::Error;
 use crate::options::Options;
-use crate::profile::Z_975;
+use twinlag_estimate::Z_975;
 
 /// Below this chance the ratio does not stay.
 const RATIO_CHANGES: f64 = 1e-3;

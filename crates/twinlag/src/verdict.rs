@@ -3,6 +3,11 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use twinlag_cross_relation::{Middle, Parameter, ResidualTest};
+use twinlag_estimate::parts::{EstimatorCost, Intervals, Minimum, Objective, Ridge, ridge};
+use twinlag_estimate::{
+    Bootstrap, Estimate, EstimateError, Estimator, Hold, IntervalBasis, Intervals as Wanted, Known, NoiseColour,
+    Outcome, Task, Z_975,
+};
 use twinlag_optimise::End;
 use twinlag_sensor::Discretisation;
 
@@ -11,12 +16,6 @@ use crate::characterisation::{
     SecondLag, SensorEstimate, Status,
 };
 use crate::error::Error;
-use crate::estimate::intervals::{Intervals, Minimum};
-use crate::estimate::{Bootstrap, Estimate, IntervalBasis, Outcome, Task};
-use crate::levels::NoiseColour;
-use crate::objective::{EstimatorCost, Objective};
-use crate::options::{Estimator, Hold, Intervals as Wanted, Known};
-use crate::profile::{Ridge, Z_975, ridge};
 use crate::question::{Fitted, Question, REJECT, Watch};
 
 /// A time constant whose logarithm has a larger standard error than this is not determined: its interval spans a factor of
@@ -254,10 +253,18 @@ impl<'a, const P: usize> Question<'a, P> {
     /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
     /// more than noise, neither hold can be preferred.
     fn ridge(&self, best: &Fitted<'a>, index: usize, middle: Middle) -> Result<Option<Ridge>, Error> {
-        let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, Error> {
+        let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, EstimateError> {
             let cost = EstimatorCost::Whitened(fitted.whitened.clone());
             let objective = Objective::<P> { cost: &cost, priors: &self.priors };
-            ridge::<P>(&objective, &fitted.whitened, &self.variables, &fitted.fit.x, index, middle, self.options)
+            ridge::<P>(
+                &objective,
+                &fitted.whitened,
+                &self.variables,
+                &fitted.fit.x,
+                index,
+                middle,
+                &self.options.optimiser,
+            )
         };
         let found = along(best)?;
         if self.options.hold != Hold::Auto || self.readings.even_period_s().is_none() {
@@ -674,7 +681,7 @@ impl Estimate for Watched<'_> {
         self.estimator.assumes()
     }
 
-    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, Error> {
+    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
         let outcome = self.estimator.estimate(task);
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         (self.watch)(done, self.bootstrap.replicates);

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 
 use twinlag::Estimator;
 use twinlag::cross_relation::{Readings, Segment};
-use twinlag::estimate::{Estimate, Outcome, Task};
+use twinlag::estimate::{Estimate, EstimateError, Outcome, Task};
 use twinlag::optimise::Optimiser;
 use twinlag_experiment::{Experiment, Own, Plan, Table};
 use twinlag_study::{Options, run};
@@ -30,10 +30,10 @@ impl Estimate for Halves {
         "what the whitened estimator does"
     }
 
-    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, twinlag::Error> {
+    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
         let whole = &task.readings.segments()[0];
         let half = whole.len() / 2;
-        let of = |rows: std::ops::Range<usize>| -> Result<Outcome, twinlag::Error> {
+        let of = |rows: std::ops::Range<usize>| -> Result<Outcome, EstimateError> {
             let (y1, y2) = (whole.y1()[rows.clone()].to_vec(), whole.y2()[rows].to_vec());
             let readings = Readings::new(vec![Segment::new(y1, y2, whole.steps().clone())?])?;
             Estimator::Whitened.estimate(&Task { readings: &readings, starts_s: task.starts_s.clone(), ..*task })

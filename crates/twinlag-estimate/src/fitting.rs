@@ -3,16 +3,16 @@
 use twinlag_cross_relation::{Form, Whitened};
 use twinlag_optimise::{Budget, Minimiser, MultiStart, Problem, Variable};
 
-use crate::error::Error;
+use crate::error::EstimateError;
 use crate::objective::{EstimatorCost, Objective, Prior};
 
 /// Compression may move no estimate by more than this many standard errors.
 const SHIFT: f64 = 1e-2;
 
 /// Where a fit of the whitened cost ended, and the cost itself, in its exact form.
-pub(crate) struct Minimised<'a> {
-    pub(crate) whitened: Whitened<'a>,
-    pub(crate) all: MultiStart,
+pub struct Minimised<'a> {
+    pub whitened: Whitened<'a>,
+    pub all: MultiStart,
 }
 
 /// Minimises `whitened` with `priors` over `variables` from `starts`, which are made once the objective is there.
@@ -20,17 +20,17 @@ pub(crate) struct Minimised<'a> {
 /// Where the record allows it, in the compressed form; then again from there in the exact one if the bound on what that can
 /// have moved is above a hundredth of a standard error, or if there was no end to be had: squares rounded before they are
 /// summed leave the compressed cost rougher, by the square of the signal over the noise, which solvers that compare values feel.
-pub(crate) fn minimise_whitened<'a, const P: usize>(
+pub fn minimise_whitened<'a, const P: usize>(
     whitened: Whitened<'a>,
     priors: &[Prior],
     variables: &[Variable],
     minimiser: &dyn Minimiser,
     starts: impl FnOnce(&Objective<'_, '_, P>) -> Vec<Vec<f64>>,
-) -> Result<Minimised<'a>, Error> {
+) -> Result<Minimised<'a>, EstimateError> {
     let run = |cost: &EstimatorCost<'a>, starts: &dyn Fn(&Objective<'_, '_, P>) -> Vec<Vec<f64>>| {
         let objective = Objective::<P> { cost, priors };
         let problem = Problem::new(&objective, variables.to_vec())?;
-        Ok::<_, Error>(MultiStart::run(&problem, minimiser, &starts(&objective), &Budget::default())?)
+        Ok::<_, EstimateError>(MultiStart::run(&problem, minimiser, &starts(&objective), &Budget::default())?)
     };
     // At second order each evaluation is the banded one anyway.
     let whitened = if P == 6 { whitened } else { whitened.compressed(P == 4) };

@@ -8,13 +8,13 @@ use twinlag_bias::{Compensated, Hybrid, Noise, Normalised, plain_covariance};
 use twinlag_cross_relation::{CrossRelation, Segment};
 use twinlag_optimise::{Budget, Evaluations, Fit, MultiStart, Problem};
 
-use super::intervals::Intervals;
-use super::whitened::{Found, find, free_parameters, outcome};
-use super::{NoiseKnowledge, Outcome, Task};
-use crate::error::Error;
+use crate::error::EstimateError;
+use crate::intervals::Intervals;
 use crate::levels::Levels;
 use crate::objective::{EstimatorCost, Objective};
-use crate::options::Estimator;
+use crate::task::{Outcome, Task};
+use crate::vocabulary::{Estimator, NoiseKnowledge};
+use crate::whitened::{Found, find, free_parameters, outcome};
 
 /// Steps of Dinkelbach's iteration, which converges quadratically.
 const LEVEL_STEPS: usize = 12;
@@ -23,7 +23,7 @@ const LEVEL_TOLERANCE: f64 = 1e-12;
 /// Autocovariances of autoregressive noise are carried until they are this share of the variance.
 const FORGOTTEN: f64 = 1e-12;
 
-pub(super) fn estimate<const P: usize>(estimator: Estimator, task: &Task<'_>) -> Result<Outcome, Error> {
+pub(crate) fn estimate<const P: usize>(estimator: Estimator, task: &Task<'_>) -> Result<Outcome, EstimateError> {
     let mut evaluations = Evaluations::default();
     // The whitened fit finds levels and start where they are not given.
     let mut levels = match task.noise {
@@ -55,7 +55,7 @@ pub(super) fn estimate<const P: usize>(estimator: Estimator, task: &Task<'_>) ->
         Estimator::Hybrid => EstimatorCost::Hybrid(Hybrid::new(published, noise)?),
         _ => EstimatorCost::CrossRelation(published),
     };
-    let mut run = |cost: &EstimatorCost<'_>, starts: &[Vec<f64>]| -> Result<Fit, Error> {
+    let mut run = |cost: &EstimatorCost<'_>, starts: &[Vec<f64>]| -> Result<Fit, EstimateError> {
         let objective = Objective::<P> { cost, priors: &[] };
         let problem = Problem::new(&objective, task.variables::<P>())?;
         let all = MultiStart::run(&problem, task.minimiser, starts, &Budget::default())?;
@@ -99,11 +99,11 @@ pub(super) fn estimate<const P: usize>(estimator: Estimator, task: &Task<'_>) ->
 
 /// Level and minimum of the compensated cost when only the ratio of the levels is known: level from the cost at the current
 /// estimate, compensate, minimise again (Dinkelbach's iteration). `run` minimises from given starts.
-pub(crate) fn profile_level<'a, const P: usize>(
+pub fn profile_level<'a, const P: usize>(
     cost: &Compensated<'a>,
     starts: &[Vec<f64>],
-    mut run: impl FnMut(&EstimatorCost<'a>, &[Vec<f64>]) -> Result<Fit, Error>,
-) -> Result<(Compensated<'a>, Fit), Error> {
+    mut run: impl FnMut(&EstimatorCost<'a>, &[Vec<f64>]) -> Result<Fit, EstimateError>,
+) -> Result<(Compensated<'a>, Fit), EstimateError> {
     let level_at = |cost: &Compensated<'a>, x: &[f64]| cost.profiled_level::<P>(&std::array::from_fn(|i| x[i]));
     let first = level_at(cost, &starts[0]);
     let mut cost = cost.with_level(first)?;
@@ -126,18 +126,18 @@ pub(crate) fn profile_level<'a, const P: usize>(
 
 /// Time constants that a filter's unknown initial state is left to decay, 5e-5 of it remaining: after five of them, 0.7 % is left,
 /// which biases a record of 2500 samples by 0.15 %, visible below 5 % noise.
-pub(crate) const SETTLED: f64 = 10.0;
+pub const SETTLED: f64 = 10.0;
 
 /// Samples to leave out: as asked, or ten times the longest time constant at `start`, at most half of a stretch.
-fn discard(task: &Task<'_>, start: &[f64]) -> Result<usize, Error> {
+fn discard(task: &Task<'_>, start: &[f64]) -> Result<usize, EstimateError> {
     let longest = task.readings.segments().iter().map(Segment::len).max().unwrap_or(0);
     let settled = (SETTLED * start[0].max(start[1]) / task.readings.mean_step_s()).ceil() as usize;
     let discard = task.discard.unwrap_or(settled.min(longest / 2));
-    if discard >= longest { Err(Error::DiscardsAll { discard, longest }) } else { Ok(discard) }
+    if discard >= longest { Err(EstimateError::DiscardsAll { discard, longest }) } else { Ok(discard) }
 }
 
 /// White noise, or autoregressive noise of first order: `s² φ^l` at lag `l`.
-pub(crate) fn noise(std_k: f64, ar1: f64) -> Result<Noise, Error> {
+pub fn noise(std_k: f64, ar1: f64) -> Result<Noise, EstimateError> {
     if ar1 == 0.0 {
         return Ok(Noise::white(std_k)?);
     }

@@ -12,7 +12,7 @@ const KEPT: usize = 2;
 
 /// Starts for `objective`, data-driven: the difference equation's least squares, and the lowest points of a logarithmic grid
 /// for either order of the time constants. Gain and offset take one Newton step of their own at each point.
-pub(crate) fn starts<const P: usize>(
+pub fn starts<const P: usize>(
     objective: &Objective<'_, '_, P>,
     readings: &Readings,
     variables: &[Variable],
@@ -55,7 +55,7 @@ pub(crate) fn starts<const P: usize>(
 ///
 /// - `first`: time constants, gain and offset of that fit
 /// - `second_order`: which sensors have a second lag
-pub(crate) fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
+pub fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
     let shares: &[[f64; 2]] = match second_order {
         [true, true] => &[[0.05, 0.05], [0.3, 0.3], [0.8, 0.8], [0.05, 0.8], [0.8, 0.05]],
         [_, false] => &[[0.05, 0.0], [0.3, 0.0], [0.8, 0.0]],
@@ -69,7 +69,7 @@ pub(crate) fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool;
     shares.iter().map(start).collect()
 }
 
-pub(crate) fn hold_known(x: &mut [f64], variables: &[Variable]) {
+pub fn hold_known(x: &mut [f64], variables: &[Variable]) {
     for (x, v) in x.iter_mut().zip(variables) {
         *x = x.clamp(v.lower, v.upper);
     }

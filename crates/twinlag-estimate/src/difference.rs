@@ -4,16 +4,16 @@ use twinlag_cross_relation::DifferenceEquationEstimator;
 use twinlag_optimise::{End, Evaluations};
 use twinlag_sensor::Discretisation;
 
-use super::intervals::Intervals;
-use super::whitened::{find, outcome};
-use super::{NoiseKnowledge, Outcome, Task};
-use crate::error::Error;
-use crate::options::Estimator;
+use crate::error::EstimateError;
+use crate::intervals::Intervals;
+use crate::task::{Outcome, Task};
+use crate::vocabulary::{Estimator, NoiseKnowledge};
+use crate::whitened::{find, outcome};
 
-pub(super) fn estimate(estimator: Estimator, task: &Task<'_>) -> Result<Outcome, Error> {
+pub(crate) fn estimate(estimator: Estimator, task: &Task<'_>) -> Result<Outcome, EstimateError> {
     if task.second_order != [false; 2] || task.hold != Discretisation::ZeroOrderHold {
-        return Err(Error::Option {
-            option: "the difference-equation estimators",
+        return Err(EstimateError::Unexpected {
+            what: "the difference-equation estimators",
             expected: "first-order sensors and the zero-order hold, in which the equation is linear in two numbers"
                 .into(),
             got: format!("second lags {:?}, {:?}", task.second_order, task.hold),
@@ -21,7 +21,7 @@ pub(super) fn estimate(estimator: Estimator, task: &Task<'_>) -> Result<Outcome,
     }
     // Levels are needed for the intervals, and their ratio by the generalised estimator.
     let mut evaluations = Evaluations::default();
-    let mut levels = || -> Result<[f64; 2], Error> {
+    let mut levels = || -> Result<[f64; 2], EstimateError> {
         if let NoiseKnowledge::Known { std_k, .. } = task.noise {
             return Ok(std_k);
         }

@@ -1,8 +1,8 @@
 //! Where each estimator comes from and what it takes for granted.
 
-use crate::options::Estimator;
+use crate::vocabulary::Estimator;
 
-pub(super) fn source(estimator: Estimator) -> &'static str {
+pub(crate) fn source(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::Whitened => {
             "functional maximum likelihood of errors in variables, exactly whitened; docs, chapter \"Theory\", section 3"
@@ -29,7 +29,7 @@ pub(super) fn source(estimator: Estimator) -> &'static str {
     }
 }
 
-pub(super) fn assumes(estimator: Estimator) -> &'static str {
+pub(crate) fn assumes(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::Whitened => {
             "the sensors' order, the hold, independent noises, and the ratio of their levels, which it finds"

@@ -4,48 +4,14 @@
 //! [`Estimate`]. It answers the bare question, without looking at whether the model is right; for a record that you want to
 //! *know* about take [`crate::characterise()`], which tests the residual, says what is not determined, and finds the hold.
 
-mod assumptions;
-mod bootstrap;
-mod difference;
-pub(crate) mod intervals;
-pub(crate) mod published;
-mod whitened;
-
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{Parameter, Readings};
 use twinlag_optimise::{End, Evaluations, Minimiser, Optimiser, Variable};
 use twinlag_sensor::Discretisation;
 
-use crate::error::Error;
-use crate::levels::NoiseColour;
-use crate::options::Estimator;
-
-pub use bootstrap::Bootstrap;
-pub(crate) use published::SETTLED;
-
-/// What is known of the noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum NoiseKnowledge {
-    /// Both levels, K.
-    Known {
-        /// Standard deviations of both channels.
-        std_k: [f64; 2],
-        /// First-order autoregressive coefficients; 0 for white noise.
-        #[serde(default)]
-        ar1: [f64; 2],
-    },
-    /// Nothing: the levels are found from the data.
-    Found(NoiseColour),
-    /// The ratio `s2/s1`: the level is profiled out.
-    Ratio(f64),
-}
-
-impl Default for NoiseKnowledge {
-    fn default() -> Self {
-        Self::Found(NoiseColour::White)
-    }
-}
+use crate::error::EstimateError;
+use crate::vocabulary::{Estimator, IntervalBasis, NoiseKnowledge};
+use crate::{assumptions, difference, published, whitened};
 
 /// What an estimator is given.
 pub struct Task<'a> {
@@ -85,7 +51,7 @@ impl<'a> Task<'a> {
     }
 
     /// The variables of a cost with `P` parameters.
-    fn variables<const P: usize>(&self) -> Vec<Variable> {
+    pub(crate) fn variables<const P: usize>(&self) -> Vec<Variable> {
         let (step_s, span_s) = (self.readings.mean_step_s(), self.readings.span_s());
         let held = |name: &str, value: f64| Variable::linear(name, 1.0, value, value);
         let tau = |name: &str, lower: f64, upper: f64| Variable::logarithmic(name, lower * step_s, upper * span_s);
@@ -103,23 +69,11 @@ impl<'a> Task<'a> {
     }
 
     /// The given starts as points of `P` parameters; a second lag begins at a fifth of the first.
-    fn starts<const P: usize>(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn starts<const P: usize>(&self) -> Vec<Vec<f64>> {
         let second = |i: usize, tau_s: f64| if self.second_order[i] { 0.2 * tau_s } else { 0.0 };
         let point = |t: &[f64; 2]| [t[0], t[1], 1.0, 0.0, second(0, t[0]), second(1, t[1])][..P].to_vec();
         self.starts_s.iter().map(point).collect()
     }
-}
-
-/// What 95 % intervals rest on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum IntervalBasis {
-    /// Standard errors, in the logarithm of the time constant.
-    StandardError,
-    /// The profile of the cost, where standard errors do not describe it.
-    Profile,
-    /// The same estimator on simulated records: see [`Bootstrap`].
-    Bootstrap,
 }
 
 /// What an estimator returns. A fit that ran always returns one, however it ended.
@@ -160,9 +114,9 @@ pub trait Estimate: Send + Sync {
     /// Both time constants of `task`.
     ///
     /// # Errors
-    /// [`Error`] where the question cannot be put: uneven sampling, too few samples, an order it cannot take; `CostError::Singular`
+    /// [`EstimateError`] where the question cannot be put: uneven sampling, too few samples, an order it cannot take; `CostError::Singular`
     /// inside it where a closed form has no solution. A fit that ran is never an error.
-    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, Error>;
+    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError>;
 }
 
 impl Estimate for Estimator {
@@ -178,11 +132,11 @@ impl Estimate for Estimator {
         assumptions::assumes(*self)
     }
 
-    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, Error> {
+    fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
         let is_second_order = task.second_order != [false; 2];
         if is_second_order && task.readings.even_period_s().is_none() {
-            return Err(Error::Option {
-                option: "second-order sensors",
+            return Err(EstimateError::Unexpected {
+                what: "second-order sensors",
                 expected: "evenly spaced samples".into(),
                 got: "uneven ones".into(),
             });

@@ -5,18 +5,14 @@
 //! them, the rest stays. They are no substitute, because an effect that the model lacks is in them too, while third
 //! differences hardly see it. Autoregressive noise is found from the moments alone.
 
-use std::str::FromStr;
-
 use nalgebra::Matrix2;
-use serde::{Deserialize, Serialize};
 use twinlag_bias::{JointLevels, NoiseLevel, NoiseMoments, estimate_noise};
 use twinlag_cross_relation::{Readings, inferred_inputs};
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
-use twinlag_record::Record;
 use twinlag_sensor::Discretisation;
 
-use crate::error::Error;
-use crate::options::Options;
+use crate::error::EstimateError;
+use crate::vocabulary::{NoiseColour, NoiseSource};
 
 /// A converter whose own noise `q/√12` is this share of the level is coarse: its errors are not white.
 const COARSE: f64 = 0.7;
@@ -25,8 +21,8 @@ const COARSE: f64 = 0.7;
 const CLEARLY_LOWER: f64 = 1.0;
 /// Largest autoregressive coefficient that is looked for.
 const MOST_COLOURED: f64 = 0.97;
-/// Degrees of freedom that each stretch at rest must have: its level is then good to a quarter.
-const FEWEST_AT_REST: f64 = 8.0;
+/// Degrees of freedom, samples less two, that a stretch at rest must have: its level is then good to a quarter.
+pub const MIN_DEGREES_OF_FREEDOM_AT_REST: usize = 8;
 /// Step of a coefficient in differences.
 const AR1_STEP: f64 = 0.01;
 /// Change of a level, relative, or of a coefficient, that is none.
@@ -34,86 +30,30 @@ const SETTLED: f64 = 0.01;
 /// Rounds of weights and coefficients.
 const ROUNDS: usize = 3;
 
-/// What noise is taken to be like.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum NoiseColour {
-    /// Independent from sample to sample.
-    #[default]
-    White,
-    /// Each sample's noise carries a share of the last one's: `n[k] = φ n[k−1] + e[k]`, `φ` of each channel found from the data.
-    Autoregressive,
-}
-
-impl FromStr for NoiseColour {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        match text {
-            "white" => Ok(Self::White),
-            "autoregressive" => Ok(Self::Autoregressive),
-            _ => Err(Error::Option {
-                option: "--noise-colour",
-                expected: "white or autoregressive".into(),
-                got: text.into(),
-            }),
-        }
-    }
-}
-
-/// Where a noise level comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum NoiseSource {
-    /// It was given.
-    Given,
-    /// Scatter about a straight line in stretches in which the gas is at rest.
-    QuietSegment,
-    /// Third differences of the readings.
-    ThirdDifferences,
-    /// How the two inferred gas temperatures disagree.
-    InferredInputs,
-    /// The residual's own energy: only the ratio of the levels was given, or could be told.
-    Residual,
-}
-
-impl NoiseColour {
-    /// Rounds of levels and fit at most. For white noise the second changes levels by a few per cent of their standard error; with
-    /// its colour to be found as well, time constants, levels and coefficients follow each other slowly where the samples lie
-    /// far apart.
-    pub(crate) fn rounds(self) -> usize {
-        match self {
-            Self::White => 2,
-            Self::Autoregressive => 8,
-        }
-    }
-}
-
 /// Noise levels and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Levels {
-    pub(crate) std_k: [f64; 2],
+pub struct Levels {
+    pub std_k: [f64; 2],
     /// Where each comes from.
-    pub(crate) source: [NoiseSource; 2],
+    pub source: [NoiseSource; 2],
     /// Whether they stand, whatever a fit says.
-    pub(crate) given: bool,
+    pub given: bool,
     /// Covariance of the logarithms of the two variances: 0 if given.
-    pub(crate) log_covariance: [[f64; 2]; 2],
+    pub log_covariance: [[f64; 2]; 2],
     /// First-order autoregressive coefficients, 0 for white noise.
-    pub(crate) ar1: [f64; 2],
+    pub ar1: [f64; 2],
     /// Step of each converter where it is coarser than the noise, K.
-    pub(crate) coarse_step_k: [Option<f64>; 2],
+    pub coarse_step_k: [Option<f64>; 2],
     /// Third differences that are too large for noise, in each channel.
-    pub(crate) outliers: [usize; 2],
+    pub outliers: [usize; 2],
     /// Energy of the residual in units of the levels as found, where these had to be scaled to it.
-    pub(crate) energy_as_found: Option<f64>,
+    pub energy_as_found: Option<f64>,
     /// No level is lower than this: the converter's own noise, or next to nothing.
     least_k: [f64; 2],
 }
 
 impl Levels {
-    pub(crate) fn given(std_k: [f64; 2], ar1: [f64; 2]) -> Self {
+    pub fn given(std_k: [f64; 2], ar1: [f64; 2]) -> Self {
         Self {
             std_k,
             source: [NoiseSource::Given; 2],
@@ -127,49 +67,21 @@ impl Levels {
         }
     }
 
-    /// As `options` have it: levels that are given come first, then those of quiet segments of `record`, then a ratio, then what
-    /// the whole record shows.
-    pub(crate) fn of(record: &Record, readings: &Readings, options: &Options) -> Result<Self, Error> {
-        if let Some(std_k) = options.noise_std_k {
-            return Ok(Self::given(std_k, [0.0; 2]));
-        }
+    /// Of which only the ratio is known: the residual sets the size after the fit.
+    pub fn of_ratio(readings: &Readings, ratio: f64) -> Result<Self, EstimateError> {
         let found = Self::from_differences(readings)?;
-        if !options.quiet_segments_s.is_empty() {
-            return found.at_rest(record, &options.quiet_segments_s, options.noise_colour);
-        }
-        match options.noise_ratio {
-            // Only the ratio matters to the fit; the residual sets the size afterwards.
-            Some(ratio) => Ok(Self {
-                source: [NoiseSource::Residual; 2],
-                ..Self::given([found.std_k[0], ratio * found.std_k[0]], [0.0; 2])
-            }),
-            None => Ok(found),
-        }
+        Ok(Self {
+            source: [NoiseSource::Residual; 2],
+            ..Self::given([found.std_k[0], ratio * found.std_k[0]], [0.0; 2])
+        })
     }
 
-    /// The same with the levels, and if so asked the coefficients, of stretches in which the gas is at rest: scatter about a
-    /// straight line in each.
-    fn at_rest(mut self, record: &Record, quiet_s: &[[f64; 2]], colour: NoiseColour) -> Result<Self, Error> {
-        for (i, y) in [&record.t1_c, &record.t2_c].into_iter().enumerate() {
+    /// These levels with those, and if so asked the coefficients, of runs of samples in which the gas is at rest: scatter about
+    /// a straight line in each. At least [`MIN_DEGREES_OF_FREEDOM_AT_REST`] of them are needed for a level.
+    pub fn at_rest(mut self, runs: &[RunAtRest<'_>], colour: NoiseColour) -> Self {
+        for i in 0..2 {
             let mut sums = LineScatter::default();
-            for [from_s, to_s] in quiet_s {
-                let before = sums.degrees_of_freedom;
-                for rows in &record.segments {
-                    let times = &record.time_s[rows.clone()];
-                    let (from, to) = (times.partition_point(|t| t < from_s), times.partition_point(|t| t <= to_s));
-                    if from < to {
-                        sums.add(&times[from..to], &y[rows.clone()][from..to]);
-                    }
-                }
-                if sums.degrees_of_freedom - before < FEWEST_AT_REST {
-                    return Err(Error::QuietSegment {
-                        from_s: *from_s,
-                        to_s: *to_s,
-                        last_s: record.time_s.last().copied().unwrap_or(0.0),
-                        needed: FEWEST_AT_REST as usize + 2,
-                    });
-                }
-            }
+            runs.iter().for_each(|run| sums.add(run.time_s, run.readings[i]));
             let phi = match colour {
                 NoiseColour::White => 0.0,
                 NoiseColour::Autoregressive => sums.lag_one().clamp(-MOST_COLOURED, MOST_COLOURED),
@@ -181,11 +93,11 @@ impl Levels {
         self.outliers = [0; 2];
         self.source = [NoiseSource::QuietSegment; 2];
         self.given = true;
-        Ok(self)
+        self
     }
 
     /// Standard errors, K; `None` where a level was given, is a bound, or is what the residual happened to have.
-    pub(crate) fn standard_error_k(&self) -> [Option<f64>; 2] {
+    pub fn standard_error_k(&self) -> [Option<f64>; 2] {
         [0, 1].map(|i| {
             let is_known = self.log_covariance[i][i] > 0.0 && self.energy_as_found.is_none();
             is_known.then(|| 0.5 * self.log_covariance[i][i].sqrt() * self.std_k[i])
@@ -193,7 +105,7 @@ impl Levels {
     }
 
     /// The same levels, all of them `factor` times as large, since that is what the residual has in `terms` degrees of freedom.
-    pub(crate) fn scaled_to_residual(mut self, factor: f64, terms: f64) -> Self {
+    pub fn scaled_to_residual(mut self, factor: f64, terms: f64) -> Self {
         self.std_k = self.std_k.map(|s| s * factor);
         self.source = [NoiseSource::Residual; 2];
         self.log_covariance = [[2.0 / terms; 2]; 2];
@@ -201,7 +113,7 @@ impl Levels {
     }
 
     /// From third differences.
-    pub(crate) fn from_differences(readings: &Readings) -> Result<Self, Error> {
+    pub fn from_differences(readings: &Readings) -> Result<Self, EstimateError> {
         let found = estimate_noise(readings)?;
         let coarse = |l: &NoiseLevel| l.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE * l.std_k);
         // A channel without any noise at all: a hundred-thousandth of its swing stands in, far below any converter's step.
@@ -223,7 +135,7 @@ impl Levels {
 
     /// Relative standard deviation that the uncertainty of the levels gives the energy of a residual in which the channels' noises
     /// have `shares`.
-    pub(crate) fn energy_uncertainty(&self, shares: [f64; 2]) -> f64 {
+    pub fn energy_uncertainty(&self, shares: [f64; 2]) -> f64 {
         let variance: f64 =
             (0..2).map(|i| (0..2).map(|j| shares[i] * self.log_covariance[i][j] * shares[j]).sum::<f64>()).sum();
         variance.max(0.0).sqrt()
@@ -231,7 +143,7 @@ impl Levels {
 
     /// Whether another round of levels and fit would change nothing: for white noise the levels are the same, for coloured noise
     /// levels and coefficients are to a hundredth.
-    pub(crate) fn agrees_with(&self, other: &Self, colour: NoiseColour) -> bool {
+    pub fn agrees_with(&self, other: &Self, colour: NoiseColour) -> bool {
         let is_close = (0..2).all(|i| {
             (self.std_k[i] / other.std_k[i] - 1.0).abs() < SETTLED && (self.ar1[i] - other.ar1[i]).abs() < SETTLED
         });
@@ -240,7 +152,7 @@ impl Levels {
 
     /// Levels in the light of a fit at `theta`. `first` are those of the third differences. Unchanged where the levels were
     /// given, and where there are no moments: uneven sampling, short stretches.
-    pub(crate) fn refined<const P: usize>(
+    pub fn refined<const P: usize>(
         first: &Self,
         readings: &Readings,
         hold: Discretisation,
@@ -286,6 +198,15 @@ impl Levels {
         self.log_covariance[i][i] = relative;
         (self.log_covariance[i][1 - i], self.log_covariance[1 - i][i]) = (0.0, 0.0);
     }
+}
+
+/// An unbroken run of samples in which the gas is at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct RunAtRest<'a> {
+    /// When they were taken, s, `[n]`.
+    pub time_s: &'a [f64],
+    /// Both channels, °C, `[n]` each.
+    pub readings: [&'a [f64]; 2],
 }
 
 /// Sums of squares about a straight line, and of products of neighbours.

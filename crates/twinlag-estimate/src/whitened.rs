@@ -4,23 +4,24 @@
 use twinlag_cross_relation::{Middle, Readings, Whitened};
 use twinlag_optimise::{End, Evaluations, Fit};
 
-use super::intervals::{self, Intervals, Minimum};
-use super::{IntervalBasis, NoiseKnowledge, Outcome, Task};
-use crate::error::Error;
+use crate::error::EstimateError;
 use crate::fitting::{Minimised, minimise_whitened};
-use crate::levels::{Levels, NoiseColour};
+use crate::intervals::{self, Intervals, Minimum};
+use crate::levels::Levels;
 use crate::starts::{second_lags, starts};
+use crate::task::{Outcome, Task};
+use crate::vocabulary::{IntervalBasis, NoiseColour, NoiseKnowledge};
 
 /// The fit itself, for whoever goes on from it.
-pub(super) struct Found<'a, const P: usize> {
-    pub(super) whitened: Whitened<'a>,
-    pub(super) levels: Levels,
-    pub(super) theta: [f64; P],
-    pub(super) end: End,
-    pub(super) evaluations: Evaluations,
+pub(crate) struct Found<'a, const P: usize> {
+    pub whitened: Whitened<'a>,
+    pub levels: Levels,
+    pub theta: [f64; P],
+    pub end: End,
+    pub evaluations: Evaluations,
 }
 
-pub(super) fn estimate<const P: usize>(task: &Task<'_>) -> Result<Outcome, Error> {
+pub(crate) fn estimate<const P: usize>(task: &Task<'_>) -> Result<Outcome, EstimateError> {
     let found = find::<P>(task)?;
     let free = free_parameters::<P>(task);
     let mut intervals = None;
@@ -46,7 +47,7 @@ pub(super) fn estimate<const P: usize>(task: &Task<'_>) -> Result<Outcome, Error
 }
 
 /// What the search ended with, as an outcome.
-pub(super) fn outcome<const P: usize>(
+pub(crate) fn outcome<const P: usize>(
     theta: &[f64; P],
     noise_std_k: Option<[f64; 2]>,
     noise_ar1: [f64; 2],
@@ -68,13 +69,13 @@ pub(super) fn outcome<const P: usize>(
     }
 }
 
-pub(super) fn free_parameters<const P: usize>(task: &Task<'_>) -> Vec<usize> {
+pub(crate) fn free_parameters<const P: usize>(task: &Task<'_>) -> Vec<usize> {
     let variables = task.variables::<P>();
     (0..P).filter(|&i| variables[i].lower < variables[i].upper).collect()
 }
 
 /// Finds levels and time constants.
-pub(super) fn find<'a, const P: usize>(task: &Task<'a>) -> Result<Found<'a, P>, Error> {
+pub(crate) fn find<'a, const P: usize>(task: &Task<'a>) -> Result<Found<'a, P>, EstimateError> {
     let (first, colour) = match task.noise {
         NoiseKnowledge::Known { std_k, ar1 } => (Levels::given(std_k, ar1), NoiseColour::White),
         NoiseKnowledge::Ratio(ratio) => (Levels::given([1.0, ratio], [0.0; 2]), NoiseColour::White),
@@ -123,7 +124,7 @@ fn larger_first<const P: usize>(mut theta: [f64; P]) -> [f64; P] {
     theta
 }
 
-fn cost<'a>(readings: &'a Readings, task: &Task<'a>, levels: &Levels) -> Result<Whitened<'a>, Error> {
+fn cost<'a>(readings: &'a Readings, task: &Task<'a>, levels: &Levels) -> Result<Whitened<'a>, EstimateError> {
     let cost = Whitened::new(readings, task.hold, levels.std_k)?;
     if levels.ar1 == [0.0; 2] {
         return Ok(cost);
@@ -136,7 +137,7 @@ fn fit<'a, const P: usize>(
     levels: &Levels,
     from: Option<Vec<f64>>,
     evaluations: &mut Evaluations,
-) -> Result<Minimised<'a>, Error> {
+) -> Result<Minimised<'a>, EstimateError> {
     let variables = task.variables::<P>();
     let own = match from {
         Some(x) => vec![x],
@@ -155,7 +156,10 @@ fn fit<'a, const P: usize>(
 }
 
 /// Second lags of several sizes beside the first-order fit: one found from a single start may be missed.
-fn second_order_starts<const P: usize>(task: &Task<'_>, evaluations: &mut Evaluations) -> Result<Vec<Vec<f64>>, Error> {
+fn second_order_starts<const P: usize>(
+    task: &Task<'_>,
+    evaluations: &mut Evaluations,
+) -> Result<Vec<Vec<f64>>, EstimateError> {
     let first_order = Task { second_order: [false; 2], starts_s: Vec::new(), ..*task };
     let found = find::<2>(&first_order)?;
     evaluations.values += found.evaluations.values;

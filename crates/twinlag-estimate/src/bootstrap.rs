@@ -13,41 +13,26 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
-use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{CostError, InferredInputs, Readings, Segment, Steps, inferred_inputs};
 
-use super::{Estimate, Outcome, Task};
-use crate::error::Error;
+use crate::error::EstimateError;
+use crate::task::{Estimate, Outcome, Task};
+use crate::vocabulary::Bootstrap;
 
-/// Fewest replicates: the outermost of 39 are the 2.5 % and 97.5 % points.
-const FEWEST: usize = 39;
 /// Most of them that may fail.
 const MOST_FAILED: f64 = 0.1;
 
-/// A seeded parametric bootstrap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Bootstrap {
-    /// Simulated records, at least 39.
-    pub replicates: usize,
-    /// Seed of the noise; replicate `i` draws from streams `2 i` and `2 i + 1`.
-    pub seed: u64,
-}
-
-impl Default for Bootstrap {
-    fn default() -> Self {
-        Self { replicates: 199, seed: 1 }
-    }
-}
-
 impl Bootstrap {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        if self.replicates >= FEWEST {
+    /// Fewest replicates: the outermost of 39 are the 2.5 % and 97.5 % points.
+    pub const MIN_REPLICATES: usize = 39;
+
+    fn check(&self) -> Result<(), EstimateError> {
+        if self.replicates >= Self::MIN_REPLICATES {
             return Ok(());
         }
-        Err(Error::Option {
-            option: "--replicates",
-            expected: format!("at least {FEWEST}"),
+        Err(EstimateError::Unexpected {
+            what: "replicates of a bootstrap",
+            expected: format!("at least {}", Self::MIN_REPLICATES),
             got: self.replicates.to_string(),
         })
     }
@@ -56,13 +41,13 @@ impl Bootstrap {
     /// replicates cannot be answered.
     ///
     /// # Errors
-    /// [`Error::Option`] for too few replicates; what the estimator says of `task` itself, such as uneven sampling.
+    /// [`EstimateError::Unexpected`] for too few replicates; what the estimator says of `task` itself, such as uneven sampling.
     pub fn intervals(
         &self,
         estimator: &dyn Estimate,
         task: &Task<'_>,
         outcome: &Outcome,
-    ) -> Result<Option<[[f64; 2]; 2]>, Error> {
+    ) -> Result<Option<[[f64; 2]; 2]>, EstimateError> {
         self.check()?;
         let [t1, t2] = outcome.tau_s;
         let [s1, s2] = outcome.second_tau_s.map(|s| s.unwrap_or(0.0));
@@ -74,7 +59,7 @@ impl Bootstrap {
             let readings = self.replicate(replicate as u64, &clean, task, levels_k, outcome.noise_ar1)?;
             let again = Task { readings: &readings, starts_s: vec![outcome.tau_s], intervals: false, ..*task };
             let found = match estimator.estimate(&again) {
-                Err(Error::Cost(CostError::Singular)) => continue,
+                Err(EstimateError::Cost(CostError::Singular)) => continue,
                 found => found?,
             };
             if found.end.is_usable() {
@@ -105,7 +90,7 @@ impl Bootstrap {
         task: &Task<'_>,
         levels_k: [f64; 2],
         ar1: [f64; 2],
-    ) -> Result<Readings, Error> {
+    ) -> Result<Readings, EstimateError> {
         let mut noise = [0, 1].map(|channel| {
             let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
             rng.set_stream(2 * replicate + channel);

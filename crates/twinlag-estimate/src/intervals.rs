@@ -6,10 +6,10 @@
 use twinlag_cross_relation::{Whitened, sandwich};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
 
-use super::IntervalBasis;
 use crate::levels::Levels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::profile::Z_975;
+use crate::vocabulary::IntervalBasis;
 
 /// A profile that has risen by this share more or less than the quadratic form is not described by it.
 const DISAGREES: f64 = 0.2;
@@ -18,15 +18,15 @@ const HALVINGS: usize = 12;
 
 /// Standard errors and intervals of both time constants, s.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Intervals {
-    pub(crate) standard_error_s: [f64; 2],
-    pub(crate) interval_95_s: [[f64; 2]; 2],
-    pub(crate) basis: [IntervalBasis; 2],
+pub struct Intervals {
+    pub standard_error_s: [f64; 2],
+    pub interval_95_s: [[f64; 2]; 2],
+    pub basis: [IntervalBasis; 2],
 }
 
 impl Intervals {
     /// Quadratic in the logarithm.
-    pub(crate) fn quadratic<const P: usize>(theta: &[f64; P], covariance: &[[f64; P]; P]) -> Self {
+    pub fn quadratic<const P: usize>(theta: &[f64; P], covariance: &[[f64; P]; P]) -> Self {
         Self {
             standard_error_s: [0, 1].map(|i| covariance[i][i].sqrt()),
             interval_95_s: [0, 1].map(|i| quadratic(theta[i], covariance[i][i])),
@@ -42,7 +42,7 @@ fn quadratic(tau_s: f64, variance_s2: f64) -> [f64; 2] {
 
 /// `covariance` with what the uncertainty of found levels adds: the weights that they give move the minimum by
 /// `−A⁻¹ ½ (∂J(θ; s') − ∂J(θ; s))`, `A` half the Hessian with the priors' part, for levels `s'` one standard error off.
-pub(crate) fn with_level_uncertainty<const P: usize>(
+pub fn with_level_uncertainty<const P: usize>(
     whitened: &Whitened<'_>,
     theta: &[f64; P],
     free: &[usize],
@@ -94,19 +94,19 @@ fn inverse<const P: usize>(
 }
 
 /// A minimum of the whitened cost, and all that its neighbourhood depends on.
-pub(crate) struct Minimum<'m, 'a, const P: usize> {
-    pub(crate) whitened: &'m Whitened<'a>,
-    pub(crate) theta: [f64; P],
-    pub(crate) free: &'m [usize],
-    pub(crate) covariance: &'m [[f64; P]; P],
-    pub(crate) variables: &'m [Variable],
-    pub(crate) priors: &'m [Prior],
-    pub(crate) minimiser: &'m dyn Minimiser,
+pub struct Minimum<'m, 'a, const P: usize> {
+    pub whitened: &'m Whitened<'a>,
+    pub theta: [f64; P],
+    pub free: &'m [usize],
+    pub covariance: &'m [[f64; P]; P],
+    pub variables: &'m [Variable],
+    pub priors: &'m [Prior],
+    pub minimiser: &'m dyn Minimiser,
 }
 
 impl<const P: usize> Minimum<'_, '_, P> {
     /// Intervals of both time constants; by the profile `always`, or where the quadratic form does not describe it.
-    pub(crate) fn intervals(&self, always: bool) -> Intervals {
+    pub fn intervals(&self, always: bool) -> Intervals {
         let mut out = Intervals::quadratic(&self.theta, self.covariance);
         for i in (0..2).filter(|i| self.free.contains(i)) {
             (out.interval_95_s[i], out.basis[i]) = self.interval(i, always);
@@ -115,7 +115,7 @@ impl<const P: usize> Minimum<'_, '_, P> {
     }
 
     /// The same of the time constant `i` alone, which is free.
-    pub(crate) fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
+    pub fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
         let Self { theta, free, variables, .. } = self;
         let ends = quadratic(theta[i], self.covariance[i][i]);
         let Some(inverse) = inverse(self.whitened, theta, free, self.priors) else {

@@ -5,7 +5,7 @@ use twinlag_cross_relation::{CostValue, CrossRelation, Whitened};
 use twinlag_optimise::{Cost, Derivatives};
 
 /// Any of the estimators' costs.
-pub(crate) enum EstimatorCost<'a> {
+pub enum EstimatorCost<'a> {
     Whitened(Whitened<'a>),
     CrossRelation(CrossRelation<'a>),
     Compensated(Compensated<'a>),
@@ -14,7 +14,7 @@ pub(crate) enum EstimatorCost<'a> {
 }
 
 impl EstimatorCost<'_> {
-    pub(crate) fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
+    pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         match self {
             Self::Whitened(cost) => cost.evaluate(theta),
             Self::CrossRelation(cost) => cost.evaluate(theta),
@@ -27,20 +27,20 @@ impl EstimatorCost<'_> {
 
 /// Independent prior knowledge of one parameter, as one more residual `(θ − mean)/std`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Prior {
-    pub(crate) index: usize,
-    pub(crate) mean: f64,
-    pub(crate) std: f64,
+pub struct Prior {
+    pub index: usize,
+    pub mean: f64,
+    pub std: f64,
 }
 
 /// A cost over the first `P` parameters, with priors.
-pub(crate) struct Objective<'a, 'c, const P: usize> {
-    pub(crate) cost: &'c EstimatorCost<'a>,
-    pub(crate) priors: &'c [Prior],
+pub struct Objective<'a, 'c, const P: usize> {
+    pub cost: &'c EstimatorCost<'a>,
+    pub priors: &'c [Prior],
 }
 
 impl<const P: usize> Objective<'_, '_, P> {
-    pub(crate) fn at(&self, x: &[f64]) -> CostValue<P> {
+    pub fn at(&self, x: &[f64]) -> CostValue<P> {
         let theta: [f64; P] = std::array::from_fn(|i| x[i]);
         let mut out = self.cost.evaluate(&theta);
         for prior in self.priors {

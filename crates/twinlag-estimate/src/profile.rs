@@ -8,13 +8,12 @@
 use twinlag_cross_relation::{Middle, Whitened};
 use twinlag_optimise::{Budget, Cost, End, Minimiser, Problem, Variable};
 
-use crate::error::Error;
-use crate::options::Options;
+use crate::error::EstimateError;
 
 /// 95 % point of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
 /// 97.5 % point of the standard normal.
-pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
+pub const Z_975: f64 = 1.959_963_984_540_054;
 /// From one held value to the next.
 const RATIO: f64 = 1.25;
 /// Held values tried each way.
@@ -25,7 +24,7 @@ const MOST: i32 = 60;
 const MOSTLY_NOISE: f64 = 0.25;
 /// How far above the minimum such places are allowed: the truth lies lower than this where noise has its way with a parameter
 /// that the signal does not determine.
-pub(crate) const FAR_ABOVE: f64 = 50.0;
+pub const FAR_ABOVE: f64 = 50.0;
 /// Halvings, in logarithms, that place the edge of what is allowed.
 const HALVINGS: usize = 5;
 /// A time constant this small beside its lower bound is none.
@@ -33,11 +32,11 @@ const VANISHING: f64 = 1e-3;
 
 /// Intervals over all values of the undetermined time constant that the record allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Ridge {
+pub struct Ridge {
     /// `τ2 − τ1` where the fit ended, and its interval, s.
-    pub(crate) difference: (f64, [f64; 2]),
+    pub difference: (f64, [f64; 2]),
     /// Interval of the time constant that was not held, s.
-    pub(crate) other: [f64; 2],
+    pub other: [f64; 2],
 }
 
 impl Ridge {
@@ -51,7 +50,7 @@ impl Ridge {
     }
 
     /// The union of two, where this one ended.
-    pub(crate) fn with(&self, other: &Self) -> Self {
+    pub fn with(&self, other: &Self) -> Self {
         Self {
             difference: (self.difference.0, union(self.difference.1, other.difference.1)),
             other: union(self.other, other.other),
@@ -60,15 +59,15 @@ impl Ridge {
 }
 
 /// Walks along time constant `index` (0 or 1) from `best`, the lowest point found for `cost` over `variables`.
-pub(crate) fn ridge<const P: usize>(
+pub fn ridge<const P: usize>(
     cost: &dyn Cost,
     whitened: &Whitened<'_>,
     variables: &[Variable],
     best: &[f64],
     index: usize,
     middle: Middle,
-    options: &Options,
-) -> Result<Option<Ridge>, Error> {
+    minimiser: &dyn Minimiser,
+) -> Result<Option<Ridge>, EstimateError> {
     let other = 1 - index;
     let rest: Vec<usize> = (0..P).filter(|&i| i != index && variables[i].lower < variables[i].upper).collect();
     if !rest.contains(&other) {
@@ -95,13 +94,13 @@ pub(crate) fn ridge<const P: usize>(
         found = Some(found.map_or(here, |r| r.with(&here)));
     };
     // The rest fitted with the time constant held: where, how far above the minimum, and whether it is allowed.
-    let fit_at = |held: f64, from: &[f64]| -> Result<Option<(Vec<f64>, f64, bool)>, Error> {
+    let fit_at = |held: f64, from: &[f64]| -> Result<Option<(Vec<f64>, f64, bool)>, EstimateError> {
         let mut variables = variables.to_vec();
         variables[index] = variables[index].clone().held_at(held);
         let mut from = from.to_vec();
         from[index] = held;
         let problem = Problem::new(cost, variables)?;
-        let fit = options.optimiser.minimise(&problem, &from, &Budget::default())?;
+        let fit = minimiser.minimise(&problem, &from, &Budget::default())?;
         if matches!(fit.end, End::OnBound(_)) {
             return Ok(None);
         }
