@@ -24,7 +24,7 @@ impl<'a> Compensated<'a> {
         Self { cost, noise, level: 1.0 }
     }
 
-    /// The same cost for noise of `level` times the variance that [`Compensated::new`] was given, in both channels.
+    /// This cost for noise of `level` times the variance given to [`Compensated::new`], in both channels.
     ///
     /// # Errors
     /// [`NoiseError::Negative`] unless `level` is finite and not negative.
@@ -36,7 +36,7 @@ impl<'a> Compensated<'a> {
         }
     }
 
-    /// What the variances given to [`Compensated::new`] are multiplied by: 1 unless [`Compensated::with_level`] says otherwise.
+    /// Factor on the variances given to [`Compensated::new`]: 1 unless set by [`Compensated::with_level`].
     pub fn level(&self) -> f64 {
         self.level
     }

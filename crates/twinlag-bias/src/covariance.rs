@@ -1,4 +1,4 @@
-//! What noise does to an estimate by the published cost and its relatives: the covariance of their minimum.
+//! The covariance of the minimum of the published cost and its relatives, due to noise.
 //!
 //! `Cov = A⁻¹ M A⁻¹` with `A` half the Hessian of the summed cost and `M` the variance of half its gradient,
 //! `Σ_k e[k] v_i[k]` with `v_i = ∂_i e` (less a multiple of `e` for the normalised cost). `e` carries noise of both channels

@@ -11,12 +11,12 @@ pub enum NoiseError {
     Ratio { value: f64 },
     #[error("a weight must lie between 0 (normalised) and 1 (compensated), got {value}")]
     Weight { value: f64 },
-    #[error("without noise in either channel there is nothing to measure the cost by")]
+    #[error("without noise in either channel the cost has no scale: at least one level must be positive")]
     NoNoise,
     #[error(
         "an autocovariance starts with the variance, which no lag exceeds: lag {lag} is {value}, the variance {variance}"
     )]
     Autocovariance { lag: usize, value: f64, variance: f64 },
-    #[error("at least {needed} neighbouring samples are needed to tell noise from signal, got {samples}")]
+    #[error("at least {needed} neighbouring samples are needed to distinguish noise from signal, got {samples}")]
     TooShort { samples: usize, needed: usize },
 }

@@ -14,10 +14,10 @@ use crate::noise_gain::Noise;
 
 /// Compensated cross-relation cost over a power of what noise adds to it.
 ///
-/// It assumes what [`crate::Compensated`] does, stationary noise of known autocovariance that is independent of the gas, but
-/// leans on the level less: if the true variances are `1 + ε` times the given ones, `E[F_w] = J_clean/N^(1−w) + ε N^w`, and
-/// the minimum is off by `w` times what it would be off with the compensated cost (to first order in `ε`). The ratio of the
-/// levels has to be right for any `w`.
+/// Like [`crate::Compensated`], it assumes stationary noise of known autocovariance that is independent of
+/// the gas, but it depends less on the level. If the true variances are `1 + ε` times the given ones, then
+/// `E[F_w] = J_clean/N^(1−w) + ε N^w`, and to first order in `ε` the error of the minimum is `w` times that
+/// of the compensated cost. The ratio of the levels has to be right for any `w`.
 #[derive(Clone, Debug)]
 pub struct Hybrid<'a> {
     cost: CrossRelation<'a>,
@@ -48,12 +48,12 @@ impl<'a> Hybrid<'a> {
         Ok(Self { cost, noise, weight })
     }
 
-    /// The cost that this one is made of.
+    /// The cost from which this one is computed.
     pub fn cost(&self) -> &CrossRelation<'a> {
         &self.cost
     }
 
-    /// `w`.
+    /// The weight `w`, from 0 (normalised) to 1 (compensated).
     pub fn weight(&self) -> f64 {
         self.weight
     }

@@ -1,4 +1,4 @@
-//! Noise levels from the data: what a smooth signal cannot do from one sample to the next.
+//! Noise levels from the data, estimated from changes that are too fast for a smooth signal.
 //!
 //! Sensors are low-pass, so their highest frequencies usually show the noise floor. The third difference
 //! `y[k] − 3 y[k+1] + 3 y[k+2] − y[k+3]` of a smooth signal is small; of white noise it has variance `20 s²`. It fails where
@@ -18,7 +18,8 @@ pub struct NoiseLevel {
     pub standard_error_k: f64,
     /// Step of the converter, K, if the readings lie on a grid.
     pub quantisation_step_k: Option<f64>,
-    /// Third differences left out because noise does not make such: a dropout has up to four, a sharp step of the gas some.
+    /// Number of third differences left out because they are too large for noise. A dropout causes up to
+    /// four of them, and a sharp step of the gas some.
     pub outliers: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Noise levels from how the two inferred gas temperatures disagree, whatever the gas does.
+//! Noise levels from the disagreement of the two inferred gas temperatures, whatever the gas does.
 //!
 //! `f1 = x + n1`, `f2 = x + n2` with independent noises of known *shape*: so `f1 (f1 − f2)` has expectation `|n1|²` at each
 //! frequency and `f2 (f2 − f1)` has `|n2|²`, the gas having dropped out, exactly and without any assumption about it. In bands
@@ -6,8 +6,8 @@
 //! gas that is Gaussian in the band) finds both, and their standard errors. Where the gas has power a moment scatters widely
 //! and has little weight; the bands that it leaves alone decide, wherever they are.
 //!
-//! Where third differences ([`crate::estimate_noise`]) take a signal that moves from sample to sample for noise, this does not.
-//! It needs the time constants, which need the levels: iterate.
+//! Unlike third differences ([`crate::estimate_noise`]), this method does not mistake a signal that moves
+//! from sample to sample for noise. It needs the time constants, whose estimate needs the levels, so iterate.
 //!
 //! # Source
 //! Own derivation; docs, chapter "Theory", section 5.
@@ -55,8 +55,8 @@ pub struct JointLevels {
     pub std_k: [f64; 2],
     /// Covariance of the two *variances*, K⁴.
     pub covariance_k4: [[f64; 2]; 2],
-    /// Which of them was held at a tenth of the other because the moments put it lower, or below zero: it is at most that,
-    /// within its standard error.
+    /// The channel whose level was held at a tenth of the other's because the moments gave a lower or
+    /// negative value. The true level is at most that, within its standard error.
     pub is_held: [bool; 2],
     /// Weighted sum of squares that the levels leave of the moments: about twice the number of bands, less the parameters, if
     /// noise has the assumed shape and both sensors their models.
@@ -128,8 +128,8 @@ impl NoiseMoments {
         out
     }
 
-    /// Levels for coefficients `ar1` with the weights that noise of `std_k` and `weighing_ar1` gives: its misfit, minimised over
-    /// `ar1`, tells the colour of the noise. (Weights that followed `ar1` would favour whatever makes them small.)
+    /// Levels for coefficients `ar1` with the weights that noise of `std_k` and `weighing_ar1` gives. Its misfit, minimised over
+    /// `ar1`, determines the colour of the noise. (Weights that followed `ar1` would favour whatever makes them small.)
     pub fn levels_weighed(&self, std_k: [f64; 2], weighing_ar1: [f64; 2], ar1: [f64; 2]) -> Option<JointLevels> {
         self.step(&self.shapes(ar1), &self.weights(&self.shapes(weighing_ar1), std_k)?)
     }

@@ -1,4 +1,4 @@
-//! What a synthetic filter lets through of the noise at its input.
+//! How much of the noise at its input a synthetic filter passes.
 
 use num_dual::Dual2SVec64;
 use twinlag_cross_relation::{CostValue, synthetic_filter};
@@ -40,7 +40,7 @@ impl Noise {
         }
     }
 
-    /// Its variance, K².
+    /// Variance of the noise, K².
     pub(crate) fn variance(&self) -> f64 {
         self.autocovariance[0]
     }

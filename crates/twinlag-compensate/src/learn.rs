@@ -41,24 +41,25 @@ const NEARLY: f64 = 6.0;
 /// Priors beside the best one, at most.
 const MOST_OTHERS: usize = 4;
 
-/// A prior, and how well the readings tell it.
+/// A prior for the gas, and how well the readings determine it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Learned {
     /// The prior.
     pub prior: Prior,
     /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky factor at a time.
     pub deviations: Vec<Prior>,
-    /// Priors of other kinds that the readings do not tell from it, and their weights; its own weight is what is left to one. Where a
-    /// spectrum sinks below the noise, how it goes on is not in the readings.
+    /// Alternative priors that fit almost as well, with their posterior weights (`prior` has the remainder).
+    /// They matter because the readings do not determine how the spectrum continues below the noise floor.
     pub others: Vec<(f64, Prior)>,
-    /// What the standard deviations of both channels' noise are to be multiplied by; 1 where they are known.
+    /// Factors on the standard deviations of both channels' noise; 1 if these are known.
     pub noise_factor: [f64; 2],
 }
 
-/// The prior that `readings` of `rig` support, the covariance of its numbers the inverse of Fisher's information.
+/// Estimates the prior that `readings` of `rig` support. The covariance of its numbers is the inverse of
+/// Fisher's information.
 ///
-/// Instants that are missing, and uneven ones, are bridged by straight lines; where that is more than a few the likelihood is that of the
-/// readings themselves.
+/// Straight lines bridge missing and uneven instants. If there are more than a few of these, the likelihood
+/// is that of the readings themselves.
 ///
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
@@ -66,7 +67,8 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     learned(readings, rig, Ask::Gas)
 }
 
-/// The same in less time: parts are added and not exchanged. For a gas temperature without bands.
+/// Estimates a prior as [`learn`] does, but faster: parts are added and not exchanged. Use it for a gas
+/// temperature without bands.
 ///
 /// # Errors
 /// As [`learn`].
@@ -74,8 +76,9 @@ pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, Compensa
     learned(readings, rig, Ask::GasQuickly)
 }
 
-/// The same where the noise of `rig` was found from the readings without regard to what the gas is like: gas that is rough from one
-/// sample to the next is taken for noise then, so both levels are found once more, together with the prior.
+/// Estimates a prior as [`learn`] does, together with the noise levels of both channels. Use it if the noise
+/// of `rig` was estimated without regard to the gas, since gas that is rough from one sample to the next is
+/// then mistaken for noise.
 ///
 /// # Errors
 /// As [`learn`].

@@ -1,11 +1,13 @@
 //! The gas temperature, with its standard deviation, from the readings of two sensors whose lags are known.
 //!
-//! For anyone who has a model of two sensors, however it was found, and wants what they measured: [`learn()`] finds from the readings
-//! how much the gas moves and how fast, [`reconstruct()`] gives its temperature at every sample with an honest band, from the whole record
-//! (Kalman's filter and a smoother), from what was read so far, or with a fixed lag; [`Stream`] does the second sample by sample, and [`Tracker`] also while the flow changes the time constants. Uneven
-//! sampling, missing readings, a delay between the channels, second lags, slow paths, noise that is not white, time constants that
-//! change and radiation are in the model ([`Rig`], [`Local`]). The crate knows neither files nor how a model is found: for logger files
-//! take `twinlag`, for the model `twinlag-diagnose`.
+//! This crate is for anyone who has a model of two sensors, however it was found, and wants the gas
+//! temperature that they measured. [`learn()`] estimates from the readings how strongly and how fast the gas
+//! fluctuates. [`reconstruct()`] gives its temperature with a band at every sample: from the whole record
+//! (Kalman's filter and a smoother), from the readings so far, or with a fixed lag. [`Stream`] filters sample
+//! by sample, and [`Tracker`] does so while the flow changes the time constants. The model ([`Rig`],
+//! [`Local`]) covers uneven sampling, missing readings, a delay between the channels, second lags, slow
+//! paths, noise that is not white, time constants that change, and radiation. The crate knows neither files
+//! nor how a model is found: for logger files use `twinlag`, for the model `twinlag-diagnose`.
 //!
 //! ```
 //! use twinlag_compensate::{Form, Readings, Rig, Sensor, learn, reconstruct};
@@ -26,7 +28,7 @@
 //! let prior = learn(&readings, &rig)?.prior;
 //! let gas = reconstruct(&readings, &rig, &prior, Form::Smoother)?;
 //!
-//! // Far nearer to the gas than the faster sensor, and it knows how near.
+//! // Much closer to the gas than the faster sensor, with a standard deviation that fits the error.
 //! let rms = |values: &[f64]| {
 //!     let squares: f64 = values.iter().zip(&record.gas_c).map(|(a, b)| (a - b) * (a - b)).sum();
 //!     (squares / values.len() as f64).sqrt()
@@ -37,7 +39,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Without its default feature `std` the crate is [`Stream`] and what that needs, for machines without an operating system.
+//! Without its default feature `std` the crate has only [`Stream`] and what it needs, for machines without an operating system.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 

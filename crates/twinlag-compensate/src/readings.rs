@@ -22,7 +22,7 @@ impl Readings {
         Self::with_missing(time_s, reading_c, missing)
     }
 
-    /// The same, of which those that are marked say nothing, whatever they are.
+    /// Readings at `time_s`, of which those marked in `missing` are ignored, whatever their value.
     ///
     /// # Errors
     /// As [`Readings::new`].
@@ -76,7 +76,7 @@ impl Readings {
         self.time_s.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no readings.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()
     }

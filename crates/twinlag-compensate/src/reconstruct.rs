@@ -10,10 +10,11 @@ use crate::system;
 /// Largest state.
 pub(crate) const MOST_STATES: usize = 24;
 
-/// The gas temperature that `readings` of `rig` tell, where the gas moves as `prior` says.
+/// Reconstructs the gas temperature from `readings` of `rig`, for a gas that fluctuates as `prior` describes.
 ///
-/// The mean and standard deviation of the gas given the readings that `form` allows: exact where sensors and gas are as `rig` and `prior`
-/// say, with a state-space model of both in continuous time; sensors that lose heat or change are linearised at their readings.
+/// The result is the mean and standard deviation of the gas given the readings that `form` allows, from a
+/// state-space model of sensors and gas in continuous time. It is exact if both are as `rig` and `prior`
+/// describe them; sensors that lose heat or change are linearised at their readings.
 ///
 /// # Errors
 /// [`CompensateError::NotPositive`] for a time constant or noise that is not, [`CompensateError::TooLarge`] for a prior with too
@@ -33,8 +34,9 @@ pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) ->
     Ok(run(readings, rig, prior, form))
 }
 
-/// The highest frequency, Hz, of which readings every `period_s` say more than the prior: where the gas has as much power as the
-/// noise of both inferred gas temperatures together. `None` if it has less everywhere.
+/// The highest frequency, Hz, at which readings every `period_s` determine the gas better than the prior:
+/// there the gas has as much power as the noise of both inferred gas temperatures together. `None` if it has
+/// less everywhere.
 pub fn bandwidth_hz(rig: &Rig, prior: &Prior, period_s: f64) -> Option<f64> {
     const POINTS: i32 = 2000;
     let highest_hz = 0.5 / period_s;

@@ -37,13 +37,13 @@ pub struct SlowPath {
     pub tau_s: f64,
 }
 
-/// One sensor: `τ dT/dt = x − T − loss`, and what follows on it.
+/// One sensor: `τ dT/dt = x − T − loss`, followed by a second lag, a slow path and noise if it has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Sensor {
     /// Time constant `τ`, s.
     pub tau_s: f64,
-    /// Of a second lag in series, s.
+    /// Time constant of a second lag in series, s.
     pub second_tau_s: Option<f64>,
     /// A slow path beside the direct one.
     pub slow: Option<SlowPath>,
@@ -59,7 +59,7 @@ impl Sensor {
         Self { tau_s, second_tau_s: None, slow: None, noise_std_k, coloured: None }
     }
 
-    /// Its response at `frequency_hz`, without losses.
+    /// Frequency response of the sensor at `frequency_hz`, without losses.
     #[cfg(feature = "std")]
     pub fn response(&self, frequency_hz: f64) -> Complex64 {
         let s = |tau_s: f64| Complex64::new(0.0, core::f64::consts::TAU * frequency_hz * tau_s);
@@ -139,12 +139,12 @@ impl Rig {
     }
 }
 
-/// What a sensor does at one instant, where that is not always the same.
+/// The state of a sensor at one instant, for sensors that change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Local {
-    /// Its time constant over the one that [`Sensor::tau_s`] says.
+    /// Time constant at this instant over [`Sensor::tau_s`].
     pub tau_factor: f64,
-    /// What it loses, K, at the reading: radiation.
+    /// Loss by radiation at the reading, K.
     pub loss_k: f64,
     /// Derivative of that with respect to its temperature.
     pub loss_slope: f64,

@@ -16,16 +16,16 @@ use crate::system::{Step, System, around};
 /// Steps that differ by less are the same.
 const SAME_STEP: f64 = 1e-9;
 
-/// Which readings an estimate may rest on.
+/// Which readings an estimate may use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// All of the record: for a record that is complete.
+    /// All readings of the record, once it is complete.
     #[default]
     Smoother,
-    /// Those up to its instant: for control, and to compare with a stream.
+    /// The readings up to each instant: for control, and for comparison with a stream.
     Filter,
-    /// Those up to this many instants later.
+    /// The readings up to this many instants later.
     FixedLag(usize),
 }
 
@@ -34,13 +34,14 @@ pub enum Form {
 pub struct Gas {
     /// At each instant, °C.
     pub gas_c: Vec<f64>,
-    /// Its standard deviation, K, where model and prior are right.
+    /// Standard deviation of the gas temperature, K, if model and prior are right.
     pub std_k: Vec<f64>,
     /// Logarithm of the likelihood of model and prior.
     pub log_likelihood: f64,
-    /// Mean square of readings less what the earlier ones led to expect, over its variance: 1 where model and prior are right.
+    /// Mean square of the innovations (readings less their predictions from earlier ones) over their
+    /// variance: 1 if model and prior are right.
     pub innovation_energy: f64,
-    /// How many readings that is of.
+    /// Number of innovations.
     pub innovations: usize,
 }
 
@@ -150,7 +151,7 @@ impl<const D: usize> Forward<D> {
         })
     }
 
-    /// From the end of `events` back to the first, told for each the gas and its variance.
+    /// Goes from the end of `events` back to the first, and passes the gas and its variance at each.
     fn back(&self, reads: &[SVector<f64, D>; 2], from: usize, to: usize, mut told: impl FnMut(usize, f64, f64)) {
         let mut pull = SVector::<f64, D>::zeros();
         let mut weight = SMatrix::<f64, D, D>::zeros();

@@ -10,25 +10,28 @@ use crate::system::{Step, System};
 /// Change of the covariance, relative to its largest entry, below which it has settled.
 const SETTLED: f64 = 1e-15;
 
-/// What is known of the gas at an instant from the readings up to it.
+/// The gas temperature at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Now {
     /// The gas temperature, °C.
     pub gas_c: f64,
-    /// Its variance, K².
+    /// Variance of the gas temperature, K².
     pub variance_k2: f64,
-    /// How far the readings are from what the earlier ones led to expect: the sum of squares over their variances, chi-square with as
-    /// many degrees of freedom as there were readings while the rig is what it was.
+    /// Normalised innovation squared: the sum of squared differences between the readings and their
+    /// predictions from earlier ones, over their variances. If the rig has not changed, it is chi-square with
+    /// one degree of freedom for each reading.
     pub surprise: f64,
-    /// The product of these variances, K² each: `−2 ln` of the likelihood of the readings is `surprise + ln scatter` and a constant.
+    /// The product of the innovation variances, K² each: `−2 ln` of the likelihood of the readings is
+    /// `surprise + ln scatter` and a constant.
     pub scatter: f64,
 }
 
 /// A causal filter for two sensors that are read every `period_s`: push readings, read the gas temperature.
 ///
-/// The same recursion as [`crate::Form::Filter`] has. Once the covariance has settled, which it does after as many samples as the
-/// slowest part of prior and sensors remembers, its gains are kept and a sample costs some `2 D²` multiplications; a missing reading
-/// sets it going again. `D` is the number of states, at least [`Stream::states`]: the smallest that holds them is the fastest.
+/// It uses the recursion of [`crate::Form::Filter`]. The covariance settles within the memory of the slowest
+/// part of prior and sensors. From then on the gains are constant, and a sample costs about `2 D²`
+/// multiplications, until a missing reading starts the recursion again. `D` is the number of states, at least
+/// [`Stream::states`]; the smallest that suffices is the fastest.
 ///
 /// ```
 /// use twinlag_compensate::{Rig, Sensor, Stream, Term};
@@ -55,7 +58,7 @@ pub struct Stream<const D: usize> {
 /// Gains that no longer change.
 #[derive(Clone, Copy, Debug)]
 struct Settled<const D: usize> {
-    /// Of each reading: its gain, and one over the variance of what is new in it.
+    /// The gain of each reading, and one over the variance of its innovation.
     gains: [(SVector<f64, D>, f64); 2],
     variance_k2: f64,
     scatter: f64,

@@ -7,39 +7,42 @@ use crate::stream::Stream;
 /// Factors of the time constants that are kept in view, evenly spaced in their logarithm between `1/FARTHEST` and `FARTHEST`.
 const FACTORS: usize = 41;
 const FARTHEST: f64 = 2.5;
-/// Chance of a sample that the factor jumps anywhere: a sudden change is followed once readings tell it so often to one.
+/// Probability that the factor jumps to any value in a sample. A sudden change is followed once the
+/// likelihood ratio of the readings exceeds one over this.
 const JUMP: f64 = 1e-9;
 /// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a single wrong one does not decide.
 const FREEDOM: f64 = 8.0;
 
-/// What is known at an instant from the readings up to it.
+/// The gas temperature and the time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
     /// The gas temperature, °C.
     pub gas_c: f64,
-    /// Its variance, K².
+    /// Variance of the gas temperature, K².
     pub variance_k2: f64,
     /// Logarithm of the time constants over those of the rig.
     pub log_factor: f64,
-    /// Variance of that.
+    /// Variance of `log_factor`.
     pub log_variance: f64,
-    /// Chance that the factor is the smallest or the largest in view: where it is not small, the factor is beyond.
+    /// Probability that the factor is the smallest or the largest that is tracked. If it is not small, the
+    /// factor has left the range.
     pub chance_beyond: f64,
-    /// How far the readings are from what the earlier ones led to expect, as in [`crate::Now`]: the mean over the factors.
+    /// Normalised innovation squared, as in [`crate::Now`], averaged over the factors.
     pub surprise: f64,
 }
 
 /// A filter for sensors whose time constants change by a common factor, as they do in flow that changes.
 ///
-/// One [`Stream`] for each of a grid of factors; their likelihoods, and a random walk of the logarithm of the factor between its
-/// neighbours, give the chance of each factor (a hidden Markov model's forward recursion), and the gas temperature is their mixture.
-/// Constant memory and work for a sample, nothing allocated after [`Tracker::new`].
+/// It runs one [`Stream`] for each factor on a grid. Their likelihoods, and a random walk of the logarithm of
+/// the factor between neighbours, give the probability of each factor (the forward recursion of a hidden
+/// Markov model), and the gas temperature is their mixture. Memory and work per sample are constant, and
+/// nothing is allocated after [`Tracker::new`].
 #[derive(Clone, Debug)]
 pub struct Tracker<const D: usize> {
     streams: Vec<Stream<D>>,
     log_factor: Vec<f64>,
     chance: Vec<f64>,
-    /// Those after the step, and the logarithms of the likelihoods.
+    /// Probabilities after the step, and the logarithms of the likelihoods.
     next: Vec<f64>,
     log_likelihood: Vec<f64>,
     /// Chance of a step to either neighbour.
@@ -110,7 +113,7 @@ impl<const D: usize> Tracker<D> {
 /// [`Tracker::push`] with as many states as are needed.
 pub type Push = Box<dyn FnMut([Option<f64>; 2]) -> Tracked + Send>;
 
-/// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` where there is none.
+/// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more than the largest.
 pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
     fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
         let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;

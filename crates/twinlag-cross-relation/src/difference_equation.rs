@@ -39,7 +39,7 @@ impl DifferenceEquationEstimator {
     /// Time constants `[τ1, τ2]` (s).
     ///
     /// # Errors
-    /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for a noise ratio that is none; [`CostError::Singular`] where the
+    /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for an invalid noise ratio; [`CostError::Singular`] where the
     /// solution is no pair of positive time constants.
     ///
     /// # Source

@@ -1,4 +1,4 @@
-//! The two inferred gas temperatures, each on its own: what their noise levels can be told from.
+//! The two inferred gas temperatures, each on its own, from which their noise levels can be estimated.
 
 use num_dual::DualSVec64;
 use twinlag_sensor::Discretisation;
@@ -9,7 +9,7 @@ use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::readings::{Readings, Steps};
 
-/// What each sensor implies of the gas, behind one common filter: `f_i[k] = Σ_j filter_i[j] y_i[k+j]`.
+/// The gas temperature that each sensor implies, behind one common filter: `f_i[k] = Σ_j filter_i[j] y_i[k+j]`.
 ///
 /// At the right parameters both are the same filtered gas temperature, each with its channel's noise: white noise of variance
 /// `s²` becomes `s² |Σ_j filter[j] e^(i w j)|²` at `w` radians per sample. For first-order sensors and the zero-order hold they

@@ -21,7 +21,7 @@ pub enum Parameter {
     Offset,
     /// Time constant of a second lag in series with that of sensor 1, s; 0 for a sensor of first order.
     SecondTau1,
-    /// The same of sensor 2, s.
+    /// Time constant of a second lag in series with that of sensor 2, s; 0 for a sensor of first order.
     SecondTau2,
 }
 
@@ -41,8 +41,8 @@ pub(crate) struct Pair<D> {
 }
 
 impl<const P: usize> Pair<DualSVec64<P>> {
-    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1, offset 0 and first order. A second time constant of
-    /// zero is none, and has no derivatives.
+    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1, offset 0 and first order. A
+    /// second time constant of zero means no second lag, and has no derivatives.
     pub(crate) fn variables(theta: &[f64; P]) -> Self {
         const { assert!(P == 2 || P == 4 || P == 6, "two time constants, with gain and offset, with second lags") };
         let variable = |i: usize, otherwise: f64| match theta.get(i) {
@@ -70,8 +70,9 @@ pub(crate) fn parts<const P: usize>(x: DualSVec64<P>) -> (f64, [f64; P]) {
 pub struct CostValue<const P: usize> {
     /// The cost.
     pub value: f64,
-    /// Its first derivatives.
+    /// First derivatives of the value.
     pub gradient: [f64; P],
-    /// Its second derivatives; for sums of squares whose residual is small, the Gauss-Newton part of them where so stated.
+    /// Second derivatives of the value; where so stated, only their Gauss-Newton part, for sums of squares
+    /// whose residual is small.
     pub hessian: [[f64; P]; P],
 }

@@ -91,7 +91,7 @@ fn sum(x: &[f64]) -> f64 {
     strands.iter().chain(rest).sum()
 }
 
-/// Both channels of a record: one or more segments, a common level taken off.
+/// Both channels of a record: one or more segments, with a common level subtracted.
 ///
 /// At unity gain the costs do not depend on it, and taking it off keeps it out of the rounding. With a free gain it is the
 /// temperature at which the offset is stated: gain and offset are least entangled at the mean of the record.

@@ -11,7 +11,7 @@ pub struct ResidualTest {
     pub test: String,
     /// The statistic.
     pub statistic: f64,
-    /// Its degrees of freedom, where it has any.
+    /// Degrees of freedom of the statistic, if it has any.
     pub degrees_of_freedom: Option<f64>,
     /// Probability of a statistic at least as extreme if the model is right.
     pub p_value: f64,

@@ -32,7 +32,7 @@ pub fn sandwich<const P: usize>(
     free.iter().all(|&i| out[i][i].is_finite() && out[i][i] > 0.0).then_some(out)
 }
 
-/// `A⁻¹` over the `free` parameters, zero for the rest; `None` where [`sandwich`] has none.
+/// `A⁻¹` over the `free` parameters, zero for the rest; `None` where [`sandwich`] returns `None`.
 pub(crate) fn inverse<const P: usize>(curvature: &[[f64; P]; P], free: &[usize]) -> Option<[[f64; P]; P]> {
     sandwich(curvature, curvature, free)
 }

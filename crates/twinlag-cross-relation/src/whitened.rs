@@ -55,7 +55,7 @@ impl<'a> Whitened<'a> {
         Self::with_form(readings, hold, noise_std, form)
     }
 
-    /// As [`Whitened::new`], in a form of the caller's choice.
+    /// Creates the cost as [`Whitened::new`] does, in a form of the caller's choice.
     ///
     /// # Errors
     /// As [`Whitened::new`], and [`CostError::NoSpectralForm`].
@@ -89,7 +89,7 @@ impl<'a> Whitened<'a> {
         Ok(if form == Form::Compressed { out.compressed(false) } else { out })
     }
 
-    /// The same cost with its bins gathered into bands, where it is in the spectral form; unchanged otherwise.
+    /// This cost with its bins gathered into bands, if it is in the spectral form; unchanged otherwise.
     ///
     /// - `calibration`: whether gain and offset will be asked for (`P` 4), which takes more than twice as many sums; without it
     ///   such questions are answered by the full sum
@@ -101,7 +101,7 @@ impl<'a> Whitened<'a> {
         self
     }
 
-    /// The same cost without compression.
+    /// This cost without compression.
     #[must_use]
     pub fn exact(mut self) -> Self {
         self.compressed = None;
@@ -117,7 +117,7 @@ impl<'a> Whitened<'a> {
         }
     }
 
-    /// The same cost for other noise levels, without transforming again.
+    /// This cost for other noise levels, without transforming again.
     ///
     /// # Errors
     /// [`CostError::NotPositive`].
@@ -127,11 +127,11 @@ impl<'a> Whitened<'a> {
         Ok(self)
     }
 
-    /// The same cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]` with `e` white, of order 0
-    /// (empty: white), 1 or 2. The noise levels stay standard deviations of `n`.
+    /// This cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]` with white
+    /// `e`, of order 0 (empty: white), 1 or 2. The noise levels remain standard deviations of `n`.
     ///
-    /// Exact, in the banded form: the equation is multiplied by both channels' whitening filters, which costs as many samples
-    /// as they are long and supposes nothing about the noise before the record.
+    /// Exact, in the banded form: the equation is multiplied by the whitening filters of both channels. This
+    /// costs as many samples as they are long and assumes nothing about the noise before the record.
     ///
     /// # Errors
     /// [`CostError::Autoregression`] for an order above 2 or noise that is not stationary,

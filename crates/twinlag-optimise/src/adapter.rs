@@ -1,6 +1,6 @@
 //! The one place where our costs meet argmin's traits.
 //!
-//! argmin asks for value, gradient and Hessian apart, runs without limits unless told, reports an exhausted budget as
+//! argmin asks for value, gradient and Hessian separately, runs without limits by default, reports an exhausted budget as
 //! success, and stops with an error at a value that is not a number. So: one evaluation serves all three, limits and the
 //! best point are the ledger's, and a value that is not finite is infinite.
 
@@ -160,7 +160,7 @@ impl Hessian for Objective<'_, '_, '_, '_> {
 }
 
 /// A solver that keeps the ledger: its iterations are counted even if it stops with an error, which takes argmin's own count
-/// with it; it is told to stop when the budget is spent, whether it has noticed or not.
+/// with it; it is stopped when the budget is spent, whether it has noticed or not.
 struct Kept<'l, 'p, 'c, 'o, S> {
     solver: S,
     ledger: &'l Ledger<'p, 'c, 'o>,

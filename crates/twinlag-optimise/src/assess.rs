@@ -10,7 +10,7 @@ use crate::report::End;
 const ON_BOUND: f64 = 1e-6;
 /// A Newton step longer than this, in coordinates, means that the minimum is elsewhere.
 const NOT_THERE: f64 = 1e-3;
-/// Curvature below this share of the largest one is none.
+/// Curvature below this share of the largest one counts as zero.
 const FLAT: f64 = 1e-12;
 
 impl Problem<'_> {

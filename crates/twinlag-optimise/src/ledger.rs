@@ -1,4 +1,4 @@
-//! What a fit has done so far: the one place through which every solver reaches the cost.
+//! The account of a fit so far, and the one place through which every solver reaches the cost.
 //!
 //! Every call of the cost passes here, is counted as the cost sees it, and is refused once the budget is spent. The best
 //! point is kept here too, so it survives whatever becomes of the solver.
@@ -122,7 +122,7 @@ impl<'p, 'c, 'o> Ledger<'p, 'c, 'o> {
         self.iterations.set(self.iterations.get() + 1);
     }
 
-    /// Tells whoever watches where the fit stands.
+    /// Reports to the observer how far the fit has come.
     pub(crate) fn report(&self) {
         if let Some(observer) = &self.observer {
             let best = self.best.borrow();

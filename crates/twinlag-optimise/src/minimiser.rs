@@ -1,4 +1,4 @@
-//! What a minimiser is.
+//! The trait that every minimiser implements.
 
 use crate::problem::{Problem, ProblemError};
 use crate::report::{Budget, Fit, Progress};
@@ -9,21 +9,22 @@ use crate::report::{Budget, Fit, Progress};
 /// [`Problem::value_at`] and [`Problem::derivatives_at`]; [`Problem::point`] takes its answer back to the variables' own units, and
 /// [`Problem::assess`] says what kind of point it is.
 pub trait Minimiser {
-    /// The name that reports carry.
+    /// Name of the solver, as it appears in reports.
     fn name(&self) -> String;
 
     /// Minimises `problem` from `start` (all variables, their own units; moved inside the bounds first).
     ///
     /// # Errors
     /// [`ProblemError::Start`] for a start of the wrong length or not finite, [`ProblemError::NeedsDerivatives`] where a solver
-    /// that follows gradients meets a cost without any, [`ProblemError::OneVariable`] where one for a single variable meets
+    /// that follows gradients gets a cost without any, [`ProblemError::OneVariable`] where one for a single variable gets
     /// several. A fit that ran is never an error.
     fn minimise(&self, problem: &Problem<'_>, start: &[f64], budget: &Budget) -> Result<Fit, ProblemError>;
 
-    /// [`Minimiser::minimise`], telling `observer` how far it has come: for a progress bar, a picture of the way, or a log.
+    /// Minimises as [`Minimiser::minimise`] does, and reports its progress to `observer`: for a progress
+    /// bar, a picture of the path, or a log.
     ///
-    /// The solvers of this crate tell at the start and after every iteration. By default, that is, for a solver that cannot be
-    /// looked into, the end alone is told.
+    /// The solvers of this crate report at the start and after every iteration. The default implementation,
+    /// for a solver that cannot be observed, reports only the end.
     ///
     /// ```
     /// # use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};

@@ -1,4 +1,4 @@
-//! Several starts, one answer: the lowest of all ends.
+//! Several starts, of which the lowest end is the answer.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use crate::minimiser::Minimiser;
 use crate::problem::{Problem, ProblemError};
 use crate::report::{Budget, Fit};
 
-/// What became of every start, the lowest end first.
+/// The result of every start, the lowest end first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MultiStart {
     fits: Vec<Fit>,

@@ -31,8 +31,8 @@ pub enum Optimiser {
         /// Edge of the first simplex, in coordinates.
         edge: f64,
     },
-    /// Limited-memory BFGS with the Moré-Thuente line search. Needs derivatives; never the default: it can claim
-    /// convergence on a plateau, which the report then calls by its name.
+    /// Limited-memory BFGS with the Moré-Thuente line search. Needs derivatives. It is never the default,
+    /// since it can claim convergence on a plateau; the report then says so.
     #[serde(rename = "l-bfgs")]
     LBfgs {
         /// Steps remembered.
@@ -40,7 +40,7 @@ pub enum Optimiser {
         /// Done when the gradient is below this.
         gradient_tolerance: f64,
     },
-    /// BFGS with the Moré-Thuente line search. Needs derivatives; no less trusting of a plateau.
+    /// BFGS with the Moré-Thuente line search. Needs derivatives. It too can claim convergence on a plateau.
     Bfgs {
         /// Done when the gradient is below this.
         gradient_tolerance: f64,
@@ -55,18 +55,19 @@ pub enum Optimiser {
         /// Done when a step, or the region, is no longer than this.
         step_tolerance: f64,
     },
-    /// A swarm over the whole of the bounds, the start among it; then Levenberg-Marquardt from the best point, or the simplex
-    /// if the cost has no derivatives. Global, as far as anything is: the same seed finds the same end.
+    /// A swarm over the whole of the bounds, including the start; then Levenberg-Marquardt from the best
+    /// point, or the simplex if the cost has no derivatives. Global, as far as any solver is; a seed always
+    /// finds the same end.
     ParticleSwarm {
         /// Size of the swarm.
         particles: usize,
         /// Iterations of the swarm.
         generations: u64,
-        /// Of the random numbers.
+        /// Seed of the random numbers.
         seed: u64,
     },
-    /// A random walk over the whole of the bounds that grows less and less bold; then the same local search. Global, as far
-    /// as anything is: the same seed finds the same end.
+    /// A random walk over the whole of the bounds, with falling temperature; then a local search as for the
+    /// swarm. Global, as far as any solver is; a seed always finds the same end.
     SimulatedAnnealing {
         /// Iterations of the walk.
         sweeps: u64,
@@ -77,7 +78,7 @@ pub enum Optimiser {
         temperature: f64,
         /// Temperature at the end, relative to that at the start.
         cooling: f64,
-        /// Of the random numbers.
+        /// Seed of the random numbers.
         seed: u64,
     },
     /// Brent's search between the bounds of one free variable, by values alone. The start is one candidate and no more.
@@ -104,8 +105,8 @@ impl Optimiser {
         "newton-trust-region-dogleg",
     ];
 
-    /// Names of the global solvers, which search the whole of the bounds. Where a cost has a lower minimum than the one next to
-    /// the start they go there, whether it is the one that makes sense or not.
+    /// Names of the global solvers, which search the whole of the bounds. If a cost has a lower minimum than
+    /// the one next to the start they go there, whether or not it makes sense.
     pub const GLOBAL_NAMES: [&'static str; 2] = ["particle-swarm", "simulated-annealing"];
 
     /// Names of the solvers for one free variable. With more they refuse: [`ProblemError::OneVariable`].
@@ -220,7 +221,7 @@ impl Optimiser {
     }
 }
 
-/// What became of the best point, by the cost's own derivatives.
+/// How the fit ended at the best point, judged by the cost's own derivatives.
 fn judge(ledger: &Ledger<'_, '_, '_>, stop: &Stop) -> End {
     let failure = match stop {
         Stop::Exhausted => return End::LimitReached,

@@ -1,10 +1,11 @@
-//! What is minimised: a cost over named variables with bounds, seen in coordinates in which they are all of size one.
+//! The problem to minimise: a cost over named variables with bounds, in coordinates in which they are all
+//! of size one.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 /// A scalar function to be minimised. Implement [`Cost::derivatives`] as well if you have them: most solvers are then far
-/// faster, and the report can tell a minimum from a plateau.
+/// faster, and the report can distinguish a minimum from a plateau.
 pub trait Cost {
     /// The cost at `x`, in the variables' own units. A value that is not finite counts as infinitely bad.
     fn value(&self, x: &[f64]) -> f64;
@@ -42,9 +43,9 @@ pub enum Scale {
 /// A variable of the cost. `lower == upper` holds it there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Variable {
-    /// What reports call it.
+    /// Name of the variable in reports.
     pub name: String,
-    /// How solvers see it.
+    /// How the variable is scaled inside the solvers.
     pub scale: Scale,
     /// Smallest value allowed.
     pub lower: f64,
@@ -63,7 +64,7 @@ impl Variable {
         Self { name: name.into(), scale: Scale::Linear { typical }, lower, upper }
     }
 
-    /// The same variable, held at `value`.
+    /// This variable, held at `value`.
     #[must_use]
     pub fn held_at(mut self, value: f64) -> Self {
         (self.lower, self.upper) = (value, value);
@@ -102,14 +103,14 @@ pub enum ProblemError {
     NotPositive { name: String, lower: f64, upper: f64 },
     #[error("the typical change of {name} must be finite and positive, got {typical}")]
     Typical { name: String, typical: f64 },
-    #[error("every variable is held: there is nothing to minimise over")]
+    #[error("every variable is held: at least one must be free")]
     NothingFree,
     #[error("a start needs {expected} finite values, one for each variable, got {got:?}")]
     Start { expected: usize, got: Vec<f64> },
     #[error("{optimiser} needs derivatives, and this cost has none: implement `Cost::derivatives`, or use nelder-mead")]
     NeedsDerivatives { optimiser: String },
     #[error(
-        "{optimiser} minimises over one variable, and {} are free here ({}): hold the others, or take another optimiser",
+        "{optimiser} minimises over one variable, and {} are free here ({}): hold the others, or use another optimiser",
         free.len(),
         free.join(", ")
     )]
@@ -224,7 +225,7 @@ impl<'a> Problem<'a> {
         self.look_at(z).ok()
     }
 
-    /// [`Problem::derivatives_at`], with the reason where there are none.
+    /// The derivatives of [`Problem::derivatives_at`], or the reason why there are none.
     pub(crate) fn look_at(&self, z: &[f64]) -> Result<Derivatives, NoDerivatives> {
         let x = self.point(z);
         let mut d = self.cost.derivatives(&x).ok_or(NoDerivatives::Anywhere)?;

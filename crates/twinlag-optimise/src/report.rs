@@ -50,7 +50,7 @@ impl Default for Budget {
     }
 }
 
-/// How far a fit has come: what a watcher is told after every iteration.
+/// How far a fit has come, as reported to an observer after every iteration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// Iterations of the solver so far, 0 for the start.

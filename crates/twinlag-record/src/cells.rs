@@ -10,7 +10,7 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.split(line_end(text)).enumerate().map(|(index, line)| (index + 1, line.trim_end_matches('\r')))
 }
 
-/// The same lines from the last to the first, without numbers.
+/// The lines of a text from the last to the first, without numbers.
 pub(crate) fn lines_from_end(text: &str) -> impl Iterator<Item = &str> {
     text.rsplit(line_end(text)).map(|line| line.trim_end_matches('\r'))
 }

@@ -1,5 +1,5 @@
-//! Which columns are time, T1 and T2: as the caller says, else from names and units. A guess is noted; where two readings
-//! of a header are possible there is none.
+//! Which columns are time, T1 and T2: those that the caller names, else a guess from names and units. A
+//! guess is noted. If a header can be read in two ways, nothing is guessed.
 
 use crate::RecordError;
 use crate::clock;

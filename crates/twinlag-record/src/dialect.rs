@@ -1,6 +1,6 @@
 //! Which delimiter and which decimal sign a file uses. The delimiter is the one whose cells are most alike from line to
-//! line and most often numbers or times; the decimal sign is what the cells show, and a file that shows both or cannot
-//! tell is refused.
+//! line and most often numbers or times; the decimal sign is what the cells show. A file that shows both, or from which
+//! it cannot be determined, is refused.
 
 use std::borrow::Cow;
 
@@ -79,7 +79,7 @@ fn judge(sample: &[&str], delimiter: Delimiter) -> Option<Split> {
     Some(Split { delimiter, cells: most, alike, valid: f64::from(valid) / f64::from(filled.max(1)) })
 }
 
-/// Why no decimal sign could be told; cells with their lines.
+/// Why no decimal sign could be determined; cells with their lines.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Unclear {
     Thousands { line: usize, cell: String },

@@ -55,7 +55,7 @@ pub enum RecordError {
     OneColumn { file: String, line: usize },
     #[error(
         "{file}: line {line}: {found} comma-separated whole numbers under {expected} column names: the comma seems to be \
-         both separator and decimal sign, which cannot be told apart; export with semicolons or with decimal points"
+         both separator and decimal sign, which cannot be distinguished; export with semicolons or with decimal points"
     )]
     DecimalCommaBetweenCommas { file: String, line: usize, expected: usize, found: usize },
     #[error(
@@ -64,7 +64,7 @@ pub enum RecordError {
     )]
     WholeNumbersWithoutHeader { file: String, line: usize, found: usize },
     #[error(
-        "{file}: line {line}: '{cell}' may be a thousands separator or a decimal comma, and no other cell tells which; \
+        "{file}: line {line}: '{cell}' may be a thousands separator or a decimal comma, and no other cell shows which; \
          export without thousands separators and with decimal points"
     )]
     ThousandsOrDecimal { file: String, line: usize, cell: String },
@@ -123,7 +123,7 @@ pub enum RecordError {
     #[error("{file}: {at}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
     NotATime { file: String, at: Place, column: String, cell: String, expected: &'static str },
     #[error(
-        "{file}: {at}, column {column}: '{cell}' may be day/month or month/day, and no date in the file tells \
+        "{file}: {at}, column {column}: '{cell}' may be day/month or month/day, and no date in the file shows \
          which; write dates as YYYY-MM-DD"
     )]
     AmbiguousDate { file: String, at: Place, column: String, cell: String },
@@ -158,7 +158,7 @@ pub enum RecordError {
     #[error("{file}: columns {first} and {second} are the same in every sample; choose two different sensors")]
     Identical { file: String, first: String, second: String },
     #[error(
-        "{file}: column {column} is {shown} °C in every sample, so that it tells nothing about its sensor; \
+        "{file}: column {column} is {shown} °C in every sample, so it contains no information about its sensor; \
          is it connected, is it a setpoint? Choose another column", shown = plain(*value_c)
     )]
     Constant { file: String, column: String, value_c: f64 },

@@ -108,7 +108,7 @@ impl Record {
     /// Reads a file: [`Table::from_path`], then [`Record::from_table`].
     ///
     /// # Errors
-    /// Those of both.
+    /// Those of [`Table::from_path`] and of [`Record::from_table`].
     pub fn read(path: impl AsRef<Path>, selection: &Selection) -> Result<Self, RecordError> {
         Self::from_table(&Table::from_path(path)?, selection)
     }
@@ -116,7 +116,7 @@ impl Record {
     /// Takes time and two temperatures from a table; converts them to s and °C, and checks them.
     ///
     /// # Errors
-    /// Every variant of [`RecordError`] on columns that cannot be told or used, times that do not increase, and
+    /// Every variant of [`RecordError`] on columns that cannot be identified or used, times that do not increase, and
     /// temperatures that cannot be: out of range, missing throughout, constant, identical, or fewer than 8 usable.
     pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
@@ -165,7 +165,7 @@ impl Record {
         record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at)
     }
 
-    /// The same record with a flow velocity or density, in any unit, one value for each row.
+    /// This record with a flow velocity or density, in any unit, one value for each row.
     ///
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::ConstantFlow`].

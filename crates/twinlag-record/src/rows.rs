@@ -51,7 +51,7 @@ impl RowReader {
     /// For lines that come after those of `table`, of which `selection` chose the columns.
     ///
     /// # Errors
-    /// As [`crate::Record::from_table`] on columns that cannot be told.
+    /// As [`crate::Record::from_table`] on columns that cannot be identified.
     pub fn after(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let chosen = choose(table, selection, &mut Vec::new())?;
         let format = table.notes().iter().find_map(|note| match note {

@@ -41,7 +41,7 @@ pub struct Sampling {
 
 /// A beat is at least one in so many steps: a logger's period is not off its clock's unit by less.
 const RAREST: usize = 50;
-/// Departure, in periods, that is none.
+/// Departure, in periods, below which stamps count as even.
 const EXACT: f64 = 0.01;
 
 impl Sampling {

@@ -70,7 +70,7 @@ impl Axis {
         if self.is_logarithmic() { value.log10() } else { value }
     }
 
-    /// The range to draw: the user's, or that of `values` with a margin, at a base of which (`floor`) there is none.
+    /// The range to draw: the user's, or that of `values` with a margin except at the base (`floor`).
     ///
     /// `None` if there is no range and no value to show.
     pub(crate) fn limits(

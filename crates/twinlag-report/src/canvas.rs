@@ -1,6 +1,6 @@
 //! The one module that knows kuva: a sheet on which the others draw lines, areas and text in pixels, `y` downwards.
 //!
-//! Of kuva we use the scene and its writer, not its charts. Those were tried first (0.6.0): a heat map has cells equally
+//! We use the scene of kuva and its writer, not its charts. Those were tried first (0.6.0): a heat map has cells equally
 //! wide in value only, which is not a grid of time constants in equal ratios, and shows seams between them on a
 //! logarithmic axis; tick labels mix notations (`1e-2`, `0.020`); a line has no markers.
 

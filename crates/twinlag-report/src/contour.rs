@@ -1,4 +1,4 @@
-//! Contour lines by marching squares, linear between grid points; the two ambiguous cases are told apart by the mean of
+//! Contour lines by marching squares, linear between grid points; the two ambiguous cases are distinguished by the mean of
 //! the four corners. Exact for a plane.
 
 use std::collections::BTreeMap;

@@ -82,7 +82,7 @@ impl Figure {
     /// The figure as SVG. The same figure gives the same bytes.
     ///
     /// # Errors
-    /// Any [`ReportError`]: no panels, panels without data, lengths that do not fit, ranges that are none.
+    /// Any [`ReportError`]: no panels, panels without data, lengths that do not fit, invalid ranges.
     pub fn to_svg(&self) -> Result<String, ReportError> {
         if self.panels.is_empty() {
             return Err(ReportError::NoPanels { figure: self.title.clone() });

@@ -11,7 +11,7 @@ fn exponent(value: f64, significant: usize) -> i32 {
     text.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0)
 }
 
-/// With so many decimals, a proper minus sign, and none before a zero.
+/// A number with the given number of decimals and a proper minus sign, but no minus sign before a zero.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -31,8 +31,8 @@ fn is_plain(exponent: i32) -> bool {
     (-4..6).contains(&exponent)
 }
 
-/// A number to so many significant digits; digits before the point are all kept, and what is not finite is *not
-/// determined*.
+/// A number to the given number of significant digits. All digits before the point are kept, and a number
+/// that is not finite is *not determined*.
 ///
 /// ```
 /// use twinlag_report::rounded;
@@ -98,7 +98,7 @@ pub fn between([low, high]: [f64; 2]) -> String {
     format!("{} to {}", fixed(low, decimals), fixed(high, decimals))
 }
 
-/// A probability to two digits; what a double cannot tell from zero is *below* a power of ten.
+/// A probability to two digits; one that a double cannot distinguish from zero is *below* a power of ten.
 ///
 /// ```
 /// use twinlag_report::probability;

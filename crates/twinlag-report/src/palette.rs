@@ -1,4 +1,4 @@
-//! One palette for all figures: that of Okabe and Ito (2008), eight colours told apart with the common forms of colour
+//! One palette for all figures: that of Okabe and Ito (2008), eight colours that remain distinct with the common forms of colour
 //! blindness. Yellow is left out, since a thin yellow line is lost on white paper; grey stands for what is background.
 
 /// A colour of the palette.

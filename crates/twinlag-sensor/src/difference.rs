@@ -1,4 +1,5 @@
-//! From the continuous sensor to a difference equation, and what each way of doing it assumes of the gas between samples.
+//! From the continuous sensor to a difference equation, and what each way of doing it assumes about the
+//! gas between samples.
 
 use core::fmt;
 
@@ -9,11 +10,11 @@ use crate::error::ModelError;
 use crate::number::Number;
 use crate::stream::EquationResponder;
 
-/// What the gas temperature is taken to do between two samples.
+/// How the gas temperature is assumed to move between two samples.
 ///
-/// A real gas does none of these exactly. What the choice costs a blind estimate is [`crate::tone_floor`]; it falls with
-/// the square of the sample period for the zero-order hold and the bilinear rule, with its fourth power for the first-order
-/// hold.
+/// A real gas does none of these exactly. [`crate::tone_floor`] computes the error that the choice causes
+/// in a blind estimate. This error falls with the square of the sample period for the zero-order hold and
+/// the bilinear rule, and with its fourth power for the first-order hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -55,7 +56,7 @@ impl DifferenceEquation {
         x.iter().map(|&gas| responder.push(gas)).collect()
     }
 
-    /// The same sample by sample.
+    /// The reading computed sample by sample, in constant memory.
     pub fn responder(&self) -> EquationResponder {
         EquationResponder::new(*self)
     }

@@ -89,7 +89,7 @@ impl FirstOrder {
         x.iter().map(|&gas| responder.push(gas)).collect()
     }
 
-    /// The same sample by sample.
+    /// The reading computed sample by sample, in constant memory.
     pub fn responder(&self) -> FirstOrderResponder {
         FirstOrderResponder::new(self.input_gain())
     }
@@ -104,7 +104,7 @@ impl FirstOrder {
         y.iter().filter_map(|&reading| inverter.push(reading)).collect()
     }
 
-    /// The same sample by sample.
+    /// The gas temperature computed from readings sample by sample, in constant memory.
     pub fn inverter(&self) -> FirstOrderInverter {
         FirstOrderInverter::new(self.input_gain())
     }

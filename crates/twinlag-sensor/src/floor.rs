@@ -1,4 +1,4 @@
-//! What the choice of discretisation alone costs a blind estimate.
+//! The error that the choice of discretisation alone causes in a blind estimate.
 //!
 //! Two sensors see one continuous tone. Their readings have the complex ratio `H1/H2` of the *continuous* responses; a
 //! blind method looks for the two discrete sensors with that same ratio. The time constants at which it finds them differ

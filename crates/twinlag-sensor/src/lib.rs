@@ -1,9 +1,10 @@
 //! How a temperature sensor maps the temperature of the gas to its reading, and back.
 //!
-//! For anyone who simulates, corrects or fits sensors that lag: time constant, sample period, pole, noise gain, response,
-//! frequency response, exact inverse, and what each way of going from continuous to sampled time costs. This crate knows
-//! no files, no costs, no optimisers and no random numbers. To *find* a time constant take `twinlag` (records in, answers
-//! out) or `twinlag-cross-relation` (the costs alone).
+//! This crate is for anyone who simulates, corrects or fits sensors that lag. It has time constant, sample
+//! period, pole, noise gain, response, frequency response and exact inverse, and computes the error of
+//! each way of going from continuous to sampled time. It knows no files, no costs, no optimisers and no
+//! random numbers. To *find* a time constant use `twinlag` (records in, answers out) or
+//! `twinlag-cross-relation` (the costs alone).
 //!
 //! ```
 //! use twinlag_sensor::{Discretisation, FirstOrder, Lag, tone_floor};
@@ -27,10 +28,10 @@
 //! # Ok::<(), twinlag_sensor::ModelError>(())
 //! ```
 //!
-//! Sample by sample, in constant memory, it is [`FirstOrder::responder`], [`FirstOrder::inverter`] and
-//! [`DifferenceEquation::responder`]. Without its default feature `std` the crate is all but the functions that give a whole record and
-//! dual numbers, for machines without an operating system or an allocator. Exponentials are then those of `libm`, which may differ in the
-//! last digit.
+//! [`FirstOrder::responder`], [`FirstOrder::inverter`] and [`DifferenceEquation::responder`] work sample by
+//! sample, in constant memory. Without the default feature `std` the crate works on machines without an
+//! operating system or an allocator; it then lacks the functions that return a whole record, and dual
+//! numbers. Exponentials are then those of `libm`, which may differ in the last digit.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 

@@ -1,4 +1,4 @@
-//! What the formulas of the coefficients are written in.
+//! The number type in which the formulas of the coefficients are written.
 
 use core::ops::Neg;
 
@@ -9,7 +9,7 @@ use num_traits::NumOps;
 /// A number that the formulas of the coefficients take: `f64`, and with the feature `std` every dual number of `num-dual` over
 /// `f64`, which gives derivatives.
 pub trait Number: Copy + From<f64> + Neg<Output = Self> + NumOps + NumOps<f64> {
-    /// Its value, without derivatives.
+    /// The value of the number, without derivatives.
     fn value(self) -> f64;
 
     /// `1/x`.

@@ -1,4 +1,5 @@
-//! Sensors sample by sample: constant memory, nothing allocated. Each is exactly what the slice of that name gives.
+//! Sensors sample by sample, in constant memory and without allocation. Each gives exactly the values of
+//! the method for a whole record.
 
 use crate::difference::DifferenceEquation;
 

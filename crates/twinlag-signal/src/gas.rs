@@ -127,7 +127,7 @@ impl<'a> Resolution<'a> {
         Err(SignalError::NotResolved { field: path(within, name), value, step_s, oversampling })
     }
 
-    /// The same for a raised-cosine rise of `rise_s`, which is half a period.
+    /// Checks the resolution of a raised-cosine rise of `rise_s`, which is half a period.
     fn check_rise(self, within: &str, name: &str, value: f64, rise_s: f64) -> Result<(), SignalError> {
         self.check(within, name, value, 0.5 / rise_s)
     }
@@ -163,7 +163,7 @@ impl GasPath {
         Ok(Self { grid, hold: gas.hold, values_c })
     }
 
-    /// The same with something added at every grid point, K.
+    /// This gas with `added_k` (K) added at every grid point.
     pub(crate) fn plus(&self, added_k: &[f64]) -> Self {
         let values_c = self.values_c.iter().zip(added_k).map(|(value_c, added_k)| value_c + added_k).collect();
         Self { grid: self.grid, hold: self.hold, values_c }

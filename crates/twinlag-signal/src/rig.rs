@@ -67,7 +67,7 @@ impl Rig {
         Self { seed, record, gas, sensors, flow: None, mismatch: None, base_dir: PathBuf::new() }.checked()
     }
 
-    /// The same rig in a flow that changes both time constants.
+    /// This rig in a flow that changes both time constants.
     ///
     /// # Errors
     /// As [`Rig::new`].
@@ -75,7 +75,7 @@ impl Rig {
         Self { flow: Some(flow), ..self }.checked()
     }
 
-    /// The same rig with another gas for one of the sensors.
+    /// This rig with a different gas for one of the sensors.
     ///
     /// # Errors
     /// As [`Rig::new`]; [`SignalError::UnknownChannel`] if no sensor has the channel that it names.
@@ -106,14 +106,14 @@ impl Rig {
         Ok(self)
     }
 
-    /// The same rig, looking for a gas series with a relative path in `dir` (the rig file's directory, usually).
+    /// This rig, with relative paths of a gas series taken from `dir` (usually the directory of the rig file).
     #[must_use]
     pub fn with_base_dir(mut self, dir: impl AsRef<Path>) -> Self {
         dir.as_ref().clone_into(&mut self.base_dir);
         self
     }
 
-    /// The same rig with another seed.
+    /// This rig with another seed.
     #[must_use]
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.seed = seed;

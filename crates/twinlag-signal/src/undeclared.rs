@@ -1,4 +1,4 @@
-//! Random rigs with an effect that the reader of the record is not told of: for the trial of a diagnosis.
+//! Random rigs with an effect unknown to the reader of the record, for testing a diagnosis.
 //!
 //! [`undeclared`] draws sampling, gas, two first-order sensors and their noise, and puts the effects asked for into one
 //! of the sensors, or into both where that is their nature. What was drawn is known: [`Undeclared::kinds`], the
@@ -109,7 +109,7 @@ impl Undeclared {
     /// Trial 0 of the rig.
     ///
     /// # Errors
-    /// As [`Rig::simulate`]; none of its errors is expected at a size factor of about 1.
+    /// As [`Rig::simulate`]; no error is expected at a size factor of about 1.
     pub fn simulate(&self) -> Result<Simulated, SignalError> {
         self.rig.simulate()
     }

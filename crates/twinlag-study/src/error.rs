@@ -31,7 +31,7 @@ impl fmt::Display for Gap {
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]
 pub enum StudyError {
-    #[error("a study needs a cell, a trial and a block of a trial at least, got {cells}, {trials} and {block}")]
+    #[error("a study needs at least one cell, one trial and one trial per block, got {cells}, {trials} and {block}")]
     Empty { cells: usize, trials: u64, block: u64 },
     #[error("{cells} cells of {trials} trials in blocks of {block} are more than 2⁶² blocks")]
     TooLarge { cells: usize, trials: u64, block: u64 },
@@ -43,17 +43,17 @@ pub enum StudyError {
     Trial { cell: usize, trial: u64, cause: Failure },
     #[error("cell {cell} could not be prepared: {cause}")]
     Scratch { cell: usize, cause: Failure },
-    #[error("{} exists: ask to resume it, or use another directory", path.display())]
+    #[error("{} exists: resume it, or use another directory", path.display())]
     Exists { path: PathBuf },
     #[error("{} could not be read: {cause}", path.display())]
     Read { path: PathBuf, cause: std::io::Error },
     #[error("{} could not be written: {cause}", path.display())]
     Write { path: PathBuf, cause: std::io::Error },
-    #[error("{} is no part of a study, or a damaged one: {cause}", path.display())]
+    #[error("{} is not part of a study, or is damaged: {cause}", path.display())]
     Damaged { path: PathBuf, cause: serde_json::Error },
     #[error("{} has another {what}: expected {expected}, got {got}", path.display())]
     OtherStudy { path: PathBuf, what: &'static str, expected: String, got: String },
-    #[error("{} repeats {gap}, which another part has as well", path.display())]
+    #[error("{} repeats {gap}, which is also in another part", path.display())]
     Twice { path: PathBuf, gap: Gap },
     #[error("there are no parts to merge")]
     NoParts,

@@ -1,9 +1,10 @@
-//! Monte-Carlo studies whose result has the same bytes on any number of threads, from any set of shards, after any restart.
+//! Monte-Carlo studies whose result is byte-identical for any number of threads, shards and restarts.
 //!
-//! For anyone who repeats a trial many times at each cell of a grid, and wants means, spreads, quantiles and rates with
-//! their standard errors. The crate knows neither thermocouples nor experiments: it runs any [`Study`]. It draws no random
-//! numbers either: a trial seeds itself from its index, as below. To accumulate numbers without running anything, take
-//! [`Values`] and [`Rate`] alone; to combine anything else in a fixed order, [`Forest`].
+//! This crate is for anyone who repeats a trial many times at each cell of a grid, and wants means, spreads,
+//! quantiles and rates with their standard errors. It knows neither thermocouples nor experiments, and runs
+//! any [`Study`]. Nor does it draw random numbers: a trial seeds itself from its index, as below. To
+//! accumulate numbers without running anything, use [`Values`] and [`Rate`] alone; to combine anything else
+//! in a fixed order, use [`Forest`].
 //!
 //! ```
 //! use std::ops::ControlFlow;

@@ -152,12 +152,12 @@ impl Shard {
         if index < of { Ok(Self { index, of }) } else { Err(StudyError::NoSuchShard { got: format!("{index}/{of}") }) }
     }
 
-    /// Which one, from 0.
+    /// Index of the shard, from 0.
     pub fn index(&self) -> u64 {
         self.index
     }
 
-    /// Of how many.
+    /// Number of shards.
     pub fn of(&self) -> u64 {
         self.of
     }
@@ -216,7 +216,7 @@ impl Part {
     /// Reads a part.
     ///
     /// # Errors
-    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is none; [`StudyError::OtherStudy`] if it is in another format.
+    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is not a part of a study; [`StudyError::OtherStudy`] if it is in another format.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         #[derive(Deserialize)]
         struct Probe {

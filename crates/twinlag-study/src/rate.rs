@@ -19,12 +19,12 @@ impl Rate {
         self.k += u64::from(happened);
     }
 
-    /// How often it happened.
+    /// Number of times that the event happened.
     pub fn hits(&self) -> u64 {
         self.k
     }
 
-    /// Of how many.
+    /// Number of times that it could have happened.
     pub fn count(&self) -> u64 {
         self.n
     }

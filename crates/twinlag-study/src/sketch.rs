@@ -1,7 +1,7 @@
 //! Quantiles from counts in fixed bins.
 //!
-//! A bin is what the sign, the exponent and the first seven bits after the leading one of a floating-point number tell:
-//! 128 bins to the octave, at most 1/128 of their lower edge wide. The bin of a number is a shift of its bits, exact and
+//! A bin is determined by the sign, the exponent and the first seven bits after the leading one of a
+//! floating-point number: 128 bins to the octave, at most 1/128 of their lower edge wide. The bin of a number is a shift of its bits, exact and
 //! the same on every machine, with no logarithm in it. Bins are never joined, so that counts from any sources add up to the
 //! same sketch in any order. (Sketches that bound their number of bins by joining the outermost lose that.)
 

@@ -80,9 +80,9 @@ impl TryFrom<UncheckedValues> for Values {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Statistic {
-    /// Of a number.
+    /// Statistics of a number.
     Value(Values),
-    /// Of something that happens or does not.
+    /// Rate of an event that happens or does not.
     Event(Rate),
 }
 

@@ -291,7 +291,7 @@ fn overlapping_shards_are_refused() {
     let mut paths = shards(&dir, &NOISE, 3);
     paths.push(paths[1].clone());
     let error = merge(&paths).unwrap_err().to_string();
-    assert!(error.ends_with("1-3.json repeats cell 1 blocks 0 to 101, which another part has as well"), "{error}");
+    assert!(error.ends_with("1-3.json repeats cell 1 blocks 0 to 101, which is also in another part"), "{error}");
     paths[3] = shards(&dir, &NOISE, 7)[6].clone();
     assert!(matches!(merge(&paths), Err(StudyError::Twice { gap, .. }) if gap.cell == 2));
 }
@@ -347,7 +347,7 @@ fn a_damaged_part_is_refused_wherever_it_is_cut_and_whatever_was_edited() {
         fs::write(&path, bytes).unwrap();
         let error = Part::read(&path).expect_err(what);
         assert!(matches!(error, StudyError::Damaged { .. }), "{what}: {error}");
-        assert!(error.to_string().contains("0-2.json is no part of a study, or a damaged one"), "{error}");
+        assert!(error.to_string().contains("0-2.json is not part of a study, or is damaged"), "{error}");
     };
     // The file ends in a line feed that it can do without.
     for cut in (0..text.len() - 2).step_by(text.len() / 97).chain([text.len() - 2]) {

@@ -22,7 +22,7 @@ const EVALUATIONS: u64 = 120;
 const EDGE: f64 = 0.25;
 const SPREAD: f64 = 0.05;
 
-/// Of `found` and each kind of single part the one that is likeliest, the choice of their numbers counted, with numbers of its own.
+/// The likeliest of `found` and each kind of single part, with fitted numbers, allowing for their count.
 pub(super) fn choose(
     search: &Search<'_>,
     readings: &Readings,

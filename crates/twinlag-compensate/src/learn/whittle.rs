@@ -11,8 +11,8 @@ use crate::spectrum::Periodogram;
 pub(super) const BINS_PER_ONE: f64 = 1.944;
 /// Step of a logarithm in differences.
 const STEP: f64 = 1e-4;
-/// Standard deviation of the logarithm of each number before the readings are looked at: what they do not tell is known within a factor
-/// of e.
+/// Prior standard deviation of the logarithm of each number: numbers that the readings do not determine are
+/// known within a factor of e.
 const LOG_STD: f64 = 1.0;
 
 /// Twice the negative logarithm of Whittle's likelihood.
@@ -24,7 +24,8 @@ pub(super) struct Whittle<'a> {
 }
 
 impl Whittle<'_> {
-    /// Of the logarithms of the numbers, with what was known of them before; the deviance is twice the logarithm of the likelihood.
+    /// Fisher's information of the logarithms of the numbers, including their prior; the deviance is twice
+    /// the logarithm of the likelihood.
     pub(super) fn information(&self) -> Option<DMatrix<f64>> {
         let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
         let derivatives = self.derivatives(&values)?;
@@ -61,8 +62,8 @@ impl Periodogram {
         self.noise[0].iter().zip(&self.noise[1]).map(|(a, b)| first * a + second * b).collect()
     }
 
-    /// Of what both sensors disagree on, and of what was known of the noise before: the deviance of `factors` of the noise with gradient
-    /// and curvature.
+    /// The deviance of `factors` of the noise, from the disagreement of both sensors and the prior of the
+    /// noise, with gradient and curvature.
     pub(super) fn of_factors(&self, factors: [f64; 2]) -> (f64, [f64; 2], [[f64; 2]; 2]) {
         let prior = BINS_PER_ONE / (LOG_STD * LOG_STD);
         let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();

@@ -1,4 +1,4 @@
-//! Levenberg-Marquardt with bounds: argmin has none.
+//! Levenberg-Marquardt with bounds, which argmin's does not support.
 //!
 //! Each iteration solves `(H + μ diag H) s = −g` over the variables that are not held at a bound by the gradient, moves to
 //! the nearest point inside the bounds, and accepts a lower cost. `H` is whatever curvature the cost supplies: for sums of

@@ -40,7 +40,7 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, particles: usize, generations: u6
     }
 }
 
-/// A solver that is done after so many iterations.
+/// A solver that stops after a given number of iterations.
 struct Generations<S> {
     solver: S,
     left: u64,

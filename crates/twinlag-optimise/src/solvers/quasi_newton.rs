@@ -6,7 +6,8 @@ use argmin::solver::quasinewton::{BFGS, LBFGS};
 use crate::adapter::{Objective, Outside, SolverState, run as run_argmin};
 use crate::ledger::{Ledger, Stop};
 
-/// With the whole inverse Hessian, which starts as the identity: coordinates are of size one, and so are values.
+/// BFGS with the whole inverse Hessian, which starts as the identity, since coordinates and values are of
+/// size one.
 pub(crate) fn bfgs(ledger: &Ledger<'_, '_, '_>, gradient_tolerance: f64) -> Stop {
     let z = ledger.best().z;
     let identity = (0..z.len()).map(|i| (0..z.len()).map(|j| f64::from(u8::from(i == j))).collect()).collect();
@@ -19,7 +20,7 @@ pub(crate) fn bfgs(ledger: &Ledger<'_, '_, '_>, gradient_tolerance: f64) -> Stop
     })
 }
 
-/// With the last `memory` steps in its place.
+/// L-BFGS, with the last `memory` steps in place of the inverse Hessian.
 pub(crate) fn l_bfgs(ledger: &Ledger<'_, '_, '_>, memory: usize, gradient_tolerance: f64) -> Stop {
     let z = ledger.best().z;
     let solver = LBFGS::new(MoreThuenteLineSearch::new(), memory)

@@ -1,4 +1,4 @@
-//! Newton steps within a trust region: argmin's, with a rule for stopping, of which it has none.
+//! argmin's Newton steps within a trust region, with a stopping rule, which argmin lacks.
 
 use argmin::core::{
     Error, KV, KvValue, Problem, Solver, State as _, TerminationReason, TerminationStatus, TrustRegionRadius,
@@ -14,7 +14,7 @@ type State = SolverState<Vec<f64>, Vec<Vec<f64>>>;
 /// Longest step: the factor e² for logarithms that Levenberg-Marquardt has too.
 const LARGEST_RADIUS: f64 = 2.0;
 
-/// With conjugate gradients for the step.
+/// A trust region whose step is found by conjugate gradients.
 pub(crate) fn steihaug(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     // n iterations solve the model but for rounding; without a limit there may be no end. The tolerance also says which
     // gradient, relative to the value at the start, is none.
@@ -23,7 +23,7 @@ pub(crate) fn steihaug(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop
     run(ledger, step, step_tolerance)
 }
 
-/// With the dogleg for the step.
+/// A trust region whose step is the dogleg.
 pub(crate) fn dogleg(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     run(ledger, Dogleg::new(), step_tolerance)
 }

@@ -132,8 +132,9 @@ impl Kind {
         }
     }
 
-    /// What a library of effects calls it. Gain, offset and curvature are one, `"calibration"`: blind, they are hard to
-    /// tell apart. [`Kind::None`] and the [aliens](Kind::ALIENS) have none.
+    /// The name of this effect in a library of effects. Gain, offset and curvature share the name
+    /// `"calibration"`, because they are hard to distinguish from the readings alone. [`Kind::None`] and
+    /// the [aliens](Kind::ALIENS) have no name.
     pub fn effect(self) -> Option<&'static str> {
         match self {
             Self::None | Self::Hysteresis | Self::IntermittentContact | Self::ClockSlip | Self::Replaced => None,
