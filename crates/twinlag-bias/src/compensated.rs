@@ -1,8 +1,9 @@
 //! The published cost with the noise taken out of its expectation.
 //!
-//! `E[J] = J_clean + N2(τ2) + N1(τ1)/g²`, where `N_i` is what the noise of the *other* channel's synthetic filter passes:
-//! channel 1's noise goes through the model of sensor 2 and the other way round. `N` falls as the time constant grows, so
-//! the plain cost is dragged to long time constants. Exact in expectation for stationary noise independent of the gas.
+//! `E[J] = J_clean + N2(τ2) + N1(τ1)/g²`, where `N_i` is what the noise of the *other* channel's
+//! synthetic filter passes: channel 1's noise goes through the model of sensor 2 and the other way
+//! round. `N` falls as the time constant grows, so the plain cost is dragged to long time
+//! constants. Exact in expectation for stationary noise independent of the gas.
 
 use twinlag_cross_relation::{CostValue, CrossRelation};
 
@@ -24,7 +25,8 @@ impl<'a> Compensated<'a> {
         Self { cost, noise, level: 1.0 }
     }
 
-    /// This cost for noise of `level` times the variance given to [`Compensated::new`], in both channels.
+    /// This cost for noise of `level` times the variance given to [`Compensated::new`], in both
+    /// channels.
     ///
     /// # Errors
     /// [`NoiseError::Negative`] unless `level` is finite and not negative.
@@ -36,20 +38,24 @@ impl<'a> Compensated<'a> {
         }
     }
 
-    /// Factor on the variances given to [`Compensated::new`]: 1 unless set by [`Compensated::with_level`].
+    /// Factor on the variances given to [`Compensated::new`]: 1 unless set by
+    /// [`Compensated::with_level`].
     pub fn level(&self) -> f64 {
         self.level
     }
 
-    /// The level at which the compensated cost at `theta` would be zero: `ℓ = J_CR/N` with `N` the noise's share at level 1.
+    /// The level at which the compensated cost at `theta` would be zero: `ℓ = J_CR/N` with `N` the
+    /// noise's share at level 1.
     ///
-    /// Where only the ratio of the two levels is known, give [`Compensated::new`] any pair of that ratio and repeat: minimise,
-    /// take `profiled_level` at the minimum, go on [`Compensated::with_level`] of it. This is Dinkelbach's iteration. It converges
-    /// faster than linearly to the minimum of [`Normalised`], which is the shorter way to the same point and has its
-    /// covariance; `ℓ` then is the level of the noise. NaN if neither channel has noise.
+    /// Where only the ratio of the two levels is known, give [`Compensated::new`] any pair of that
+    /// ratio and repeat: minimise, take `profiled_level` at the minimum, go on
+    /// [`Compensated::with_level`] of it. This is Dinkelbach's iteration. It converges faster than
+    /// linearly to the minimum of [`Normalised`], which is the shorter way to the same point and
+    /// has its covariance; `ℓ` then is the level of the noise. NaN if neither channel has noise.
     ///
     /// # Source
-    /// Dinkelbach 1967 for the minimum of a ratio (recalled, not consulted); docs, chapter "Theory", section 2.
+    /// Dinkelbach 1967 for the minimum of a ratio (recalled, not consulted); docs, chapter
+    /// "Theory", section 2.
     pub fn profiled_level<const P: usize>(&self, theta: &[f64; P]) -> f64 {
         self.cost.evaluate(theta).value / added_by_noise(&self.noise, theta, self.cost.period_s()).value
     }
@@ -59,11 +65,13 @@ impl<'a> Compensated<'a> {
         &self.cost
     }
 
-    /// `J_BC = J_CR − s1² h(c) − s2² h(a)/g²` for white noise, with gradient and Hessian, at `theta` (`P` 2, 4 or 6; for sensors
-    /// of second order `h` is the gain of [`Noise::passed_second_order`]). Can be negative: it is a difference.
+    /// `J_BC = J_CR − s1² h(c) − s2² h(a)/g²` for white noise, with gradient and Hessian, at
+    /// `theta` (`P` 2, 4 or 6; for sensors of second order `h` is the gain of
+    /// [`Noise::passed_second_order`]). Can be negative: it is a difference.
     ///
     /// # Source
-    /// Gillespie, Hung, Kee, McLoone 2016 (abstract seen). Formula: own derivation, docs, chapter "Theory", section 2.
+    /// Gillespie, Hung, Kee, McLoone 2016 (abstract seen). Formula: own derivation, docs, chapter
+    /// "Theory", section 2.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let mut out = self.cost.evaluate(theta);
         let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
@@ -78,9 +86,9 @@ impl<'a> Compensated<'a> {
     }
 }
 
-/// Covariance `[P][P]` of the minimum `theta` of the *plain* cross-relation cost under white noise of `noise_std` `[s1, s2]`
-/// (K), zero for parameters not in `free`; `None` where `theta` is no minimum. It says how the estimate scatters, not how
-/// far it is off.
+/// Covariance `[P][P]` of the minimum `theta` of the *plain* cross-relation cost under white noise
+/// of `noise_std` `[s1, s2]` (K), zero for parameters not in `free`; `None` where `theta` is no
+/// minimum. It says how the estimate scatters, not how far it is off.
 pub fn plain_covariance<const P: usize>(
     cost: &CrossRelation<'_>,
     theta: &[f64; P],
@@ -91,8 +99,8 @@ pub fn plain_covariance<const P: usize>(
 }
 
 impl Compensated<'_> {
-    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
-    /// in `free`; `None` where `theta` is no minimum.
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K),
+    /// zero for parameters not in `free`; `None` where `theta` is no minimum.
     pub fn covariance<const P: usize>(
         &self,
         theta: &[f64; P],
@@ -104,8 +112,8 @@ impl Compensated<'_> {
 }
 
 impl Normalised<'_> {
-    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
-    /// in `free`; `None` where `theta` is no minimum.
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K),
+    /// zero for parameters not in `free`; `None` where `theta` is no minimum.
     pub fn covariance<const P: usize>(
         &self,
         theta: &[f64; P],
@@ -120,9 +128,9 @@ impl Normalised<'_> {
 
 /// Cross-relation cost over what noise adds to it, for levels known up to a common factor.
 ///
-/// `J_N = J_CR / (s1² h(c) + s2² h(a)/g²)`. Its minimum is at the truth whatever the level: it is the fixed point of
-/// "estimate the level from the cost, compensate, minimise again" (Dinkelbach's iteration). With the true levels it is 1
-/// there on average.
+/// `J_N = J_CR / (s1² h(c) + s2² h(a)/g²)`. Its minimum is at the truth whatever the level: it is
+/// the fixed point of "estimate the level from the cost, compensate, minimise again" (Dinkelbach's
+/// iteration). With the true levels it is 1 there on average.
 #[derive(Clone, Debug)]
 pub struct Normalised<'a> {
     cost: CrossRelation<'a>,
@@ -130,7 +138,8 @@ pub struct Normalised<'a> {
 }
 
 impl<'a> Normalised<'a> {
-    /// `cost` normalised by white noise of standard deviation ratio `s2/s1 = ratio`, in units of `s1² = 1 K²`.
+    /// `cost` normalised by white noise of standard deviation ratio `s2/s1 = ratio`, in units of
+    /// `s1² = 1 K²`.
     ///
     /// # Errors
     /// [`NoiseError::Ratio`] unless the ratio is finite and positive.
@@ -155,8 +164,9 @@ impl<'a> Normalised<'a> {
     /// The normalised cost with gradient and Hessian at `theta` (`P` 2, 4 or 6).
     ///
     /// # Source
-    /// Own derivation; docs, chapter "Theory", section 2. A normalisation is published (Gillespie, Hung, Kee, McLoone 2016), but
-    /// its abstract calls it biased where this one is not, so they are not the same.
+    /// Own derivation; docs, chapter "Theory", section 2. A normalisation is published (Gillespie,
+    /// Hung, Kee, McLoone 2016), but its abstract calls it biased where this one is not, so they
+    /// are not the same.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let above = self.cost.evaluate(theta);
         let below = added_by_noise(&self.noise, theta, self.cost.period_s());

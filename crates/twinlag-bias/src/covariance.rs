@@ -1,21 +1,25 @@
 //! The covariance of the minimum of the published cost and its relatives, due to noise.
 //!
-//! `Cov = A⁻¹ M A⁻¹` with `A` half the Hessian of the summed cost and `M` the variance of half its gradient,
-//! `Σ_k e[k] v_i[k]` with `v_i = ∂_i e` (less a multiple of `e` for the normalised cost). `e` carries noise of both channels
-//! behind the synthetic filters, so `M_ij = Σ_c s_c² (F_cᵀ v_i)·(F_cᵀ v_j) + n ⟨κ_i κ_j⟩`: the filters run backwards over
-//! `v` give the noise of `e` its colour, and `κ_i(w) = E[U* V_i]` is what noise in `e` and noise in `v_i` have in common.
+//! `Cov = A⁻¹ M A⁻¹` with `A` half the Hessian of the summed cost and `M` the variance of half its
+//! gradient, `Σ_k e[k] v_i[k]` with `v_i = ∂_i e` (less a multiple of `e` for the normalised cost).
+//! `e` carries noise of both channels behind the synthetic filters, so
+//! `M_ij = Σ_c s_c² (F_cᵀ v_i)·(F_cᵀ v_j) + n ⟨κ_i κ_j⟩`: the filters run backwards over `v` give
+//! the noise of `e` its colour, and `κ_i(w) = E[U* V_i]` is what noise in `e` and noise in `v_i`
+//! have in common.
 
 use nalgebra::Complex;
 use twinlag_cross_relation::{CostValue, CrossRelation, sandwich, synthetic_filter};
 
 use crate::noise_gain::derivatives;
 
-/// Covariance `[P][P]` of the minimum `theta` of a cost built on `cost`, zero for parameters not in `free`.
+/// Covariance `[P][P]` of the minimum `theta` of a cost built on `cost`, zero for parameters not in
+/// `free`.
 ///
 /// - `at_minimum`: the cost that was minimised, with its Hessian, at `theta`
 /// - `noise_std`: white noise levels `[s1, s2]`, K
-/// - `pull`: for each parameter the multiple `c_i` of `e` in `v_i = ∂_i e − c_i e`: zero for the plain and the compensated
-///   cost, half the logarithmic derivative of the denominator for the normalised one
+/// - `pull`: for each parameter the multiple `c_i` of `e` in `v_i = ∂_i e − c_i e`: zero for the
+///   plain and the compensated cost, half the logarithmic derivative of the denominator for the
+///   normalised one
 ///
 /// - `unit`: what turns the cost's Hessian into that of the mean square of `e`
 ///
@@ -34,7 +38,8 @@ pub(crate) fn covariance<const P: usize>(
     let gain = theta.get(2).copied().unwrap_or(1.0);
     let variance = [noise_std[0].powi(2), (noise_std[1] / gain).powi(2)];
 
-    // Channel 1 goes through sensor 2's model, channel 2 through sensor 1's: the filter that colours each channel's noise.
+    // Channel 1 goes through sensor 2's model, channel 2 through sensor 1's: the filter that
+    // colours each channel's noise.
     let colour = [&models[1], &models[0]];
     let signal = cost.error_signal(theta);
     let backward: Vec<[Vec<f64>; 2]> = (0..P)
@@ -55,8 +60,8 @@ pub(crate) fn covariance<const P: usize>(
     sandwich(&curvature, &score, free)
 }
 
-/// A synthetic filter `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)`, its coefficients' derivatives by its two time constants, and
-/// its slowest pole.
+/// A synthetic filter `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)`, its coefficients' derivatives by
+/// its two time constants, and its slowest pole.
 struct Model {
     feed: [(f64, [f64; 2]); 2],
     back: [(f64, [f64; 2]); 2],
@@ -90,7 +95,8 @@ impl Model {
         out
     }
 
-    /// Frequency response at the delay `z⁻¹ = exp(−jw)`, and its derivatives by both time constants.
+    /// Frequency response at the delay `z⁻¹ = exp(−jw)`, and its derivatives by both time
+    /// constants.
     fn response(&self, delay: Complex<f64>) -> (Complex<f64>, [Complex<f64>; 2]) {
         let at = |c: [f64; 2]| delay * (delay * c[1] + c[0]);
         let below = at(self.back.map(|c| c.0)) + 1.0;

@@ -1,8 +1,10 @@
-//! Between compensation and normalisation: the compensated cost in units of a power of what noise adds to it.
+//! Between compensation and normalisation: the compensated cost in units of a power of what noise
+//! adds to it.
 //!
-//! `F_w = (J_CR − N)/N^(1−w)` with `N(θ) = s1² h(c) + s2² h(a)/g²`. `w = 1` is the compensated cost, `w = 0` the normalised one
-//! less 1, `w = 1/2` the hybrid, `(J_CR − N)/√N`: the excess of the mean square of `e` over its noise, in units of the standard
-//! deviation of that noise. `F_w` is linear in `J_CR`, so at the given levels `E[F_w] = J_clean/N^(1−w)` at *every* `θ`: nowhere
+//! `F_w = (J_CR − N)/N^(1−w)` with `N(θ) = s1² h(c) + s2² h(a)/g²`. `w = 1` is the compensated
+//! cost, `w = 0` the normalised one less 1, `w = 1/2` the hybrid, `(J_CR − N)/√N`: the excess of
+//! the mean square of `e` over its noise, in units of the standard deviation of that noise. `F_w`
+//! is linear in `J_CR`, so at the given levels `E[F_w] = J_clean/N^(1−w)` at *every* `θ`: nowhere
 //! negative and zero at the truth, for every `w`.
 
 use twinlag_cross_relation::{CostValue, CrossRelation};
@@ -14,10 +16,11 @@ use crate::noise_gain::Noise;
 
 /// Compensated cross-relation cost over a power of what noise adds to it.
 ///
-/// Like [`crate::Compensated`], it assumes stationary noise of known autocovariance that is independent of
-/// the gas, but it depends less on the level. If the true variances are `1 + ε` times the given ones, then
-/// `E[F_w] = J_clean/N^(1−w) + ε N^w`, and to first order in `ε` the error of the minimum is `w` times that
-/// of the compensated cost. The ratio of the levels has to be right for any `w`.
+/// Like [`crate::Compensated`], it assumes stationary noise of known autocovariance that is
+/// independent of the gas, but it depends less on the level. If the true variances are `1 + ε`
+/// times the given ones, then `E[F_w] = J_clean/N^(1−w) + ε N^w`, and to first order in `ε` the
+/// error of the minimum is `w` times that of the compensated cost. The ratio of the levels has to
+/// be right for any `w`.
 #[derive(Clone, Debug)]
 pub struct Hybrid<'a> {
     cost: CrossRelation<'a>,
@@ -58,13 +61,14 @@ impl<'a> Hybrid<'a> {
         self.weight
     }
 
-    /// `F_w = (J_CR − N) N^(w−1)` with gradient and exact Hessian at `theta` (`P` 2, 4 or 6), in the square of the channels'
-    /// unit to the power of `w`. Can be negative: it is a difference.
+    /// `F_w = (J_CR − N) N^(w−1)` with gradient and exact Hessian at `theta` (`P` 2, 4 or 6), in
+    /// the square of the channels' unit to the power of `w`. Can be negative: it is a difference.
     ///
     /// # Source
-    /// Own reading. A hybrid of normalisation and compensation is published (Gillespie, Hung, Kee, McLoone, *Noise resilient
-    /// discrete-time cross-relation sensor characterisation*), but its abstract, which is all that was seen, gives no formula;
-    /// whether it is this one is not known. Derivation: docs, chapter "Theory", section 2.
+    /// Own reading. A hybrid of normalisation and compensation is published (Gillespie, Hung, Kee,
+    /// McLoone, *Noise resilient discrete-time cross-relation sensor characterisation*), but its
+    /// abstract, which is all that was seen, gives no formula; whether it is this one is not known.
+    /// Derivation: docs, chapter "Theory", section 2.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let above = self.cost.evaluate(theta);
         let noise = added_by_noise(&self.noise, theta, self.cost.period_s());
@@ -90,11 +94,11 @@ impl<'a> Hybrid<'a> {
         }
     }
 
-    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K), zero for parameters not
-    /// in `free`; `None` where `theta` is no minimum.
+    /// Covariance `[P][P]` of the minimum `theta` under white noise of `noise_std` `[s1, s2]` (K),
+    /// zero for parameters not in `free`; `None` where `theta` is no minimum.
     ///
-    /// In units of `N^(w−1)` the gradient is `∂J − (w + (1 − w) J/N) ∂N`: of the sum over samples, half of it is
-    /// `Σ e (∂e − (1 − w) ∂N/(2N) e)` less a number that does not scatter.
+    /// In units of `N^(w−1)` the gradient is `∂J − (w + (1 − w) J/N) ∂N`: of the sum over samples,
+    /// half of it is `Σ e (∂e − (1 − w) ∂N/(2N) e)` less a number that does not scatter.
     pub fn covariance<const P: usize>(
         &self,
         theta: &[f64; P],

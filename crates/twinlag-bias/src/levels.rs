@@ -1,9 +1,10 @@
 //! Noise levels from the data, estimated from changes that are too fast for a smooth signal.
 //!
-//! Sensors are low-pass, so their highest frequencies usually show the noise floor. The third difference
-//! `y[k] − 3 y[k+1] + 3 y[k+2] − y[k+3]` of a smooth signal is small; of white noise it has variance `20 s²`. It fails where
-//! the samples lie as far apart as the faster time constant, with coloured noise, and below the step of the converter,
-//! which therefore sets a floor of `q/√12`.
+//! Sensors are low-pass, so their highest frequencies usually show the noise floor. The third
+//! difference `y[k] − 3 y[k+1] + 3 y[k+2] − y[k+3]` of a smooth signal is small; of white noise it
+//! has variance `20 s²`. It fails where the samples lie as far apart as the faster time constant,
+//! with coloured noise, and below the step of the converter, which therefore sets a floor of
+//! `q/√12`.
 
 use twinlag_cross_relation::{Readings, Segment, Steps};
 
@@ -12,20 +13,22 @@ use crate::error::NoiseError;
 /// Noise of one channel as the data show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseLevel {
-    /// Standard deviation, K: the larger of the third-difference estimate and the quantisation floor.
+    /// Standard deviation, K: the larger of the third-difference estimate and the quantisation
+    /// floor.
     pub std_k: f64,
     /// Standard error of `std_k`, K, for white Gaussian noise.
     pub standard_error_k: f64,
     /// Step of the converter, K, if the readings lie on a grid.
     pub quantisation_step_k: Option<f64>,
-    /// Number of third differences left out because they are too large for noise. A dropout causes up to
-    /// four of them, and a sharp step of the gas some.
+    /// Number of third differences left out because they are too large for noise. A dropout causes
+    /// up to four of them, and a sharp step of the gas some.
     pub outliers: usize,
 }
 
 /// Noise levels `[s1, s2]` of both channels.
 ///
-/// For uneven steps the third divided difference takes the place of the third difference, each scaled to unit noise.
+/// For uneven steps the third divided difference takes the place of the third difference, each
+/// scaled to unit noise.
 ///
 /// # Errors
 /// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.
@@ -48,8 +51,9 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
         let step = quantisation_step(readings.segments().iter().map(channel));
         let floor = step.map_or(0.0, |q| q / 12.0_f64.sqrt());
         let std_k = from_differences.max(floor);
-        // The third differences of white noise have autocorrelations −3/4, 3/10, −1/20: their mean square over n has
-        // relative variance 2 (1 + 2 (9/16 + 9/100 + 1/400))/n = 4.62/n, half of it in the standard deviation.
+        // The third differences of white noise have autocorrelations −3/4, 3/10, −1/20: their mean
+        // square over n has relative variance 2 (1 + 2 (9/16 + 9/100 + 1/400))/n = 4.62/n, half of
+        // it in the standard deviation.
         Ok(NoiseLevel {
             std_k,
             standard_error_k: 0.5 * std_k * (4.62 / count as f64).sqrt(),
@@ -60,9 +64,10 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
     Ok([level(Segment::y1)?, level(Segment::y2)?])
 }
 
-/// Leaves out differences beyond six robust standard deviations (1.4826 times the median absolute value) and returns their
-/// number. White Gaussian noise has one such in five hundred million. Where more than half are zero, as with a coarse
-/// converter, there is no scale to judge by and all are kept.
+/// Leaves out differences beyond six robust standard deviations (1.4826 times the median absolute
+/// value) and returns their number. White Gaussian noise has one such in five hundred million.
+/// Where more than half are zero, as with a coarse converter, there is no scale to judge by and all
+/// are kept.
 fn drop_outliers(differences: &mut Vec<f64>) -> usize {
     let mut sizes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
     let middle = sizes.len() / 2;
@@ -91,10 +96,12 @@ fn third_difference(steps: &Steps, k: usize) -> [f64; 4] {
     }
 }
 
-/// The grid that all differences between neighbouring readings lie on, if it is coarse enough to matter.
+/// The grid that all differences between neighbouring readings lie on, if it is coarse enough to
+/// matter.
 ///
-/// A grid counts if nearly all differences are whole multiples of the smallest one. Written decimals always make some
-/// grid; it is the floor that they imply that is used, and it is small where the decimals are fine.
+/// A grid counts if nearly all differences are whole multiples of the smallest one. Written
+/// decimals always make some grid; it is the floor that they imply that is used, and it is small
+/// where the decimals are fine.
 fn quantisation_step<'a>(channels: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
     let differences: Vec<f64> =
         channels.flat_map(|y| y.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 1e-9).collect();
@@ -125,8 +132,8 @@ mod tests {
         })
     }
 
-    /// A sine of 50 samples a period leaves `10 (2π/50)³/√2 = 0.014 K` of third difference, over √20: 3 mK, against a noise
-    /// of 0.3 K. Four standard errors.
+    /// A sine of 50 samples a period leaves `10 (2π/50)³/√2 = 0.014 K` of third difference, over
+    /// √20: 3 mK, against a noise of 0.3 K. Four standard errors.
     #[test]
     fn white_noise_on_a_smooth_signal_is_found_in_both_channels() {
         let [y1, y2] = noisy(5000, [0.3, 1.1], |k| k as f64);
@@ -139,8 +146,9 @@ mod tests {
         }
     }
 
-    /// Uneven steps, the signal a parabola in time, which the divided differences take to zero whatever the steps: what is
-    /// left is the noise. Neighbouring differences correlate more than at even steps: eight standard errors.
+    /// Uneven steps, the signal a parabola in time, which the divided differences take to zero
+    /// whatever the steps: what is left is the noise. Neighbouring differences correlate more than
+    /// at even steps: eight standard errors.
     #[test]
     fn uneven_steps_do_not_let_the_signal_through() {
         let steps: Vec<f64> = (0..4999).map(|k| 1.0 + 0.7 * f64::from(k % 3)).collect();
@@ -156,7 +164,8 @@ mod tests {
         }
     }
 
-    /// One dropout in 3000 samples would multiply the level by ten; it is left out and counted: four differences see it.
+    /// One dropout in 3000 samples would multiply the level by ten; it is left out and counted:
+    /// four differences see it.
     #[test]
     fn a_dropout_does_not_pass_for_noise() {
         let [mut y1, y2] = noisy(3000, [0.3, 1.1], |k| k as f64);

@@ -1,14 +1,15 @@
 //! What measurement noise adds to a two-sensor cost, and how to subtract it.
 //!
-//! This crate is for anyone who uses the published cross-relation cost on noisy data. It has the noise gain
-//! of the synthetic filters of first and second order for white and coloured noise; the compensated cost
-//! for known levels; the normalised cost for a known ratio (or the compensated one with its level
-//! profiled); the hybrid between the two; and estimates of the levels from the data. All costs take two,
-//! four or six parameters, in the order of [`twinlag_cross_relation::Parameter::ALL`].
+//! This crate is for anyone who uses the published cross-relation cost on noisy data. It has the
+//! noise gain of the synthetic filters of first and second order for white and coloured noise; the
+//! compensated cost for known levels; the normalised cost for a known ratio (or the compensated one
+//! with its level profiled); the hybrid between the two; and estimates of the levels from the data.
+//! All costs take two, four or six parameters, in the order of
+//! [`twinlag_cross_relation::Parameter::ALL`].
 //!
-//! If you are free to choose, prefer the exactly whitened cost of `twinlag-cross-relation`, which needs no
-//! compensation and is up to several times more precise. For whole records use `twinlag`. This crate knows
-//! no optimiser.
+//! If you are free to choose, prefer the exactly whitened cost of `twinlag-cross-relation`, which
+//! needs no compensation and is up to several times more precise. For whole records use `twinlag`.
+//! This crate knows no optimiser.
 //!
 //! ```
 //! use twinlag_bias::{Compensated, Noise};

@@ -1,13 +1,15 @@
 //! Noise levels from the disagreement of the two inferred gas temperatures, whatever the gas does.
 //!
-//! `f1 = x + n1`, `f2 = x + n2` with independent noises of known *shape*: so `f1 (f1 − f2)` has expectation `|n1|²` at each
-//! frequency and `f2 (f2 − f1)` has `|n2|²`, the gas having dropped out, exactly and without any assumption about it. In bands
-//! these are two sets of moments, linear in the two variances; weighted least squares with the moments' own covariance (for a
-//! gas that is Gaussian in the band) finds both, and their standard errors. Where the gas has power a moment scatters widely
-//! and has little weight; the bands that it leaves alone decide, wherever they are.
+//! `f1 = x + n1`, `f2 = x + n2` with independent noises of known *shape*: so `f1 (f1 − f2)` has
+//! expectation `|n1|²` at each frequency and `f2 (f2 − f1)` has `|n2|²`, the gas having dropped
+//! out, exactly and without any assumption about it. In bands these are two sets of moments, linear
+//! in the two variances; weighted least squares with the moments' own covariance (for a gas that is
+//! Gaussian in the band) finds both, and their standard errors. Where the gas has power a moment
+//! scatters widely and has little weight; the bands that it leaves alone decide, wherever they are.
 //!
-//! Unlike third differences ([`crate::estimate_noise`]), this method does not mistake a signal that moves
-//! from sample to sample for noise. It needs the time constants, whose estimate needs the levels, so iterate.
+//! Unlike third differences ([`crate::estimate_noise`]), this method does not mistake a signal that
+//! moves from sample to sample for noise. It needs the time constants, whose estimate needs the
+//! levels, so iterate.
 //!
 //! # Source
 //! Own derivation; docs, chapter "Theory", section 5.
@@ -22,10 +24,11 @@ const RATIO: f64 = 1.25;
 const LEAST: usize = 12;
 /// Fewest samples of a stretch that is used.
 const SHORTEST: usize = 64;
-/// Neighbouring bins of a Hann window share power: a mean over them has the variance of this many times fewer bins,
-/// `1 + 2 (2/3)² + 2 (1/6)²`.
+/// Neighbouring bins of a Hann window share power: a mean over them has the variance of this many
+/// times fewer bins, `1 + 2 (2/3)² + 2 (1/6)²`.
 const SHARED: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
-/// A level is taken to be no less than this share of the other: below it hardly matters, and weights stay finite.
+/// A level is taken to be no less than this share of the other: below it hardly matters, and
+/// weights stay finite.
 const LEAST_SHARE: f64 = 0.1;
 /// Steps towards weights that agree with the levels they give.
 const STEPS: usize = 6;
@@ -55,11 +58,11 @@ pub struct JointLevels {
     pub std_k: [f64; 2],
     /// Covariance of the two *variances*, K⁴.
     pub covariance_k4: [[f64; 2]; 2],
-    /// The channel whose level was held at a tenth of the other's because the moments gave a lower or
-    /// negative value. The true level is at most that, within its standard error.
+    /// The channel whose level was held at a tenth of the other's because the moments gave a lower
+    /// or negative value. The true level is at most that, within its standard error.
     pub is_held: [bool; 2],
-    /// Weighted sum of squares that the levels leave of the moments: about twice the number of bands, less the parameters, if
-    /// noise has the assumed shape and both sensors their models.
+    /// Weighted sum of squares that the levels leave of the moments: about twice the number of
+    /// bands, less the parameters, if noise has the assumed shape and both sensors their models.
     pub misfit: f64,
 }
 
@@ -85,7 +88,8 @@ impl NoiseMoments {
             let transform =
                 |value: &dyn Fn(usize) -> f64| spectrum(&*plan, (0..n).map(|k| window[k] * value(k)).collect());
             let (first, difference) = (transform(&|k| f1[k] - mean), transform(&|k| f1[k] - f2[k]));
-            // Neither the mean nor the bin at half the sampling rate has an independent imaginary part.
+            // Neither the mean nor the bin at half the sampling rate has an independent imaginary
+            // part.
             for k in 1..n.div_ceil(2) {
                 let (p, u) = (first[k], difference[k]);
                 let q = p - u;
@@ -111,7 +115,8 @@ impl NoiseMoments {
         Some(Self { bands })
     }
 
-    /// Levels for noise that is white, or autoregressive of first order with coefficients `ar1` (0 is white).
+    /// Levels for noise that is white, or autoregressive of first order with coefficients `ar1` (0
+    /// is white).
     ///
     /// - `start_std_k`: levels to begin the weights with; the fixed point does not depend on them
     ///
@@ -128,8 +133,9 @@ impl NoiseMoments {
         out
     }
 
-    /// Levels for coefficients `ar1` with the weights that noise of `std_k` and `weighing_ar1` gives. Its misfit, minimised over
-    /// `ar1`, determines the colour of the noise. (Weights that followed `ar1` would favour whatever makes them small.)
+    /// Levels for coefficients `ar1` with the weights that noise of `std_k` and `weighing_ar1`
+    /// gives. Its misfit, minimised over `ar1`, determines the colour of the noise. (Weights that
+    /// followed `ar1` would favour whatever makes them small.)
     pub fn levels_weighed(&self, std_k: [f64; 2], weighing_ar1: [f64; 2], ar1: [f64; 2]) -> Option<JointLevels> {
         self.step(&self.shapes(ar1), &self.weights(&self.shapes(weighing_ar1), std_k)?)
     }
@@ -219,8 +225,8 @@ impl Band {
 
     /// Inverse covariance of the two moments where the noises have powers `noise`, all Gaussian.
     ///
-    /// With `p = x + n1`, `u = n1 − n2`: `Var Re(p u*) = ½ (⟨|p|²⟩⟨|u|²⟩ + ⟨n1²⟩²)`, likewise for the other, and covariance
-    /// `−½ (⟨x²⟩⟨|u|²⟩ − ⟨n1²⟩⟨n2²⟩)`, over the number of bins.
+    /// With `p = x + n1`, `u = n1 − n2`: `Var Re(p u*) = ½ (⟨|p|²⟩⟨|u|²⟩ + ⟨n1²⟩²)`, likewise for
+    /// the other, and covariance `−½ (⟨x²⟩⟨|u|²⟩ − ⟨n1²⟩⟨n2²⟩)`, over the number of bins.
     fn information(&self, noise: &Vector2<f64>) -> Option<Matrix2<f64>> {
         let (n1, n2, gas) = (noise[0], noise[1], self.gas);
         let both = n1 + n2;

@@ -25,10 +25,12 @@ impl Noise {
         }
     }
 
-    /// Coloured noise of the given autocovariance at lags 0, 1, 2, … samples (K²), zero beyond the last.
+    /// Coloured noise of the given autocovariance at lags 0, 1, 2, … samples (K²), zero beyond the
+    /// last.
     ///
     /// # Errors
-    /// [`NoiseError::Negative`] for a variance that is no variance, [`NoiseError::Autocovariance`] for a lag larger than it.
+    /// [`NoiseError::Negative`] for a variance that is no variance, [`NoiseError::Autocovariance`]
+    /// for a lag larger than it.
     pub fn coloured(autocovariance: Vec<f64>) -> Result<Self, NoiseError> {
         let variance = autocovariance.first().copied().unwrap_or(f64::NAN);
         if !(variance.is_finite() && variance >= 0.0) {
@@ -45,11 +47,12 @@ impl Noise {
         self.autocovariance[0]
     }
 
-    /// Variance that this noise leaves behind the filter `(1 − p) z⁻¹/(1 − p z⁻¹)`, `p = exp(−Ts/τ)`, with its first two
-    /// derivatives with respect to `τ`.
+    /// Variance that this noise leaves behind the filter `(1 − p) z⁻¹/(1 − p z⁻¹)`,
+    /// `p = exp(−Ts/τ)`, with its first two derivatives with respect to `τ`.
     ///
-    /// `σ² = h(p) (r[0] + 2 Σ_l r[l] p^l)`, `h(p) = (1 − p)/(1 + p)`: the noise's autocovariance times the autocorrelation
-    /// `h p^l` of the impulse response, summed over lags of both signs. For white noise `r[0] h(p)`.
+    /// `σ² = h(p) (r[0] + 2 Σ_l r[l] p^l)`, `h(p) = (1 − p)/(1 + p)`: the noise's autocovariance
+    /// times the autocorrelation `h p^l` of the impulse response, summed over lags of both signs.
+    /// For white noise `r[0] h(p)`.
     ///
     /// # Source
     /// Own derivation, docs, chapter "Theory", section 2.
@@ -73,18 +76,21 @@ impl Noise {
     }
 
     /// Variance that this noise leaves behind the filter of second order
-    /// `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)` ([`synthetic_filter`]), with gradient and Hessian with respect to `[τ, τ₂]` (s).
+    /// `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)` ([`synthetic_filter`]), with gradient and Hessian
+    /// with respect to `[τ, τ₂]` (s).
     ///
     /// `σ² = r[0] ρ[0] + 2 Σ_l r[l] ρ[l]` with the autocorrelation `ρ` of the impulse response:
     /// `ρ[0] = ((n1 + n2)(1 + d2) − 2 n1 n2)/((1 − d2)(1 − d1 + d2))`, the noise gain, then
-    /// `ρ[1] = (n1 n2 − d1 ρ[0])/(1 + d2)` and `ρ[l] = −d1 ρ[l−1] − d2 ρ[l−2]`. `second_tau_s = 0` is the filter of first order.
+    /// `ρ[1] = (n1 n2 − d1 ρ[0])/(1 + d2)` and `ρ[l] = −d1 ρ[l−1] − d2 ρ[l−2]`. `second_tau_s = 0`
+    /// is the filter of first order.
     ///
     /// # Source
     /// Own derivation (Yule-Walker equations), docs, chapter "Theory", section 2.
     pub fn passed_second_order(&self, tau_s: f64, second_tau_s: f64, period_s: f64) -> CostValue<2> {
         let filter = synthetic_filter(tau_s, second_tau_s, period_s);
         let ([_, n1, n2], [_, d1, d2]) = (filter.numerator, filter.denominator);
-        // With unit static gain 1 + d1 + d2 = n1 + n2, so that this needs no difference of nearly equal numbers.
+        // With unit static gain 1 + d1 + d2 = n1 + n2, so that this needs no difference of nearly
+        // equal numbers.
         let gain = ((n1 + n2) * (d2 + 1.0) - n1 * n2 * 2.0) / ((-d2 + 1.0) * (d2 - d1 + 1.0));
         let mut next = (n1 * n2 - d1 * gain) / (d2 + 1.0);
         let mut now = gain;
@@ -129,7 +135,8 @@ mod tests {
         assert!((got / want - 1.0).abs() < 1e-12, "got {got}, want {want}");
     }
 
-    /// Central differences of step 1e-5 in `ln τ`: truncation 1e-10, rounding 1e-11 for the first and 1e-6 for the second.
+    /// Central differences of step 1e-5 in `ln τ`: truncation 1e-10, rounding 1e-11 for the first
+    /// and 1e-6 for the second.
     #[test]
     fn derivatives_are_those_of_the_value() {
         let noise = Noise::coloured(vec![0.25, 0.1, -0.05, 0.02]).expect("valid");
@@ -143,9 +150,11 @@ mod tests {
         }
     }
 
-    /// `w = A aᵏ + C cᵏ` with distinct poles has the sum of squares `A² a²/(1 − a²) + 2 A C a c/(1 − a c) + C² c²/(1 − c²)`, and the
-    /// same at lag `l` with `aˡ`, `cˡ` in place of one factor. The residues follow from the partial fractions of the sensor,
-    /// `A = τ/(τ − τ₂) (1 − a)/a`, `C = −τ₂/(τ − τ₂) (1 − c)/c`. Rounding is amplified by `1/(1 − a²)`, some 100.
+    /// `w = A aᵏ + C cᵏ` with distinct poles has the sum of squares
+    /// `A² a²/(1 − a²) + 2 A C a c/(1 − a c) + C² c²/(1 − c²)`, and the same at lag `l` with `aˡ`,
+    /// `cˡ` in place of one factor. The residues follow from the partial fractions of the sensor,
+    /// `A = τ/(τ − τ₂) (1 − a)/a`, `C = −τ₂/(τ − τ₂) (1 − c)/c`. Rounding is amplified by
+    /// `1/(1 − a²)`, some 100.
     #[test]
     fn second_order_noise_gain_is_the_closed_form_of_distinct_poles() {
         for (tau, second) in [(0.0238_f64, 0.009_f64), (0.0238, 0.0005), (0.005, 0.12)] {
@@ -168,9 +177,10 @@ mod tests {
         }
     }
 
-    /// Equal poles have no such form: here 100 000 samples of white noise behind the simulated sensor. The output is
-    /// correlated over some `2τ/Ts` = 10 samples to either side, so its mean square has a relative standard error of about
-    /// `√(2 · 15/n)` = 1.7 %; four of these. The first-order noise gain, 0.1, is twice as large.
+    /// Equal poles have no such form: here 100 000 samples of white noise behind the simulated
+    /// sensor. The output is correlated over some `2τ/Ts` = 10 samples to either side, so its mean
+    /// square has a relative standard error of about `√(2 · 15/n)` = 1.7 %; four of these. The
+    /// first-order noise gain, 0.1, is twice as large.
     #[test]
     fn critically_damped_noise_gain_is_that_of_a_simulation() {
         use rand::SeedableRng;

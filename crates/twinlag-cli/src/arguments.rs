@@ -15,9 +15,9 @@ use crate::study::Study;
 
 /// Identifies the dynamics of two temperature sensors from their readings alone.
 ///
-/// Two thermocouples of different thickness in the same gas lag differently. From how their readings
-/// differ, twinlag estimates the time constant of each without knowing the gas temperature. The
-/// confidence intervals account for the noise in the readings.
+/// Two thermocouples of different thickness in the same gas lag differently. From how their
+/// readings differ, twinlag estimates the time constant of each without knowing the gas
+/// temperature. The confidence intervals account for the noise in the readings.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -54,8 +54,8 @@ impl Arguments {
 pub(crate) enum Command {
     /// Estimate both time constants of a record, with intervals, noise levels and residual tests.
     Characterise(Box<Characterise>),
-    /// Find the physical effects that two first-order lags fail to describe, add them to the model, and compare the errors
-    /// before and after.
+    /// Find the physical effects that two first-order lags fail to describe, add them to the model,
+    /// and compare the errors before and after.
     Diagnose(Box<Diagnose>),
     /// Reconstruct the gas temperature at every sample, with its standard deviation.
     Compensate(Box<Compensate>),
@@ -63,10 +63,12 @@ pub(crate) enum Command {
     Track(Box<Track>),
     /// Simulate a record from the description of a rig: gas, sensors, noise, converter.
     Simulate(Simulate),
-    /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the results.
+    /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the
+    /// results.
     #[command(subcommand)]
     Study(Study),
-    /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no file.
+    /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no
+    /// file.
     Demo(Demo),
 }
 
@@ -90,7 +92,8 @@ Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be
 pub(crate) struct Characterise {
     #[command(flatten)]
     pub(crate) input: Input,
-    /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time constants are fitted.
+    /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time
+    /// constants are fitted.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
 }
@@ -152,14 +155,16 @@ pub(crate) struct Compensate {
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
-    /// Use a model written by `twinlag diagnose --save` instead of diagnosing this record; its effects stay fixed.
+    /// Use a model written by `twinlag diagnose --save` instead of diagnosing this record; its
+    /// effects stay fixed.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
-    /// Which readings each answer may use: smoother (the whole record), filter (those up to that instant), or lag:N (those and
-    /// the next N samples).
+    /// Which readings each answer may use: smoother (the whole record), filter (those up to that
+    /// instant), or lag:N (those and the next N samples).
     #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]
     pub(crate) form: Form,
-    /// The channel to trust where gain, offset or delay differ; two sensors alone cannot reveal which one is right.
+    /// The channel to trust where gain, offset or delay differ; two sensors alone cannot reveal
+    /// which one is right.
     #[arg(long, value_name = "CHANNEL", default_value = "T1", ignore_case = true)]
     pub(crate) trust: Trust,
     /// Do not consider this effect; may be given several times.
@@ -208,8 +213,9 @@ pub(crate) struct Track {
     /// Process rows as they arrive, after learning from this many.
     #[arg(long, value_name = "ROWS", conflicts_with_all = ["window", "picture", "report"], value_parser = clap::value_parser!(u32).range(200..))]
     pub(crate) live: Option<u32>,
-    /// With --live: how far the time constants may change within one second, as a fraction (standard deviation; it grows with
-    /// the square root of time) [default: 0.1 within ten time constants of the slower sensor].
+    /// With --live: how far the time constants may change within one second, as a fraction
+    /// (standard deviation; it grows with the square root of time) [default: 0.1 within ten time
+    /// constants of the slower sensor].
     #[arg(long, value_name = "SHARE", requires = "live")]
     pub(crate) change: Option<f64>,
     /// Overwrite output files that exist.
@@ -262,10 +268,12 @@ pub(crate) struct Columns {
     /// A trusted temperature, used for scoring only and never in an estimate.
     #[arg(long, value_name = "COL")]
     reference: Option<ColumnRef>,
-    /// A flow velocity or density, in any unit: `diagnose` tries time constants proportional to a power of it.
+    /// A flow velocity or density, in any unit: `diagnose` tries time constants proportional to a
+    /// power of it.
     #[arg(long, value_name = "COL")]
     flow: Option<ColumnRef>,
-    /// Time from row to row, for files without a time column; a guessed time column is then ignored.
+    /// Time from row to row, for files without a time column; a guessed time column is then
+    /// ignored.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
     /// How to read the time stamps: auto, uniform (evenly spaced, whatever they say) or as-stamped.
@@ -300,21 +308,23 @@ impl Columns {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct Method {
-    /// Noise standard deviations of the two channels in K, both positive; estimated from the data if left out.
+    /// Noise standard deviations of the two channels in K, both positive; estimated from the data
+    /// if left out.
     #[arg(long, value_name = "S1,S2", value_parser = pair, allow_hyphen_values = true, help_heading = "Noise")]
     noise: Option<Pair>,
     /// Ratio S2/S1 of the noise levels, if only the ratio is known.
     #[arg(long, value_name = "R", allow_hyphen_values = true, help_heading = "Noise")]
     noise_ratio: Option<f64>,
-    /// A stretch of steady gas temperature, in seconds from the start: its scatter gives the noise levels. May be given several
-    /// times.
+    /// A stretch of steady gas temperature, in seconds from the start: its scatter gives the noise
+    /// levels. May be given several times.
     #[arg(long, value_name = "FROM..TO", value_parser = stretch, allow_hyphen_values = true, help_heading = "Noise")]
     quiet_segment: Vec<Stretch>,
-    /// Model of the noise that is estimated: white, or autoregressive (each sample keeps a share of the previous one's).
+    /// Model of the noise that is estimated: white, or autoregressive (each sample keeps a share of
+    /// the previous one's).
     #[arg(long, value_name = "KIND", default_value = "white", help_heading = "Noise")]
     noise_colour: NoiseColour,
-    /// One of whitened, cross-relation, bias-compensated, normalised, hybrid, difference-equation-ls, difference-equation-tls,
-    /// difference-equation-gtls.
+    /// One of whitened, cross-relation, bias-compensated, normalised, hybrid,
+    /// difference-equation-ls, difference-equation-tls, difference-equation-gtls.
     #[arg(long, value_name = "NAME", default_value = "whitened")]
     estimator: Estimator,
     #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt", help = optimisers())]
@@ -325,20 +335,22 @@ pub(crate) struct Method {
     /// Also fit a second lag in series in these sensors: T1, T2 or T1,T2.
     #[arg(long, value_name = "LIST")]
     second_order: Option<String>,
-    /// A parameter that is already known, exactly or with a standard deviation; may be given once for each of
-    /// `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`, `T1.second_time_constant_s`,
-    /// `T2.second_time_constant_s`.
+    /// A parameter that is already known, exactly or with a standard deviation; may be given once
+    /// for each of `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`,
+    /// `T1.second_time_constant_s`, `T2.second_time_constant_s`.
     #[arg(long, value_name = "NAME=VALUE[+-SD]", allow_hyphen_values = true)]
     known: Vec<Known>,
-    /// Samples that the cross-relation, bias-compensated, normalised and hybrid estimators leave out at the start of each
-    /// unbroken stretch.
+    /// Samples that the cross-relation, bias-compensated, normalised and hybrid estimators leave
+    /// out at the start of each unbroken stretch.
     #[arg(long, value_name = "K0")]
     discard: Option<usize>,
-    /// How the gas is assumed to move between samples: auto, zero-order-hold, first-order-hold or bilinear.
+    /// How the gas is assumed to move between samples: auto, zero-order-hold, first-order-hold or
+    /// bilinear.
     #[arg(long, value_name = "HOW", default_value = "auto")]
     hold: Hold,
-    /// How to find 95 % intervals: auto (from standard errors, or from the profile of the cost where standard errors do not
-    /// describe it), profile, or bootstrap (by repeating the estimate on simulated records).
+    /// How to find 95 % intervals: auto (from standard errors, or from the profile of the cost
+    /// where standard errors do not describe it), profile, or bootstrap (by repeating the estimate
+    /// on simulated records).
     #[arg(long, value_name = "HOW", default_value = "auto", value_parser = ["auto", "profile", "bootstrap"])]
     intervals: String,
     /// Number of simulated records of the bootstrap, at least 39 [default: 199].

@@ -1,4 +1,5 @@
-//! `twinlag demo`: simulates a built-in rig with an effect unknown to the estimator, and diagnoses the record.
+//! `twinlag demo`: simulates a built-in rig with an effect unknown to the estimator, and diagnoses
+//! the record.
 
 use twinlag::DiagnoseOptions;
 use twinlag::record::{Channels, Record, SamplingChoice};

@@ -1,9 +1,11 @@
-//! The `twinlag` program: identifies the dynamics of two temperature sensors from their readings alone.
+//! The `twinlag` program: identifies the dynamics of two temperature sensors from their readings
+//! alone.
 //!
-//! The program is a thin layer over the crate `twinlag`: it reads arguments, shows progress and prints
-//! answers. Data go to standard output, messages to standard error. Exit codes: 0 answered; 2 wrong
-//! usage; 3 the file cannot be used; 4 the data were read but cannot answer the question (the answer is
-//! still printed, with a `status` that says why); 75 a shard of a study is missing; 1 any other error.
+//! The program is a thin layer over the crate `twinlag`: it reads arguments, shows progress and
+//! prints answers. Data go to standard output, messages to standard error. Exit codes: 0 answered;
+//! 2 wrong usage; 3 the file cannot be used; 4 the data were read but cannot answer the question
+//! (the answer is still printed, with a `status` that says why); 75 a shard of a study is missing;
+//! 1 any other error.
 
 mod arguments;
 mod characterise;

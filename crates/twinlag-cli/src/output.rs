@@ -43,8 +43,8 @@ pub(crate) struct Views<'a> {
     pub(crate) report: Option<&'a Path>,
 }
 
-/// Checks the outputs of a table of numbers, its picture and its report. Returns whether the table goes
-/// to standard output, `-`.
+/// Checks the outputs of a table of numbers, its picture and its report. Returns whether the table
+/// goes to standard output, `-`.
 pub(crate) fn check_data(
     record: &Path,
     out: &Path,

@@ -22,7 +22,8 @@ use crate::print;
 /// What to do with a Monte-Carlo study.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Study {
-    /// Run a study, or one shard of it; the result is byte-identical for any number of threads, shards and restarts.
+    /// Run a study, or one shard of it; the result is byte-identical for any number of threads,
+    /// shards and restarts.
     Run(Run),
     /// Join the parts of all shards in a folder into the table and the pictures.
     Merge {

@@ -1,8 +1,9 @@
 //! What the gas is like, from the readings themselves.
 //!
-//! Whittle's likelihood of the periodogram, `−Σ ln P + I/P`, `P` the power that a prior and the noise are expected to give: parts are
-//! added one at a time, each where it explains most, and exchanged for others, as long as the readings become more probable, the
-//! numbers integrated out (`MacKay` 2003, chapter 28).
+//! Whittle's likelihood of the periodogram, `−Σ ln P + I/P`, `P` the power that a prior and the
+//! noise are expected to give: parts are added one at a time, each where it explains most, and
+//! exchanged for others, as long as the readings become more probable, the numbers integrated out
+//! (`MacKay` 2003, chapter 28).
 
 mod holes;
 mod part;
@@ -27,14 +28,15 @@ const HARMONICS: usize = 8;
 const FEWEST_HARMONICS: usize = 3;
 /// Fewest samples with both readings.
 const FEWEST: usize = 32;
-/// Share of instants that may be missing, and by which steps may differ, before the lines between them matter.
+/// Share of instants that may be missing, and by which steps may differ, before the lines between
+/// them matter.
 const FEW_MISSING: f64 = 0.01;
 /// What a harmonic must gain to count as one: chance gains less, 19 times in 20.
 const HARMONIC_GAIN: f64 = 1.0;
 /// Candidates that are fitted to the end, after all were begun.
 const PROMISING: usize = 4;
-/// Differences of scores: what fits that end early leave; beyond which fitting all numbers together is not tried; and within which parts
-/// of other kinds are nearly as likely, one to twenty.
+/// Differences of scores: what fits that end early leave; beyond which fitting all numbers together
+/// is not tried; and within which parts of other kinds are nearly as likely, one to twenty.
 const NOTHING_GAINED: f64 = 0.5;
 const HOPELESS: f64 = 15.0;
 const NEARLY: f64 = 6.0;
@@ -46,20 +48,22 @@ const MOST_OTHERS: usize = 4;
 pub struct Learned {
     /// The prior.
     pub prior: Prior,
-    /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky factor at a time.
+    /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky
+    /// factor at a time.
     pub deviations: Vec<Prior>,
-    /// Alternative priors that fit almost as well, with their posterior weights (`prior` has the remainder).
-    /// They matter because the readings do not determine how the spectrum continues below the noise floor.
+    /// Alternative priors that fit almost as well, with their posterior weights (`prior` has the
+    /// remainder). They matter because the readings do not determine how the spectrum continues
+    /// below the noise floor.
     pub others: Vec<(f64, Prior)>,
     /// Factors on the standard deviations of both channels' noise; 1 if these are known.
     pub noise_factor: [f64; 2],
 }
 
-/// Estimates the prior that `readings` of `rig` support. The covariance of its numbers is the inverse of
-/// Fisher's information.
+/// Estimates the prior that `readings` of `rig` support. The covariance of its numbers is the
+/// inverse of Fisher's information.
 ///
-/// Straight lines bridge missing and uneven instants. If there are more than a few of these, the likelihood
-/// is that of the readings themselves.
+/// Straight lines bridge missing and uneven instants. If there are more than a few of these, the
+/// likelihood is that of the readings themselves.
 ///
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
@@ -67,8 +71,8 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
     learned(readings, rig, Ask::Gas)
 }
 
-/// Estimates a prior as [`learn`] does, but faster: parts are added and not exchanged. Use it for a gas
-/// temperature without bands.
+/// Estimates a prior as [`learn`] does, but faster: parts are added and not exchanged. Use it for a
+/// gas temperature without bands.
 ///
 /// # Errors
 /// As [`learn`].
@@ -76,9 +80,9 @@ pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, Compensa
     learned(readings, rig, Ask::GasQuickly)
 }
 
-/// Estimates a prior as [`learn`] does, together with the noise levels of both channels. Use it if the noise
-/// of `rig` was estimated without regard to the gas, since gas that is rough from one sample to the next is
-/// then mistaken for noise.
+/// Estimates a prior as [`learn`] does, together with the noise levels of both channels. Use it if
+/// the noise of `rig` was estimated without regard to the gas, since gas that is rough from one
+/// sample to the next is then mistaken for noise.
 ///
 /// # Errors
 /// As [`learn`].
@@ -157,15 +161,17 @@ impl Fitted {
         Self { parts, deviance: f64::INFINITY, cost: 0.0 }
     }
 
-    /// Minus twice the logarithm of the probability of the readings, the numbers integrated out by Laplace's method.
+    /// Minus twice the logarithm of the probability of the readings, the numbers integrated out by
+    /// Laplace's method.
     fn score(&self) -> f64 {
         self.deviance / BINS_PER_ONE + self.cost
     }
 }
 
 impl Search<'_> {
-    /// The likeliest parts: they are added, and then each is exchanged for what explains more in its place, until neither gains. With
-    /// those of other kinds that came up on the way and are nearly as likely.
+    /// The likeliest parts: they are added, and then each is exchanged for what explains more in
+    /// its place, until neither gains. With those of other kinds that came up on the way and are
+    /// nearly as likely.
     fn run(&self) -> (Fitted, Vec<Fitted>) {
         let noise = if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() };
         let first = self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()));
@@ -206,7 +212,8 @@ impl Search<'_> {
         }
     }
 
-    /// `current` with one part left out, or one of each kind in its place, or a comb that ends elsewhere.
+    /// `current` with one part left out, or one of each kind in its place, or a comb that ends
+    /// elsewhere.
     fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
         let mut out = Vec::new();
         for i in (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none()) {
@@ -308,7 +315,8 @@ impl Search<'_> {
         ]
     }
 
-    /// What might be added to `current`, where there is most above what is expected: a line, a band, a broad process, a comb.
+    /// What might be added to `current`, where there is most above what is expected: a line, a
+    /// band, a broad process, a comb.
     fn more(&self, current: &Fitted) -> Vec<Part> {
         let p = self.periodogram;
         let expected = self.expected(&current.parts);

@@ -1,13 +1,15 @@
-//! The gas temperature, with its standard deviation, from the readings of two sensors whose lags are known.
+//! The gas temperature, with its standard deviation, from the readings of two sensors whose lags
+//! are known.
 //!
 //! This crate is for anyone who has a model of two sensors, however it was found, and wants the gas
-//! temperature that they measured. [`learn()`] estimates from the readings how strongly and how fast the gas
-//! fluctuates. [`reconstruct()`] gives its temperature with a band at every sample: from the whole record
-//! (Kalman's filter and a smoother), from the readings so far, or with a fixed lag. [`Stream`] filters sample
-//! by sample, and [`Tracker`] does so while the flow changes the time constants. The model ([`Rig`],
-//! [`Local`]) covers uneven sampling, missing readings, a delay between the channels, second lags, slow
-//! paths, noise that is not white, time constants that change, and radiation. The crate knows neither files
-//! nor how a model is found: for logger files use `twinlag`, for the model `twinlag-diagnose`.
+//! temperature that they measured. [`learn()`] estimates from the readings how strongly and how
+//! fast the gas fluctuates. [`reconstruct()`] gives its temperature with a band at every sample:
+//! from the whole record (Kalman's filter and a smoother), from the readings so far, or with a
+//! fixed lag. [`Stream`] filters sample by sample, and [`Tracker`] does so while the flow changes
+//! the time constants. The model ([`Rig`], [`Local`]) covers uneven sampling, missing readings, a
+//! delay between the channels, second lags, slow paths, noise that is not white, time constants
+//! that change, and radiation. The crate knows neither files nor how a model is found: for logger
+//! files use `twinlag`, for the model `twinlag-diagnose`.
 //!
 //! ```
 //! use twinlag_compensate::{Form, Readings, Rig, Sensor, learn, reconstruct};
@@ -39,7 +41,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Without its default feature `std` the crate has only [`Stream`] and what it needs, for machines without an operating system.
+//! Without its default feature `std` the crate has only [`Stream`] and what it needs, for machines
+//! without an operating system.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 

@@ -1,8 +1,9 @@
 //! What is believed of the gas before the readings are looked at: how much it moves, and how fast.
 //!
-//! A sum of stationary processes, each with a few numbers and a state of one or two dimensions. Its spectrum is a sum of
-//! resonances and of one-over-frequency-squared falls, which is enough for turbulence, steps and pulsation; what the gas really
-//! did is then up to the readings, as far as they go.
+//! A sum of stationary processes, each with a few numbers and a state of one or two dimensions. Its
+//! spectrum is a sum of resonances and of one-over-frequency-squared falls, which is enough for
+//! turbulence, steps and pulsation; what the gas really did is then up to the readings, as far as
+//! they go.
 
 #[cfg(feature = "std")]
 use serde::{Deserialize, Serialize};
@@ -11,15 +12,16 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "std", derive(Serialize, Deserialize), serde(tag = "kind", rename_all = "kebab-case"))]
 pub enum Term {
-    /// First-order noise (Ornstein and Uhlenbeck 1930), autocovariance `σ² exp(−2π f |t|)`: rough, like turbulence or steps.
+    /// First-order noise (Ornstein and Uhlenbeck 1930), autocovariance `σ² exp(−2π f |t|)`: rough,
+    /// like turbulence or steps.
     Rough {
         /// Standard deviation `σ`, K.
         std_k: f64,
         /// Corner `f`, Hz, above which the spectrum falls as `1/f²`.
         corner_hz: f64,
     },
-    /// An oscillator driven by white noise, spectrum `∝ 1/((f² − f₀²)² + (f f₀/Q)²)`: a line where the quality `Q` is high, a smooth
-    /// process whose spectrum falls as `1/f⁴` where it is low.
+    /// An oscillator driven by white noise, spectrum `∝ 1/((f² − f₀²)² + (f f₀/Q)²)`: a line where
+    /// the quality `Q` is high, a smooth process whose spectrum falls as `1/f⁴` where it is low.
     Resonance {
         /// Standard deviation, K.
         std_k: f64,
@@ -70,7 +72,8 @@ impl Term {
             Self::Resonance { std_k, frequency_hz, quality } => {
                 let angle = TAU * frequency_hz * lag_s.abs();
                 let half = 0.5 / quality;
-                // e^(−h a) (cos(η a) + h/η sin(η a)), η² = 1 − h²; the sum of exponentials where that is negative.
+                // e^(−h a) (cos(η a) + h/η sin(η a)), η² = 1 − h²; the sum of exponentials where
+                // that is negative.
                 let square = 1.0 - half * half;
                 let eta = square.abs().sqrt();
                 let shape = if eta * angle < 1e-6 {
@@ -110,7 +113,8 @@ impl Prior {
 mod tests {
     use super::*;
 
-    /// The autocovariance is the transform of the density (Wiener and Khinchin): the same rule, at a lag of 0.03 s.
+    /// The autocovariance is the transform of the density (Wiener and Khinchin): the same rule, at
+    /// a lag of 0.03 s.
     #[test]
     fn autocovariances_are_transforms_of_densities() {
         for quality in [0.3, 0.5, 0.8, 5.0] {
@@ -125,7 +129,8 @@ mod tests {
         }
     }
 
-    /// A density integrates to the variance. The rule's error and the tail beyond the last point, `2 σ² f₀/(π f_max)`, are below 1e-3.
+    /// A density integrates to the variance. The rule's error and the tail beyond the last point,
+    /// `2 σ² f₀/(π f_max)`, are below 1e-3.
     #[test]
     fn densities_integrate_to_the_variance() {
         for term in [

@@ -3,7 +3,8 @@
 use crate::error::CompensateError;
 use crate::rig::Local;
 
-/// Temperatures of two sensors: readings with whatever their calibration does to them already taken off.
+/// Temperatures of two sensors: readings with whatever their calibration does to them already taken
+/// off.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     time_s: Vec<f64>,
@@ -91,7 +92,8 @@ impl Readings {
         (!self.missing[channel][k]).then(|| self.reading_c[channel][k])
     }
 
-    /// Both sensors at instant `k`, each with its reading about `level_c`: the last one, where it is missing.
+    /// Both sensors at instant `k`, each with its reading about `level_c`: the last one, where it
+    /// is missing.
     pub(crate) fn locals(&self, k: usize, level_c: f64) -> Option<[(Local, f64); 2]> {
         let locals = self.locals.as_ref()?;
         Some([0, 1].map(|i| (locals[i][k], self.reading_c[i][k] - level_c)))

@@ -10,15 +10,16 @@ use crate::system;
 /// Largest state.
 pub(crate) const MOST_STATES: usize = 24;
 
-/// Reconstructs the gas temperature from `readings` of `rig`, for a gas that fluctuates as `prior` describes.
+/// Reconstructs the gas temperature from `readings` of `rig`, for a gas that fluctuates as `prior`
+/// describes.
 ///
-/// The result is the mean and standard deviation of the gas given the readings that `form` allows, from a
-/// state-space model of sensors and gas in continuous time. It is exact if both are as `rig` and `prior`
-/// describe them; sensors that lose heat or change are linearised at their readings.
+/// The result is the mean and standard deviation of the gas given the readings that `form` allows,
+/// from a state-space model of sensors and gas in continuous time. It is exact if both are as `rig`
+/// and `prior` describe them; sensors that lose heat or change are linearised at their readings.
 ///
 /// # Errors
-/// [`CompensateError::NotPositive`] for a time constant or noise that is not, [`CompensateError::TooLarge`] for a prior with too
-/// many terms.
+/// [`CompensateError::NotPositive`] for a time constant or noise that is not,
+/// [`CompensateError::TooLarge`] for a prior with too many terms.
 pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Result<Gas, CompensateError> {
     rig.check()?;
     let states = system::states(rig, &prior.terms);
@@ -34,9 +35,9 @@ pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) ->
     Ok(run(readings, rig, prior, form))
 }
 
-/// The highest frequency, Hz, at which readings every `period_s` determine the gas better than the prior:
-/// there the gas has as much power as the noise of both inferred gas temperatures together. `None` if it has
-/// less everywhere.
+/// The highest frequency, Hz, at which readings every `period_s` determine the gas better than the
+/// prior: there the gas has as much power as the noise of both inferred gas temperatures together.
+/// `None` if it has less everywhere.
 pub fn bandwidth_hz(rig: &Rig, prior: &Prior, period_s: f64) -> Option<f64> {
     const POINTS: i32 = 2000;
     let highest_hz = 0.5 / period_s;

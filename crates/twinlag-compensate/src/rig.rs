@@ -37,7 +37,8 @@ pub struct SlowPath {
     pub tau_s: f64,
 }
 
-/// One sensor: `τ dT/dt = x − T − loss`, followed by a second lag, a slow path and noise if it has them.
+/// One sensor: `τ dT/dt = x − T − loss`, followed by a second lag, a slow path and noise if it has
+/// them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "std", derive(Serialize, Deserialize))]
 pub struct Sensor {
@@ -91,8 +92,8 @@ pub struct Rig {
     pub delay_s: f64,
     /// The channel, 0 or 1, whose clock the gas is wanted by.
     pub clock: usize,
-    /// What the gas at the second sensor has that the gas at the first has not: half of it is added to the gas at one and taken from
-    /// that at the other.
+    /// What the gas at the second sensor has that the gas at the first has not: half of it is added
+    /// to the gas at one and taken from that at the other.
     pub mismatch: Option<Coloured>,
 }
 
@@ -127,8 +128,9 @@ impl Rig {
         self.mismatch.map_or(Ok(()), |m| positive("the correlation time of the mismatch", m.correlation_s))
     }
 
-    /// Two-sided spectral density of the noise of both inferred gas temperatures together at `frequency_hz`, read every `period_s`,
-    /// K²/Hz: `1/Σ |H_i|²/N_i`, and a quarter of the mismatch's.
+    /// Two-sided spectral density of the noise of both inferred gas temperatures together at
+    /// `frequency_hz`, read every `period_s`, K²/Hz: `1/Σ |H_i|²/N_i`, and a quarter of the
+    /// mismatch's.
     pub fn noise_density_k2_per_hz(&self, frequency_hz: f64, period_s: f64) -> f64 {
         let information: f64 = self
             .sensors

@@ -1,8 +1,8 @@
 //! The gas temperature of a whole record: forward with the filter, and back with what came later.
 //!
-//! The way back is that of Bryson and Frazier, modified for readings taken one at a time (Bierman 1973): it adds up what later
-//! readings say of the state in `λ` and `Λ`, needs no inverse of a covariance, and so minds neither missing readings nor states
-//! that are known exactly.
+//! The way back is that of Bryson and Frazier, modified for readings taken one at a time (Bierman
+//! 1973): it adds up what later readings say of the state in `λ` and `Λ`, needs no inverse of a
+//! covariance, and so minds neither missing readings nor states that are known exactly.
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -38,8 +38,8 @@ pub struct Gas {
     pub std_k: Vec<f64>,
     /// Logarithm of the likelihood of model and prior.
     pub log_likelihood: f64,
-    /// Mean square of the innovations (readings less their predictions from earlier ones) over their
-    /// variance: 1 if model and prior are right.
+    /// Mean square of the innovations (readings less their predictions from earlier ones) over
+    /// their variance: 1 if model and prior are right.
     pub innovation_energy: f64,
     /// Number of innovations.
     pub innovations: usize,
@@ -151,7 +151,8 @@ impl<const D: usize> Forward<D> {
         })
     }
 
-    /// Goes from the end of `events` back to the first, and passes the gas and its variance at each.
+    /// Goes from the end of `events` back to the first, and passes the gas and its variance at
+    /// each.
     fn back(&self, reads: &[SVector<f64, D>; 2], from: usize, to: usize, mut told: impl FnMut(usize, f64, f64)) {
         let mut pull = SVector::<f64, D>::zeros();
         let mut weight = SMatrix::<f64, D, D>::zeros();

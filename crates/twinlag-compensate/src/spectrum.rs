@@ -1,4 +1,5 @@
-//! The power of the gas as both readings together show it, and what a gas of known spectrum would show.
+//! The power of the gas as both readings together show it, and what a gas of known spectrum would
+//! show.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,17 +11,19 @@ use crate::prior::Term;
 use crate::readings::Readings;
 use crate::rig::Rig;
 
-/// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what lasts longer the smoother sees
-/// all the same.
+/// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
+/// lasts longer the smoother sees all the same.
 const LONGEST: usize = 16384;
-/// Multiples of the sampling frequency from which power folds back; what is farther away is taken as if the gas were sampled.
+/// Multiples of the sampling frequency from which power folds back; what is farther away is taken
+/// as if the gas were sampled.
 const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 /// Distance from critical damping below which both exponentials of a resonance cancel.
 const NEARLY_CRITICAL: f64 = 1e-3;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
 const OVERLAP: f64 = 0.947;
 
-/// A tapered periodogram of the gas, of long records the mean over pieces that overlap by half, with what noise adds to it.
+/// A tapered periodogram of the gas, of long records the mean over pieces that overlap by half,
+/// with what noise adds to it.
 pub(crate) struct Periodogram {
     pub(crate) period_s: f64,
     /// Instants of the even grid.
@@ -35,11 +38,12 @@ pub(crate) struct Periodogram {
     pub(crate) power: Vec<f64>,
     /// What the noise of each channel adds to it.
     pub(crate) noise: [Vec<f64>; 2],
-    /// The periodogram of what both sensors disagree on, `H₂ Y₁ − H₁ Y₂`, which the gas is not in, over what it is expected to be, and the
-    /// share of the first channel in that; the lowest bins are left out, where the taper lets the gas through.
+    /// The periodogram of what both sensors disagree on, `H₂ Y₁ − H₁ Y₂`, which the gas is not in,
+    /// over what it is expected to be, and the share of the first channel in that; the lowest bins
+    /// are left out, where the taper lets the gas through.
     pub(crate) disagreement: Vec<[f64; 2]>,
-    /// Of power that the gas has beyond the sampling and folds back, what the sensors take off, in each bin: by multiples of the sampling
-    /// frequency.
+    /// Of power that the gas has beyond the sampling and folds back, what the sensors take off, in
+    /// each bin: by multiples of the sampling frequency.
     flattened: Vec<(f64, Vec<f64>)>,
     /// Autocorrelation of the taper.
     taper: Vec<f64>,
@@ -57,7 +61,8 @@ fn taper(n: usize) -> Vec<f64> {
 impl Periodogram {
     /// Of `readings` about `level_c`, on an even grid with straight lines over what is missing.
     ///
-    /// The inferred gas is `Σ H_i* Y_i/N_i` over `Σ |H_i|²/N_i`, which has the least noise of all that are true to the gas.
+    /// The inferred gas is `Σ H_i* Y_i/N_i` over `Σ |H_i|²/N_i`, which has the least noise of all
+    /// that are true to the gas.
     pub(crate) fn of(readings: &Readings, rig: &Rig, level_c: f64) -> Self {
         let period_s = readings.period_s();
         let first_s = readings.time_s()[0];
@@ -124,10 +129,12 @@ impl Periodogram {
         Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
     }
 
-    /// What the periodogram of a gas with these terms is expected to be: `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's
-    /// autocorrelation, which is exact for a record of any length (Sykulski et al. 2019). That is the gas as if it were sampled itself;
-    /// what it has above the sampling folds back through sensors that have flattened it, so `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)`
-    /// comes off, `G` what both sensors together make of the gas.
+    /// What the periodogram of a gas with these terms is expected to be:
+    /// `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's autocorrelation, which is exact for
+    /// a record of any length (Sykulski et al. 2019). That is the gas as if it were sampled itself;
+    /// what it has above the sampling folds back through sensors that have flattened it, so
+    /// `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)` comes off, `G` what both sensors together make
+    /// of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
         let n = self.samples;
         let plan = &self.plan;
@@ -151,8 +158,8 @@ impl Periodogram {
     }
 }
 
-/// Adds to `out` what [`Term::autocovariance_k2`] gives at multiples of `period_s`: real and complex exponentials, each a product of the
-/// one before.
+/// Adds to `out` what [`Term::autocovariance_k2`] gives at multiples of `period_s`: real and
+/// complex exponentials, each a product of the one before.
 fn add_autocovariances(term: &Term, period_s: f64, out: &mut [f64]) {
     let mut add = |start: Complex64, rate: Complex64| {
         let factor = (rate * period_s).exp();
@@ -218,8 +225,9 @@ fn on_grid(readings: &Readings, channel: usize, first_s: f64, period_s: f64, sam
         .collect()
 }
 
-/// Frequencies, Hz, and two-sided spectral densities, K²/Hz, of `values` that are read every `period_s`: the periodogram under Hann's
-/// taper, its mean in bands that widen with frequency, a tenth of it each. For pictures.
+/// Frequencies, Hz, and two-sided spectral densities, K²/Hz, of `values` that are read every
+/// `period_s`: the periodogram under Hann's taper, its mean in bands that widen with frequency, a
+/// tenth of it each. For pictures.
 pub fn power_spectrum(values: &[f64], period_s: f64) -> (Vec<f64>, Vec<f64>) {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / (n as f64).max(1.0);

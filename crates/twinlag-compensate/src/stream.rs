@@ -18,20 +18,21 @@ pub struct Now {
     /// Variance of the gas temperature, K².
     pub variance_k2: f64,
     /// Normalised innovation squared: the sum of squared differences between the readings and their
-    /// predictions from earlier ones, over their variances. If the rig has not changed, it is chi-square with
-    /// one degree of freedom for each reading.
+    /// predictions from earlier ones, over their variances. If the rig has not changed, it is
+    /// chi-square with one degree of freedom for each reading.
     pub surprise: f64,
-    /// The product of the innovation variances, K² each: `−2 ln` of the likelihood of the readings is
-    /// `surprise + ln scatter` and a constant.
+    /// The product of the innovation variances, K² each: `−2 ln` of the likelihood of the readings
+    /// is `surprise + ln scatter` and a constant.
     pub scatter: f64,
 }
 
-/// A causal filter for two sensors that are read every `period_s`: push readings, read the gas temperature.
+/// A causal filter for two sensors that are read every `period_s`: push readings, read the gas
+/// temperature.
 ///
-/// It uses the recursion of [`crate::Form::Filter`]. The covariance settles within the memory of the slowest
-/// part of prior and sensors. From then on the gains are constant, and a sample costs about `2 D²`
-/// multiplications, until a missing reading starts the recursion again. `D` is the number of states, at least
-/// [`Stream::states`]; the smallest that suffices is the fastest.
+/// It uses the recursion of [`crate::Form::Filter`]. The covariance settles within the memory of
+/// the slowest part of prior and sensors. From then on the gains are constant, and a sample costs
+/// about `2 D²` multiplications, until a missing reading starts the recursion again. `D` is the
+/// number of states, at least [`Stream::states`]; the smallest that suffices is the fastest.
 ///
 /// ```
 /// use twinlag_compensate::{Rig, Sensor, Stream, Term};
@@ -70,8 +71,9 @@ impl<const D: usize> Stream<D> {
         crate::system::states(rig, terms)
     }
 
-    /// A filter for sensors that are read every `period_s`, in gas that moves about `level_c` as `terms` do; `None` where `D` states are
-    /// too few, or where one channel is later than the other, which a stream cannot undo.
+    /// A filter for sensors that are read every `period_s`, in gas that moves about `level_c` as
+    /// `terms` do; `None` where `D` states are too few, or where one channel is later than the
+    /// other, which a stream cannot undo.
     pub fn new(rig: &Rig, level_c: f64, terms: &[Term], period_s: f64) -> Option<Self> {
         if Self::states(rig, terms) > D || rig.delay_s != 0.0 {
             return None;

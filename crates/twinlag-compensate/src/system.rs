@@ -1,7 +1,9 @@
-//! Gas and sensors as one linear system `dz/dt = A z + noise`, and what it does over a step of time.
+//! Gas and sensors as one linear system `dz/dt = A z + noise`, and what it does over a step of
+//! time.
 //!
-//! The state is that of the gas's terms, then of each sensor (its body, a second lag, a slow path), then of noise that is not
-//! white, then a constant one that carries losses; what is left of `D` rests at zero.
+//! The state is that of the gas's terms, then of each sensor (its body, a second lag, a slow path),
+//! then of noise that is not white, then a constant one that carries losses; what is left of `D`
+//! rests at zero.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -128,7 +130,8 @@ impl<const D: usize> System<D> {
         }
         layout.one = take(1);
         before[(layout.one, layout.one)] = 0.0;
-        // Where each body was before the first reading nobody knows: as far from the level as the gas goes, twice.
+        // Where each body was before the first reading nobody knows: as far from the level as the
+        // gas goes, twice.
         for i in 0..2 {
             for at in [Some(layout.body[i]), layout.second[i], layout.slow[i]].into_iter().flatten() {
                 before[(at, at)] = 4.0 * swing;
@@ -144,7 +147,8 @@ impl<const D: usize> System<D> {
         state
     }
 
-    /// What happens in `step_s`, with each sensor as it is then. `reading_k` is what each reads about the level, where losses are known.
+    /// What happens in `step_s`, with each sensor as it is then. `reading_k` is what each reads
+    /// about the level, where losses are known.
     pub(crate) fn step(&self, step_s: f64, locals: Option<[(Local, f64); 2]>) -> Step<D> {
         let mut rates = self.rates;
         for i in 0..2 {
@@ -165,7 +169,8 @@ impl<const D: usize> System<D> {
     }
 }
 
-/// `a b`, in loops that are not unrolled, one copy for each size: otherwise the larger sizes take minutes to compile.
+/// `a b`, in loops that are not unrolled, one copy for each size: otherwise the larger sizes take
+/// minutes to compile.
 #[inline(never)]
 pub(crate) fn product<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D, D>) -> SMatrix<f64, D, D> {
     let mut out = SMatrix::<f64, D, D>::zeros();
@@ -186,8 +191,8 @@ pub(crate) fn around<const D: usize>(a: &SMatrix<f64, D, D>, b: &SMatrix<f64, D,
     product(&product(a, b), &a.transpose())
 }
 
-/// `Φ = exp(A t)` and `∫₀ᵗ exp(A u) Q exp(Aᵀ u) du`: their series over a part of the step, doubled until it is whole, so that
-/// nothing cancels. Most of `A` is zero, which the series makes use of.
+/// `Φ = exp(A t)` and `∫₀ᵗ exp(A u) Q exp(Aᵀ u) du`: their series over a part of the step, doubled
+/// until it is whole, so that nothing cancels. Most of `A` is zero, which the series makes use of.
 fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, D, D>, step_s: f64) -> Step<D> {
     let size = (0..D).map(|row| rates.row(row).iter().map(|r| r.abs()).sum::<f64>()).fold(0.0, f64::max) * step_s;
     let mut doublings = 0;

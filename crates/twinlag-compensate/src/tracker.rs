@@ -4,13 +4,15 @@ use crate::prior::Prior;
 use crate::rig::Rig;
 use crate::stream::Stream;
 
-/// Factors of the time constants that are kept in view, evenly spaced in their logarithm between `1/FARTHEST` and `FARTHEST`.
+/// Factors of the time constants that are kept in view, evenly spaced in their logarithm between
+/// `1/FARTHEST` and `FARTHEST`.
 const FACTORS: usize = 41;
 const FARTHEST: f64 = 2.5;
 /// Probability that the factor jumps to any value in a sample. A sudden change is followed once the
 /// likelihood ratio of the readings exceeds one over this.
 const JUMP: f64 = 1e-9;
-/// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a single wrong one does not decide.
+/// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a
+/// single wrong one does not decide.
 const FREEDOM: f64 = 8.0;
 
 /// The gas temperature and the time constants at an instant, from the readings up to it.
@@ -24,19 +26,20 @@ pub struct Tracked {
     pub log_factor: f64,
     /// Variance of `log_factor`.
     pub log_variance: f64,
-    /// Probability that the factor is the smallest or the largest that is tracked. If it is not small, the
-    /// factor has left the range.
+    /// Probability that the factor is the smallest or the largest that is tracked. If it is not
+    /// small, the factor has left the range.
     pub chance_beyond: f64,
     /// Normalised innovation squared, as in [`crate::Now`], averaged over the factors.
     pub surprise: f64,
 }
 
-/// A filter for sensors whose time constants change by a common factor, as they do in flow that changes.
+/// A filter for sensors whose time constants change by a common factor, as they do in flow that
+/// changes.
 ///
-/// It runs one [`Stream`] for each factor on a grid. Their likelihoods, and a random walk of the logarithm of
-/// the factor between neighbours, give the probability of each factor (the forward recursion of a hidden
-/// Markov model), and the gas temperature is their mixture. Memory and work per sample are constant, and
-/// nothing is allocated after [`Tracker::new`].
+/// It runs one [`Stream`] for each factor on a grid. Their likelihoods, and a random walk of the
+/// logarithm of the factor between neighbours, give the probability of each factor (the forward
+/// recursion of a hidden Markov model), and the gas temperature is their mixture. Memory and work
+/// per sample are constant, and nothing is allocated after [`Tracker::new`].
 #[derive(Clone, Debug)]
 pub struct Tracker<const D: usize> {
     streams: Vec<Stream<D>>,
@@ -50,8 +53,9 @@ pub struct Tracker<const D: usize> {
 }
 
 impl<const D: usize> Tracker<D> {
-    /// A filter for sensors that are read every `period_s`, whose time constants were those of `rig` and whose logarithm wanders by
-    /// `change` a second, standard deviation, growing as the root of time. `None` as for [`Stream::new`].
+    /// A filter for sensors that are read every `period_s`, whose time constants were those of
+    /// `rig` and whose logarithm wanders by `change` a second, standard deviation, growing as the
+    /// root of time. `None` as for [`Stream::new`].
     pub fn new(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Self> {
         let spacing = 2.0 * FARTHEST.ln() / (FACTORS - 1) as f64;
         let log_factor: Vec<f64> = (0..FACTORS).map(|k| (k as f64 - (FACTORS - 1) as f64 / 2.0) * spacing).collect();
@@ -96,7 +100,8 @@ impl<const D: usize> Tracker<D> {
         let mean = |of: &dyn Fn(usize) -> f64| (0..FACTORS).map(|k| self.chance[k] * of(k)).sum::<f64>();
         let gas = mean(&|k| gas_c[k]);
         let log_factor = mean(&|k| self.log_factor[k]);
-        // Between two factors of the grid any is as good: a twelfth of the square of what lies between them.
+        // Between two factors of the grid any is as good: a twelfth of the square of what lies
+        // between them.
         let spacing = self.log_factor[1] - self.log_factor[0];
         let between = |k: usize| 0.5 * (gas_c[(k + 1).min(last)] - gas_c[k.saturating_sub(1)]);
         Tracked {
@@ -113,7 +118,8 @@ impl<const D: usize> Tracker<D> {
 /// [`Tracker::push`] with as many states as are needed.
 pub type Push = Box<dyn FnMut([Option<f64>; 2]) -> Tracked + Send>;
 
-/// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more than the largest.
+/// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more
+/// than the largest.
 pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
     fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
         let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;

@@ -1,9 +1,11 @@
-//! The whitened cost by Cholesky factorisation of the banded noise covariance: exact for any spacing of the samples.
+//! The whitened cost by Cholesky factorisation of the banded noise covariance: exact for any
+//! spacing of the samples.
 //!
-//! Noise of `u` is a moving average, `V[k,m] = Σ_i s_i² Σ_j c_i,k[j] c_i,m[j + k − m]`. With `V = L Lᵀ` the residual
-//! `r = L⁻¹ u` is white at the true parameters. Factor and residual are built in one sweep that keeps `q` rows, and exact
-//! derivatives ride along as dual numbers: `O(N q²)`. With even steps the factor settles, geometrically and to the last digit,
-//! as the start of the record is forgotten; from there on a row costs what its residual does.
+//! Noise of `u` is a moving average, `V[k,m] = Σ_i s_i² Σ_j c_i,k[j] c_i,m[j + k − m]`. With
+//! `V = L Lᵀ` the residual `r = L⁻¹ u` is white at the true parameters. Factor and residual are
+//! built in one sweep that keeps `q` rows, and exact derivatives ride along as dual numbers:
+//! `O(N q²)`. With even steps the factor settles, geometrically and to the last digit, as the start
+//! of the record is forgotten; from there on a row costs what its residual does.
 
 use num_dual::{DualNum, DualSVec64};
 
@@ -80,7 +82,8 @@ pub(crate) fn sweep<const P: usize>(
             continue;
         }
 
-        // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the older ones.
+        // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the
+        // older ones.
         let mut factor = [zero; LONGEST];
         let reach = band.min(k);
         for lag in (0..=reach).rev() {

@@ -1,15 +1,17 @@
 //! Estimators from the difference equation, which is linear in two numbers.
 //!
-//! With `λ = (1 − c)/(1 − a)` and `κ = −a λ` the two zero-order-hold sensors obey, sample by sample and without the gas,
+//! With `λ = (1 − c)/(1 − a)` and `κ = −a λ` the two zero-order-hold sensors obey, sample by sample
+//! and without the gas,
 //!
 //! ```text
 //! λ (y1[k] − y2[k−1]) + κ (y1[k−1] − y2[k−1]) − (y2[k] − y2[k−1]) = 0        η' x[k] = 0,  η = [λ, κ, 1]
 //! ```
 //!
-//! exactly for gas held between samples. All three estimators here minimise a ratio `Σ (η' x[k])² / η' W η` over the direction of
-//! `η`; they differ in `W`, which says how noise is taken to be spread over the three columns of `x`. No start is needed, and
-//! no sample is discarded. Noise of neighbouring `x` is correlated, which none of them uses: the whitened cost does, and is
-//! more precise.
+//! exactly for gas held between samples. All three estimators here minimise a ratio
+//! `Σ (η' x[k])² / η' W η` over the direction of `η`; they differ in `W`, which says how noise is
+//! taken to be spread over the three columns of `x`. No start is needed, and no sample is
+//! discarded. Noise of neighbouring `x` is correlated, which none of them uses: the whitened cost
+//! does, and is more precise.
 
 use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, Side};
@@ -21,16 +23,19 @@ use crate::readings::Readings;
 /// How the difference equation is solved for the two time constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DifferenceEquationEstimator {
-    /// `W = diag(0, 0, 1)`, all the noise in the third column: least squares by QR factorisation. Noise in the regressors biases
-    /// it, badly from a few per cent on; with sensor 1 the faster, to short time constants.
+    /// `W = diag(0, 0, 1)`, all the noise in the third column: least squares by QR factorisation.
+    /// Noise in the regressors biases it, badly from a few per cent on; with sensor 1 the faster,
+    /// to short time constants.
     LeastSquares,
-    /// `W = 1`, equal and independent noise in the three columns: the smallest right singular vector. But all three hold
-    /// `y2[k−1]`, and their noise is neither equal nor independent, so it stays biased, and at high noise wildly.
+    /// `W = 1`, equal and independent noise in the three columns: the smallest right singular
+    /// vector. But all three hold `y2[k−1]`, and their noise is neither equal nor independent, so
+    /// it stays biased, and at high noise wildly.
     TotalLeastSquares,
-    /// `W` the covariance that white noise gives the three columns: consistent. The smallest right singular vector of the columns
-    /// whitened by its Cholesky factor.
+    /// `W` the covariance that white noise gives the three columns: consistent. The smallest right
+    /// singular vector of the columns whitened by its Cholesky factor.
     Generalised {
-        /// Ratio `s2/s1` of the noise levels, all that is needed of them. An error in it goes straight into the estimate.
+        /// Ratio `s2/s1` of the noise levels, all that is needed of them. An error in it goes
+        /// straight into the estimate.
         noise_ratio: f64,
     },
 }
@@ -39,12 +44,13 @@ impl DifferenceEquationEstimator {
     /// Time constants `[τ1, τ2]` (s).
     ///
     /// # Errors
-    /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for an invalid noise ratio; [`CostError::Singular`] where the
-    /// solution is no pair of positive time constants.
+    /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for an invalid noise ratio;
+    /// [`CostError::Singular`] where the solution is no pair of positive time constants.
     ///
     /// # Source
-    /// Difference equation: Hung, McLoone, Irwin, Kee, *A difference equation approach to two-thermocouple sensor characterisation in
-    /// constant velocity flow environments*, 2005 (abstract seen). Weights: own derivation, docs, chapter "Theory", section 2.
+    /// Difference equation: Hung, McLoone, Irwin, Kee, *A difference equation approach to
+    /// two-thermocouple sensor characterisation in constant velocity flow environments*, 2005
+    /// (abstract seen). Weights: own derivation, docs, chapter "Theory", section 2.
     pub fn estimate(self, readings: &Readings) -> Result<[f64; 2], CostError> {
         let period_s = readings.even_period_s().ok_or(CostError::UnevenSampling)?;
         let columns: Vec<Vector3<f64>> = runs(readings).flatten().collect();
@@ -66,16 +72,20 @@ impl DifferenceEquationEstimator {
         }
     }
 
-    /// Covariance `[2][2]` (s²) of the estimate `tau_s` of this estimator under white Gaussian noise of `noise_std` `[s1, s2]` (K).
+    /// Covariance `[2][2]` (s²) of the estimate `tau_s` of this estimator under white Gaussian
+    /// noise of `noise_std` `[s1, s2]` (K).
     ///
-    /// `A⁻¹ M A⁻¹` with `A = S − μ W`, `S = Σ x x'`, `μ` the minimum, over `[λ, κ]`, carried over to the time constants by the delta
-    /// method. `M` is the variance of the score `Σ r (x − r W η/η'Wη)`, `r = η' x`, a quadratic form of noise that neighbouring
-    /// `k` share: the products of signal and noise from the sums at lags −1, 0 and 1 of the data, less what noise adds to
-    /// these, and the products of noise with noise. It says how the estimate scatters about its own limit, which for least
-    /// squares and for total least squares is not the truth: not how far it is off.
+    /// `A⁻¹ M A⁻¹` with `A = S − μ W`, `S = Σ x x'`, `μ` the minimum, over `[λ, κ]`, carried over
+    /// to the time constants by the delta method. `M` is the variance of the score
+    /// `Σ r (x − r W η/η'Wη)`, `r = η' x`, a quadratic form of noise that neighbouring `k` share:
+    /// the products of signal and noise from the sums at lags −1, 0 and 1 of the data, less what
+    /// noise adds to these, and the products of noise with noise. It says how the estimate scatters
+    /// about its own limit, which for least squares and for total least squares is not the truth:
+    /// not how far it is off.
     ///
     /// # Errors
-    /// As [`DifferenceEquationEstimator::estimate`]; [`CostError::Singular`] also where no positive variance comes out.
+    /// As [`DifferenceEquationEstimator::estimate`]; [`CostError::Singular`] also where no positive
+    /// variance comes out.
     ///
     /// # Source
     /// Own derivation, docs, chapter "Theory", section 2.
@@ -123,7 +133,8 @@ impl DifferenceEquationEstimator {
                         + form(&eta, &data, &v[j]) * form(&v[i], &shared, &eta)
                         + form(&v[i], &data, &eta) * form(&eta, &shared, &v[j])
                         + form(&v[i], &data, &v[j]) * form(&eta, &shared, &eta);
-                    // The data's sums hold noise already: what it adds to the above is twice what noise times noise is.
+                    // The data's sums hold noise already: what it adds to the above is twice what
+                    // noise times noise is.
                     let own = form(&eta, &shared, &eta) * form(&v[i], &shared, &v[j])
                         + form(&eta, &shared, &v[j]) * form(&v[i], &shared, &eta);
                     score[(i, j)] += cross - count * own;
@@ -157,7 +168,8 @@ impl DifferenceEquationEstimator {
     }
 }
 
-/// Time constants `[τ1, τ2]` (s) by least squares on the difference equation: a start for nothing, not an estimate.
+/// Time constants `[τ1, τ2]` (s) by least squares on the difference equation: a start for nothing,
+/// not an estimate.
 ///
 /// # Errors
 /// As [`DifferenceEquationEstimator::estimate`].
@@ -175,7 +187,8 @@ fn runs(readings: &Readings) -> impl Iterator<Item = impl Iterator<Item = Vector
 
 /// Covariance of the noise of a row with that of the same row, and with that of the next.
 fn column_noise([s1, s2]: [f64; 2]) -> [Matrix3<f64>; 2] {
-    // x[k] = T [y1[k], y1[k−1], y2[k], y2[k−1]]; the next row's second and fourth reading are this one's first and third.
+    // x[k] = T [y1[k], y1[k−1], y2[k], y2[k−1]]; the next row's second and fourth reading are this
+    // one's first and third.
     let t = Matrix3x4::new(1.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, -1.0, 1.0);
     let (v1, v2) = (s1 * s1, s2 * s2);
     let same = Matrix4::from_diagonal(&[v1, v1, v2, v2].into());
@@ -184,7 +197,8 @@ fn column_noise([s1, s2]: [f64; 2]) -> [Matrix3<f64>; 2] {
     [t * same * t.transpose(), t * next * t.transpose()]
 }
 
-/// `[λ, κ]` of the direction `[λ, κ, 1]` that minimises `Σ (η' x)² / η' W η`, `W` positive definite.
+/// `[λ, κ]` of the direction `[λ, κ, 1]` that minimises `Σ (η' x)² / η' W η`, `W` positive
+/// definite.
 fn smallest_direction(columns: &[Vector3<f64>], spread: &Matrix3<f64>) -> Result<[f64; 2], CostError> {
     let weight = Mat::from_fn(3, 3, |i, j| spread[(i, j)]);
     let factor = weight.llt(Side::Lower).map_err(|_| CostError::Singular)?;

@@ -7,9 +7,10 @@ use crate::readings::Readings;
 
 /// Mean squared cross-relation error as a function of `[a, b, c, d]`.
 ///
-/// **Only the relative gain is identifiable.** `e` is linear in `(b, d)`: scaling both by `κ` scales the cost by `κ²`, and
-/// `b = d = 0` makes it zero. So this function has no isolated minimum; hold one static gain (say `b = 1 − a`) or minimise
-/// [`CrossRelation`] over two time constants and the relative gain `g`, which is `d/(1 − c)` over `b/(1 − a)`.
+/// **Only the relative gain is identifiable.** `e` is linear in `(b, d)`: scaling both by `κ`
+/// scales the cost by `κ²`, and `b = d = 0` makes it zero. So this function has no isolated
+/// minimum; hold one static gain (say `b = 1 − a`) or minimise [`CrossRelation`] over two time
+/// constants and the relative gain `g`, which is `d/(1 − c)` over `b/(1 − a)`.
 #[derive(Clone, Debug)]
 pub struct FreeGains<'a> {
     unity: CrossRelation<'a>,
@@ -26,9 +27,9 @@ impl<'a> FreeGains<'a> {
 
     /// Cost with gradient and exact Hessian at `[a, b, c, d]`, poles in (0, 1), gains positive.
     ///
-    /// The filters start at the steady state of their first sample, as with unit gain. With static gains
-    /// `β = b/(1 − a)`, `δ = d/(1 − c)` the error is `δ` times the unit-gain error at relative gain `g = δ/β`; derivatives
-    /// follow by the chain rule.
+    /// The filters start at the steady state of their first sample, as with unit gain. With static
+    /// gains `β = b/(1 − a)`, `δ = d/(1 − c)` the error is `δ` times the unit-gain error at
+    /// relative gain `g = δ/β`; derivatives follow by the chain rule.
     pub fn evaluate(&self, [a, b, c, d]: [f64; 4]) -> CostValue<4> {
         let period_s = self.unity.period_s();
         let delta = d / (1.0 - c);

@@ -1,4 +1,5 @@
-//! The two inferred gas temperatures, each on its own, from which their noise levels can be estimated.
+//! The two inferred gas temperatures, each on its own, from which their noise levels can be
+//! estimated.
 
 use num_dual::DualSVec64;
 use twinlag_sensor::Discretisation;
@@ -9,11 +10,13 @@ use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::readings::{Readings, Steps};
 
-/// The gas temperature that each sensor implies, behind one common filter: `f_i[k] = Σ_j filter_i[j] y_i[k+j]`.
+/// The gas temperature that each sensor implies, behind one common filter:
+/// `f_i[k] = Σ_j filter_i[j] y_i[k+j]`.
 ///
-/// At the right parameters both are the same filtered gas temperature, each with its channel's noise: white noise of variance
-/// `s²` becomes `s² |Σ_j filter[j] e^(i w j)|²` at `w` radians per sample. For first-order sensors and the zero-order hold they
-/// are the inferred gas temperatures themselves.
+/// At the right parameters both are the same filtered gas temperature, each with its channel's
+/// noise: white noise of variance `s²` becomes `s² |Σ_j filter[j] e^(i w j)|²` at `w` radians per
+/// sample. For first-order sensors and the zero-order hold they are the inferred gas temperatures
+/// themselves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InferredInputs {
     /// Filter of each channel, oldest sample first; both have the same number of coefficients.
@@ -22,7 +25,8 @@ pub struct InferredInputs {
     pub segments: Vec<[Vec<f64>; 2]>,
 }
 
-/// The inferred inputs at `theta` (the first `P` of [`crate::Parameter::ALL`]) for evenly sampled readings.
+/// The inferred inputs at `theta` (the first `P` of [`crate::Parameter::ALL`]) for evenly sampled
+/// readings.
 ///
 /// # Errors
 /// [`CostError::UnevenSampling`], [`CostError::NoDifferenceEquation`].

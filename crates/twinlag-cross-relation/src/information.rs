@@ -1,13 +1,16 @@
 //! How well the record determines the parameters: the covariance of the whitened estimate.
 //!
-//! `Cov = A⁻¹ M A⁻¹`. `A` is half the Hessian of the sum of squares: what the *signal* says about the parameters. `M` is the
-//! variance of half the gradient at the truth, and there are two ways to it:
+//! `Cov = A⁻¹ M A⁻¹`. `A` is half the Hessian of the sum of squares: what the *signal* says about
+//! the parameters. `M` is the variance of half the gradient at the truth, and there are two ways to
+//! it:
 //!
 //! - If the residual is white, `M = A + E`, where `E` is what noise multiplied by noise adds:
-//!   `E_ij = Σ_w s1² s2² Re(D_i D_j*)/λ²`, `D_i = ∂_i P Q − ∂_i Q P`, with `P`, `Q` the filters on the two channels in `u`
-//!   and `λ = s1² |P|² + s2² |Q|²`. Negligible at low noise; without it intervals are too short at high noise.
-//! - If it is not, because the model lacks something, `M = Σ_w S_w d_w d_w'` with `S` the smoothed spectrum of the residual
-//!   itself and `d` the transform of its derivatives: the noise that there is, not the noise that was assumed.
+//!   `E_ij = Σ_w s1² s2² Re(D_i D_j*)/λ²`, `D_i = ∂_i P Q − ∂_i Q P`, with `P`, `Q` the filters on
+//!   the two channels in `u` and `λ = s1² |P|² + s2² |Q|²`. Negligible at low noise; without it
+//!   intervals are too short at high noise.
+//! - If it is not, because the model lacks something, `M = Σ_w S_w d_w d_w'` with `S` the smoothed
+//!   spectrum of the residual itself and `d` the transform of its derivatives: the noise that there
+//!   is, not the noise that was assumed.
 //!
 //! Derivation: docs, chapter "Theory", section 6.
 
@@ -25,20 +28,23 @@ use crate::whitened::Whitened;
 pub enum Middle {
     /// White noise of the stated levels, the noise-noise term included.
     WhiteNoise,
-    /// The residual's own smoothed spectrum, for records in which model error is not small against noise.
+    /// The residual's own smoothed spectrum, for records in which model error is not small against
+    /// noise.
     ResidualSpectrum,
 }
 
 impl Whitened<'_> {
     /// Half the Hessian of the sum of squares at `theta`, `[P][P]`.
     ///
-    /// Central differences of the exact gradient, over a tenth of a standard error each way. Unlike the Gauss-Newton matrix
-    /// it does not count noise as signal. Not positive definite where `theta` is no minimum.
+    /// Central differences of the exact gradient, over a tenth of a standard error each way. Unlike
+    /// the Gauss-Newton matrix it does not count noise as signal. Not positive definite where
+    /// `theta` is no minimum.
     pub fn observed_information<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
         let normal = self.evaluate(theta).hessian;
         let mut half = [[0.0; P]; P];
         for i in 0..P {
-            // Gain and offset are linear; a time constant must stay positive, and a second lag that there is none of has no slope.
+            // Gain and offset are linear; a time constant must stay positive, and a second lag that
+            // there is none of has no slope.
             let scale = if matches!(i, 2 | 3) { f64::INFINITY } else { 0.05 * theta[i] };
             let step = (0.1 / (0.5 * normal[i][i]).sqrt()).min(scale);
             if !(step.is_finite() && step > 0.0) {
@@ -55,13 +61,15 @@ impl Whitened<'_> {
         std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (half[i][j] + half[j][i])))
     }
 
-    /// Cramér-Rao bound: the covariance that no unbiased estimate goes below, `[P][P]`, zero for parameters not in `free`, for noise
-    /// of the stated levels and a gas that is unknown and not random.
+    /// Cramér-Rao bound: the covariance that no unbiased estimate goes below, `[P][P]`, zero for
+    /// parameters not in `free`, for noise of the stated levels and a gas that is unknown and not
+    /// random.
     ///
-    /// To be asked of the cost on readings *without* noise, at the `theta` that made them: `(Σ_w d_w d_w')⁻¹` with `d` the derivative
-    /// of the whitened residual, which is the exact finite-record form of
-    /// `d = (∂H2 H1 − ∂H1 H2) X/√(s1² |H2|² + s2² |H1|²)` summed over all frequencies. On noisy readings noise would count as signal.
-    /// `None` where the record determines no such bound.
+    /// To be asked of the cost on readings *without* noise, at the `theta` that made them:
+    /// `(Σ_w d_w d_w')⁻¹` with `d` the derivative of the whitened residual, which is the exact
+    /// finite-record form of `d = (∂H2 H1 − ∂H1 H2) X/√(s1² |H2|² + s2² |H1|²)` summed over all
+    /// frequencies. On noisy readings noise would count as signal. `None` where the record
+    /// determines no such bound.
     pub fn cramer_rao<const P: usize>(&self, theta: &[f64; P], free: &[usize]) -> Option<[[f64; P]; P]> {
         inverse(&self.evaluate(theta).hessian.map(|row| row.map(|h| 0.5 * h)), free)
     }
@@ -69,10 +77,11 @@ impl Whitened<'_> {
     /// Covariance of the parameters at the minimum `theta`, `[P][P]`, zero for those not in `free`.
     ///
     /// - `free`: indices of the parameters that were fitted
-    /// - `prior_std`: for each parameter, the standard deviation of independent prior knowledge, infinite without any
+    /// - `prior_std`: for each parameter, the standard deviation of independent prior knowledge,
+    ///   infinite without any
     ///
-    /// `None` if the information matrix of the free parameters is not positive definite: the record does not determine
-    /// them.
+    /// `None` if the information matrix of the free parameters is not positive definite: the record
+    /// does not determine them.
     pub fn covariance<const P: usize>(
         &self,
         theta: &[f64; P],
@@ -95,12 +104,13 @@ impl Whitened<'_> {
         sandwich(&known(&full), &known(&score), free)
     }
 
-    /// Score test of parameters that were not fitted: whether letting the `tested` ones float would lower the cost by more than
-    /// noise does, judged at the fit `theta` over the `fitted` ones.
+    /// Score test of parameters that were not fitted: whether letting the `tested` ones float would
+    /// lower the cost by more than noise does, judged at the fit `theta` over the `fitted` ones.
     ///
-    /// `S' W⁻¹ S` with `S` half the gradient by the tested parameters and `W = T (A + E) T'`, `T = [−A_tf A_ff⁻¹, 1]`, its variance
-    /// once the fitted ones have adapted: chi-square distributed with as many degrees of freedom as parameters are tested.
-    /// Evaluated where the model is taken to be right, it holds also where the record could not determine the tested
+    /// `S' W⁻¹ S` with `S` half the gradient by the tested parameters and `W = T (A + E) T'`,
+    /// `T = [−A_tf A_ff⁻¹, 1]`, its variance once the fitted ones have adapted: chi-square
+    /// distributed with as many degrees of freedom as parameters are tested. Evaluated where the
+    /// model is taken to be right, it holds also where the record could not determine the tested
     /// parameters. `None` where the fitted ones are not determined.
     ///
     /// # Source
@@ -127,13 +137,14 @@ impl Whitened<'_> {
         statistic.is_finite().then_some(statistic)
     }
 
-    /// How much of what the residual seems to say about parameter `index`, the other `free` ones following it, is noise
-    /// multiplied by noise: `v'Ev / v'Gv` with the Gauss-Newton matrix `G`, along the direction `v` in which the cost's
-    /// profile runs.
+    /// How much of what the residual seems to say about parameter `index`, the other `free` ones
+    /// following it, is noise multiplied by noise: `v'Ev / v'Gv` with the Gauss-Newton matrix `G`,
+    /// along the direction `v` in which the cost's profile runs.
     ///
-    /// It falls towards zero as the signal determines the parameter, and is of the order of one where the signal says nothing:
-    /// the cost then still has some shape, but no interval can be read from it. Zero where the residual does not depend on the
-    /// parameter at all, as on the time constant of a sensor that is far faster than the sampling.
+    /// It falls towards zero as the signal determines the parameter, and is of the order of one
+    /// where the signal says nothing: the cost then still has some shape, but no interval can be
+    /// read from it. Zero where the residual does not depend on the parameter at all, as on the
+    /// time constant of a sensor that is far faster than the sampling.
     pub fn noise_share<const P: usize>(&self, theta: &[f64; P], free: &[usize], index: usize) -> f64 {
         let (g, e) = (self.evaluate(theta).hessian, self.noise_noise(theta));
         let rest: Vec<usize> = free.iter().copied().filter(|&i| i != index).collect();
@@ -153,8 +164,9 @@ impl Whitened<'_> {
         if all > 0.0 { form(&e) / all } else { 0.0 }
     }
 
-    /// Share of each channel's noise in the variance of the difference of the inferred inputs at `theta`, mean over frequency: how
-    /// much the energy of the whitened residual falls, relative, when that channel's variance is taken to be larger.
+    /// Share of each channel's noise in the variance of the difference of the inferred inputs at
+    /// `theta`, mean over frequency: how much the energy of the whitened residual falls, relative,
+    /// when that channel's variance is taken to be larger.
     pub fn noise_shares<const P: usize>(&self, theta: &[f64; P]) -> [f64; 2] {
         let pair = Pair::<num_dual::DualSVec64<P>>::variables(theta);
         let row = row(self.model(), &pair, self.readings().mean_step_s());
@@ -241,7 +253,8 @@ impl Whitened<'_> {
     }
 }
 
-/// Mean square of `bins` in windows that widen with frequency: from 0.7 to 1.4 times it, a few bins at least.
+/// Mean square of `bins` in windows that widen with frequency: from 0.7 to 1.4 times it, a few bins
+/// at least.
 fn smoothed(bins: &[f64]) -> Vec<f64> {
     let mut sums = vec![0.0];
     bins.iter().for_each(|b| sums.push(sums[sums.len() - 1] + b * b));
@@ -281,9 +294,10 @@ mod tests {
         Whitened::new(readings, Discretisation::ZeroOrderHold, NOISE_STD).expect("valid")
     }
 
-    /// Half the gradient at the truth has variance `A + E`, with `A` of the record without noise. Over 2000 records a variance
-    /// has a relative standard error of `√(2/1999) = 3.2 %`, more where the score has heavier tails than a Gaussian; five of
-    /// these. Without a signal `A` vanishes, and the time constants and the gain see `E` alone.
+    /// Half the gradient at the truth has variance `A + E`, with `A` of the record without noise.
+    /// Over 2000 records a variance has a relative standard error of `√(2/1999) = 3.2 %`, more
+    /// where the score has heavier tails than a Gaussian; five of these. Without a signal `A`
+    /// vanishes, and the time constants and the gain see `E` alone.
     #[test]
     fn the_score_varies_as_the_signal_and_the_noise_noise_terms_say() {
         let mut rng = ChaCha8Rng::seed_from_u64(21);
@@ -301,7 +315,8 @@ mod tests {
                 }
             }
             for i in 0..4 {
-                // At the truth of a clean record the residual is zero and the Gauss-Newton matrix is the Hessian.
+                // At the truth of a clean record the residual is zero and the Gauss-Newton matrix
+                // is the Hessian.
                 let want = 0.5 * signal[i][i] + noise[i][i];
                 let tol = 5.0 * 0.032 * want;
                 assert!(
@@ -315,8 +330,9 @@ mod tests {
         }
     }
 
-    /// A residual that is white has a flat spectrum of one, and both middles agree to the scatter of the smoothed spectrum:
-    /// some 100 bins carry the signal's information, so about `√(2/100) = 14 %` in the variance; four of these.
+    /// A residual that is white has a flat spectrum of one, and both middles agree to the scatter
+    /// of the smoothed spectrum: some 100 bins carry the signal's information, so about
+    /// `√(2/100) = 14 %` in the variance; four of these.
     #[test]
     fn both_middles_agree_where_the_residual_is_white() {
         let mut rng = ChaCha8Rng::seed_from_u64(22);
@@ -332,7 +348,8 @@ mod tests {
         }
     }
 
-    /// Noise without a signal leaves a share of a third and more; with the signal the share falls as its square.
+    /// Noise without a signal leaves a share of a third and more; with the signal the share falls
+    /// as its square.
     #[test]
     fn the_noise_share_tells_signal_from_none() {
         let mut rng = ChaCha8Rng::seed_from_u64(24);
@@ -343,10 +360,11 @@ mod tests {
         assert!(some < 0.02 && (some / more / 100.0 - 1.0).abs() < 0.2, "at 30 K: {some}, at 300 K: {more}");
     }
 
-    /// 400 records with gain 1.1 and offset 0.3 K as stated: the statistic of both is chi-square with two degrees of freedom,
-    /// mean 2 and standard deviation 2, so that the mean of 400 lies within 2 ± 0.4 (four standard errors). At a gain stated
-    /// five per cent wrong it is larger by the square of that error in standard errors of the gain, as Wald's test has it, to
-    /// leading order in the error: within a third.
+    /// 400 records with gain 1.1 and offset 0.3 K as stated: the statistic of both is chi-square
+    /// with two degrees of freedom, mean 2 and standard deviation 2, so that the mean of 400 lies
+    /// within 2 ± 0.4 (four standard errors). At a gain stated five per cent wrong it is larger by
+    /// the square of that error in standard errors of the gain, as Wald's test has it, to leading
+    /// order in the error: within a third.
     #[test]
     fn the_score_test_is_chi_square_at_the_truth_and_sees_a_gain_off_it() {
         let mut rng = ChaCha8Rng::seed_from_u64(25);
@@ -376,8 +394,8 @@ mod tests {
         assert!(wald > 20.0, "the signal must show the error at all: {wald}");
     }
 
-    /// What is held is not part of the covariance, and what is known beforehand to ten times the precision of the record
-    /// is known to that precision after it.
+    /// What is held is not part of the covariance, and what is known beforehand to ten times the
+    /// precision of the record is known to that precision after it.
     #[test]
     fn held_and_known_parameters_are_what_they_were() {
         let mut rng = ChaCha8Rng::seed_from_u64(23);

@@ -1,14 +1,16 @@
 //! The difference of the two inferred gas temperatures as one short filter on each channel.
 //!
-//! A sensor obeys `A_i y_i = B_i x`. Multiplying sensor 1's equation by `B2` and sensor 2's by `B1` removes `x`:
-//! `u = B2 A1 y1 − B1 A2 y2'`, `y2' = (y2 − o)/g`. A factor that `B1` and `B2` share (the delay of the zero-order hold, the
-//! `1 + z⁻¹` of the bilinear rule) is left off, and both filters are scaled to unit gain at rest, so that `u` is in kelvin of
-//! gas temperature: for first-order sensors and those two holds it is `f1 − f2` of the theory,
+//! A sensor obeys `A_i y_i = B_i x`. Multiplying sensor 1's equation by `B2` and sensor 2's by `B1`
+//! removes `x`: `u = B2 A1 y1 − B1 A2 y2'`, `y2' = (y2 − o)/g`. A factor that `B1` and `B2` share
+//! (the delay of the zero-order hold, the `1 + z⁻¹` of the bilinear rule) is left off, and both
+//! filters are scaled to unit gain at rest, so that `u` is in kelvin of gas temperature: for
+//! first-order sensors and those two holds it is `f1 − f2` of the theory,
 //! `f_i[k] = (y_i[k+1] − a_i y_i[k])/(1 − a_i)`.
 //!
-//! Noise that is autoregressive, `Φ_i n_i = e_i`, is made white by multiplying the whole equation by `Φ1 Φ2`: the channels pass
-//! `Φ1 Φ2` times their filter, and the white `e_1` passes `Φ2` times it, `e_2` `Φ1`. What is left of the noise is a moving
-//! average again, exactly, without anything to be known of the noise before the record.
+//! Noise that is autoregressive, `Φ_i n_i = e_i`, is made white by multiplying the whole equation
+//! by `Φ1 Φ2`: the channels pass `Φ1 Φ2` times their filter, and the white `e_1` passes `Φ2` times
+//! it, `e_2` `Φ1`. What is left of the noise is a moving average again, exactly, without anything
+//! to be known of the noise before the record.
 
 use num_dual::{DualNum, DualSVec64};
 use twinlag_sensor::Discretisation;
@@ -17,8 +19,9 @@ use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::polynomial::Polynomial;
 
-/// The filters of `u[k] = Σ_j d1[j] y1[k+j] − Σ_j d2[j] (y2[k+j] − o)`, the gain of channel 2 inside `d2`, and those that the
-/// white noise of each channel passes on its way into `u`. Oldest sample first; both `data` filters are equally long.
+/// The filters of `u[k] = Σ_j d1[j] y1[k+j] − Σ_j d2[j] (y2[k+j] − o)`, the gain of channel 2
+/// inside `d2`, and those that the white noise of each channel passes on its way into `u`. Oldest
+/// sample first; both `data` filters are equally long.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row<D> {
     pub(crate) data: [Polynomial<D>; 2],
@@ -30,8 +33,8 @@ pub(crate) fn has_inverse(hold: Discretisation) -> bool {
     hold != Discretisation::BandLimited
 }
 
-/// Whether each `u[k]` takes but two neighbouring samples of each channel, and noise is white: what uneven steps and the sine
-/// transform need.
+/// Whether each `u[k]` takes but two neighbouring samples of each channel, and noise is white: what
+/// uneven steps and the sine transform need.
 pub(crate) fn is_one_step<D>(model: &Model, pair: &Pair<D>) -> bool {
     matches!(model.hold, Discretisation::ZeroOrderHold | Discretisation::Bilinear)
         && pair.second_tau_s.iter().all(Option::is_none)
@@ -49,8 +52,8 @@ pub(crate) fn row<const P: usize>(model: &Model, pair: &Pair<DualSVec64<P>>, ste
         b1 = b1.without_sums(shared);
         b2 = b2.without_sums(shared);
     }
-    // Each filter is scaled by its own sum: the sums are equal where the numerators are part of them, and the scale of a
-    // one-step filter is that of its own sensor alone.
+    // Each filter is scaled by its own sum: the sums are equal where the numerators are part of
+    // them, and the scale of a one-step filter is that of its own sensor alone.
     let white = [s1.denominator.times(&b2), s2.denominator.times(&b1)].map(|c| c.scaled(c.sum().recip()));
     let white = [white[0], white[1].scaled(pair.gain.recip())];
     if model.is_white() {
@@ -61,7 +64,8 @@ pub(crate) fn row<const P: usize>(model: &Model, pair: &Pair<DualSVec64<P>>, ste
     Row { data: [noise[0].times(&phi1), noise[1].times(&phi2)], noise }
 }
 
-/// One sensor's difference equation, oldest sample first, the delay or one factor `1 + z⁻¹` taken out of the numerator.
+/// One sensor's difference equation, oldest sample first, the delay or one factor `1 + z⁻¹` taken
+/// out of the numerator.
 #[derive(Clone, Copy)]
 struct Sensor<D> {
     numerator: Polynomial<D>,

@@ -1,9 +1,10 @@
 //! How badly two temperature sensors disagree about the gas that both were in.
 //!
-//! For anyone who wants the costs alone, to minimise with an optimiser of their own: the published cross-relation cost with
-//! gradient and Hessian, and the exactly whitened one, the residual it leaves, and the covariance of what it estimates. The
-//! crate knows no optimiser and no files. To take the noise's bias out of the published cost see `twinlag-bias`; for whole
-//! records take `twinlag`.
+//! For anyone who wants the costs alone, to minimise with an optimiser of their own: the published
+//! cross-relation cost with gradient and Hessian, and the exactly whitened one, the residual it
+//! leaves, and the covariance of what it estimates. The crate knows no optimiser and no files. To
+//! take the noise's bias out of the published cost see `twinlag-bias`; for whole records take
+//! `twinlag`.
 //!
 //! ```
 //! use twinlag_cross_relation::{CrossRelation, Readings, Whitened};

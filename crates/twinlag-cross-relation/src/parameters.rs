@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 /// One parameter of the pair, in the order in which the costs take them.
 ///
-/// Sensor 1 reads `y1 = h1 ∗ x`, sensor 2 reads `y2 = g (h2 ∗ x) + o`, where `h` are lags of unit gain, of first order or of
-/// second, `g` is the *relative* gain and `o` the *relative* offset, at the level that was taken off the readings. What both
-/// channels share (a common gain, a common offset) cannot be seen without knowing the gas temperature.
+/// Sensor 1 reads `y1 = h1 ∗ x`, sensor 2 reads `y2 = g (h2 ∗ x) + o`, where `h` are lags of unit
+/// gain, of first order or of second, `g` is the *relative* gain and `o` the *relative* offset, at
+/// the level that was taken off the readings. What both channels share (a common gain, a common
+/// offset) cannot be seen without knowing the gas temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
@@ -17,16 +18,20 @@ pub enum Parameter {
     Tau2,
     /// Gain of channel 2 relative to channel 1.
     Gain,
-    /// Offset of channel 2 against channel 1 where channel 1 reads the level of [`crate::Readings`], K.
+    /// Offset of channel 2 against channel 1 where channel 1 reads the level of
+    /// [`crate::Readings`], K.
     Offset,
-    /// Time constant of a second lag in series with that of sensor 1, s; 0 for a sensor of first order.
+    /// Time constant of a second lag in series with that of sensor 1, s; 0 for a sensor of first
+    /// order.
     SecondTau1,
-    /// Time constant of a second lag in series with that of sensor 2, s; 0 for a sensor of first order.
+    /// Time constant of a second lag in series with that of sensor 2, s; 0 for a sensor of first
+    /// order.
     SecondTau2,
 }
 
 impl Parameter {
-    /// All six, in order. Costs take the first two (gain 1, offset 0, first order), the first four (first order), or all.
+    /// All six, in order. Costs take the first two (gain 1, offset 0, first order), the first four
+    /// (first order), or all.
     pub const ALL: [Self; 6] = [Self::Tau1, Self::Tau2, Self::Gain, Self::Offset, Self::SecondTau1, Self::SecondTau2];
 }
 
@@ -41,8 +46,8 @@ pub(crate) struct Pair<D> {
 }
 
 impl<const P: usize> Pair<DualSVec64<P>> {
-    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1, offset 0 and first order. A
-    /// second time constant of zero means no second lag, and has no derivatives.
+    /// The first `P` of [`Parameter::ALL`] as variables, the rest at gain 1, offset 0 and first
+    /// order. A second time constant of zero means no second lag, and has no derivatives.
     pub(crate) fn variables(theta: &[f64; P]) -> Self {
         const { assert!(P == 2 || P == 4 || P == 6, "two time constants, with gain and offset, with second lags") };
         let variable = |i: usize, otherwise: f64| match theta.get(i) {
@@ -65,14 +70,15 @@ pub(crate) fn parts<const P: usize>(x: DualSVec64<P>) -> (f64, [f64; P]) {
     (x.re, std::array::from_fn(|i| gradient[i]))
 }
 
-/// Value, gradient and Hessian of a scalar cost with respect to the first `P` of [`Parameter::ALL`], in their own units.
+/// Value, gradient and Hessian of a scalar cost with respect to the first `P` of
+/// [`Parameter::ALL`], in their own units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CostValue<const P: usize> {
     /// The cost.
     pub value: f64,
     /// First derivatives of the value.
     pub gradient: [f64; P],
-    /// Second derivatives of the value; where so stated, only their Gauss-Newton part, for sums of squares
-    /// whose residual is small.
+    /// Second derivatives of the value; where so stated, only their Gauss-Newton part, for sums of
+    /// squares whose residual is small.
     pub hessian: [[f64; P]; P],
 }

@@ -2,8 +2,8 @@
 
 use num_dual::DualNum;
 
-/// Coefficients that the longest filter has: two second-order sensors under the first-order hold, second-order noise on both
-/// channels.
+/// Coefficients that the longest filter has: two second-order sensors under the first-order hold,
+/// second-order noise on both channels.
 pub(crate) const LONGEST: usize = 9;
 
 /// A filter of at most [`LONGEST`] coefficients, oldest sample first.

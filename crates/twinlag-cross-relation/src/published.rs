@@ -1,12 +1,13 @@
 //! The published cost: each channel passed through a model of the *other* sensor.
 //!
-//! `e[k] = (G2 y1)[k] − (G1 y2)[k]`, `J = mean(e²)`: with both models right, both sides are the gas temperature seen through
-//! both sensors, and only noise is left. Each synthetic filter starts at steady state on its first sample, which is wrong,
-//! so the first `discard` samples do not count. Exact for gas held between samples; noise biases its minimum to long time
-//! constants (see the crate `twinlag-bias`).
+//! `e[k] = (G2 y1)[k] − (G1 y2)[k]`, `J = mean(e²)`: with both models right, both sides are the gas
+//! temperature seen through both sensors, and only noise is left. Each synthetic filter starts at
+//! steady state on its first sample, which is wrong, so the first `discard` samples do not count.
+//! Exact for gas held between samples; noise biases its minimum to long time constants (see the
+//! crate `twinlag-bias`).
 //!
-//! Sensors of first order have a recursion written out by hand, those of second order one whose coefficients come with their
-//! derivatives from `twinlag_sensor::Discretisation::second_order`.
+//! Sensors of first order have a recursion written out by hand, those of second order one whose
+//! coefficients come with their derivatives from `twinlag_sensor::Discretisation::second_order`.
 
 use crate::error::CostError;
 use crate::parameters::CostValue;
@@ -46,15 +47,18 @@ impl<'a> CrossRelation<'a> {
         self.counted
     }
 
-    /// Cost with gradient and exact Hessian at `theta` (the first `P` of [`crate::Parameter::ALL`], `P` 2, 4 or 6).
+    /// Cost with gradient and exact Hessian at `theta` (the first `P` of [`crate::Parameter::ALL`],
+    /// `P` 2, 4 or 6).
     ///
-    /// `J = mean(e², k ≥ discard)`, `e = G2(τ2, τ₂2) y1 − G1(τ1, τ₂1) (y2 − o)/g`, in the square of the channels' unit. A second
-    /// time constant of 0 is a sensor of first order, and the derivatives with respect to it are 0.
+    /// `J = mean(e², k ≥ discard)`, `e = G2(τ2, τ₂2) y1 − G1(τ1, τ₂1) (y2 − o)/g`, in the square of
+    /// the channels' unit. A second time constant of 0 is a sensor of first order, and the
+    /// derivatives with respect to it are 0.
     ///
     /// # Source
-    /// Hung, McLoone, Irwin, Kee, *Blind two-thermocouple sensor characterisation*, 2007 (abstract seen); Gillespie, Hung, Kee,
-    /// McLoone 2016 (abstract seen), for `g = 1`, `o = 0` and first order. Second order: after the title of Gillespie and
-    /// others 2015, which was all that was seen of it; own derivation.
+    /// Hung, McLoone, Irwin, Kee, *Blind two-thermocouple sensor characterisation*, 2007 (abstract
+    /// seen); Gillespie, Hung, Kee, McLoone 2016 (abstract seen), for `g = 1`, `o = 0` and first
+    /// order. Second order: after the title of Gillespie and others 2015, which was all that was
+    /// seen of it; own derivation.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let (value, gradient, hessian) =
             if is_first_order(theta) { self.first_order_sums(theta) } else { self.second_order_sums(theta) };
@@ -66,7 +70,8 @@ impl<'a> CrossRelation<'a> {
         }
     }
 
-    /// The error signal `e` at `theta` and its derivatives `[∂e/∂θ_i]`, one entry for each counted sample.
+    /// The error signal `e` at `theta` and its derivatives `[∂e/∂θ_i]`, one entry for each counted
+    /// sample.
     pub fn error_signal<const P: usize>(&self, theta: &[f64; P]) -> Vec<(f64, [f64; P])> {
         let mut out = Vec::with_capacity(self.counted);
         if is_first_order(theta) {
@@ -110,7 +115,8 @@ impl<'a> CrossRelation<'a> {
                 }
             })
         };
-        // Σ e ∂²e. All derivatives so far are by the poles; the products with gain and offset follow from the gradient.
+        // Σ e ∂²e. All derivatives so far are by the poles; the products with gain and offset
+        // follow from the gradient.
         for i in 0..2 {
             hessian[i][i] += 2.0 * bend[i];
         }
@@ -148,8 +154,9 @@ impl<'a> CrossRelation<'a> {
         sums
     }
 
-    /// Calls `visit` with each counted error, its derivatives by both poles, gain and offset (and zeros), and *half* its second
-    /// derivatives by the poles. Returns what takes derivatives by poles to derivatives by time constants.
+    /// Calls `visit` with each counted error, its derivatives by both poles, gain and offset (and
+    /// zeros), and *half* its second derivatives by the poles. Returns what takes derivatives by
+    /// poles to derivatives by time constants.
     #[inline]
     fn for_each<const P: usize>(&self, theta: &[f64; P], mut visit: impl FnMut(f64, [f64; P], [f64; 2])) -> Chain {
         const { assert!(P == 2 || P == 4 || P == 6, "two time constants, with gain and offset, with second lags") };
@@ -166,7 +173,8 @@ impl<'a> CrossRelation<'a> {
         Chain { poles, gain }
     }
 
-    /// Runs both filters of first order over every segment and shows them to `see` at each sample that counts.
+    /// Runs both filters of first order over every segment and shows them to `see` at each sample
+    /// that counts.
     #[inline]
     fn run(&self, poles: [f64; 2], mut see: impl FnMut(&Filters)) {
         for segment in self.counted_segments() {
@@ -184,7 +192,8 @@ impl<'a> CrossRelation<'a> {
         }
     }
 
-    /// What follows the first sample of a channel: up to the first sample that counts, and beyond it.
+    /// What follows the first sample of a channel: up to the first sample that counts, and beyond
+    /// it.
     fn cut<'s>(&self, channel: &'s [f64]) -> [&'s [f64]; 2] {
         let (before, counted) = channel[1..].split_at(self.discard);
         [before, counted]
@@ -195,7 +204,8 @@ impl<'a> CrossRelation<'a> {
         self.readings.segments().iter().filter(|s| s.len() > self.discard)
     }
 
-    /// `Σ e²`, half its gradient and half its Hessian (upper triangle), for sensors of second order.
+    /// `Σ e²`, half its gradient and half its Hessian (upper triangle), for sensors of second
+    /// order.
     fn second_order_sums<const P: usize>(&self, theta: &[f64; P]) -> (f64, [f64; P], [[f64; P]; P]) {
         let mut value = 0.0;
         let mut gradient = [0.0; P];
@@ -212,7 +222,8 @@ impl<'a> CrossRelation<'a> {
         (value, gradient, hessian)
     }
 
-    /// Calls `visit` with each counted error, its gradient by all six parameters, and its Hessian (upper triangle).
+    /// Calls `visit` with each counted error, its gradient by all six parameters, and its Hessian
+    /// (upper triangle).
     fn for_each_of_second_order(&self, theta: &[f64], mut visit: impl FnMut(f64, [f64; 6], &[[f64; 6]; 6])) {
         let (gain, offset) = (theta[2], theta[3]);
         let share = 1.0 / gain;
@@ -244,7 +255,8 @@ fn is_first_order(theta: &[f64]) -> bool {
     !theta.iter().skip(4).any(|second| *second > 0.0)
 }
 
-/// Sums over the counted samples with the derivatives `dw` by each filter's own pole: `∂e/∂a = −dw[0]`, `∂e/∂c = dw[1]`.
+/// Sums over the counted samples with the derivatives `dw` by each filter's own pole:
+/// `∂e/∂a = −dw[0]`, `∂e/∂c = dw[1]`.
 #[derive(Default)]
 struct Sums {
     square: f64,
@@ -277,12 +289,14 @@ impl Pole {
     }
 }
 
-/// Both synthetic filters of first order, `w[k] = a w[k−1] + (1 − a) y[k−1]`, with derivatives by their poles: that of sensor 1
-/// on channel 2, then that of sensor 2 on channel 1. Pairs, so that one instruction steps both.
+/// Both synthetic filters of first order, `w[k] = a w[k−1] + (1 − a) y[k−1]`, with derivatives by
+/// their poles: that of sensor 1 on channel 2, then that of sensor 2 on channel 1. Pairs, so that
+/// one instruction steps both.
 struct Filters {
     /// `y[k]`.
     input: [f64; 2],
-    /// `w[k] − y[k]`, which obeys `a (w[k−1] − y[k−1]) − (y[k] − y[k−1])` and feeds the derivative as it is.
+    /// `w[k] − y[k]`, which obeys `a (w[k−1] − y[k−1]) − (y[k] − y[k−1])` and feeds the derivative
+    /// as it is.
     behind: [f64; 2],
     dw: [f64; 2],
     half_ddw: [f64; 2],
@@ -300,7 +314,8 @@ impl Filters {
 
     #[inline]
     fn step(&mut self, poles: [f64; 2], y: [f64; 2]) {
-        // Each new value waits for one product and one sum of its own past; the rest is ready before.
+        // Each new value waits for one product and one sum of its own past; the rest is ready
+        // before.
         for i in 0..2 {
             self.half_ddw[i] = poles[i] * self.half_ddw[i] + self.dw[i];
             self.dw[i] = poles[i] * self.dw[i] + self.behind[i];

@@ -1,4 +1,5 @@
-//! The two channels as the costs take them: cut where samples are missing, with a common level taken off.
+//! The two channels as the costs take them: cut where samples are missing, with a common level
+//! taken off.
 
 use crate::error::CostError;
 
@@ -23,8 +24,8 @@ impl Segment {
     /// Channels `y1`, `y2`, `[n]` each, `n ≥ 2`, with `steps` between their samples.
     ///
     /// # Errors
-    /// [`CostError::LengthMismatch`], [`CostError::StepCount`], [`CostError::TooShort`], [`CostError::NotFinite`] or
-    /// [`CostError::BadStep`].
+    /// [`CostError::LengthMismatch`], [`CostError::StepCount`], [`CostError::TooShort`],
+    /// [`CostError::NotFinite`] or [`CostError::BadStep`].
     pub fn new(y1: Vec<f64>, y2: Vec<f64>, steps: Steps) -> Result<Self, CostError> {
         if y1.len() != y2.len() {
             return Err(CostError::LengthMismatch { first: y1.len(), second: y2.len() });
@@ -93,8 +94,9 @@ fn sum(x: &[f64]) -> f64 {
 
 /// Both channels of a record: one or more segments, with a common level subtracted.
 ///
-/// At unity gain the costs do not depend on it, and taking it off keeps it out of the rounding. With a free gain it is the
-/// temperature at which the offset is stated: gain and offset are least entangled at the mean of the record.
+/// At unity gain the costs do not depend on it, and taking it off keeps it out of the rounding.
+/// With a free gain it is the temperature at which the offset is stated: gain and offset are least
+/// entangled at the mean of the record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     segments: Vec<Segment>,
@@ -113,7 +115,8 @@ impl Readings {
         Self::about(segments, mean)
     }
 
-    /// Joins `segments` into one record, `level` taken off: the temperature at which the relative offset is stated.
+    /// Joins `segments` into one record, `level` taken off: the temperature at which the relative
+    /// offset is stated.
     ///
     /// # Errors
     /// As [`Readings::new`].
@@ -141,7 +144,8 @@ impl Readings {
         &self.segments
     }
 
-    /// What was taken off: the mean of all samples of both channels, unless something else was asked for.
+    /// What was taken off: the mean of all samples of both channels, unless something else was
+    /// asked for.
     pub fn level(&self) -> f64 {
         self.level
     }

@@ -20,12 +20,14 @@ pub struct ResidualTest {
 /// Tests of a whitened residual, `segments` in order of time.
 ///
 /// - `fitted`: number of parameters fitted to it
-/// - `level_std`: relative standard deviation of the noise *variance* that the whitening assumed: 0 where it is known
+/// - `level_std`: relative standard deviation of the noise *variance* that the whitening assumed: 0
+///   where it is known
 ///
-/// `total-energy`: `Σ r²` over its degrees of freedom, two-sided, as a normal deviate `(χ²/dof − 1)/√(2/dof + level²)`.
-/// `band-energy`: the bin energies of the sine transform in bands of a third of an octave and at least 8 bins, relative to
-/// their mean; the largest deviate of any band (Wilson-Hilferty), its p-value for that many bands (Šidák).
-/// `whiteness`: Ljung-Box statistic of the first 20 autocorrelations, chi-square distributed.
+/// `total-energy`: `Σ r²` over its degrees of freedom, two-sided, as a normal deviate
+/// `(χ²/dof − 1)/√(2/dof + level²)`. `band-energy`: the bin energies of the sine transform in bands
+/// of a third of an octave and at least 8 bins, relative to their mean; the largest deviate of any
+/// band (Wilson-Hilferty), its p-value for that many bands (Šidák). `whiteness`: Ljung-Box
+/// statistic of the first 20 autocorrelations, chi-square distributed.
 ///
 /// # Source
 /// Ljung and Box 1978; Wilson and Hilferty 1931.
@@ -136,7 +138,8 @@ mod tests {
         (0..n).map(|_| StandardNormal.sample(rng)).collect()
     }
 
-    /// 1000 white residuals: each test rejects at 1 % in 10 ± 3.1 of them; four standard deviations.
+    /// 1000 white residuals: each test rejects at 1 % in 10 ± 3.1 of them; four standard
+    /// deviations.
     #[test]
     fn white_noise_is_rejected_as_often_as_stated() {
         let mut rng = ChaCha8Rng::seed_from_u64(11);
@@ -152,7 +155,8 @@ mod tests {
         }
     }
 
-    /// A lag-one correlation of 0.2 over 2000 samples is nine standard errors; a level 10 % off is six.
+    /// A lag-one correlation of 0.2 over 2000 samples is nine standard errors; a level 10 % off is
+    /// six.
     #[test]
     fn coloured_and_mis_scaled_residuals_are_rejected() {
         let mut rng = ChaCha8Rng::seed_from_u64(12);

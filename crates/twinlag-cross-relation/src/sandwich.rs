@@ -7,8 +7,9 @@ use nalgebra::DMatrix;
 /// - `curvature`: `A`, half the expected Hessian of the cost, `[P][P]`
 /// - `score`: `M`, the variance of half its gradient, `[P][P]`
 ///
-/// `None` if `A` over the free parameters is not positive definite, or a variance comes out as none. The parameters may differ
-/// by orders of magnitude: singular is judged after scaling to unit diagonal.
+/// `None` if `A` over the free parameters is not positive definite, or a variance comes out as
+/// none. The parameters may differ by orders of magnitude: singular is judged after scaling to unit
+/// diagonal.
 pub fn sandwich<const P: usize>(
     curvature: &[[f64; P]; P],
     score: &[[f64; P]; P],
@@ -41,7 +42,8 @@ pub(crate) fn inverse<const P: usize>(curvature: &[[f64; P]; P], free: &[usize])
 mod tests {
     use super::*;
 
-    /// With `M = A` the sandwich is the inverse: here of `[[4, 1], [1, 2]]`, times 1e6 in one parameter's units.
+    /// With `M = A` the sandwich is the inverse: here of `[[4, 1], [1, 2]]`, times 1e6 in one
+    /// parameter's units.
     #[test]
     fn with_equal_halves_it_is_the_inverse() {
         let a = [[4.0, 1e3, 7.0], [1e3, 2e6, 7.0], [7.0, 7.0, 7.0]];

@@ -1,10 +1,12 @@
 //! The whitened cost by discrete sine transform: a few additions per sample and evaluation.
 //!
-//! For one-step inverses and even sampling the covariance of `u` is tridiagonal Toeplitz, and the sine transform of type I
-//! diagonalises such a matrix *exactly*. So the channels are transformed once, and each evaluation is a sum over bins:
-//! `U_j = Σ_i v_i(θ) D_i,j`, `λ_j = α(θ) + β(θ) cos w_j`, cost `Σ U_j²/λ_j`. With `T_i`, `S_i` the transforms of channel `i`
-//! without its last and without its first sample, `D` is `T1 − T2`, `S1 − T1`, `S2 − T2`, and with a gain or an offset also
-//! `T2` and the transform of ones. A circular transform is not a substitute: its end effects swamp the small eigenvalues.
+//! For one-step inverses and even sampling the covariance of `u` is tridiagonal Toeplitz, and the
+//! sine transform of type I diagonalises such a matrix *exactly*. So the channels are transformed
+//! once, and each evaluation is a sum over bins: `U_j = Σ_i v_i(θ) D_i,j`,
+//! `λ_j = α(θ) + β(θ) cos w_j`, cost `Σ U_j²/λ_j`. With `T_i`, `S_i` the transforms of channel `i`
+//! without its last and without its first sample, `D` is `T1 − T2`, `S1 − T1`, `S2 − T2`, and with
+//! a gain or an offset also `T2` and the transform of ones. A circular transform is not a
+//! substitute: its end effects swamp the small eigenvalues.
 
 use num_dual::{DualNum, DualSVec64};
 
@@ -59,7 +61,8 @@ impl<const P: usize> Weights<P> {
             alpha += (c[0] * c[0] + c[1] * c[1]) * v;
             beta += c[0] * c[1] * (2.0 * v);
         }
-        // c1 · (T1, S1) − c2 · (T2, S2) + Σ c2 · o, in differences: channel 1 has unit gain at rest, channel 2 its share.
+        // c1 · (T1, S1) − c2 · (T2, S2) + Σ c2 · o, in differences: channel 1 has unit gain at
+        // rest, channel 2 its share.
         let share = pair.gain.recip();
         let parts_of_u = [zero + 1.0, c1[1], -c2[1], -share + 1.0, share * pair.offset];
         Self { parts: parts_of_u.map(parts), alpha: parts(alpha), beta: parts(beta) }

@@ -1,14 +1,16 @@
-//! The synthetic filter: a sensor of first or second order as the cross-relation uses it, with derivatives.
+//! The synthetic filter: a sensor of first or second order as the cross-relation uses it, with
+//! derivatives.
 //!
-//! `w[k] = n1 y[k−1] + n2 y[k−2] − d1 w[k−1] − d2 w[k−2]`, exact for gas held between samples (zero-order hold). The
-//! derivatives of `w` obey the same recursion, fed by what the derivatives of the coefficients make of `y` and `w`: run side
-//! by side, they are exact.
+//! `w[k] = n1 y[k−1] + n2 y[k−2] − d1 w[k−1] − d2 w[k−2]`, exact for gas held between samples
+//! (zero-order hold). The derivatives of `w` obey the same recursion, fed by what the derivatives
+//! of the coefficients make of `y` and `w`: run side by side, they are exact.
 
 use num_dual::Dual2SVec64;
 use twinlag_sensor::{Discretisation, FirstOrderCoefficients, SecondOrderCoefficients};
 
-/// Coefficients of the sensor `1/((1 + s τ)(1 + s τ₂))` under the zero-order hold, with their first and second derivatives
-/// with respect to `[τ, τ₂]`, from `tau_s`, `second_tau_s` (s) and the sample period (s).
+/// Coefficients of the sensor `1/((1 + s τ)(1 + s τ₂))` under the zero-order hold, with their first
+/// and second derivatives with respect to `[τ, τ₂]`, from `tau_s`, `second_tau_s` (s) and the
+/// sample period (s).
 ///
 /// `second_tau_s = 0` is the sensor of first order, `n2 = d2 = 0`, which does not depend on `τ₂`.
 #[expect(clippy::missing_panics_doc, reason = "the zero-order hold has a difference equation")]

@@ -1,7 +1,8 @@
 //! Sine transforms of a segment, and what depends on its length alone.
 //!
-//! The sine transform of type I of a channel and of the channel one sample later both follow from *one* Fourier transform of
-//! the channel padded with as many zeros: with `N` samples, `w_j = π j/N` and `Y_j = Σ_m y[m] e^(−i w_j m)`,
+//! The sine transform of type I of a channel and of the channel one sample later both follow from
+//! *one* Fourier transform of the channel padded with as many zeros: with `N` samples,
+//! `w_j = π j/N` and `Y_j = Σ_m y[m] e^(−i w_j m)`,
 //!
 //! ```text
 //! Σ_k y[k+1] sin(w_j (k+1)) = −Im Y_j            k = 0 … N−2
@@ -88,7 +89,8 @@ impl Plan {
     }
 }
 
-/// One evenly sampled segment, transformed: `T_i` channel `i` without its last sample, `S_i` without its first.
+/// One evenly sampled segment, transformed: `T_i` channel `i` without its last sample, `S_i`
+/// without its first.
 #[derive(Clone, Debug)]
 pub(crate) struct Transformed {
     pub(crate) period_s: f64,

@@ -1,9 +1,11 @@
-//! The exact cost: the two inferred gas temperatures compared where noise puts them, not where filters smear it.
+//! The exact cost: the two inferred gas temperatures compared where noise puts them, not where
+//! filters smear it.
 //!
-//! `u = f1 − f2` is noise alone at the true parameters, a moving average of known covariance `V(θ)`. The cost is
-//! `u' V(θ)⁻¹ u` *without* a log-determinant: the gas temperature is a free nuisance, so the scale of `u` carries no
-//! information. This is the functional maximum likelihood of the errors-in-variables problem; only the *ratio* of the noise
-//! levels moves its minimum. No initial state, no samples to discard.
+//! `u = f1 − f2` is noise alone at the true parameters, a moving average of known covariance
+//! `V(θ)`. The cost is `u' V(θ)⁻¹ u` *without* a log-determinant: the gas temperature is a free
+//! nuisance, so the scale of `u` carries no information. This is the functional maximum likelihood
+//! of the errors-in-variables problem; only the *ratio* of the noise levels moves its minimum. No
+//! initial state, no samples to discard.
 
 use num_dual::DualSVec64;
 use twinlag_sensor::Discretisation;
@@ -22,13 +24,13 @@ use crate::transform::Transformed;
 /// How the whitening is computed. The first two give the same numbers to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Sine transform, once; then a sum over bins. Even sampling, zero-order hold or bilinear rule, first-order sensors, white
-    /// noise.
+    /// Sine transform, once; then a sum over bins. Even sampling, zero-order hold or bilinear rule,
+    /// first-order sensors, white noise.
     Spectral,
     /// Banded Cholesky factorisation at every evaluation. Any sampling, hold, order and noise.
     Banded,
-    /// The spectral form with its bins gathered into bands: about a hundred terms for records of any length, at a known error
-    /// ([`Whitened::shift_bound`]). For what the spectral form takes.
+    /// The spectral form with its bins gathered into bands: about a hundred terms for records of
+    /// any length, at a known error ([`Whitened::shift_bound`]). For what the spectral form takes.
     Compressed,
 }
 
@@ -44,11 +46,13 @@ pub struct Whitened<'a> {
 }
 
 impl<'a> Whitened<'a> {
-    /// The cost on `readings` for white noise of `noise_std` `[s1, s2]` (K), in the fastest exact form there is for them.
+    /// The cost on `readings` for white noise of `noise_std` `[s1, s2]` (K), in the fastest exact
+    /// form there is for them.
     ///
     /// # Errors
     /// [`CostError::NotPositive`] for a noise level, [`CostError::NoDifferenceEquation`],
-    /// [`CostError::HoldNeedsEvenSampling`], or [`CostError::TooShort`] if no segment is as long as the inverse is wide.
+    /// [`CostError::HoldNeedsEvenSampling`], or [`CostError::TooShort`] if no segment is as long as
+    /// the inverse is wide.
     pub fn new(readings: &'a Readings, hold: Discretisation, noise_std: [f64; 2]) -> Result<Self, CostError> {
         let even = readings.segments().iter().all(|s| matches!(s.steps(), Steps::Even(_)));
         let form = if even && hold != Discretisation::FirstOrderHold { Form::Spectral } else { Form::Banded };
@@ -89,10 +93,11 @@ impl<'a> Whitened<'a> {
         Ok(if form == Form::Compressed { out.compressed(false) } else { out })
     }
 
-    /// This cost with its bins gathered into bands, if it is in the spectral form; unchanged otherwise.
+    /// This cost with its bins gathered into bands, if it is in the spectral form; unchanged
+    /// otherwise.
     ///
-    /// - `calibration`: whether gain and offset will be asked for (`P` 4), which takes more than twice as many sums; without it
-    ///   such questions are answered by the full sum
+    /// - `calibration`: whether gain and offset will be asked for (`P` 4), which takes more than
+    ///   twice as many sums; without it such questions are answered by the full sum
     #[must_use]
     pub fn compressed(mut self, calibration: bool) -> Self {
         let series = if calibration { 5 } else { 3 };
@@ -127,11 +132,13 @@ impl<'a> Whitened<'a> {
         Ok(self)
     }
 
-    /// This cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]` with white
-    /// `e`, of order 0 (empty: white), 1 or 2. The noise levels remain standard deviations of `n`.
+    /// This cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]`
+    /// with white `e`, of order 0 (empty: white), 1 or 2. The noise levels remain standard
+    /// deviations of `n`.
     ///
-    /// Exact, in the banded form: the equation is multiplied by the whitening filters of both channels. This
-    /// costs as many samples as they are long and assumes nothing about the noise before the record.
+    /// Exact, in the banded form: the equation is multiplied by the whitening filters of both
+    /// channels. This costs as many samples as they are long and assumes nothing about the noise
+    /// before the record.
     ///
     /// # Errors
     /// [`CostError::Autoregression`] for an order above 2 or noise that is not stationary,
@@ -166,24 +173,25 @@ impl<'a> Whitened<'a> {
         self.readings
     }
 
-    /// Number of whitened residuals at `theta`: for each segment of `n` samples `n − 1` for first-order sensors (zero-order hold,
-    /// bilinear rule), `n − 2` with the first-order hold, fewer by one or two with second lags or autoregressive noise.
+    /// Number of whitened residuals at `theta`: for each segment of `n` samples `n − 1` for
+    /// first-order sensors (zero-order hold, bilinear rule), `n − 2` with the first-order hold,
+    /// fewer by one or two with second lags or autoregressive noise.
     pub fn terms<const P: usize>(&self, theta: &[f64; P]) -> usize {
         let row = row(&self.model, &Pair::<DualSVec64<P>>::variables(theta), self.readings.mean_step_s());
         let width = row.data[0].as_slice().len();
         self.readings.segments().iter().map(|s| (s.len() + 1).saturating_sub(width)).sum()
     }
 
-    /// Sum of squares `Σ r²` with its exact gradient and its Gauss-Newton Hessian `2 Σ ∂r ∂r'` at `theta` (the first `P` of
-    /// [`crate::Parameter::ALL`], `P` 2 or 4).
+    /// Sum of squares `Σ r²` with its exact gradient and its Gauss-Newton Hessian `2 Σ ∂r ∂r'` at
+    /// `theta` (the first `P` of [`crate::Parameter::ALL`], `P` 2 or 4).
     ///
-    /// Value and gradient are the same in both forms. The Gauss-Newton matrices belong to different square roots of `V⁻¹` and
-    /// differ by terms of the size of the residual.
+    /// Value and gradient are the same in both forms. The Gauss-Newton matrices belong to different
+    /// square roots of `V⁻¹` and differ by terms of the size of the residual.
     ///
     /// Infinite for second lags on uneven steps, which have no inverse here.
     ///
-    /// With known noise levels the sum is chi-square distributed with about [`Whitened::terms`] less `P` degrees of
-    /// freedom at the minimum.
+    /// With known noise levels the sum is chi-square distributed with about [`Whitened::terms`]
+    /// less `P` degrees of freedom at the minimum.
     pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         let pair = Pair::variables(theta);
         if self.has_no_inverse(&pair) {
@@ -217,13 +225,14 @@ impl<'a> Whitened<'a> {
         }
     }
 
-    /// The whitened residual in order of time, one vector for each segment: white, of unit variance, if model and noise
-    /// levels are right.
+    /// The whitened residual in order of time, one vector for each segment: white, of unit
+    /// variance, if model and noise levels are right.
     pub fn residual<const P: usize>(&self, theta: &[f64; P]) -> Vec<Vec<f64>> {
         self.jacobian(theta).into_iter().map(|s| s.into_iter().map(|(r, _)| r).collect()).collect()
     }
 
-    /// The whitened residual in order of time with its derivatives `[∂r/∂θ_i]`, one vector for each segment.
+    /// The whitened residual in order of time with its derivatives `[∂r/∂θ_i]`, one vector for each
+    /// segment.
     pub fn jacobian<const P: usize>(&self, theta: &[f64; P]) -> Vec<Vec<(f64, [f64; P])>> {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         if self.has_no_inverse(&pair) {
@@ -237,7 +246,8 @@ impl<'a> Whitened<'a> {
         self.readings.segments().iter().map(of).collect()
     }
 
-    /// The whitened residual per frequency, from slow to fast, one vector for each segment; `None` in the banded form.
+    /// The whitened residual per frequency, from slow to fast, one vector for each segment; `None`
+    /// in the banded form.
     ///
     /// Bin `j` (from 0) of a segment with `n` bins lies at `(j + 1)/(2 (n + 1) Ts)` Hz.
     pub fn spectrum<const P: usize>(&self, theta: &[f64; P]) -> Option<Vec<Vec<f64>>> {
@@ -257,11 +267,13 @@ impl<'a> Whitened<'a> {
         is_one_step(&self.model, pair) && self.compressed.as_ref().is_some_and(|all| all.iter().all(serves))
     }
 
-    /// How far compression can have moved each of the `free` parameters from the minimum of the full sum, at most, in standard
-    /// errors (those of the information at `theta`); zeros where nothing is compressed.
+    /// How far compression can have moved each of the `free` parameters from the minimum of the
+    /// full sum, at most, in standard errors (those of the information at `theta`); zeros where
+    /// nothing is compressed.
     ///
-    /// `|A⁻¹ δ| / √A⁻¹_ii`, worst signs, with `A` half the Hessian and `δ` the bound on what interpolation changes of half the
-    /// gradient. Where the information is singular it is infinite.
+    /// `|A⁻¹ δ| / √A⁻¹_ii`, worst signs, with `A` half the Hessian and `δ` the bound on what
+    /// interpolation changes of half the gradient. Where the information is singular it is
+    /// infinite.
     pub fn shift_bound<const P: usize>(&self, theta: &[f64; P], free: &[usize]) -> [f64; P] {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         let mut out = [0.0; P];

@@ -7,8 +7,8 @@ use crate::error::ExperimentError;
 use crate::plan::Plan;
 use crate::table::Table;
 
-/// Writes `results.json`, `results.csv` and the plan's pictures and summaries into `folder`, which is made if need be. Files of these names
-/// are replaced.
+/// Writes `results.json`, `results.csv` and the plan's pictures and summaries into `folder`, which
+/// is made if need be. Files of these names are replaced.
 ///
 /// # Errors
 /// [`ExperimentError::Write`]; whatever keeps a picture from being drawn.

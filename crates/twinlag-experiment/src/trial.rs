@@ -10,7 +10,8 @@ use twinlag_study::{Failure, Outcome, Quantity, Study};
 use crate::error::ExperimentError;
 use crate::plan::{Bench, Cell, Method, OptimiserChoice, Plan, Start};
 
-/// What each method yields, in the order of its quantities; those of both sensors stand side by side.
+/// What each method yields, in the order of its quantities; those of both sensors stand side by
+/// side.
 const PER_METHOD: [&str; 9] = [
     "ln-error",
     "relative-error",
@@ -95,7 +96,8 @@ impl<'a> Experiment<'a> {
         Self::with(plan, &Own::default())
     }
 
-    /// The study of `plan`, some of whose methods name estimators or optimisers that are the caller's `own`; these go first.
+    /// The study of `plan`, some of whose methods name estimators or optimisers that are the
+    /// caller's `own`; these go first.
     ///
     /// # Errors
     /// For an estimator or an optimiser that there is not.
@@ -131,8 +133,8 @@ impl<'a> Experiment<'a> {
         })
     }
 
-    /// Cramér-Rao bound of a cell: standard deviations of `ln τ` of both sensors, for known noise and an unknown gas, on trial 0's
-    /// gas. `None` without noise.
+    /// Cramér-Rao bound of a cell: standard deviations of `ln τ` of both sensors, for known noise
+    /// and an unknown gas, on trial 0's gas. `None` without noise.
     ///
     /// # Errors
     /// For a rig that cannot be.

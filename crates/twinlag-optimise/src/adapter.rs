@@ -1,8 +1,9 @@
 //! The one place where our costs meet argmin's traits.
 //!
-//! argmin asks for value, gradient and Hessian separately, runs without limits by default, reports an exhausted budget as
-//! success, and stops with an error at a value that is not a number. So: one evaluation serves all three, limits and the
-//! best point are the ledger's, and a value that is not finite is infinite.
+//! argmin asks for value, gradient and Hessian separately, runs without limits by default, reports
+//! an exhausted budget as success, and stops with an error at a value that is not a number. So: one
+//! evaluation serves all three, limits and the best point are the ledger's, and a value that is not
+//! finite is infinite.
 
 use std::cell::RefCell;
 
@@ -14,7 +15,8 @@ use argmin::core::{
 use crate::ledger::{Ledger, Stop};
 use crate::problem::{Derivatives, NoDerivatives};
 
-/// A value below this share of the slope is one that happens to vanish at the start, as a difference may: it is no unit.
+/// A value below this share of the slope is one that happens to vanish at the start, as a
+/// difference may: it is no unit.
 const VANISHING: f64 = 1e-3;
 
 /// State of the solvers used here: vectors, and matrices as vectors of rows.
@@ -25,8 +27,9 @@ pub(crate) type SolverState<G, H> = IterState<Vec<f64>, G, (), H, (), f64>;
 pub(crate) enum Outside {
     /// Infinitely bad: for solvers that compare values only.
     Infinite,
-    /// The nearest point inside, plus a quadratic wall: continuous, for solvers that follow the gradient. At a bound against
-    /// which the cost presses, the slope is the wall's, which is zero there: the solver sees that it has arrived.
+    /// The nearest point inside, plus a quadratic wall: continuous, for solvers that follow the
+    /// gradient. At a bound against which the cost presses, the slope is the wall's, which is zero
+    /// there: the solver sees that it has arrived.
     Wall,
 }
 
@@ -74,7 +77,8 @@ impl<'l, 'p, 'c, 'o> Objective<'l, 'p, 'c, 'o> {
         (inside, distance2)
     }
 
-    /// `d`, taken at `inside`, as the solver is to see it at `z`: in the unit of the values, the wall added.
+    /// `d`, taken at `inside`, as the solver is to see it at `z`: in the unit of the values, the
+    /// wall added.
     fn seen_from(&self, z: &[f64], inside: &[f64], mut d: Derivatives) -> Derivatives {
         d.value /= self.unit;
         d.gradient.iter_mut().chain(d.curvature.iter_mut().flatten()).for_each(|v| *v /= self.unit);
@@ -134,7 +138,8 @@ impl CostFunction for Objective<'_, '_, '_, '_> {
         }
         match self.ledger.value(&inside) {
             Ok(value) => Ok(value / self.unit + distance2),
-            // argmin's simplex panics on an error from a corner, so to a solver that only compares values the point is bad.
+            // argmin's simplex panics on an error from a corner, so to a solver that only compares
+            // values the point is bad.
             Err(_) if self.outside == Outside::Infinite => Ok(f64::INFINITY),
             Err(exhausted) => Err(exhausted.into()),
         }
@@ -159,8 +164,9 @@ impl Hessian for Objective<'_, '_, '_, '_> {
     }
 }
 
-/// A solver that keeps the ledger: its iterations are counted even if it stops with an error, which takes argmin's own count
-/// with it; it is stopped when the budget is spent, whether it has noticed or not.
+/// A solver that keeps the ledger: its iterations are counted even if it stops with an error, which
+/// takes argmin's own count with it; it is stopped when the budget is spent, whether it has noticed
+/// or not.
 struct Kept<'l, 'p, 'c, 'o, S> {
     solver: S,
     ledger: &'l Ledger<'p, 'c, 'o>,

@@ -14,12 +14,13 @@ const NOT_THERE: f64 = 1e-3;
 const FLAT: f64 = 1e-12;
 
 impl Problem<'_> {
-    /// How a fit that stopped at coordinates `z` ended. Costs one evaluation of the derivatives, and one of the value where
-    /// there are none.
+    /// How a fit that stopped at coordinates `z` ended. Costs one evaluation of the derivatives,
+    /// and one of the value where there are none.
     ///
-    /// [`End::OnBound`] within 1e-6 of a bound; else [`End::Converged`] where the curvature is positive and a Newton step
-    /// would move no coordinate by more than 1e-3, [`End::Stalled`] where not, with `failure` (what the solver itself said)
-    /// as the reason if there is one; [`End::Unchecked`] for a cost without derivatives.
+    /// [`End::OnBound`] within 1e-6 of a bound; else [`End::Converged`] where the curvature is
+    /// positive and a Newton step would move no coordinate by more than 1e-3, [`End::Stalled`]
+    /// where not, with `failure` (what the solver itself said) as the reason if there is one;
+    /// [`End::Unchecked`] for a cost without derivatives.
     pub fn assess(&self, z: &[f64], failure: Option<&str>) -> End {
         self.judge(z, || self.value_at(z), self.derivatives_at(z).as_ref(), failure)
     }
@@ -83,7 +84,8 @@ fn extreme_eigenvalues(matrix: &[Vec<f64>]) -> (f64, f64) {
 mod tests {
     use super::extreme_eigenvalues;
 
-    /// Eigenvalues 3 ± √2 and, with a third coordinate of curvature 7 added, the same and 7; rounding only.
+    /// Eigenvalues 3 ± √2 and, with a third coordinate of curvature 7 added, the same and 7;
+    /// rounding only.
     #[test]
     fn eigenvalues_are_the_same_by_the_short_way_and_the_long() {
         let two = extreme_eigenvalues(&[vec![4.0, 1.0], vec![1.0, 2.0]]);

@@ -1,8 +1,8 @@
-//! `A x = b` for a small symmetric positive definite `A`, in place and without allocating: fits of two variables take
-//! microseconds, in which a heap matrix for each step is felt.
+//! `A x = b` for a small symmetric positive definite `A`, in place and without allocating: fits of
+//! two variables take microseconds, in which a heap matrix for each step is felt.
 
-/// Replaces `b` by `A⁻¹ b` (`A`: `[n][n]` in one slice, of which the lower triangle is used and overwritten). `None` if `A` is
-/// not positive definite; `b` is then spoilt.
+/// Replaces `b` by `A⁻¹ b` (`A`: `[n][n]` in one slice, of which the lower triangle is used and
+/// overwritten). `None` if `A` is not positive definite; `b` is then spoilt.
 pub(crate) fn solve(a: &mut [f64], b: &mut [f64]) -> Option<()> {
     let n = b.len();
     for j in 0..n {
@@ -34,8 +34,8 @@ mod tests {
 
     use super::solve;
 
-    /// `A = M Mᵀ + I` has its smallest eigenvalue above one and its largest below 1 + n², so the two solutions agree to
-    /// n³ ε = 1e-13 with room to spare.
+    /// `A = M Mᵀ + I` has its smallest eigenvalue above one and its largest below 1 + n², so the
+    /// two solutions agree to n³ ε = 1e-13 with room to spare.
     #[test]
     fn the_solution_is_that_of_nalgebra() {
         for n in 1..6 {

@@ -1,7 +1,7 @@
 //! The account of a fit so far, and the one place through which every solver reaches the cost.
 //!
-//! Every call of the cost passes here, is counted as the cost sees it, and is refused once the budget is spent. The best
-//! point is kept here too, so it survives whatever becomes of the solver.
+//! Every call of the cost passes here, is counted as the cost sees it, and is refused once the
+//! budget is spent. The best point is kept here too, so it survives whatever becomes of the solver.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -49,7 +49,8 @@ pub(crate) struct Ledger<'p, 'c, 'o> {
     budget: Budget,
     counts: Cell<Evaluations>,
     iterations: Cell<u64>,
-    /// Whether something was asked for after the budget was spent: solvers may hide the refusal in an error of their own.
+    /// Whether something was asked for after the budget was spent: solvers may hide the refusal in
+    /// an error of their own.
     refused: Cell<bool>,
     best: RefCell<Best>,
     observer: Option<RefCell<Observer<'o>>>,

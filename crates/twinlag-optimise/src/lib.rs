@@ -1,14 +1,15 @@
 //! The minimum of any smooth cost within bounds, with a report on how the fit ended.
 //!
-//! This crate is for anyone with a cost of a few variables who wants to swap solvers by name, keep bounds,
-//! and learn when a result is not a minimum because it lies on a bound or a plateau, or because the budget
-//! was spent. The crate knows nothing of thermocouples: the costs are in `twinlag-cross-relation`, their
-//! use on records in `twinlag`.
+//! This crate is for anyone with a cost of a few variables who wants to swap solvers by name, keep
+//! bounds, and learn when a result is not a minimum because it lies on a bound or a plateau, or
+//! because the budget was spent. The crate knows nothing of thermocouples: the costs are in
+//! `twinlag-cross-relation`, their use on records in `twinlag`.
 //!
-//! The solvers are those of [argmin](https://argmin-rs.org), and a bounded Levenberg-Marquardt of our own;
-//! argmin itself does not appear in this crate's signatures. [`Optimiser`] lists them: local solvers that
-//! use derivatives or values, global solvers that search the whole of the bounds, and one for a single
-//! variable. To add another, implement [`Minimiser`]. To watch a fit, use [`Minimiser::minimise_observed`].
+//! The solvers are those of [argmin](https://argmin-rs.org), and a bounded Levenberg-Marquardt of
+//! our own; argmin itself does not appear in this crate's signatures. [`Optimiser`] lists them:
+//! local solvers that use derivatives or values, global solvers that search the whole of the
+//! bounds, and one for a single variable. To add another, implement [`Minimiser`]. To watch a fit,
+//! use [`Minimiser::minimise_observed`].
 //!
 //! ```
 //! use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Variable};

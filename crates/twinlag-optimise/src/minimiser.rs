@@ -5,26 +5,29 @@ use crate::report::{Budget, Fit, Progress};
 
 /// A local minimiser: from one start to one report. Implement it to bring a solver of your own.
 ///
-/// A solver sees the problem in free coordinates of size one: [`Problem::coordinates`] of the start, [`Problem::bounds`],
-/// [`Problem::value_at`] and [`Problem::derivatives_at`]; [`Problem::point`] takes its answer back to the variables' own units, and
-/// [`Problem::assess`] says what kind of point it is.
+/// A solver sees the problem in free coordinates of size one: [`Problem::coordinates`] of the
+/// start, [`Problem::bounds`], [`Problem::value_at`] and [`Problem::derivatives_at`];
+/// [`Problem::point`] takes its answer back to the variables' own units, and [`Problem::assess`]
+/// says what kind of point it is.
 pub trait Minimiser {
     /// Name of the solver, as it appears in reports.
     fn name(&self) -> String;
 
-    /// Minimises `problem` from `start` (all variables, their own units; moved inside the bounds first).
+    /// Minimises `problem` from `start` (all variables, their own units; moved inside the bounds
+    /// first).
     ///
     /// # Errors
-    /// [`ProblemError::Start`] for a start of the wrong length or not finite, [`ProblemError::NeedsDerivatives`] where a solver
-    /// that follows gradients gets a cost without any, [`ProblemError::OneVariable`] where one for a single variable gets
-    /// several. A fit that ran is never an error.
+    /// [`ProblemError::Start`] for a start of the wrong length or not finite,
+    /// [`ProblemError::NeedsDerivatives`] where a solver that follows gradients gets a cost without
+    /// any, [`ProblemError::OneVariable`] where one for a single variable gets several. A fit that
+    /// ran is never an error.
     fn minimise(&self, problem: &Problem<'_>, start: &[f64], budget: &Budget) -> Result<Fit, ProblemError>;
 
-    /// Minimises as [`Minimiser::minimise`] does, and reports its progress to `observer`: for a progress
-    /// bar, a picture of the path, or a log.
+    /// Minimises as [`Minimiser::minimise`] does, and reports its progress to `observer`: for a
+    /// progress bar, a picture of the path, or a log.
     ///
-    /// The solvers of this crate report at the start and after every iteration. The default implementation,
-    /// for a solver that cannot be observed, reports only the end.
+    /// The solvers of this crate report at the start and after every iteration. The default
+    /// implementation, for a solver that cannot be observed, reports only the end.
     ///
     /// ```
     /// # use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};

@@ -27,12 +27,14 @@ impl MultiStart {
         if fits.is_empty() {
             return Err(ProblemError::NoStart);
         }
-        // The sort is stable: of equal ends the earlier start is kept, so the answer does not depend on anything else.
+        // The sort is stable: of equal ends the earlier start is kept, so the answer does not
+        // depend on anything else.
         fits.sort_by(|a, b| a.value.total_cmp(&b.value));
         Ok(Self { fits })
     }
 
-    /// The lowest end, usable or not: a lower point on a bound is not passed over for a higher one inside.
+    /// The lowest end, usable or not: a lower point on a bound is not passed over for a higher one
+    /// inside.
     pub fn best(&self) -> &Fit {
         &self.fits[0]
     }

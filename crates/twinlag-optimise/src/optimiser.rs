@@ -13,8 +13,8 @@ use crate::solvers::{
 
 /// The solvers that come with this crate, with their options.
 ///
-/// Tolerances of steps are in coordinates (`ln x`, or `x/typical`), those of values and gradients relative to the value at
-/// the start.
+/// Tolerances of steps are in coordinates (`ln x`, or `x/typical`), those of values and gradients
+/// relative to the value at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
@@ -31,8 +31,8 @@ pub enum Optimiser {
         /// Edge of the first simplex, in coordinates.
         edge: f64,
     },
-    /// Limited-memory BFGS with the Moré-Thuente line search. Needs derivatives. It is never the default,
-    /// since it can claim convergence on a plateau; the report then says so.
+    /// Limited-memory BFGS with the Moré-Thuente line search. Needs derivatives. It is never the
+    /// default, since it can claim convergence on a plateau; the report then says so.
     #[serde(rename = "l-bfgs")]
     LBfgs {
         /// Steps remembered.
@@ -40,7 +40,8 @@ pub enum Optimiser {
         /// Done when the gradient is below this.
         gradient_tolerance: f64,
     },
-    /// BFGS with the Moré-Thuente line search. Needs derivatives. It too can claim convergence on a plateau.
+    /// BFGS with the Moré-Thuente line search. Needs derivatives. It too can claim convergence on a
+    /// plateau.
     Bfgs {
         /// Done when the gradient is below this.
         gradient_tolerance: f64,
@@ -55,9 +56,9 @@ pub enum Optimiser {
         /// Done when a step, or the region, is no longer than this.
         step_tolerance: f64,
     },
-    /// A swarm over the whole of the bounds, including the start; then Levenberg-Marquardt from the best
-    /// point, or the simplex if the cost has no derivatives. Global, as far as any solver is; a seed always
-    /// finds the same end.
+    /// A swarm over the whole of the bounds, including the start; then Levenberg-Marquardt from the
+    /// best point, or the simplex if the cost has no derivatives. Global, as far as any solver is;
+    /// a seed always finds the same end.
     ParticleSwarm {
         /// Size of the swarm.
         particles: usize,
@@ -66,22 +67,23 @@ pub enum Optimiser {
         /// Seed of the random numbers.
         seed: u64,
     },
-    /// A random walk over the whole of the bounds, with falling temperature; then a local search as for the
-    /// swarm. Global, as far as any solver is; a seed always finds the same end.
+    /// A random walk over the whole of the bounds, with falling temperature; then a local search as
+    /// for the swarm. Global, as far as any solver is; a seed always finds the same end.
     SimulatedAnnealing {
         /// Iterations of the walk.
         sweeps: u64,
         /// Moves in each of them.
         moves: u64,
-        /// The rise that is still often accepted at first, relative to the median difference of values at random from that at
-        /// the start.
+        /// The rise that is still often accepted at first, relative to the median difference of
+        /// values at random from that at the start.
         temperature: f64,
         /// Temperature at the end, relative to that at the start.
         cooling: f64,
         /// Seed of the random numbers.
         seed: u64,
     },
-    /// Brent's search between the bounds of one free variable, by values alone. The start is one candidate and no more.
+    /// Brent's search between the bounds of one free variable, by values alone. The start is one
+    /// candidate and no more.
     Brent {
         /// Done when the minimum is known to this.
         step_tolerance: f64,
@@ -105,11 +107,12 @@ impl Optimiser {
         "newton-trust-region-dogleg",
     ];
 
-    /// Names of the global solvers, which search the whole of the bounds. If a cost has a lower minimum than
-    /// the one next to the start they go there, whether or not it makes sense.
+    /// Names of the global solvers, which search the whole of the bounds. If a cost has a lower
+    /// minimum than the one next to the start they go there, whether or not it makes sense.
     pub const GLOBAL_NAMES: [&'static str; 2] = ["particle-swarm", "simulated-annealing"];
 
-    /// Names of the solvers for one free variable. With more they refuse: [`ProblemError::OneVariable`].
+    /// Names of the solvers for one free variable. With more they refuse:
+    /// [`ProblemError::OneVariable`].
     pub const ONE_VARIABLE_NAMES: [&'static str; 1] = ["brent"];
 
     /// Names of all solvers.

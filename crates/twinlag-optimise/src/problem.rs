@@ -1,13 +1,14 @@
-//! The problem to minimise: a cost over named variables with bounds, in coordinates in which they are all
-//! of size one.
+//! The problem to minimise: a cost over named variables with bounds, in coordinates in which they
+//! are all of size one.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// A scalar function to be minimised. Implement [`Cost::derivatives`] as well if you have them: most solvers are then far
-/// faster, and the report can distinguish a minimum from a plateau.
+/// A scalar function to be minimised. Implement [`Cost::derivatives`] as well if you have them:
+/// most solvers are then far faster, and the report can distinguish a minimum from a plateau.
 pub trait Cost {
-    /// The cost at `x`, in the variables' own units. A value that is not finite counts as infinitely bad.
+    /// The cost at `x`, in the variables' own units. A value that is not finite counts as
+    /// infinitely bad.
     fn value(&self, x: &[f64]) -> f64;
 
     /// The cost with its derivatives at `x`; `None` if there are none.
@@ -142,8 +143,8 @@ impl<'a> Problem<'a> {
     /// Minimise `cost` over `variables`, in the order in which the cost takes them.
     ///
     /// # Errors
-    /// [`ProblemError`] for bounds out of order, not finite, or not positive where they must be, and where no variable is
-    /// free.
+    /// [`ProblemError`] for bounds out of order, not finite, or not positive where they must be,
+    /// and where no variable is free.
     pub fn new(cost: &'a dyn Cost, variables: Vec<Variable>) -> Result<Self, ProblemError> {
         for v in &variables {
             let Variable { name, lower, upper, .. } = v.clone();
@@ -220,7 +221,8 @@ impl<'a> Problem<'a> {
         if value.is_finite() { value } else { f64::INFINITY }
     }
 
-    /// Derivatives with respect to the coordinates. `None` without derivatives, or where they are not finite.
+    /// Derivatives with respect to the coordinates. `None` without derivatives, or where they are
+    /// not finite.
     pub fn derivatives_at(&self, z: &[f64]) -> Option<Derivatives> {
         self.look_at(z).ok()
     }
@@ -233,7 +235,8 @@ impl<'a> Problem<'a> {
             Scale::Logarithmic => x[i],
             Scale::Linear { typical } => typical,
         };
-        // In place: free indices rise, so what belongs at `p` is still where the cost put it, at `i ≥ p`.
+        // In place: free indices rise, so what belongs at `p` is still where the cost put it, at
+        // `i ≥ p`.
         for (p, &i) in self.free.iter().enumerate() {
             d.curvature.swap(p, i);
             for (q, &j) in self.free.iter().enumerate() {

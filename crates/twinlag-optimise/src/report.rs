@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum End {
-    /// A minimum inside all bounds: the solver stopped there, and gradient and curvature agree that it is one.
+    /// A minimum inside all bounds: the solver stopped there, and gradient and curvature agree that
+    /// it is one.
     Converged,
     /// The solver stopped by its own rule; the cost has no derivatives to check it with.
     Unchecked,

@@ -1,4 +1,5 @@
-//! Axes: what a reader sees ([`Axis`]), and the ruler that turns values into pixels and finds round ticks.
+//! Axes: what a reader sees ([`Axis`]), and the ruler that turns values into pixels and finds round
+//! ticks.
 
 use crate::ReportError;
 use crate::canvas::text_width;
@@ -40,7 +41,8 @@ impl Axis {
         Self { label: label.into(), scale: Scale::Logarithmic, range: None }
     }
 
-    /// An axis of named places: the first is at 0, the next at 1, and so on. For the `x` axis of charts.
+    /// An axis of named places: the first is at 0, the next at 1, and so on. For the `x` axis of
+    /// charts.
     pub fn categories<S: Into<String>>(label: impl Into<String>, names: impl IntoIterator<Item = S>) -> Self {
         let names = names.into_iter().map(Into::into).collect();
         Self { label: label.into(), scale: Scale::Categories(names), range: None }
@@ -70,7 +72,8 @@ impl Axis {
         if self.is_logarithmic() { value.log10() } else { value }
     }
 
-    /// The range to draw: the user's, or that of `values` with a margin except at the base (`floor`).
+    /// The range to draw: the user's, or that of `values` with a margin except at the base
+    /// (`floor`).
     ///
     /// `None` if there is no range and no value to show.
     pub(crate) fn limits(
@@ -142,7 +145,8 @@ pub(crate) struct Tick {
     pub(crate) label: String,
 }
 
-/// The room that ticks have: pixels along the axis, labels side by side (`Across`) or one below the other (`Down`).
+/// The room that ticks have: pixels along the axis, labels side by side (`Across`) or one below the
+/// other (`Down`).
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Spacing {
     Across(f64),
@@ -183,13 +187,15 @@ impl Ruler {
         self.from_px + (position - self.low) / (self.high - self.low) * (self.to_px - self.from_px)
     }
 
-    /// The pixel of the base of bars: zero, or the lower end of a logarithmic axis, brought into the axis.
+    /// The pixel of the base of bars: zero, or the lower end of a logarithmic axis, brought into
+    /// the axis.
     pub(crate) fn base_px(&self) -> f64 {
         self.px_of_position(if self.axis.is_logarithmic() { self.low } else { 0.0_f64.clamp(self.low, self.high) })
     }
 }
 
-/// Takes away labels, least important first, until no two stand closer than 10 px: those not of a power of ten go first.
+/// Takes away labels, least important first, until no two stand closer than 10 px: those not of a
+/// power of ten go first.
 fn thin(ticks: &mut [Tick], px: impl Fn(f64) -> f64) {
     let crowded = |ticks: &[Tick]| {
         let labelled: Vec<&Tick> = ticks.iter().filter(|t| !t.label.is_empty()).collect();
@@ -241,7 +247,8 @@ fn linear_ticks(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
         .collect()
 }
 
-/// Over many decades the powers of ten, over few also 2 and 5 times these, over less than one as on a linear axis.
+/// Over many decades the powers of ten, over few also 2 and 5 times these, over less than one as on
+/// a linear axis.
 fn logarithmic_ticks(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
     let decades = high.log10() - low.log10();
     if decades < 0.7 {

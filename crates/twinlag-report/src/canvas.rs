@@ -1,8 +1,10 @@
-//! The one module that knows kuva: a sheet on which the others draw lines, areas and text in pixels, `y` downwards.
+//! The one module that knows kuva: a sheet on which the others draw lines, areas and text in
+//! pixels, `y` downwards.
 //!
-//! We use the scene of kuva and its writer, not its charts. Those were tried first (0.6.0): a heat map has cells equally
-//! wide in value only, which is not a grid of time constants in equal ratios, and shows seams between them on a
-//! logarithmic axis; tick labels mix notations (`1e-2`, `0.020`); a line has no markers.
+//! We use the scene of kuva and its writer, not its charts. Those were tried first (0.6.0): a heat
+//! map has cells equally wide in value only, which is not a grid of time constants in equal ratios,
+//! and shows seams between them on a logarithmic axis; tick labels mix notations (`1e-2`, `0.020`);
+//! a line has no markers.
 
 use kuva::backend::svg::SvgBackend;
 use kuva::plot::ColorMap;
@@ -10,7 +12,8 @@ use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 use std::fmt::Write;
 
-/// `DejaVu Sans` first: the widths of [`text_width`] are its widths, and it is wider than the others.
+/// `DejaVu Sans` first: the widths of [`text_width`] are its widths, and it is wider than the
+/// others.
 const FONT: &str = "DejaVu Sans, Verdana, Liberation Sans, Arial, sans-serif";
 
 pub(crate) const INK: &str = "#222222";
@@ -117,7 +120,8 @@ impl Frame {
     }
 }
 
-/// The outline of many strokes, as one SVG path: one element with short numbers, which is what keeps the files small.
+/// The outline of many strokes, as one SVG path: one element with short numbers, which is what
+/// keeps the files small.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outline(String);
 
@@ -147,7 +151,8 @@ impl Outline {
         self
     }
 
-    /// A box on whole pixels: neighbours share their edge exactly, so that no hairline shows between them.
+    /// A box on whole pixels: neighbours share their edge exactly, so that no hairline shows
+    /// between them.
     pub(crate) fn cell(&mut self, frame: &Frame) {
         let (left, top) = (frame.left.round(), frame.top.round());
         let (width, height) = (frame.right.round() - left, frame.bottom.round() - top);
@@ -283,15 +288,16 @@ impl Text {
     }
 }
 
-/// The colour of a heat map at `t` in [0, 1]: pale yellow to dark violet, viridis from its end, lightened by a quarter so
-/// that lines and marks stand out.
+/// The colour of a heat map at `t` in [0, 1]: pale yellow to dark violet, viridis from its end,
+/// lightened by a quarter so that lines and marks stand out.
 pub(crate) fn heat(t: f64) -> String {
     let (r, g, b) = ColorMap::Viridis.map_rgb(1.0 - t).unwrap_or((255, 255, 255));
     let light = |c: u8| c + (255 - c) / 4;
     format!("#{:02x}{:02x}{:02x}", light(r), light(g), light(b))
 }
 
-/// Width of a text in pixels: the advance widths of `DejaVu Sans`, by classes of characters, to about 5 %.
+/// Width of a text in pixels: the advance widths of `DejaVu Sans`, by classes of characters, to
+/// about 5 %.
 pub(crate) fn text_width(text: &str, size: u32) -> f64 {
     let ems: f64 = text
         .chars()

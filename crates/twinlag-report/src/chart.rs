@@ -1,5 +1,5 @@
-//! Charts: lines, points, steps and bars over common axes. A [`Series`] is data with a name; the [`Chart`] puts them on
-//! axes; colours and markers are handed out by the figure, by name.
+//! Charts: lines, points, steps and bars over common axes. A [`Series`] is data with a name; the
+//! [`Chart`] puts them on axes; colours and markers are handed out by the figure, by name.
 
 use crate::ReportError;
 use crate::axis::Axis;
@@ -16,7 +16,8 @@ pub(crate) enum Shape {
 
 /// Named data to be drawn: values `y` at places `x`, in the units of the chart's axes.
 ///
-/// Values that are not finite, and on a logarithmic axis those not positive, are left out; lines have a gap there.
+/// Values that are not finite, and on a logarithmic axis those not positive, are left out; lines
+/// have a gap there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub(crate) name: String,
@@ -34,12 +35,14 @@ impl Series {
         Self { name: name.into(), x, y, shape, interval: None, band: None, dashed: false, colour: None }
     }
 
-    /// A line with a marker at each point, for some ten points. With an empty name the series is not in the legend.
+    /// A line with a marker at each point, for some ten points. With an empty name the series is
+    /// not in the legend.
     pub fn line(name: impl Into<String>, x: impl Into<Vec<f64>>, y: impl Into<Vec<f64>>) -> Self {
         Self::new(name, x.into(), y.into(), Shape::Line)
     }
 
-    /// A line without markers, of any number of points: it is thinned with [`decimate`](crate::decimate()).
+    /// A line without markers, of any number of points: it is thinned with
+    /// [`decimate`](crate::decimate()).
     pub fn trace(name: impl Into<String>, x: impl Into<Vec<f64>>, y: impl Into<Vec<f64>>) -> Self {
         Self::new(name, x.into(), y.into(), Shape::Trace)
     }
@@ -54,7 +57,8 @@ impl Series {
         Self::new(name, x.into(), y.into(), Shape::Steps)
     }
 
-    /// Bars, one for each category of [`Axis::categories`], in its order. Several such series stand side by side.
+    /// Bars, one for each category of [`Axis::categories`], in its order. Several such series stand
+    /// side by side.
     pub fn bars(name: impl Into<String>, y: impl Into<Vec<f64>>) -> Self {
         let y = y.into();
         Self::new(name, (0..y.len()).map(|i| i as f64).collect(), y, Shape::Bars)
@@ -148,8 +152,8 @@ impl Reference {
 
 /// Series on common axes.
 ///
-/// The legend goes inside, where it hides nothing, or above the axes if there is no such place. A chart of one series
-/// has none.
+/// The legend goes inside, where it hides nothing, or above the axes if there is no such place. A
+/// chart of one series has none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
     pub(crate) title: String,
@@ -182,7 +186,8 @@ impl Chart {
         self
     }
 
-    /// Moves the series sideways by `step_px` pixels from one to the next, so that error bars at one `x` stay apart.
+    /// Moves the series sideways by `step_px` pixels from one to the next, so that error bars at
+    /// one `x` stay apart.
     #[must_use]
     pub fn dodge(self, step_px: f64) -> Self {
         Self { dodge_px: step_px, ..self }
@@ -202,7 +207,8 @@ impl Chart {
         self.series.iter().try_for_each(Series::check)?;
         let references =
             |horizontal: bool| self.references.iter().filter(move |r| r.horizontal == horizontal).map(|r| r.value);
-        // Only points that can be drawn count: on logarithmic axes, an x whose y is zero is no point.
+        // Only points that can be drawn count: on logarithmic axes, an x whose y is zero is no
+        // point.
         let shown = |s: &Series, i: usize| self.x.shows(s.x[i]) && self.y.shows(s.y[i]);
         let points =
             || self.series.iter().flat_map(move |s| (0..s.x.len()).filter(move |i| shown(s, *i)).map(move |i| (s, i)));

@@ -1,4 +1,5 @@
-//! How a chart is drawn: data to pixels, a place for the legend and for the labels of reference lines.
+//! How a chart is drawn: data to pixels, a place for the legend and for the labels of reference
+//! lines.
 
 use crate::axes::{draw_axes, draw_grid, rulers};
 use crate::axis::Ruler;
@@ -226,7 +227,8 @@ impl Legend {
         self.size(self.columns_above(width)).1
     }
 
-    /// The place inside that hides least, corners first, with its number of columns and what it hides.
+    /// The place inside that hides least, corners first, with its number of columns and what it
+    /// hides.
     fn place(&self, frame: &Frame, obstacles: &[Point]) -> Option<(Frame, usize, usize)> {
         let mut best: Option<(Frame, usize, usize)> = None;
         for columns in 1..=self.entries.len().min(3) {

@@ -1,13 +1,13 @@
-//! Contour lines by marching squares, linear between grid points; the two ambiguous cases are distinguished by the mean of
-//! the four corners. Exact for a plane.
+//! Contour lines by marching squares, linear between grid points; the two ambiguous cases are
+//! distinguished by the mean of the four corners. Exact for a plane.
 
 use std::collections::BTreeMap;
 
 /// An edge of the grid: from point `(column, row)` to the right (`false`) or upwards (`true`).
 type Edge = (usize, usize, bool);
 
-/// Lines along which `z` is `level`, in units of grid steps: `(0, 0)` is the first grid point. Cells with a corner that is
-/// not finite are left out. `z[row * columns + column]`.
+/// Lines along which `z` is `level`, in units of grid steps: `(0, 0)` is the first grid point.
+/// Cells with a corner that is not finite are left out. `z[row * columns + column]`.
 pub(crate) fn contour(z: &[f64], columns: usize, level: f64) -> Vec<Vec<(f64, f64)>> {
     let rows = z.len() / columns;
     let at = |i: usize, j: usize| z[j * columns + i] - level;
@@ -29,8 +29,8 @@ pub(crate) fn contour(z: &[f64], columns: usize, level: f64) -> Vec<Vec<(f64, f6
             match crossed[..] {
                 [a, b] => join(a, b),
                 [a, b, c, d] => {
-                    // A saddle. If the middle is on the side of the first corner, that corner and the third are joined,
-                    // and the strokes cut off the second and the fourth.
+                    // A saddle. If the middle is on the side of the first corner, that corner and
+                    // the third are joined, and the strokes cut off the second and the fourth.
                     if (corners.iter().sum::<f64>() < 0.0) == (corners[0] < 0.0) {
                         join(a, b);
                         join(c, d);
@@ -77,8 +77,9 @@ pub(crate) fn contour(z: &[f64], columns: usize, level: f64) -> Vec<Vec<(f64, f6
 mod tests {
     use super::contour;
 
-    /// Oracle: the circle. Linear interpolation on a grid of step 1 errs by at most `1/(8 r)` of the sagitta for a
-    /// distance function of radius `r`, here 0.016; a misplaced corner errs by tenths.
+    /// Oracle: the circle. Linear interpolation on a grid of step 1 errs by at most `1/(8 r)` of
+    /// the sagitta for a distance function of radius `r`, here 0.016; a misplaced corner errs by
+    /// tenths.
     #[test]
     fn the_contour_of_a_distance_is_one_closed_circle() {
         let n = 25;

@@ -1,14 +1,17 @@
-//! Thinning of long traces without loss of their envelope: of the points that share a pixel column, the first, the lowest,
-//! the highest and the last are kept. The drawn line then covers the same pixels, up to slanted strokes within one column.
+//! Thinning of long traces without loss of their envelope: of the points that share a pixel column,
+//! the first, the lowest, the highest and the last are kept. The drawn line then covers the same
+//! pixels, up to slanted strokes within one column.
 
-/// Indices of the points to keep so that a trace drawn over `columns` pixel columns looks the same, in increasing order.
+/// Indices of the points to keep so that a trace drawn over `columns` pixel columns looks the same,
+/// in increasing order.
 ///
-/// - `x`, `y`: the trace, `[n]` each, `x` in increasing order (in another order extremes are still kept, but more points
-///   than needed with them)
-/// - `columns`: number of equally wide bins between the smallest and the largest `x`; zero counts as one
+/// - `x`, `y`: the trace, `[n]` each, `x` in increasing order (in another order extremes are still
+///   kept, but more points than needed with them)
+/// - `columns`: number of equally wide bins between the smallest and the largest `x`; zero counts
+///   as one
 ///
-/// Kept are at most four points for each bin, and of each run of values that are not finite one, so that a gap stays a
-/// gap. If `x` and `y` differ in length, the shorter counts.
+/// Kept are at most four points for each bin, and of each run of values that are not finite one, so
+/// that a gap stays a gap. If `x` and `y` differ in length, the shorter counts.
 ///
 /// ```
 /// let x: Vec<f64> = (0..100_000).map(f64::from).collect();

@@ -1,4 +1,5 @@
-//! Documents: one HTML page that needs nothing but itself. Text, tables and pictures go in as blocks, in their order.
+//! Documents: one HTML page that needs nothing but itself. Text, tables and pictures go in as
+//! blocks, in their order.
 
 use std::fmt::Write;
 
@@ -6,9 +7,10 @@ use crate::canvas::is_unprintable;
 
 /// A page of text, tables and pictures, as one file that can be mailed, printed and kept.
 ///
-/// The page has no script, no link and no other file: its style is in it, its pictures are inline SVG. It follows the
-/// reader's choice of light or dark, fits a phone, and prints in black on white. All text is escaped, whatever it holds,
-/// and the same document gives the same bytes. It is well-formed XML as well, so that any parser can check it.
+/// The page has no script, no link and no other file: its style is in it, its pictures are inline
+/// SVG. It follows the reader's choice of light or dark, fits a phone, and prints in black on
+/// white. All text is escaped, whatever it holds, and the same document gives the same bytes. It is
+/// well-formed XML as well, so that any parser can check it.
 ///
 /// ```
 /// use twinlag_report::{Axis, Chart, Document, Figure, Series, Table};
@@ -63,7 +65,8 @@ impl Table {
         Self { header: strings(header), rows: Vec::new(), caption: String::new() }
     }
 
-    /// With one row more. A row that is short ends in empty cells; one that is long widens the table.
+    /// With one row more. A row that is short ends in empty cells; one that is long widens the
+    /// table.
     #[must_use]
     pub fn row<S: Into<String>>(mut self, cells: impl IntoIterator<Item = S>) -> Self {
         self.rows.push(strings(cells));
@@ -162,9 +165,10 @@ impl Document {
 
     /// With a picture and what it shows; pictures are numbered.
     ///
-    /// - `svg`: what [`Figure::to_svg`](crate::Figure::to_svg) gives, or any SVG of one's own making. It is the one thing
-    ///   that goes in as markup: whoever takes it from a stranger takes what is in it. Its `id`s are made its own, so that
-    ///   two pictures with the same ones do not disturb each other (references from within a `<style>` excepted).
+    /// - `svg`: what [`Figure::to_svg`](crate::Figure::to_svg) gives, or any SVG of one's own
+    ///   making. It is the one thing that goes in as markup: whoever takes it from a stranger takes
+    ///   what is in it. Its `id`s are made its own, so that two pictures with the same ones do not
+    ///   disturb each other (references from within a `<style>` excepted).
     #[must_use]
     pub fn figure(self, svg: impl Into<String>, caption: impl Into<String>) -> Self {
         self.with(Block::Figure { svg: svg.into(), caption: caption.into() })
@@ -261,7 +265,8 @@ fn aside(out: &mut String, class: &str, label: &str, text: &str) {
     put(out, format_args!("<p class=\"{class}\" role=\"note\"><strong>{label}</strong> {}</p>\n", escaped(text)));
 }
 
-/// Text that is text wherever it stands, between tags or in an attribute. Characters that no page may hold become `�`.
+/// Text that is text wherever it stands, between tags or in an attribute. Characters that no page
+/// may hold become `�`.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -281,8 +286,8 @@ fn escaped(text: &str) -> String {
     out
 }
 
-/// A picture as a part of the page: what comes before `<svg` left out, `id`s and references to them its own, named by its
-/// caption. The name space is left out as well: within a page it is known.
+/// A picture as a part of the page: what comes before `<svg` left out, `id`s and references to them
+/// its own, named by its caption. The name space is left out as well: within a page it is known.
 fn inlined(svg: &str, figure: usize) -> String {
     let Some(start) = svg.find("<svg") else { return String::new() };
     let mut out = String::with_capacity(svg.len() + 200);
@@ -467,7 +472,8 @@ mod tests {
         assert_eq!(full(NASTY).to_html(), full(NASTY).to_html());
     }
 
-    /// kuva writes no `id` for what is drawn here today; clip paths and gradients of others' SVG have them.
+    /// kuva writes no `id` for what is drawn here today; clip paths and gradients of others' SVG
+    /// have them.
     #[test]
     fn ids_of_two_pictures_do_not_meet() {
         let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><defs>\

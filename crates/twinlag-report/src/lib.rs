@@ -1,12 +1,14 @@
-//! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped bars; and pages of them
-//! with text and tables, as one HTML file each.
+//! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped
+//! bars; and pages of them with text and tables, as one HTML file each.
 //!
-//! For anyone who has numbers and wants a figure for a report, without a plotting environment: error bars and intervals,
-//! logarithmic axes, reference lines, contour lines, one colour-blind-safe palette, and a legend that hides no data. The
-//! same data give the same bytes, so figures can be kept under version control and compared. A [`Document`] puts figures,
-//! tables and text on a page that needs no network and no script; [`plus_minus`] and its like round the numbers. What it does not do:
-//! interaction, three dimensions, filled contours. Whoever wants those, or a kind of chart that is not here, is better
-//! served by [kuva](https://docs.rs/kuva), which writes the SVG here too but does not show in the signatures.
+//! For anyone who has numbers and wants a figure for a report, without a plotting environment:
+//! error bars and intervals, logarithmic axes, reference lines, contour lines, one
+//! colour-blind-safe palette, and a legend that hides no data. The same data give the same bytes,
+//! so figures can be kept under version control and compared. A [`Document`] puts figures, tables
+//! and text on a page that needs no network and no script; [`plus_minus`] and its like round the
+//! numbers. What it does not do: interaction, three dimensions, filled contours. Whoever wants
+//! those, or a kind of chart that is not here, is better served by [kuva](https://docs.rs/kuva),
+//! which writes the SVG here too but does not show in the signatures.
 //!
 //! ```
 //! use twinlag_report::{Axis, Chart, Figure, Mark, Reference, Series, Surface};

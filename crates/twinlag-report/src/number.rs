@@ -1,17 +1,20 @@
-//! Numbers as a reader wants them: rounded to what is known of them, with a proper minus sign, never `NaN`.
+//! Numbers as a reader wants them: rounded to what is known of them, with a proper minus sign,
+//! never `NaN`.
 
 use crate::axis::superscript;
 
 /// What stands where there is no number.
 const ABSENT: &str = "not determined";
 
-/// The exponent of ten of a number as it is after rounding to so many significant digits: that of 9.99 is 1 with two.
+/// The exponent of ten of a number as it is after rounding to so many significant digits: that of
+/// 9.99 is 1 with two.
 fn exponent(value: f64, significant: usize) -> i32 {
     let text = format!("{value:.*e}", significant.saturating_sub(1));
     text.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0)
 }
 
-/// A number with the given number of decimals and a proper minus sign, but no minus sign before a zero.
+/// A number with the given number of decimals and a proper minus sign, but no minus sign before a
+/// zero.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
@@ -31,8 +34,8 @@ fn is_plain(exponent: i32) -> bool {
     (-4..6).contains(&exponent)
 }
 
-/// A number to the given number of significant digits. All digits before the point are kept, and a number
-/// that is not finite is *not determined*.
+/// A number to the given number of significant digits. All digits before the point are kept, and a
+/// number that is not finite is *not determined*.
 ///
 /// ```
 /// use twinlag_report::rounded;
@@ -59,7 +62,8 @@ pub fn rounded(value: f64, significant: usize) -> String {
     }
 }
 
-/// A number and its standard error, to two digits of the error; without an error, to four digits of its own.
+/// A number and its standard error, to two digits of the error; without an error, to four digits of
+/// its own.
 ///
 /// ```
 /// use twinlag_report::plus_minus;
@@ -98,7 +102,8 @@ pub fn between([low, high]: [f64; 2]) -> String {
     format!("{} to {}", fixed(low, decimals), fixed(high, decimals))
 }
 
-/// A probability to two digits; one that a double cannot distinguish from zero is *below* a power of ten.
+/// A probability to two digits; one that a double cannot distinguish from zero is *below* a power
+/// of ten.
 ///
 /// ```
 /// use twinlag_report::probability;

@@ -1,10 +1,11 @@
-//! One palette for all figures: that of Okabe and Ito (2008), eight colours that remain distinct with the common forms of colour
-//! blindness. Yellow is left out, since a thin yellow line is lost on white paper; grey stands for what is background.
+//! One palette for all figures: that of Okabe and Ito (2008), eight colours that remain distinct
+//! with the common forms of colour blindness. Yellow is left out, since a thin yellow line is lost
+//! on white paper; grey stands for what is background.
 
 /// A colour of the palette.
 ///
-/// Without one, a series takes the next free colour in the order of this list (grey excepted); series of one name have
-/// one colour throughout a figure.
+/// Without one, a series takes the next free colour in the order of this list (grey excepted);
+/// series of one name have one colour throughout a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[expect(missing_docs, reason = "colours")]
 #[non_exhaustive]

@@ -26,8 +26,9 @@ impl Mark {
 
 /// A function on a grid of two parameters, drawn as a heat map with contour lines.
 ///
-/// The contours are those of the ticks on the colour bar, unless [`Surface::levels`] names others, which the bar then
-/// marks. Values that are not finite (or not positive, on a logarithmic scale) stay white.
+/// The contours are those of the ticks on the colour bar, unless [`Surface::levels`] names others,
+/// which the bar then marks. Values that are not finite (or not positive, on a logarithmic scale)
+/// stay white.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     pub(crate) title: String,

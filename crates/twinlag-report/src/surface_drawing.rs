@@ -7,7 +7,8 @@ use crate::contour::contour;
 use crate::palette::Colour;
 use crate::surface::Surface;
 
-/// So many shades: few enough to keep the file small, enough that the steps hardly show between contour lines.
+/// So many shades: few enough to keep the file small, enough that the steps hardly show between
+/// contour lines.
 const SHADES: usize = 24;
 const GAP_PX: f64 = 12.0;
 const BAR_PX: f64 = 14.0;
@@ -32,7 +33,8 @@ pub(crate) fn draw_surface(
 ) {
     let axes = [&surface.x, &surface.y];
     let [rx, ry] = rulers(axes, limits, frame);
-    // Everything about the values in the terms of the colour axis: 0 at the lower end of the bar, 1 at the upper.
+    // Everything about the values in the terms of the colour axis: 0 at the lower end of the bar, 1
+    // at the upper.
     let colour_axis = Ruler::new(&surface.value, value_limits, 0.0, 1.0);
     let shade: Vec<f64> = surface.z.iter().map(|z| colour_axis.px(*z)).collect();
     let xs: Vec<f64> = surface.xs.iter().map(|x| rx.px(*x)).collect();
@@ -70,7 +72,8 @@ fn between(grid: &[f64], index: f64) -> f64 {
     grid[below] + (index - below as f64) * (grid[below + 1] - grid[below])
 }
 
-/// One path for each shade, of all cells at least that dark: each is painted over the paler ones, so no gap shows.
+/// One path for each shade, of all cells at least that dark: each is painted over the paler ones,
+/// so no gap shows.
 fn draw_shades(canvas: &mut Canvas, shade: &[f64], xs: &[f64], ys: &[f64], frame: &Frame) {
     // Cells reach half way to their neighbours; the outermost end at the outermost grid points.
     let edges = |grid: &[f64]| -> Vec<f64> {

@@ -1,5 +1,5 @@
-//! From the continuous sensor to a difference equation, and what each way of doing it assumes about the
-//! gas between samples.
+//! From the continuous sensor to a difference equation, and what each way of doing it assumes about
+//! the gas between samples.
 
 use core::fmt;
 
@@ -12,22 +12,25 @@ use crate::stream::EquationResponder;
 
 /// How the gas temperature is assumed to move between two samples.
 ///
-/// A real gas does none of these exactly. [`crate::tone_floor`] computes the error that the choice causes
-/// in a blind estimate. This error falls with the square of the sample period for the zero-order hold and
-/// the bilinear rule, and with its fourth power for the first-order hold.
+/// A real gas does none of these exactly. [`crate::tone_floor`] computes the error that the choice
+/// causes in a blind estimate. This error falls with the square of the sample period for the
+/// zero-order hold and the bilinear rule, and with its fourth power for the first-order hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Discretisation {
-    /// Constant until the next sample, as the published method has it: `y[k] = a y[k−1] + (1 − a) x[k−1]`.
+    /// Constant until the next sample, as the published method has it:
+    /// `y[k] = a y[k−1] + (1 − a) x[k−1]`.
     #[default]
     ZeroOrderHold,
     /// Straight line between samples: exact for a piecewise linear gas temperature.
     FirstOrderHold,
-    /// Trapezoidal rule, `s = (2/Ts)(1 − z⁻¹)/(1 + z⁻¹)`. A pair of sensors shares the factor `1 + z⁻¹`, so for blind work
-    /// this is the zero-order hold with `τ` stretched: `Ts/2 / tanh(Ts/2τ)` in place of `τ`.
+    /// Trapezoidal rule, `s = (2/Ts)(1 − z⁻¹)/(1 + z⁻¹)`. A pair of sensors shares the factor
+    /// `1 + z⁻¹`, so for blind work this is the zero-order hold with `τ` stretched:
+    /// `Ts/2 / tanh(Ts/2τ)` in place of `τ`.
     Bilinear,
-    /// No power above half the sampling rate: the continuous frequency response itself. It has no difference equation.
+    /// No power above half the sampling rate: the continuous frequency response itself. It has no
+    /// difference equation.
     BandLimited,
 }
 
@@ -49,7 +52,8 @@ impl DifferenceEquation {
         self.denominator.coefficients()
     }
 
-    /// Reading in gas of temperature `x`, `[n]` to `[n]`, at rest at `x[0]` before the first sample.
+    /// Reading in gas of temperature `x`, `[n]` to `[n]`, at rest at `x[0]` before the first
+    /// sample.
     #[cfg(feature = "std")]
     pub fn respond(&self, x: &[f64]) -> Vec<f64> {
         let mut responder = self.responder();
@@ -73,8 +77,8 @@ fn at(coefficients: &[f64], delay: Complex64) -> Complex64 {
 }
 
 impl Discretisation {
-    /// The difference equation of `G(s) = Σ r_i / (1 + s τ_i)`, given `(r_i, τ_i)`, two at most, with `Σ r_i = 1` and distinct
-    /// `τ_i`.
+    /// The difference equation of `G(s) = Σ r_i / (1 + s τ_i)`, given `(r_i, τ_i)`, two at most,
+    /// with `Σ r_i = 1` and distinct `τ_i`.
     pub(crate) fn of_modes(self, modes: &[(f64, f64)], period_s: f64) -> Result<DifferenceEquation, ModelError> {
         let mut numerator = Polynomial::new(&[0.0]);
         let mut denominator = Polynomial::new(&[1.0]);
@@ -87,9 +91,11 @@ impl Discretisation {
         Ok(DifferenceEquation { numerator, denominator })
     }
 
-    /// Coefficients of the first-order sensor of time constant `tau_s` (s), `None` for [`Discretisation::BandLimited`].
+    /// Coefficients of the first-order sensor of time constant `tau_s` (s), `None` for
+    /// [`Discretisation::BandLimited`].
     ///
-    /// Generic over dual numbers, so that a cost gets exact derivatives with respect to `tau_s` from the one formula.
+    /// Generic over dual numbers, so that a cost gets exact derivatives with respect to `tau_s`
+    /// from the one formula.
     pub fn first_order<D: Number>(self, tau_s: D, period_s: f64) -> Option<FirstOrderCoefficients<D>> {
         let zero = D::from(0.0);
         let one = D::from(1.0);
@@ -110,11 +116,12 @@ impl Discretisation {
 }
 
 impl Discretisation {
-    /// Coefficients of the second-order sensor `1/((1 + s τ)(1 + s τ₂))`, `None` for [`Discretisation::BandLimited`].
+    /// Coefficients of the second-order sensor `1/((1 + s τ)(1 + s τ₂))`, `None` for
+    /// [`Discretisation::BandLimited`].
     ///
-    /// Generic over dual numbers as [`Discretisation::first_order`] is. Exact for any two positive time constants, equal ones
-    /// included: the partial fractions are combined into the divided difference of the exponential before their poles can
-    /// cancel.
+    /// Generic over dual numbers as [`Discretisation::first_order`] is. Exact for any two positive
+    /// time constants, equal ones included: the partial fractions are combined into the divided
+    /// difference of the exponential before their poles can cancel.
     pub fn second_order<D: Number>(
         self,
         tau_s: D,
@@ -146,7 +153,8 @@ impl Discretisation {
                 [zero, first, all - first]
             }
             Self::FirstOrderHold => {
-                // The response to a triangle of unit height is the second difference of the ramp response.
+                // The response to a triangle of unit height is the second difference of the ramp
+                // response.
                 let ramp = |t: f64| {
                     let fall = -(-p * t).exp_m1();
                     -(p + q) / (p * q) * fall + p / q * divided_difference(p, q, t) + t
@@ -173,7 +181,8 @@ fn divided_difference<D: Number>(p: D, q: D, t: f64) -> D {
     (-(p + q) * (0.5 * t)).exp() * sinhc * t
 }
 
-/// `y[k] + den[1] y[k−1] + den[2] y[k−2] = num[0] x[k] + num[1] x[k−1] + num[2] x[k−2]`, `den[0] = 1`.
+/// `y[k] + den[1] y[k−1] + den[2] y[k−2] = num[0] x[k] + num[1] x[k−1] + num[2] x[k−2]`,
+/// `den[0] = 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SecondOrderCoefficients<D> {
     /// Coefficients of `x[k]`, `x[k−1]`, `x[k−2]`.
@@ -260,8 +269,8 @@ mod tests {
         }
     }
 
-    /// A ramp held piecewise linear is itself, so the first-order-hold answer is the exact ramp response
-    /// `t − τ (1 − exp(−t/τ))`.
+    /// A ramp held piecewise linear is itself, so the first-order-hold answer is the exact ramp
+    /// response `t − τ (1 − exp(−t/τ))`.
     #[test]
     fn first_order_hold_answers_a_ramp_exactly() {
         let equation = FirstOrder::new(0.05, 0.004)
@@ -275,9 +284,10 @@ mod tests {
         }
     }
 
-    /// A tone of `w = ω Ts = 2π/500` per sample: the trapezoidal rule and the first-order hold err by `w²/12` of the response
-    /// per pole, the zero-order hold (half a period of delay taken out) by its first image, `w (Ts/τ)/12` per pole. Twice
-    /// the sum over two poles, the faster of 11 ms, is allowed.
+    /// A tone of `w = ω Ts = 2π/500` per sample: the trapezoidal rule and the first-order hold err
+    /// by `w²/12` of the response per pole, the zero-order hold (half a period of delay taken out)
+    /// by its first image, `w (Ts/τ)/12` per pole. Twice the sum over two poles, the faster of 11
+    /// ms, is allowed.
     #[test]
     fn slow_tones_are_answered_as_in_continuous_time() {
         let (hz, period, fastest) = (0.5, 0.004, 0.011);
@@ -296,8 +306,9 @@ mod tests {
         }
     }
 
-    /// The partial fractions of [`SecondOrder`], which lose digits to the cancellation of their poles, here 1/0.78: rounding of the
-    /// fractions, and of `1 − r(T)/T`, which loses a factor `(τ/Ts)²` = 150 in the first-order hold; 1e-12.
+    /// The partial fractions of [`SecondOrder`], which lose digits to the cancellation of their
+    /// poles, here 1/0.78: rounding of the fractions, and of `1 − r(T)/T`, which loses a factor
+    /// `(τ/Ts)²` = 150 in the first-order hold; 1e-12.
     #[test]
     fn second_order_coefficients_are_those_of_the_partial_fractions() {
         let (tau, second, period) = (0.05, 0.011, 0.004);
@@ -314,8 +325,9 @@ mod tests {
         }
     }
 
-    /// On both sides of the switch from series to quotient, and with equal poles, the coefficients are smooth in the time
-    /// constants: the mean of two neighbours 1e-6 apart differs from the middle by the second derivative, 1e-12 of the size.
+    /// On both sides of the switch from series to quotient, and with equal poles, the coefficients
+    /// are smooth in the time constants: the mean of two neighbours 1e-6 apart differs from the
+    /// middle by the second derivative, 1e-12 of the size.
     #[test]
     fn equal_and_nearly_equal_poles_are_no_special_case() {
         let period = 0.004;

@@ -1,5 +1,6 @@
-//! First-order sensor, unit static gain: `τ dy/dt = x − y`. With `x` held over one period `Ts` (zero-order hold) this is
-//! *exactly* `y[k] = a y[k−1] + (1 − a) x[k−1]`, `a = exp(−Ts/τ)`. Derivation: docs, chapter "Theory", section 1.
+//! First-order sensor, unit static gain: `τ dy/dt = x − y`. With `x` held over one period `Ts`
+//! (zero-order hold) this is *exactly* `y[k] = a y[k−1] + (1 − a) x[k−1]`, `a = exp(−Ts/τ)`.
+//! Derivation: docs, chapter "Theory", section 1.
 
 use num_complex::Complex64;
 #[cfg(not(any(feature = "std", test)))]
@@ -75,14 +76,16 @@ impl FirstOrder {
         -(-self.period_s / self.tau_s).exp_m1()
     }
 
-    /// Variance of the output per unit variance of white input noise: `h = (1 − a)/(1 + a)`, in (0, 1).
+    /// Variance of the output per unit variance of white input noise: `h = (1 − a)/(1 + a)`, in (0,
+    /// 1).
     pub fn noise_gain(&self) -> f64 {
-        // The same number as `(1 − a)/(1 + a)`, without `1 − a`, which loses half the digits at τ = 10⁸ Ts.
+        // The same number as `(1 − a)/(1 + a)`, without `1 − a`, which loses half the digits at τ =
+        // 10⁸ Ts.
         (self.period_s / (2.0 * self.tau_s)).tanh()
     }
 
-    /// Reading of the sensor in gas of temperature `x` (any unit, `[n]`), held between samples and constant at `x[0]`
-    /// before the first: `y[0] = x[0]`, `y[k] = a y[k−1] + (1 − a) x[k−1]`.
+    /// Reading of the sensor in gas of temperature `x` (any unit, `[n]`), held between samples and
+    /// constant at `x[0]` before the first: `y[0] = x[0]`, `y[k] = a y[k−1] + (1 − a) x[k−1]`.
     #[cfg(feature = "std")]
     pub fn respond(&self, x: &[f64]) -> Vec<f64> {
         let mut responder = self.responder();
@@ -94,10 +97,11 @@ impl FirstOrder {
         FirstOrderResponder::new(self.input_gain())
     }
 
-    /// Gas temperature that the reading `y` (`[n]`) implies, `[n − 1]`: `f[k] = (y[k+1] − a y[k])/(1 − a)`.
+    /// Gas temperature that the reading `y` (`[n]`) implies, `[n − 1]`:
+    /// `f[k] = (y[k+1] − a y[k])/(1 − a)`.
     ///
-    /// Exact inverse of [`FirstOrder::respond`], whatever the state before the first sample. Measurement noise is
-    /// amplified by `(1 + a²)/(1 − a)²` in variance.
+    /// Exact inverse of [`FirstOrder::respond`], whatever the state before the first sample.
+    /// Measurement noise is amplified by `(1 + a²)/(1 − a)²` in variance.
     #[cfg(feature = "std")]
     pub fn invert(&self, y: &[f64]) -> Vec<f64> {
         let mut inverter = self.inverter();
@@ -144,8 +148,9 @@ mod tests {
             .collect()
     }
 
-    /// The output is AR(1), so over `n` points its mean square has standard error `h √(2 (1 + a²) / ((1 − a²) n))` for
-    /// Gaussian input (Bartlett), less for uniform. Four of these are 3 % of `h`: a lost `1 + a` fails, the truth passes.
+    /// The output is AR(1), so over `n` points its mean square has standard error
+    /// `h √(2 (1 + a²) / ((1 − a²) n))` for Gaussian input (Bartlett), less for uniform. Four of
+    /// these are 3 % of `h`: a lost `1 + a` fails, the truth passes.
     #[test]
     fn noise_gain_is_the_variance_of_filtered_white_noise() {
         let n = 400_000;
@@ -156,7 +161,8 @@ mod tests {
         assert!((got - want).abs() < tol, "got {got:e}, want {want:e} ± {tol:e}");
     }
 
-    /// A step seen by a first-order lag is `1 − exp(−t/τ)`, sampled: the textbook's closed form, to rounding.
+    /// A step seen by a first-order lag is `1 − exp(−t/τ)`, sampled: the textbook's closed form, to
+    /// rounding.
     #[test]
     fn a_held_step_is_answered_by_the_exponential() {
         let mut x = vec![1.0; 200];
@@ -168,7 +174,8 @@ mod tests {
         }
     }
 
-    /// Each step of the inverse divides rounding errors of size `ε |y|` by `1 − a = 0.08`: some `2⁻⁵² · 2 / 0.08 ≈ 6e-15`.
+    /// Each step of the inverse divides rounding errors of size `ε |y|` by `1 − a = 0.08`: some
+    /// `2⁻⁵² · 2 / 0.08 ≈ 6e-15`.
     #[test]
     fn invert_undoes_respond() {
         let x = unit_uniform_noise(1000);

@@ -1,8 +1,9 @@
 //! The error that the choice of discretisation alone causes in a blind estimate.
 //!
-//! Two sensors see one continuous tone. Their readings have the complex ratio `H1/H2` of the *continuous* responses; a
-//! blind method looks for the two discrete sensors with that same ratio. The time constants at which it finds them differ
-//! from the true ones by the *floor*: no amount of data removes it.
+//! Two sensors see one continuous tone. Their readings have the complex ratio `H1/H2` of the
+//! *continuous* responses; a blind method looks for the two discrete sensors with that same ratio.
+//! The time constants at which it finds them differ from the true ones by the *floor*: no amount of
+//! data removes it.
 
 use num_complex::Complex64;
 #[cfg(not(any(feature = "std", test)))]
@@ -12,17 +13,19 @@ use crate::difference::Discretisation;
 use crate::error::ModelError;
 use crate::{FirstOrder, Lag};
 
-/// Relative error `[τ̂1/τ1 − 1, τ̂2/τ2 − 1]` that the discretisation leaves on a noise-free continuous tone.
+/// Relative error `[τ̂1/τ1 − 1, τ̂2/τ2 − 1]` that the discretisation leaves on a noise-free
+/// continuous tone.
 ///
 /// - `tau_s`: the true time constants, distinct
 /// - `frequency_hz`: the tone, below half the sampling rate
 ///
-/// Solves `Gd1(τ̂1)/Gd2(τ̂2) = G1(τ1)/G2(τ2)` (one complex equation, two real unknowns) by Newton's method in `ln τ`.
-/// To leading order in the period it is `−(ω Ts)²/12` for the bilinear rule, for both sensors.
+/// Solves `Gd1(τ̂1)/Gd2(τ̂2) = G1(τ1)/G2(τ2)` (one complex equation, two real unknowns) by Newton's
+/// method in `ln τ`. To leading order in the period it is `−(ω Ts)²/12` for the bilinear rule, for
+/// both sensors.
 ///
 /// # Errors
-/// [`ModelError::NotPositive`] for a non-positive argument; [`ModelError::OutOfRange`] for a tone at or above half the
-/// sampling rate, or where no pair of discrete sensors has that ratio.
+/// [`ModelError::NotPositive`] for a non-positive argument; [`ModelError::OutOfRange`] for a tone
+/// at or above half the sampling rate, or where no pair of discrete sensors has that ratio.
 pub fn tone_floor(
     tau_s: [f64; 2],
     period_s: f64,
@@ -72,8 +75,8 @@ mod tests {
 
     const TAU_S: [f64; 2] = [0.0238, 0.1168];
 
-    /// Reference: an independent NumPy fit of the zero-order-hold model to a sampled continuous 10 Hz sine gave −0.19 % and
-    /// −0.13 %, printed to two digits.
+    /// Reference: an independent NumPy fit of the zero-order-hold model to a sampled continuous 10
+    /// Hz sine gave −0.19 % and −0.13 %, printed to two digits.
     #[test]
     fn zero_order_hold_on_a_sampled_sine_is_off_by_what_an_independent_fit_found() {
         let floor = tone_floor(TAU_S, 0.002, 10.0, Discretisation::ZeroOrderHold).expect("solvable");
@@ -81,8 +84,9 @@ mod tests {
         assert!((floor[1] - -0.0013).abs() < 5e-5, "{floor:?}");
     }
 
-    /// Dividing the held responses `(1 − a)/(e^{jw} − a)` of two sensors and asking for the phase and modulus of the
-    /// continuous ratio gives `τ̂ = (Ts/2)/artanh(tan(ω Ts/2)/(ω τ))` for each. Newton's last step is below 1e-12.
+    /// Dividing the held responses `(1 − a)/(e^{jw} − a)` of two sensors and asking for the phase
+    /// and modulus of the continuous ratio gives `τ̂ = (Ts/2)/artanh(tan(ω Ts/2)/(ω τ))` for each.
+    /// Newton's last step is below 1e-12.
     #[test]
     fn the_zero_order_hold_floor_is_its_closed_form() {
         let w = std::f64::consts::TAU * 10.0;
@@ -93,8 +97,8 @@ mod tests {
         }
     }
 
-    /// The bilinear rule answers a tone as the continuous sensor answers one at `(2/Ts) tan(ω Ts/2)`, so its floor is
-    /// `(ω Ts/2)/tan(ω Ts/2) − 1` exactly, for both.
+    /// The bilinear rule answers a tone as the continuous sensor answers one at
+    /// `(2/Ts) tan(ω Ts/2)`, so its floor is `(ω Ts/2)/tan(ω Ts/2) − 1` exactly, for both.
     #[test]
     fn the_bilinear_floor_is_the_frequency_warp() {
         let half = std::f64::consts::PI * 10.0 * 0.002;
@@ -103,8 +107,8 @@ mod tests {
         assert!(floor.iter().all(|got| (got - want).abs() < 1e-9), "got {floor:?}, want {want}");
     }
 
-    /// The straight line between samples distorts both readings alike, so it leaves less than the hold does; the band-
-    /// limited response leaves nothing but Newton's last step.
+    /// The straight line between samples distorts both readings alike, so it leaves less than the
+    /// hold does; the band- limited response leaves nothing but Newton's last step.
     #[test]
     fn a_first_order_hold_leaves_less_and_the_band_limited_response_nothing() {
         let zero = tone_floor(TAU_S, 0.002, 10.0, Discretisation::ZeroOrderHold).expect("solvable");

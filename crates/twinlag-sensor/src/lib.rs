@@ -1,10 +1,10 @@
 //! How a temperature sensor maps the temperature of the gas to its reading, and back.
 //!
-//! This crate is for anyone who simulates, corrects or fits sensors that lag. It has time constant, sample
-//! period, pole, noise gain, response, frequency response and exact inverse, and computes the error of
-//! each way of going from continuous to sampled time. It knows no files, no costs, no optimisers and no
-//! random numbers. To *find* a time constant use `twinlag` (records in, answers out) or
-//! `twinlag-cross-relation` (the costs alone).
+//! This crate is for anyone who simulates, corrects or fits sensors that lag. It has time constant,
+//! sample period, pole, noise gain, response, frequency response and exact inverse, and computes
+//! the error of each way of going from continuous to sampled time. It knows no files, no costs, no
+//! optimisers and no random numbers. To *find* a time constant use `twinlag` (records in, answers
+//! out) or `twinlag-cross-relation` (the costs alone).
 //!
 //! ```
 //! use twinlag_sensor::{Discretisation, FirstOrder, Lag, tone_floor};
@@ -28,10 +28,11 @@
 //! # Ok::<(), twinlag_sensor::ModelError>(())
 //! ```
 //!
-//! [`FirstOrder::responder`], [`FirstOrder::inverter`] and [`DifferenceEquation::responder`] work sample by
-//! sample, in constant memory. Without the default feature `std` the crate works on machines without an
-//! operating system or an allocator; it then lacks the functions that return a whole record, and dual
-//! numbers. Exponentials are then those of `libm`, which may differ in the last digit.
+//! [`FirstOrder::responder`], [`FirstOrder::inverter`] and [`DifferenceEquation::responder`] work
+//! sample by sample, in constant memory. Without the default feature `std` the crate works on
+//! machines without an operating system or an allocator; it then lacks the functions that return a
+//! whole record, and dual numbers. Exponentials are then those of `libm`, which may differ in the
+//! last digit.
 
 #![cfg_attr(not(feature = "std"), no_std)]
 
@@ -57,8 +58,8 @@ use num_complex::Complex64;
 
 /// A linear sensor of unit static gain, read at a fixed rate.
 pub trait Lag {
-    /// Response of the continuous sensor at `frequency_hz`: what it does to a gas with no power above half the sampling
-    /// rate.
+    /// Response of the continuous sensor at `frequency_hz`: what it does to a gas with no power
+    /// above half the sampling rate.
     fn continuous_response(&self, frequency_hz: f64) -> Complex64;
 
     /// The sampled sensor, for a gas that does between samples what `discretisation` says.

@@ -6,8 +6,8 @@ use core::ops::Neg;
 use num_dual::DualNum;
 use num_traits::NumOps;
 
-/// A number that the formulas of the coefficients take: `f64`, and with the feature `std` every dual number of `num-dual` over
-/// `f64`, which gives derivatives.
+/// A number that the formulas of the coefficients take: `f64`, and with the feature `std` every
+/// dual number of `num-dual` over `f64`, which gives derivatives.
 pub trait Number: Copy + From<f64> + Neg<Output = Self> + NumOps + NumOps<f64> {
     /// The value of the number, without derivatives.
     fn value(self) -> f64;

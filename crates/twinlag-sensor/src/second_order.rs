@@ -33,7 +33,8 @@ impl TryFrom<Unchecked> for SecondOrder {
 }
 
 impl SecondOrder {
-    /// Lags of `tau_s` and `second_tau_s` in series (their order does not matter), read every `period_s`.
+    /// Lags of `tau_s` and `second_tau_s` in series (their order does not matter), read every
+    /// `period_s`.
     ///
     /// # Errors
     /// [`ModelError::NotPositive`] if any of the three is not finite and positive.
@@ -73,8 +74,9 @@ impl Lag for SecondOrder {
     }
 }
 
-/// Partial fractions need distinct poles. Two that lie closer than 2e-5 of their mean are moved that far apart about it:
-/// the response changes by the square of that, 1e-10, and the cancellation between the fractions costs 1e-11.
+/// Partial fractions need distinct poles. Two that lie closer than 2e-5 of their mean are moved
+/// that far apart about it: the response changes by the square of that, 1e-10, and the cancellation
+/// between the fractions costs 1e-11.
 pub(crate) fn apart(slow: f64, fast: f64) -> (f64, f64) {
     const SMALLEST: f64 = 2e-5;
     let mean = 0.5 * (slow + fast);
@@ -90,8 +92,8 @@ mod tests {
     use super::*;
     use crate::FirstOrder;
 
-    /// Two zero-order-hold steps in a row are not the step of the cascade; the closed form of the step response is
-    /// `1 − (τ e^(−t/τ) − τ₂ e^(−t/τ₂))/(τ − τ₂)`.
+    /// Two zero-order-hold steps in a row are not the step of the cascade; the closed form of the
+    /// step response is `1 − (τ e^(−t/τ) − τ₂ e^(−t/τ₂))/(τ − τ₂)`.
     #[test]
     fn a_held_step_is_answered_by_the_closed_form() {
         let (slow, fast, period) = (0.05, 0.011, 0.004);
@@ -108,7 +110,8 @@ mod tests {
         }
     }
 
-    /// The critically damped step response is `1 − (1 + t/τ) e^(−t/τ)`; 1e-9 is ten times what moving the poles apart costs.
+    /// The critically damped step response is `1 − (1 + t/τ) e^(−t/τ)`; 1e-9 is ten times what
+    /// moving the poles apart costs.
     #[test]
     fn equal_poles_are_the_critically_damped_sensor() {
         let (tau, period) = (0.05, 0.004);
@@ -125,8 +128,8 @@ mod tests {
         }
     }
 
-    /// A second lag of a thousandth of the period is gone before the next sample: `exp(−1000)` is zero, and the answer is
-    /// the first-order one delayed by that lag, 1e-3 of a period.
+    /// A second lag of a thousandth of the period is gone before the next sample: `exp(−1000)` is
+    /// zero, and the answer is the first-order one delayed by that lag, 1e-3 of a period.
     #[test]
     fn a_vanishing_second_lag_leaves_the_first_order_sensor() {
         let period = 0.004;

@@ -1,5 +1,5 @@
-//! Heat that arrives through the support: `((1 − φ) + φ/(1 + s τ_s))/(1 + s τ)`. A fraction `φ` of the final reading
-//! comes with the support's own, longer time constant.
+//! Heat that arrives through the support: `((1 − φ) + φ/(1 + s τ_s))/(1 + s τ)`. A fraction `φ` of
+//! the final reading comes with the support's own, longer time constant.
 
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
@@ -12,8 +12,9 @@ use crate::second_order::apart;
 /// A first-order sensor with a slow parallel path, unit static gain, read at a fixed rate.
 ///
 /// # Source
-/// The form used for aircraft probes: `τ₁ dT_m/dt = a T + (1 − a) T_s − T_m`, `τ₂ dT_s/dt = T − T_s` with `a = 1 − φ`
-/// (Friehe and Khelif; parameters in the Ranadu package of NCAR).
+/// The form used for aircraft probes: `τ₁ dT_m/dt = a T + (1 − a) T_s − T_m`,
+/// `τ₂ dT_s/dt = T − T_s` with `a = 1 − φ` (Friehe and Khelif; parameters in the Ranadu package of
+/// NCAR).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked")]
 pub struct SlowMode {
@@ -41,11 +42,12 @@ impl TryFrom<Unchecked> for SlowMode {
 }
 
 impl SlowMode {
-    /// Direct path `tau_s`, a `fraction` of the reading arriving through a support of `slow_tau_s`, read every `period_s`.
+    /// Direct path `tau_s`, a `fraction` of the reading arriving through a support of `slow_tau_s`,
+    /// read every `period_s`.
     ///
     /// # Errors
-    /// [`ModelError::NotPositive`] for times that are not finite and positive, [`ModelError::OutOfRange`] for a fraction
-    /// outside [0, 1).
+    /// [`ModelError::NotPositive`] for times that are not finite and positive,
+    /// [`ModelError::OutOfRange`] for a fraction outside [0, 1).
     pub fn new(tau_s: f64, fraction: f64, slow_tau_s: f64, period_s: f64) -> Result<Self, ModelError> {
         if !(0.0..1.0).contains(&fraction) {
             return Err(ModelError::OutOfRange { name: "slow fraction", low: 0.0, high: 1.0, value: fraction });
@@ -96,8 +98,8 @@ mod tests {
     use super::*;
     use crate::FirstOrder;
 
-    /// The published pair of heat balances, integrated with steps so small (Ts/2000) that Heun's error, `(h/τ)² ≈ 1e-8`
-    /// per unit, is below the tolerance.
+    /// The published pair of heat balances, integrated with steps so small (Ts/2000) that Heun's
+    /// error, `(h/τ)² ≈ 1e-8` per unit, is below the tolerance.
     #[test]
     fn a_held_step_is_answered_as_by_the_two_heat_balances() {
         let (tau, fraction, support, period) = (0.0308, 0.267, 0.447, 0.01);

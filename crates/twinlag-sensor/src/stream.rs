@@ -1,10 +1,10 @@
-//! Sensors sample by sample, in constant memory and without allocation. Each gives exactly the values of
-//! the method for a whole record.
+//! Sensors sample by sample, in constant memory and without allocation. Each gives exactly the
+//! values of the method for a whole record.
 
 use crate::difference::DifferenceEquation;
 
-/// The reading of a [`crate::FirstOrder`] sensor, one gas temperature after the other, held between samples:
-/// `y[0] = x[0]`, `y[k] = a y[k−1] + (1 − a) x[k−1]`.
+/// The reading of a [`crate::FirstOrder`] sensor, one gas temperature after the other, held between
+/// samples: `y[0] = x[0]`, `y[k] = a y[k−1] + (1 − a) x[k−1]`.
 ///
 /// ```
 /// let mut responder = twinlag_sensor::FirstOrder::new(0.0238, 0.002)?.responder();
@@ -41,11 +41,11 @@ impl FirstOrderResponder {
     }
 }
 
-/// The gas temperature from the reading of a [`crate::FirstOrder`] sensor, one reading after the other:
-/// `f[k−1] = (y[k] − a y[k−1])/(1 − a)`.
+/// The gas temperature from the reading of a [`crate::FirstOrder`] sensor, one reading after the
+/// other: `f[k−1] = (y[k] − a y[k−1])/(1 − a)`.
 ///
-/// Exact inverse of [`FirstOrderResponder`], one sample later, whatever the state before the first reading. Measurement noise is
-/// amplified by `(1 + a²)/(1 − a)²` in variance.
+/// Exact inverse of [`FirstOrderResponder`], one sample later, whatever the state before the first
+/// reading. Measurement noise is amplified by `(1 + a²)/(1 − a)²` in variance.
 ///
 /// ```
 /// let sensor = twinlag_sensor::FirstOrder::new(0.0238, 0.002)?;
@@ -79,7 +79,8 @@ impl FirstOrderInverter {
     }
 }
 
-/// The reading of any sensor that has a [`DifferenceEquation`], one gas temperature after the other, at rest in the first.
+/// The reading of any sensor that has a [`DifferenceEquation`], one gas temperature after the
+/// other, at rest in the first.
 ///
 /// ```
 /// use twinlag_sensor::{Discretisation, Lag, SecondOrder};

@@ -1,4 +1,5 @@
-//! The analogue-to-digital converter: rounding to the nearest multiple of the step, then saturation.
+//! The analogue-to-digital converter: rounding to the nearest multiple of the step, then
+//! saturation.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +10,8 @@ use crate::check::{below, finite, positive};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Adc {
-    /// Readings are rounded to multiples of this, K (halves away from zero). Not rounded if left out.
+    /// Readings are rounded to multiples of this, K (halves away from zero). Not rounded if left
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub step_k: Option<f64>,
     /// Lowest reading, °C.

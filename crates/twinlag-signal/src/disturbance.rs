@@ -1,4 +1,5 @@
-//! What is added to a channel between the sensor and the converter, noise aside: contact, drift, mains, crosstalk.
+//! What is added to a channel between the sensor and the converter, noise aside: contact, drift,
+//! mains, crosstalk.
 
 use rand::Rng;
 

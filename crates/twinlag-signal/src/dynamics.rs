@@ -1,19 +1,22 @@
-//! How a sensor moves: its state, the derivative of it, and the classical fourth-order Runge-Kutta rule.
+//! How a sensor moves: its state, the derivative of it, and the classical fourth-order Runge-Kutta
+//! rule.
 //!
-//! The rule's error is of order `(h/τ)⁴` for a gas that is smooth on the scale of a step `h`: at `h = τ/100` about
-//! 1e-10 of the swing. A gas held over each sample period is constant within every step, and never seen across its
-//! jump.
+//! The rule's error is of order `(h/τ)⁴` for a gas that is smooth on the scale of a step `h`: at
+//! `h = τ/100` about 1e-10 of the swing. A gas held over each sample period is constant within
+//! every step, and never seen across its jump.
 //!
-//! A new physical effect is a term in [`Sensor::derivative`], or in [`Sensor::calibrated_c`] if it acts on the reading.
+//! A new physical effect is a term in [`Sensor::derivative`], or in [`Sensor::calibrated_c`] if it
+//! acts on the reading.
 //!
-//! Readings between two steps, which a delay asks for, are interpolated by the cubic with the states and slopes of both
-//! (Hermite): its error is `h⁴ |T⁗|/384`.
+//! Readings between two steps, which a delay asks for, are interpolated by the cubic with the
+//! states and slopes of both (Hermite): its error is `h⁴ |T⁗|/384`.
 
 use crate::effects::Play;
 use crate::gas::GasPath;
 use crate::{Flow, Hold, Sensor};
 
-/// Temperatures of the sensor's bodies, °C: first pole, second pole, slow body. Bodies that a sensor lacks stay put.
+/// Temperatures of the sensor's bodies, °C: first pole, second pole, slow body. Bodies that a
+/// sensor lacks stay put.
 pub(crate) type State = [f64; 3];
 
 impl Sensor {
@@ -56,7 +59,8 @@ impl Sensor {
         }
     }
 
-    /// When the samples from time zero on are read, in integration steps after the start of the run-in, not before it.
+    /// When the samples from time zero on are read, in integration steps after the start of the
+    /// run-in, not before it.
     fn read_at_steps(&self, gas: &GasPath, oversampling: usize) -> Vec<f64> {
         let grid = gas.grid;
         let (samples, settle) = (grid.samples(), grid.before / grid.per_sample);
@@ -71,8 +75,8 @@ impl Sensor {
             .collect()
     }
 
-    /// Readings at the sample instants from time zero on, °C. Starts in equilibrium with the gas at the grid's start,
-    /// radiation aside.
+    /// Readings at the sample instants from time zero on, °C. Starts in equilibrium with the gas at
+    /// the grid's start, radiation aside.
     ///
     /// - `flow`: what the flow does to the first time constant
     /// - `oversampling`: integration steps per sample period, the number with which `gas` was made
@@ -81,7 +85,8 @@ impl Sensor {
         let step_s = grid.sample_period_s() / oversampling as f64;
         let samples = grid.samples();
         let read_at = self.read_at_steps(gas, oversampling);
-        // A slipping clock reads some times twice: in the order of time, and each put where it belongs.
+        // A slipping clock reads some times twice: in the order of time, and each put where it
+        // belongs.
         let mut order: Vec<usize> = (0..read_at.len()).collect();
         order.sort_by(|&a, &b| read_at[a].total_cmp(&read_at[b]));
         let mut pending = order.into_iter().peekable();

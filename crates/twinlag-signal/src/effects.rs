@@ -1,5 +1,5 @@
-//! Effects beyond lags, gain, offset, white noise and converter: what else a sensor, its wiring and the gas may do.
-//! One file each. Every one is off if left out.
+//! Effects beyond lags, gain, offset, white noise and converter: what else a sensor, its wiring and
+//! the gas may do. One file each. Every one is off if left out.
 
 mod clock_slip;
 mod coloured_noise;

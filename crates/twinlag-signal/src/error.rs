@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a rig was refused or could not be simulated. `field` is the path in the rig file, such as `sensors[1].gain`.
+/// Why a rig was refused or could not be simulated. `field` is the path in the rig file, such as
+/// `sensors[1].gain`.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]

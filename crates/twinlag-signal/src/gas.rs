@@ -25,7 +25,8 @@ pub use turbulence::Turbulence;
 
 /// The gas that both sensors see: a mean and a signal about it.
 ///
-/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Gas::new`]; fields may be added.
+/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Gas::new`]; fields
+/// may be added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Gas {
@@ -35,11 +36,13 @@ pub struct Gas {
     /// What happens between the samples.
     #[serde(default)]
     pub hold: Hold,
-    /// Whether every trial has its own signal; otherwise all have that of trial 0, and differ by their noise alone.
+    /// Whether every trial has its own signal; otherwise all have that of trial 0, and differ by
+    /// their noise alone.
     #[serde(default)]
     pub per_trial: bool,
     /// The signal, named by `kind` in a rig file; its fields stand beside those above.
-    // Unknown fields land here, and each kind refuses them: `deny_unknown_fields` and `flatten` exclude each other.
+    // Unknown fields land here, and each kind refuses them: `deny_unknown_fields` and `flatten`
+    // exclude each other.
     #[serde(flatten)]
     pub signal: Signal,
 }
@@ -51,13 +54,14 @@ pub enum Hold {
     /// It goes on as the signal does.
     #[default]
     Continuous,
-    /// It keeps the value of the sample instant until the next (zero-order hold), so that the discrete model
-    /// `y[k+1] = a y[k] + (1 − a) x[k]`, `a = exp(−Ts/τ)`, of a first-order sensor is exact.
+    /// It keeps the value of the sample instant until the next (zero-order hold), so that the
+    /// discrete model `y[k+1] = a y[k] + (1 − a) x[k]`, `a = exp(−Ts/τ)`, of a first-order sensor
+    /// is exact.
     ZeroOrder,
 }
 
-/// A gas signal. In a rig file `kind` is the variant's name: `sine`, `multi-tone`, `engine`, `turbulence`, `plunge`,
-/// `broadband` or `series`.
+/// A gas signal. In a rig file `kind` is the variant's name: `sine`, `multi-tone`, `engine`,
+/// `turbulence`, `plunge`, `broadband` or `series`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -100,22 +104,24 @@ impl Gas {
     }
 }
 
-/// Whether the integration step follows a signal: ten steps per period at least, where the rule's error is
-/// `(2π/10)⁴/2880` of the amplitude or 5e-5.
+/// Whether the integration step follows a signal: ten steps per period at least, where the rule's
+/// error is `(2π/10)⁴/2880` of the amplitude or 5e-5.
 #[derive(Clone, Copy)]
 pub(crate) struct Resolution<'a> {
     record: Option<&'a Record>,
 }
 
 impl<'a> Resolution<'a> {
-    /// A held gas is taken at the sample instants alone: nothing happens between them that a step could miss.
+    /// A held gas is taken at the sample instants alone: nothing happens between them that a step
+    /// could miss.
     pub(crate) fn new(hold: Hold, record: &'a Record) -> Self {
         Self { record: (hold == Hold::Continuous).then_some(record) }
     }
 
     const STEPS_PER_PERIOD: f64 = 10.0;
 
-    /// Refuses `frequency_hz` if it is too fast, naming the field `name`, whose own value is `value`.
+    /// Refuses `frequency_hz` if it is too fast, naming the field `name`, whose own value is
+    /// `value`.
     fn check(self, within: &str, name: &str, value: f64, frequency_hz: f64) -> Result<(), SignalError> {
         let Some(record) = self.record else { return Ok(()) };
         let step_s = record.step_s();

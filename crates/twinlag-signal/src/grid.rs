@@ -2,10 +2,12 @@
 
 use crate::{Hold, Record, SignalError};
 
-/// Most integration steps in one simulation. The gas is stored at every half step: 3.2 GB at this limit.
+/// Most integration steps in one simulation. The gas is stored at every half step: 3.2 GB at this
+/// limit.
 const MOST_STEPS: f64 = 2e8;
 
-/// Refuses a simulation of more than [`MOST_STEPS`]; `field` is what drives the number besides the record's size.
+/// Refuses a simulation of more than [`MOST_STEPS`]; `field` is what drives the number besides the
+/// record's size.
 pub(crate) fn check_size(steps: f64, field: &str) -> Result<(), SignalError> {
     if steps <= MOST_STEPS {
         Ok(())
@@ -16,8 +18,9 @@ pub(crate) fn check_size(steps: f64, field: &str) -> Result<(), SignalError> {
 
 /// Evenly spaced times at which a gas signal is generated; time zero is a point of it.
 ///
-/// For a continuous gas these are the half steps of the integration, which is where the Runge-Kutta rule asks for it;
-/// for a held gas the sample instants, so that its random numbers do not depend on the oversampling.
+/// For a continuous gas these are the half steps of the integration, which is where the Runge-Kutta
+/// rule asks for it; for a held gas the sample instants, so that its random numbers do not depend
+/// on the oversampling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Grid {
     /// Spacing, s.

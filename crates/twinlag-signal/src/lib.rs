@@ -1,14 +1,16 @@
 //! Two-sensor records from a described rig, integrated in continuous time.
 //!
-//! A [`Rig`] says what gas flows past two temperature sensors, how each sensor follows it and how it is read: it is a
-//! TOML (or JSON) file, or built in Rust. [`Rig::simulate`] returns the record that such a rig would have written, with
-//! the true gas temperature beside it. The sensors are differential equations, integrated by the classical fourth-order
-//! Runge-Kutta rule on a grid much finer than the sampling; noise and rounding come last.
+//! A [`Rig`] says what gas flows past two temperature sensors, how each sensor follows it and how
+//! it is read: it is a TOML (or JSON) file, or built in Rust. [`Rig::simulate`] returns the record
+//! that such a rig would have written, with the true gas temperature beside it. The sensors are
+//! differential equations, integrated by the classical fourth-order Runge-Kutta rule on a grid much
+//! finer than the sampling; noise and rounding come last.
 //!
-//! Who should use it: someone who tests an identification method, or teaches one, and needs records whose truth is
-//! known. Someone who wants the *formulae* of a sensor (its discrete pole, its inverse, its frequency response) should
-//! take `twinlag-sensor` instead, and someone with measured records `twinlag-record`. This crate depends on neither, on
-//! purpose: a record is never made by the code that explains it.
+//! Who should use it: someone who tests an identification method, or teaches one, and needs records
+//! whose truth is known. Someone who wants the *formulae* of a sensor (its discrete pole, its
+//! inverse, its frequency response) should take `twinlag-sensor` instead, and someone with measured
+//! records `twinlag-record`. This crate depends on neither, on purpose: a record is never made by
+//! the code that explains it.
 //!
 //! # Example
 //!
@@ -53,18 +55,20 @@
 //!
 //! # Effects
 //!
-//! Two first-order lags in white noise are where a rig starts. A [`Sensor`] may have more: further poles, radiation, a
-//! time constant that depends on temperature, a curved calibration, delay, drift, mains pick-up, crosstalk, noise with a
-//! memory, spikes, and some defects; the two share a [`Flow`] that changes, or meet slightly different gas
-//! ([`Mismatch`]). Each is off if left out, and its documentation says the formula. [`undeclared`] draws rigs with one of
-//! them at random, for the trial of a diagnosis.
+//! Two first-order lags in white noise are where a rig starts. A [`Sensor`] may have more: further
+//! poles, radiation, a time constant that depends on temperature, a curved calibration, delay,
+//! drift, mains pick-up, crosstalk, noise with a memory, spikes, and some defects; the two share a
+//! [`Flow`] that changes, or meet slightly different gas ([`Mismatch`]). Each is off if left out,
+//! and its documentation says the formula. [`undeclared`] draws rigs with one of them at random,
+//! for the trial of a diagnosis.
 //!
 //! # What the numbers mean
 //!
-//! Temperatures are in °C (`_c`), differences of temperature in K (`_k`), times in s, frequencies in Hz. The record's
-//! first sample is at time zero; the run-in before it ([`Record::settle_s`]) has negative times. Random numbers are
-//! ChaCha with eight rounds, one stream per trial and purpose ([`Rig::noise_streams`]): the same rig and trial give the
-//! same bytes on any number of threads.
+//! Temperatures are in °C (`_c`), differences of temperature in K (`_k`), times in s, frequencies
+//! in Hz. The record's first sample is at time zero; the run-in before it ([`Record::settle_s`])
+//! has negative times. Random numbers are ChaCha with eight rounds, one stream per trial and
+//! purpose ([`Rig::noise_streams`]): the same rig and trial give the same bytes on any number of
+//! threads.
 
 mod adc;
 mod check;

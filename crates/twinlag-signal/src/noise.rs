@@ -1,5 +1,5 @@
-//! Channel noise: Gaussian, white or AR(1): `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, started in its stationary state, so
-//! that its standard deviation is `s` at every sample.
+//! Channel noise: Gaussian, white or AR(1): `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, started in its
+//! stationary state, so that its standard deviation is `s` at every sample.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -14,7 +14,8 @@ use crate::check::{not_negative, path};
 pub struct Noise {
     /// Marginal standard deviation `s`, K; 0 is allowed.
     pub std_k: f64,
-    /// Correlation ρ of one sample with the next, between −1 and 1 (both excluded); 0 if left out: white noise.
+    /// Correlation ρ of one sample with the next, between −1 and 1 (both excluded); 0 if left out:
+    /// white noise.
     #[serde(default)]
     pub ar1: f64,
 }

@@ -7,7 +7,8 @@ use crate::{SignalError, grid};
 
 /// How many samples are taken, how often, and how finely the physics is integrated between them.
 ///
-/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Record::new`]; fields may be added.
+/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Record::new`]; fields
+/// may be added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -19,11 +20,12 @@ pub struct Record {
     /// Integration steps per sample period; 24 if left out.
     #[serde(default = "default_oversampling")]
     pub oversampling: usize,
-    /// Run-in before the first sample with the gas signal running, s, rounded up to whole sample periods.
+    /// Run-in before the first sample with the gas signal running, s, rounded up to whole sample
+    /// periods.
     ///
-    /// Left out: ten times the slowest time constant, after which 5e-5 of any start error is left, and the longest
-    /// delay. At the start of the
-    /// run-in both sensors are in equilibrium with the gas of that moment.
+    /// Left out: ten times the slowest time constant, after which 5e-5 of any start error is left,
+    /// and the longest delay. At the start of the run-in both sensors are in equilibrium with the
+    /// gas of that moment.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settle_s: Option<f64>,
 }
@@ -33,7 +35,8 @@ fn default_oversampling() -> usize {
 }
 
 impl Record {
-    /// `samples` readings, `sample_period_s` apart, with 24 integration steps between them and the default run-in.
+    /// `samples` readings, `sample_period_s` apart, with 24 integration steps between them and the
+    /// default run-in.
     pub fn new(samples: usize, sample_period_s: f64) -> Self {
         Self { samples, sample_period_s, oversampling: default_oversampling(), settle_s: None }
     }

@@ -13,7 +13,8 @@ use crate::{Clean, Flow, Gas, Mismatch, Record, Sensor, SignalError, Simulated};
 
 const WITHIN: [&str; 2] = ["sensors[0]", "sensors[1]"];
 
-/// A described rig, valid by construction; deserialising checks it as [`Rig::new`] does, and refuses unknown fields.
+/// A described rig, valid by construction; deserialising checks it as [`Rig::new`] does, and
+/// refuses unknown fields.
 ///
 /// The seed must be below 2⁶³ to be written as TOML.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,9 +61,10 @@ impl Rig {
     /// A rig from its parts, with steady flow and one gas for both sensors.
     ///
     /// # Errors
-    /// Any number that is not finite, or not positive where it must be; channel names empty or equal; an integration
-    /// step as long as a time constant ([`SignalError::StepTooLong`]) or too long for the gas
-    /// ([`SignalError::NotResolved`]); more than 2e8 integration steps ([`SignalError::TooLarge`]).
+    /// Any number that is not finite, or not positive where it must be; channel names empty or
+    /// equal; an integration step as long as a time constant ([`SignalError::StepTooLong`]) or too
+    /// long for the gas ([`SignalError::NotResolved`]); more than 2e8 integration steps
+    /// ([`SignalError::TooLarge`]).
     pub fn new(seed: u64, record: Record, gas: Gas, sensors: [Sensor; 2]) -> Result<Self, SignalError> {
         Self { seed, record, gas, sensors, flow: None, mismatch: None, base_dir: PathBuf::new() }.checked()
     }
@@ -106,7 +108,8 @@ impl Rig {
         Ok(self)
     }
 
-    /// This rig, with relative paths of a gas series taken from `dir` (usually the directory of the rig file).
+    /// This rig, with relative paths of a gas series taken from `dir` (usually the directory of the
+    /// rig file).
     #[must_use]
     pub fn with_base_dir(mut self, dir: impl AsRef<Path>) -> Self {
         dir.as_ref().clone_into(&mut self.base_dir);
@@ -160,7 +163,8 @@ impl Rig {
 
     /// The record of one trial: its own noise and, if [`Gas::per_trial`], its own gas signal.
     ///
-    /// For many trials of one gas signal, call [`Rig::clean`] once and [`Clean::with_noise`] for each: same bytes.
+    /// For many trials of one gas signal, call [`Rig::clean`] once and [`Clean::with_noise`] for
+    /// each: same bytes.
     ///
     /// # Errors
     /// As [`Rig::clean`].
@@ -168,12 +172,13 @@ impl Rig {
         Ok(self.clean(trial)?.with_noise(&mut self.noise_streams(trial)))
     }
 
-    /// The record of one trial before noise and ADC. Does not depend on `trial` unless [`Gas::per_trial`].
+    /// The record of one trial before noise and ADC. Does not depend on `trial` unless
+    /// [`Gas::per_trial`].
     ///
     /// # Errors
-    /// What a gas series may meet: a file that cannot be read, a line that is not two numbers, times that do not
-    /// increase, an end before the record's. [`SignalError::Diverged`], if radiation or a temperature-dependent time
-    /// constant led to readings that are not finite.
+    /// What a gas series may meet: a file that cannot be read, a line that is not two numbers,
+    /// times that do not increase, an end before the record's. [`SignalError::Diverged`], if
+    /// radiation or a temperature-dependent time constant led to readings that are not finite.
     pub fn clean(&self, trial: u64) -> Result<Clean, SignalError> {
         let settle_samples = self.record.settle_samples(self.run_in_s()) as usize;
         let grid = Grid::new(&self.record, settle_samples, self.gas.hold);
@@ -227,8 +232,9 @@ impl Rig {
         first_s.max(second_s)
     }
 
-    /// The generators of the two channels' noise in one trial: streams `8 · trial + 1` and `8 · trial + 2` of the seed
-    /// (`8 · trial` is the gas; from 3 on come what other effects draw).
+    /// The generators of the two channels' noise in one trial: streams `8 · trial + 1` and
+    /// `8 · trial + 2` of the seed (`8 · trial` is the gas; from 3 on come what other effects
+    /// draw).
     pub fn noise_streams(&self, trial: u64) -> [ChaCha8Rng; 2] {
         [Purpose::FirstNoise, Purpose::SecondNoise].map(|purpose| stream(self.seed, trial, purpose))
     }

@@ -10,16 +10,18 @@ use crate::{
 
 /// One sensor and its channel: reading = ADC(calibration(junction) + disturbances + noise).
 ///
-/// The junction follows the gas with one pole, or two in series, beside which a slow path may carry a part:
-/// `H(s) = [(1 − φ) + φ/(1 + s τ_slow)] / ((1 + s τ)(1 + s τ₂))`. Radiation and a time constant that depends on
-/// temperature or flow make the first pole nonlinear or time-varying. The reading of a junction at `T` is
-/// `gain · T + offset + curvature · (T − about)²`.
+/// The junction follows the gas with one pole, or two in series, beside which a slow path may carry
+/// a part: `H(s) = [(1 − φ) + φ/(1 + s τ_slow)] / ((1 + s τ)(1 + s τ₂))`. Radiation and a time
+/// constant that depends on temperature or flow make the first pole nonlinear or time-varying. The
+/// reading of a junction at `T` is `gain · T + offset + curvature · (T − about)²`.
 ///
-/// What happens on the way from the gas to the record, in this order: [`Mismatch`](crate::Mismatch), the poles and the
-/// slow path, hysteresis, calibration, delay, clock slip and replacement, intermittent contact, drift, mains,
-/// crosstalk; then noise, coloured noise, spikes and ADC.
+/// What happens on the way from the gas to the record, in this order:
+/// [`Mismatch`](crate::Mismatch), the poles and the slow path, hysteresis, calibration, delay,
+/// clock slip and replacement, intermittent contact, drift, mains, crosstalk; then noise, coloured
+/// noise, spikes and ADC.
 ///
-/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Sensor::new`]; fields may be added.
+/// Plain data, checked when a [`Rig`](crate::Rig) is made of it. Start from [`Sensor::new`]; fields
+/// may be added.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -34,24 +36,25 @@ pub struct Sensor {
     /// Added to the reading, K; 0 if left out.
     #[serde(default)]
     pub offset_k: f64,
-    /// Curvature of the calibration, 1/K: `curvature_per_k · (T − curvature_about_c)²` is added to the reading of a
-    /// junction at `T`; 0 if left out.
+    /// Curvature of the calibration, 1/K: `curvature_per_k · (T − curvature_about_c)²` is added to
+    /// the reading of a junction at `T`; 0 if left out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub curvature_per_k: f64,
     /// Temperature at which the curvature adds nothing, °C; 0 if left out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub curvature_about_c: f64,
-    /// Delay of the channel, s, at least 0: the reading at `t` is that of the junction at `t − delay_s`, interpolated
-    /// between integration steps by cubics with an error of `h⁴ |T⁗|/384`; 0 if left out. Before the start of the run-in
-    /// the sensor rests.
+    /// Delay of the channel, s, at least 0: the reading at `t` is that of the junction at
+    /// `t − delay_s`, interpolated between integration steps by cubics with an error of
+    /// `h⁴ |T⁗|/384`; 0 if left out. Before the start of the run-in the sensor rests.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub delay_s: f64,
-    /// Drift of the channel, K/s: `drift_k_per_s · (t − t_mid)` is added, `t_mid` half-way between the record's first
-    /// and last sample; 0 if left out.
+    /// Drift of the channel, K/s: `drift_k_per_s · (t − t_mid)` is added, `t_mid` half-way between
+    /// the record's first and last sample; 0 if left out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub drift_k_per_s: f64,
-    /// Part ε of the other channel's signal that is picked up: `y₁ → y₁ + ε (y₂ − mean(y₂))`, both taken before noise
-    /// and before the other's own crosstalk, the mean over the record; 0 if left out. Between −1 and 1.
+    /// Part ε of the other channel's signal that is picked up: `y₁ → y₁ + ε (y₂ − mean(y₂))`, both
+    /// taken before noise and before the other's own crosstalk, the mean over the record; 0 if left
+    /// out. Between −1 and 1.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub crosstalk: f64,
     /// Time constant τ₂ of a second pole in series, s.
@@ -95,8 +98,8 @@ pub struct Sensor {
     pub adc: Option<Adc>,
 }
 
-/// A part of the reading that arrives through a slower body: `y = (1 − φ) x + φ z`, `τ_slow dz/dt = x − z`, where `x`
-/// is what the sensor would read without it.
+/// A part of the reading that arrives through a slower body: `y = (1 − φ) x + φ z`,
+/// `τ_slow dz/dt = x − z`, where `x` is what the sensor would read without it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlowMode {
@@ -156,7 +159,8 @@ impl Sensor {
         .flatten()
     }
 
-    /// Run-in after which the sensor has forgotten its start: ten times its longest time constant, and its delay, s.
+    /// Run-in after which the sensor has forgotten its start: ten times its longest time constant,
+    /// and its delay, s.
     pub(crate) fn run_in_s(&self, flow: Option<&Flow>) -> f64 {
         let longest = flow.map_or(1.0, |flow| flow.range()[1]);
         let slowest_s = self
@@ -225,10 +229,11 @@ impl Sensor {
         Ok(())
     }
 
-    /// Refuses a step as long as a time constant, long before the rule's limit of stability at 2.785.
+    /// Refuses a step as long as a time constant, long before the rule's limit of stability at
+    /// 2.785.
     ///
-    /// What shortens a time constant counts: the flow at its least factor; radiation and the dependence on temperature at
-    /// the mean temperature of the gas.
+    /// What shortens a time constant counts: the flow at its least factor; radiation and the
+    /// dependence on temperature at the mean temperature of the gas.
     pub(crate) fn check_step(
         &self,
         within: &str,

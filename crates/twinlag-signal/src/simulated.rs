@@ -11,9 +11,11 @@ use crate::Sensor;
 pub struct Clean {
     /// Sample instants, s, `[n]`; the first is 0.
     pub time_s: Vec<f64>,
-    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds from there on.
+    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds
+    /// from there on.
     pub gas_c: Vec<f64>,
-    /// Both sensors' readings with calibration and disturbances, before noise, spikes and ADC, °C, `[n]` each.
+    /// Both sensors' readings with calibration and disturbances, before noise, spikes and ADC, °C,
+    /// `[n]` each.
     pub readings_c: [Vec<f64>; 2],
     pub(crate) sensors: [Sensor; 2],
     pub(crate) sample_period_s: f64,
@@ -29,7 +31,8 @@ pub struct Simulated {
     pub t1_c: Vec<f64>,
     /// Readings of the second channel, °C, `[n]`.
     pub t2_c: Vec<f64>,
-    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds from there on.
+    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds
+    /// from there on.
     pub gas_c: Vec<f64>,
     /// Names of the two channels.
     pub channels: [String; 2],
@@ -38,10 +41,11 @@ pub struct Simulated {
 impl Clean {
     /// Adds each channel's noise and spikes and passes it through its ADC.
     ///
-    /// - `noise`: one generator per channel, such as [`Rig::noise_streams`](crate::Rig::noise_streams); first
-    ///   one number per sample is drawn from it for the noise, then one for the coloured noise, then one or two for the
-    ///   spikes; none for what the channel does not have. So coloured noise does not move the other noise, nor spikes
-    ///   either
+    /// - `noise`: one generator per channel, such as
+    ///   [`Rig::noise_streams`](crate::Rig::noise_streams); first one number per sample is drawn
+    ///   from it for the noise, then one for the coloured noise, then one or two for the spikes;
+    ///   none for what the channel does not have. So coloured noise does not move the other noise,
+    ///   nor spikes either
     pub fn with_noise(&self, noise: &mut [impl Rng; 2]) -> Simulated {
         let [first, second] = noise;
         Simulated {

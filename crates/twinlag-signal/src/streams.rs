@@ -1,8 +1,9 @@
 //! Which random stream serves what: one ChaCha stream per trial and purpose.
 //!
-//! Stream `8 · trial + purpose` of the rig's seed. Purposes: 0 gas, 1 and 2 noise of the first and second channel, 3 the
-//! mismatch of the gas, 4 and 5 the contacts of the first and second channel; 6 is kept free, so that a new purpose
-//! will move no existing number. 7 is no rig's: random rigs are drawn from it. Trials are counted below 2⁶¹.
+//! Stream `8 · trial + purpose` of the rig's seed. Purposes: 0 gas, 1 and 2 noise of the first and
+//! second channel, 3 the mismatch of the gas, 4 and 5 the contacts of the first and second channel;
+//! 6 is kept free, so that a new purpose will move no existing number. 7 is no rig's: random rigs
+//! are drawn from it. Trials are counted below 2⁶¹.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

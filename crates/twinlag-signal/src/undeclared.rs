@@ -1,8 +1,9 @@
 //! Random rigs with an effect unknown to the reader of the record, for testing a diagnosis.
 //!
-//! [`undeclared`] draws sampling, gas, two first-order sensors and their noise, and puts the effects asked for into one
-//! of the sensors, or into both where that is their nature. What was drawn is known: [`Undeclared::kinds`], the
-//! [`rig`](Undeclared::rig) itself, and with it the true gas temperature.
+//! [`undeclared`] draws sampling, gas, two first-order sensors and their noise, and puts the
+//! effects asked for into one of the sensors, or into both where that is their nature. What was
+//! drawn is known: [`Undeclared::kinds`], the [`rig`](Undeclared::rig) itself, and with it the true
+//! gas temperature.
 //!
 //! | drawn | from |
 //! |---|---|
@@ -14,11 +15,11 @@
 //! | characteristic frequency of the gas | 0.07 to 0.2 over the fast time constant |
 //! | noise of each channel, white | 0.2 to 3 % of the gas's standard deviation |
 //!
-//! One seed gives one such rig, whatever the effect: `undeclared(&[Kind::None], ..)` is the same rig without it, in the
-//! same gas and the same white noise.
+//! One seed gives one such rig, whatever the effect: `undeclared(&[Kind::None], ..)` is the same
+//! rig without it, in the same gas and the same white noise.
 //!
-//! The sizes, each log-uniform within its range and then multiplied by the size factor (`scale` is the gas's standard
-//! deviation, `noise` that of the channel, `τ` the sensor's time constant):
+//! The sizes, each log-uniform within its range and then multiplied by the size factor (`scale` is
+//! the gas's standard deviation, `noise` that of the channel, `τ` the sensor's time constant):
 //!
 //! | kind | size | range |
 //! |---|---|---|
@@ -81,7 +82,8 @@ pub struct Undeclared {
     pub kinds: Vec<Kind>,
     /// The sensor that has the first of them: 0 or 1; none if both have it, or if there is none.
     pub channel: Option<usize>,
-    /// Size of the first of them, in [`Kind::unit`]; the table of [the module](self) says of what. 0 if there is none.
+    /// Size of the first of them, in [`Kind::unit`]; the table of [the module](self) says of what.
+    /// 0 if there is none.
     pub size: f64,
     /// Every one of them, in the order of `kinds`.
     pub placed: Vec<Placed>,
@@ -114,8 +116,8 @@ impl Undeclared {
         self.rig.simulate()
     }
 
-    /// What a library of effects calls those that are in the rig ([`Kind::effect`]), each once, in the order of
-    /// [`Undeclared::kinds`].
+    /// What a library of effects calls those that are in the rig ([`Kind::effect`]), each once, in
+    /// the order of [`Undeclared::kinds`].
     pub fn effects(&self) -> Vec<&'static str> {
         let mut effects: Vec<&'static str> = Vec::new();
         for effect in self.kinds.iter().filter_map(|kind| kind.effect()) {
@@ -129,15 +131,16 @@ impl Undeclared {
 
 /// A random rig with the given effects; the tables of [the module](self) say what is drawn.
 ///
-/// - `kinds`: what it has; a kind named twice counts once, [`Kind::None`] and an empty list are no effect
-/// - `size_factor`: multiplies every size, positive; sizes that would have no meaning (a fraction above 1, a lag too
-///   short to integrate) stay at the limit
+/// - `kinds`: what it has; a kind named twice counts once, [`Kind::None`] and an empty list are no
+///   effect
+/// - `size_factor`: multiplies every size, positive; sizes that would have no meaning (a fraction
+///   above 1, a lag too short to integrate) stay at the limit
 /// - `gas`: the kind of gas, drawn if none
 /// - `seed`: the same seed gives the same rig and record; its highest bit is ignored
 ///
 /// # Errors
-/// [`SignalError::NotPositive`], if the size factor is not finite and positive. Anything that [`Rig::new`] refuses, at
-/// size factors far above 1.
+/// [`SignalError::NotPositive`], if the size factor is not finite and positive. Anything that
+/// [`Rig::new`] refuses, at size factors far above 1.
 pub fn undeclared(
     kinds: &[Kind],
     size_factor: f64,

@@ -26,7 +26,8 @@ impl fmt::Display for Gap {
 
 /// Why a study could not run, or its parts could not be used.
 ///
-/// A message is whole: what caused the error is in it, and in its field, but not repeated by `Error::source`.
+/// A message is whole: what caused the error is in it, and in its field, but not repeated by
+/// `Error::source`.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]

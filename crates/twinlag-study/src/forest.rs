@@ -1,9 +1,10 @@
 //! Merging pieces that arrive in any order as if they had arrived in one.
 //!
-//! Over `blocks` pieces stands one binary tree: node `i` of level `l` covers the blocks from `i 2^l` up to `(i + 1) 2^l`, as
-//! far as there are any. A piece is a leaf. When both children of a node are there they merge, left before right, and the
-//! node takes their place; a child whose sibling would lie beyond the last block moves up unmerged. So the root is the same
-//! expression in the leaves whatever the order of arrival, and with it the same bits. Exact.
+//! Over `blocks` pieces stands one binary tree: node `i` of level `l` covers the blocks from
+//! `i 2^l` up to `(i + 1) 2^l`, as far as there are any. A piece is a leaf. When both children of a
+//! node are there they merge, left before right, and the node takes their place; a child whose
+//! sibling would lie beyond the last block moves up unmerged. So the root is the same expression in
+//! the leaves whatever the order of arrival, and with it the same bits. Exact.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,7 +15,8 @@ use thiserror::Error;
 
 /// What can be combined with what came later.
 pub trait Merge {
-    /// Adds `later` to `self`. Need not be associative or commutative: the forest always does it in the same order.
+    /// Adds `later` to `self`. Need not be associative or commutative: the forest always does it in
+    /// the same order.
     fn merge(&mut self, later: Self);
 }
 
@@ -31,8 +33,9 @@ pub enum ForestError {
     OtherTree { expected: u64, got: u64 },
 }
 
-/// The merged nodes of a binary tree over block indices. Of the first `b` blocks it holds at most `log2 b + 1` nodes, of `b`
-/// neighbours anywhere at most `2 log2 b + 1`, and so of `g + 1` runs with `g` gaps between them at most `g + 1` times that.
+/// The merged nodes of a binary tree over block indices. Of the first `b` blocks it holds at most
+/// `log2 b + 1` nodes, of `b` neighbours anywhere at most `2 log2 b + 1`, and so of `g + 1` runs
+/// with `g` gaps between them at most `g + 1` times that.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Unchecked<T>", bound(deserialize = "T: Deserialize<'de>"))]
 pub struct Forest<T> {
@@ -94,7 +97,8 @@ impl<T> Forest<T> {
 
     /// The whole, once all blocks have arrived; before that, `None`.
     pub fn root(&self) -> Option<&T> {
-        // The node that starts at 0 is the root if it reaches the end: nodes merge as soon as they can.
+        // The node that starts at 0 is the root if it reaches the end: nodes merge as soon as they
+        // can.
         self.nodes.get(&0).filter(|node| self.cover(0, node.level).end == self.blocks).map(|node| &node.value)
     }
 
@@ -231,8 +235,8 @@ impl<T> TryFrom<Unchecked<T>> for Forest<T> {
         let mut forest = Self::new(u.blocks);
         for UncheckedNode { first, level, value } in u.nodes {
             forest.check_room(first, level).map_err(|e| e.to_string())?;
-            // A forest never holds a node that could have merged or moved up. Nor is it done here, for a value: whoever
-            // reads it has not checked it yet.
+            // A forest never holds a node that could have merged or moved up. Nor is it done here,
+            // for a value: whoever reads it has not checked it yet.
             let sibling = first ^ (1 << level);
             let is_root = first == 0 && 1 << level >= u.blocks;
             let is_late = sibling >= u.blocks || forest.nodes.get(&sibling).is_some_and(|node| node.level == level);
@@ -282,7 +286,8 @@ mod tests {
         assert_eq!(root_of([0, 2], 3), None);
     }
 
-    /// After b blocks in order the nodes are the ones in the binary digits of b, of which there are ⌊log2 b⌋ + 1.
+    /// After b blocks in order the nodes are the ones in the binary digits of b, of which there are
+    /// ⌊log2 b⌋ + 1.
     #[test]
     fn blocks_in_order_leave_no_more_nodes_than_binary_digits() {
         #[derive(Clone)]
@@ -299,7 +304,8 @@ mod tests {
         assert_eq!(forest.nodes().len(), 1);
     }
 
-    /// At each level, at most two nodes can lack their sibling, at the two ends; at the highest at most one.
+    /// At each level, at most two nodes can lack their sibling, at the two ends; at the highest at
+    /// most one.
     #[test]
     fn a_run_of_blocks_leaves_few_nodes_wherever_it_begins() {
         for first in 0..64 {

@@ -1,10 +1,11 @@
-//! Monte-Carlo studies whose result is byte-identical for any number of threads, shards and restarts.
+//! Monte-Carlo studies whose result is byte-identical for any number of threads, shards and
+//! restarts.
 //!
-//! This crate is for anyone who repeats a trial many times at each cell of a grid, and wants means, spreads,
-//! quantiles and rates with their standard errors. It knows neither thermocouples nor experiments, and runs
-//! any [`Study`]. Nor does it draw random numbers: a trial seeds itself from its index, as below. To
-//! accumulate numbers without running anything, use [`Values`] and [`Rate`] alone; to combine anything else
-//! in a fixed order, use [`Forest`].
+//! This crate is for anyone who repeats a trial many times at each cell of a grid, and wants means,
+//! spreads, quantiles and rates with their standard errors. It knows neither thermocouples nor
+//! experiments, and runs any [`Study`]. Nor does it draw random numbers: a trial seeds itself from
+//! its index, as below. To accumulate numbers without running anything, use [`Values`] and [`Rate`]
+//! alone; to combine anything else in a fixed order, use [`Forest`].
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -59,17 +60,19 @@
 //!
 //! # Why the bytes are the same
 //!
-//! Floating-point addition is not associative, so the order of additions is part of the result. Trials are grouped in
-//! *blocks* of a size that the study fixes. Within a block they are added up in order of their index, by one thread. Blocks
-//! merge along one binary tree over the block index ([`Forest`]), whoever computed them and whenever they came. Nothing but
-//! `+ − × ÷` and comparisons enters what is stored, so the bytes do not depend on a machine's mathematical library, as far
-//! as this crate is concerned; a study's own trials may.
+//! Floating-point addition is not associative, so the order of additions is part of the result.
+//! Trials are grouped in *blocks* of a size that the study fixes. Within a block they are added up
+//! in order of their index, by one thread. Blocks merge along one binary tree over the block index
+//! ([`Forest`]), whoever computed them and whenever they came. Nothing but `+ − × ÷` and
+//! comparisons enters what is stored, so the bytes do not depend on a machine's mathematical
+//! library, as far as this crate is concerned; a study's own trials may.
 //!
 //! # Shards and restarts
 //!
-//! A [`Shard`] `k/n` owns the `k`-th of `n` contiguous ranges of the blocks of all cells. [`run()`] keeps a [`Part`] on disk: it
-//! is replaced, never edited, so that there is a whole one at every moment. The part of a finished shard is its result.
-//! [`merge`] joins parts in any order and says which shards are missing. [`replay`] runs a single trial again.
+//! A [`Shard`] `k/n` owns the `k`-th of `n` contiguous ranges of the blocks of all cells. [`run()`]
+//! keeps a [`Part`] on disk: it is replaced, never edited, so that there is a whole one at every
+//! moment. The part of a finished shard is its result. [`merge`] joins parts in any order and says
+//! which shards are missing. [`replay`] runs a single trial again.
 
 mod error;
 mod forest;

@@ -1,9 +1,9 @@
 //! Count, mean and central moments up to the fourth, in one pass.
 //!
-//! With `n` values of mean `μ`, the sums `M_p = Σ (x − μ)^p`, `p = 2, 3, 4`, are updated with each value and combined
-//! between two sets. The formulas are exact; what they leave is rounding, at most about `n u √(1 + μ²/m₂)` relative in `M₂`
-//! with `u = 1.1e-16` and `m₂ = M₂/n` (known from the literature for the
-//! update of `M₂` by one value; not looked up, and checked on a hard case).
+//! With `n` values of mean `μ`, the sums `M_p = Σ (x − μ)^p`, `p = 2, 3, 4`, are updated with each
+//! value and combined between two sets. The formulas are exact; what they leave is rounding, at
+//! most about `n u √(1 + μ²/m₂)` relative in `M₂` with `u = 1.1e-16` and `m₂ = M₂/n` (known from
+//! the literature for the update of `M₂` by one value; not looked up, and checked on a hard case).
 
 use serde::{Deserialize, Serialize};
 
@@ -26,9 +26,11 @@ impl Moments {
     /// Largest magnitude accepted, 1e70: the fourth powers of the differences must stay finite.
     pub const LIMIT: f64 = 1e70;
 
-    /// Adds `x` and returns `true`, or returns `false` if `x` is not finite or beyond [`Moments::LIMIT`].
+    /// Adds `x` and returns `true`, or returns `false` if `x` is not finite or beyond
+    /// [`Moments::LIMIT`].
     ///
-    /// Differences from the mean below about 1e-80 lose their fourth power to underflow; choose units accordingly.
+    /// Differences from the mean below about 1e-80 lose their fourth power to underflow; choose
+    /// units accordingly.
     ///
     /// # Source
     /// The pairwise equations of [`Moments::merge`] with a second set of one value.
@@ -97,7 +99,8 @@ impl Moments {
         (self.n > 1).then(|| (self.m2 / (self.n - 1) as f64).sqrt())
     }
 
-    /// Root mean square about zero, `√(μ² + M₂/n)`; `None` without values. Of errors, this is the RMSE.
+    /// Root mean square about zero, `√(μ² + M₂/n)`; `None` without values. Of errors, this is the
+    /// RMSE.
     pub fn root_mean_square(&self) -> Option<f64> {
         Some((self.mean()?.powi(2) + self.central(2)?).sqrt())
     }
@@ -107,10 +110,12 @@ impl Moments {
         Some(self.standard_deviation()? / (self.n as f64).sqrt())
     }
 
-    /// Standard error of the standard deviation, for values of any distribution with a fourth moment.
+    /// Standard error of the standard deviation, for values of any distribution with a fourth
+    /// moment.
     ///
-    /// `√(Var(s²))/(2 s)`, `Var(s²) = (m₄ − m₂² (n − 3)/(n − 1))/n` with the sample's own moments; the first order of the
-    /// delta method, so for large `n`. `None` below four values, and where all values are equal.
+    /// `√(Var(s²))/(2 s)`, `Var(s²) = (m₄ − m₂² (n − 3)/(n − 1))/n` with the sample's own moments;
+    /// the first order of the delta method, so for large `n`. `None` below four values, and where
+    /// all values are equal.
     pub fn standard_deviation_error(&self) -> Option<f64> {
         let n = self.n as f64;
         let (m2, m4) = (self.central(2)?, self.central(4)?);
@@ -120,13 +125,14 @@ impl Moments {
 
     /// Standard error of [`Moments::root_mean_square`], by the delta method: `sd(x²)/(2 rms √n)`.
     ///
-    /// `Var(x²) = 4 μ² m₂ + 4 μ m₃ + m₄ − m₂²` over the sample, times `n/(n − 1)`. `None` below two values, and where all
-    /// values are zero.
+    /// `Var(x²) = 4 μ² m₂ + 4 μ m₃ + m₄ − m₂²` over the sample, times `n/(n − 1)`. `None` below two
+    /// values, and where all values are zero.
     pub fn root_mean_square_error(&self) -> Option<f64> {
         let n = self.n as f64;
         let (mean, rms) = (self.mean()?, self.root_mean_square()?);
         let (m2, m3, m4) = (self.central(2)?, self.central(3)?, self.central(4)?);
-        // Values of one size and both signs have no variance of the square: rounding may leave it below zero.
+        // Values of one size and both signs have no variance of the square: rounding may leave it
+        // below zero.
         let variance = (4.0 * mean * (mean * m2 + m3) + m4 - m2 * m2).max(0.0);
         (self.n > 1 && rms > 0.0).then(|| (variance / (n - 1.0)).sqrt() / (2.0 * rms))
     }
@@ -207,7 +213,8 @@ mod tests {
         m
     }
 
-    /// Numbers in (0, 1) with a skewed distribution: squares of a Weyl sequence. No generator is needed for an identity.
+    /// Numbers in (0, 1) with a skewed distribution: squares of a Weyl sequence. No generator is
+    /// needed for an identity.
     fn skewed(n: usize) -> Vec<f64> {
         (1..=n).map(|i| (i as f64 * 0.618_033_988_749_894_8).fract().powi(2)).collect()
     }
@@ -223,8 +230,9 @@ mod tests {
         assert!((got - want).abs() <= tol, "{what}: got {got:e}, want {want:e} ± {tol:e}");
     }
 
-    /// The values are of order one, with μ²/m₂ about 1, so rounding is at most a few n u = 1e3 × 1.1e-16 relative to moments
-    /// of order 0.1; 1e-13 is ten times that and far below what a wrong term does.
+    /// The values are of order one, with μ²/m₂ about 1, so rounding is at most a few n u = 1e3 ×
+    /// 1.1e-16 relative to moments of order 0.1; 1e-13 is ten times that and far below what a wrong
+    /// term does.
     #[test]
     fn moments_are_those_of_two_passes_pushed_or_merged() {
         let values = skewed(1000);
@@ -243,10 +251,11 @@ mod tests {
         assert_eq!(m.max().unwrap(), values.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     }
 
-    /// The set `NumAcc4` of the statistical reference data of NIST: 10000000.2 once, then 10000000.1 and 10000000.3, 500 times each. Certified mean
-    /// 10000000.2 and standard deviation 0.1. The data themselves are rounded to u × 1e7 = 1e-9, that is 1e-8 of the
-    /// standard deviation; the rounding of the method is at most n u μ/s = 1001 × 1.1e-16 × 1e8 = 1.1e-5 of it.
-    /// The textbook Σx² − nμ² has no digit left here.
+    /// The set `NumAcc4` of the statistical reference data of NIST: 10000000.2 once, then
+    /// 10000000.1 and 10000000.3, 500 times each. Certified mean 10000000.2 and standard deviation
+    /// 0.1. The data themselves are rounded to u × 1e7 = 1e-9, that is 1e-8 of the standard
+    /// deviation; the rounding of the method is at most n u μ/s = 1001 × 1.1e-16 × 1e8 = 1.1e-5 of
+    /// it. The textbook Σx² − nμ² has no digit left here.
     #[test]
     fn a_tiny_variance_on_a_large_mean_survives() {
         let values: Vec<f64> = std::iter::once(1e7 + 0.2)
@@ -273,9 +282,10 @@ mod tests {
         assert_close("its error", m.root_mean_square_error().unwrap(), want, 1e-13);
     }
 
-    /// For ±1 in equal numbers m₄ = m₂² = 1, so Var(s²) = (1 − (n − 3)/(n − 1))/n = 2/(n (n − 1)), and for a Gaussian sample
-    /// it tends to 2σ⁴/n. Both by hand: n = 100, s² = 100/99. For the Gaussian, the quantiles at (i − ½)/n of a logistic
-    /// distribution stand in: kurtosis 4.2, so Var(s²) → 3.2 σ⁴/n, and its tails are cut at n: 1 % at n = 10⁵.
+    /// For ±1 in equal numbers m₄ = m₂² = 1, so Var(s²) = (1 − (n − 3)/(n − 1))/n = 2/(n (n − 1)),
+    /// and for a Gaussian sample it tends to 2σ⁴/n. Both by hand: n = 100, s² = 100/99. For the
+    /// Gaussian, the quantiles at (i − ½)/n of a logistic distribution stand in: kurtosis 4.2, so
+    /// Var(s²) → 3.2 σ⁴/n, and its tails are cut at n: 1 % at n = 10⁵.
     #[test]
     fn the_error_of_the_standard_deviation_takes_the_fourth_moment() {
         let signs: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();

@@ -128,11 +128,12 @@ impl Header {
     }
 }
 
-/// The `k`-th of `n` contiguous ranges of the blocks of all cells, cell after cell. Written `k/n`, counted from 0.
+/// The `k`-th of `n` contiguous ranges of the blocks of all cells, cell after cell. Written `k/n`,
+/// counted from 0.
 ///
 /// Contiguous, because blocks that are neighbours merge: a shard of `b` blocks of a cell is at most
-/// `2 log2 b + 1` nodes, where every `n`-th block would be `b` nodes. If cells differ much in cost, divide into more shards
-/// than there are machines.
+/// `2 log2 b + 1` nodes, where every `n`-th block would be `b` nodes. If cells differ much in cost,
+/// divide into more shards than there are machines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Shard {
@@ -216,7 +217,8 @@ impl Part {
     /// Reads a part.
     ///
     /// # Errors
-    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is not a part of a study; [`StudyError::OtherStudy`] if it is in another format.
+    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is not a part of a study;
+    /// [`StudyError::OtherStudy`] if it is in another format.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         #[derive(Deserialize)]
         struct Probe {
@@ -238,9 +240,11 @@ impl Part {
         })
     }
 
-    /// Writes the part, in place of an older one if there is one. At every moment there is the old file or the new one.
+    /// Writes the part, in place of an older one if there is one. At every moment there is the old
+    /// file or the new one.
     ///
-    /// A process that is killed here leaves a file `<path>.tmp-<process>` behind, which can be deleted.
+    /// A process that is killed here leaves a file `<path>.tmp-<process>` behind, which can be
+    /// deleted.
     ///
     /// # Errors
     /// [`StudyError::Write`].
@@ -436,12 +440,12 @@ impl TryFrom<UncheckedResults> for Results {
 
 /// Joins the parts of a study, in any order.
 ///
-/// What counts is that every block is there once; how the study was divided does not. So a missing shard can be made up for
-/// by smaller ones.
+/// What counts is that every block is there once; how the study was divided does not. So a missing
+/// shard can be made up for by smaller ones.
 ///
 /// # Errors
-/// [`StudyError::Incomplete`], with the shards to run again; [`StudyError::Twice`]; [`StudyError::OtherStudy`]; and those of
-/// [`Part::read`].
+/// [`StudyError::Incomplete`], with the shards to run again; [`StudyError::Twice`];
+/// [`StudyError::OtherStudy`]; and those of [`Part::read`].
 pub fn merge<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Results, StudyError> {
     let mut whole: Option<Part> = None;
     let mut divided_by = None;
@@ -467,7 +471,8 @@ pub fn merge<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Resul
     finish(whole.ok_or(StudyError::NoParts)?, divided_by)
 }
 
-/// All cells' roots, or what is missing; with the shards that had it, if the study was divided by one number.
+/// All cells' roots, or what is missing; with the shards that had it, if the study was divided by
+/// one number.
 fn finish(part: Part, divided_by: Option<u64>) -> Result<Results, StudyError> {
     let jobs = part.header.jobs();
     let gaps = part.gaps_in(&(0..jobs));

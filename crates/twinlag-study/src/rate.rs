@@ -36,8 +36,9 @@ impl Rate {
 
     /// Wilson's 95 % interval of the underlying probability; `None` if `n` is zero.
     ///
-    /// With `p = k/n` and `z = 1.96`: `(p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n)`. Its coverage is near 95 % on
-    /// average over the probability; for single probabilities, above all near 0 and 1, it can be less.
+    /// With `p = k/n` and `z = 1.96`: `(p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n)`. Its
+    /// coverage is near 95 % on average over the probability; for single probabilities, above all
+    /// near 0 and 1, it can be less.
     ///
     /// # Source
     /// Wilson 1927, from memory; the ends are checked against the equation that defines them.
@@ -80,8 +81,8 @@ impl TryFrom<Unchecked> for Rate {
 mod tests {
     use super::*;
 
-    /// The ends of Wilson's interval are, by definition, the probabilities p₀ with (p − p₀)² = z² p₀ (1 − p₀)/n. Rounding
-    /// of a few operations on numbers of order one: 1e-14.
+    /// The ends of Wilson's interval are, by definition, the probabilities p₀ with (p − p₀)² = z²
+    /// p₀ (1 − p₀)/n. Rounding of a few operations on numbers of order one: 1e-14.
     #[test]
     fn the_interval_ends_where_the_observed_rate_is_z_standard_deviations_away() {
         for (k, n) in [(0, 10), (1, 10), (5, 10), (10, 10), (13, 250), (40_000, 1_000_000)] {

@@ -1,7 +1,7 @@
 //! Running a study, or a shard of it, on threads.
 //!
-//! The blocks still to be computed form one queue, cell after cell, from which threads take the next. The calling thread
-//! merges what they send, reports progress and writes the part.
+//! The blocks still to be computed form one queue, cell after cell, from which threads take the
+//! next. The calling thread merges what they send, reports progress and writes the part.
 
 use std::any::Any;
 use std::num::NonZeroUsize;
@@ -63,15 +63,16 @@ pub struct Progress {
 
 /// Runs what is missing of a shard of a study.
 ///
-/// `progress` is called on the calling thread, after each block and ten times a second at least; if it breaks, threads stop
-/// after the trial in hand, their unfinished blocks are dropped, and the part comes back as far as it is. See
-/// [`Part::is_complete`].
+/// `progress` is called on the calling thread, after each block and ten times a second at least; if
+/// it breaks, threads stop after the trial in hand, their unfinished blocks are dropped, and the
+/// part comes back as far as it is. See [`Part::is_complete`].
 ///
 /// # Errors
-/// [`StudyError::Trial`] or [`StudyError::Scratch`], the first in order of the blocks, on any number of threads; what was
-/// done is in the checkpoint. [`StudyError::Exists`], [`StudyError::OtherStudy`], [`StudyError::Damaged`] before anything is
-/// run. [`StudyError::Write`]. [`StudyError::Empty`], [`StudyError::TooLarge`], [`StudyError::SameName`] for a study that is
-/// none.
+/// [`StudyError::Trial`] or [`StudyError::Scratch`], the first in order of the blocks, on any
+/// number of threads; what was done is in the checkpoint. [`StudyError::Exists`],
+/// [`StudyError::OtherStudy`], [`StudyError::Damaged`] before anything is run.
+/// [`StudyError::Write`]. [`StudyError::Empty`], [`StudyError::TooLarge`], [`StudyError::SameName`]
+/// for a study that is none.
 pub fn run<S: Study>(
     study: &S,
     options: &Options,
@@ -86,8 +87,9 @@ pub fn run<S: Study>(
     let restored = total - queue.ranges.iter().cloned().flatten().map(|job| header.job_trials(job)).sum::<u64>();
     let mut state = Progress { done: restored, total, restored, elapsed: started.elapsed() };
 
-    // Jobs from here on are not to be worked on: 0 stops all, and a job that failed stops those after it. Those before it
-    // go on, so that the error reported is the first whatever the number of threads.
+    // Jobs from here on are not to be worked on: 0 stops all, and a job that failed stops those
+    // after it. Those before it go on, so that the error reported is the first whatever the number
+    // of threads.
     let fence = AtomicU64::new(u64::MAX);
     let (mut failed, mut unwritten) = (None::<(u64, StudyError)>, None);
     thread::scope(|scope| {
@@ -163,7 +165,8 @@ fn open(header: &Header, options: &Options) -> Result<Part, StudyError> {
             found.expect_same(header, options.shard, path)?;
             Ok(found)
         }
-        // Written at once, so that a directory that cannot be written to shows before the work is done.
+        // Written at once, so that a directory that cannot be written to shows before the work is
+        // done.
         (Ok(false), _) => part.write(path).map(|()| part),
     }
 }

@@ -1,9 +1,10 @@
 //! Quantiles from counts in fixed bins.
 //!
-//! A bin is determined by the sign, the exponent and the first seven bits after the leading one of a
-//! floating-point number: 128 bins to the octave, at most 1/128 of their lower edge wide. The bin of a number is a shift of its bits, exact and
-//! the same on every machine, with no logarithm in it. Bins are never joined, so that counts from any sources add up to the
-//! same sketch in any order. (Sketches that bound their number of bins by joining the outermost lose that.)
+//! A bin is determined by the sign, the exponent and the first seven bits after the leading one of
+//! a floating-point number: 128 bins to the octave, at most 1/128 of their lower edge wide. The bin
+//! of a number is a shift of its bits, exact and the same on every machine, with no logarithm in
+//! it. Bins are never joined, so that counts from any sources add up to the same sketch in any
+//! order. (Sketches that bound their number of bins by joining the outermost lose that.)
 
 use std::collections::BTreeMap;
 
@@ -16,15 +17,16 @@ const UNSEEN: u32 = 45;
 
 /// A histogram with bins of fixed relative width, for quantiles of any finite numbers.
 ///
-/// Memory is in proportion to the bins in use: about 128 for each octave between the smallest and largest magnitude that
-/// occur.
+/// Memory is in proportion to the bins in use: about 128 for each octave between the smallest and
+/// largest magnitude that occur.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "Vec<(i32, u64)>", try_from = "Vec<(i32, u64)>")]
 pub struct Sketch {
     bins: BTreeMap<i32, u64>,
 }
 
-/// Zero, and numbers too small to be normal, are bin 0; negative numbers have the bins of their magnitude, negated.
+/// Zero, and numbers too small to be normal, are bin 0; negative numbers have the bins of their
+/// magnitude, negated.
 fn bin(x: f64) -> i32 {
     if x.abs() < f64::MIN_POSITIVE {
         return 0;
@@ -43,7 +45,8 @@ fn middle(bin: i32) -> f64 {
 }
 
 impl Sketch {
-    /// Largest relative error of a quantile, 1/256 or 0.39 %: half a bin's width over its lower edge.
+    /// Largest relative error of a quantile, 1/256 or 0.39 %: half a bin's width over its lower
+    /// edge.
     ///
     /// Magnitudes below `f64::MIN_POSITIVE`, 2.2e-308, count as zero.
     pub const RELATIVE_ERROR: f64 = 1.0 / 256.0;
@@ -62,7 +65,8 @@ impl Sketch {
         self.bins.values().sum()
     }
 
-    /// The number of rank `⌈q n⌉` (1 at least) of the `n` counted, to within [`Sketch::RELATIVE_ERROR`] of itself.
+    /// The number of rank `⌈q n⌉` (1 at least) of the `n` counted, to within
+    /// [`Sketch::RELATIVE_ERROR`] of itself.
     ///
     /// `None` if nothing was counted, or `q` is not in [0, 1].
     pub fn quantile(&self, q: f64) -> Option<f64> {
@@ -135,7 +139,8 @@ mod tests {
         s
     }
 
-    /// The oracle is the sorted sample. The bound is exact: the middle of a bin is computed without rounding.
+    /// The oracle is the sorted sample. The bound is exact: the middle of a bin is computed without
+    /// rounding.
     #[test]
     fn quantiles_are_within_the_stated_relative_error_of_the_sorted_sample() {
         let mut values = wide(10_007);

@@ -7,14 +7,15 @@ pub type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Trials to be repeated at each of a number of cells.
 ///
-/// A trial must depend on its cell and index alone: not on the scratch that earlier trials left, on time, or on the machine.
-/// The rest is then reproducible to the bit.
+/// A trial must depend on its cell and index alone: not on the scratch that earlier trials left, on
+/// time, or on the machine. The rest is then reproducible to the bit.
 pub trait Study: Sync {
-    /// What a thread keeps from one trial of a cell to the next: buffers, plans of transforms, a generator.
+    /// What a thread keeps from one trial of a cell to the next: buffers, plans of transforms, a
+    /// generator.
     type Scratch;
 
-    /// A digest of all that decides the numbers: the plan, its seed, the version of the program. Parts of studies that
-    /// differ in it are not mixed.
+    /// A digest of all that decides the numbers: the plan, its seed, the version of the program.
+    /// Parts of studies that differ in it are not mixed.
     fn plan(&self) -> String;
 
     /// How many cells there are.
@@ -23,8 +24,9 @@ pub trait Study: Sync {
     /// How many trials each cell has.
     fn trials(&self) -> u64;
 
-    /// How many trials make a block. It decides the order of additions and so the last digits: it is part of the plan, and
-    /// not to be derived from the machine. A block should take some tens of milliseconds.
+    /// How many trials make a block. It decides the order of additions and so the last digits: it
+    /// is part of the plan, and not to be derived from the machine. A block should take some tens
+    /// of milliseconds.
     fn block(&self) -> u64;
 
     /// What a trial of this cell measures; [`Outcome`] refers to it by position.
@@ -39,7 +41,8 @@ pub trait Study: Sync {
     /// Runs trial `index` of a cell, `0 ≤ index < trials`.
     ///
     /// # Errors
-    /// Whatever makes the trial impossible. The study ends, and the error names the trial; so it does on a panic.
+    /// Whatever makes the trial impossible. The study ends, and the error names the trial; so it
+    /// does on a panic.
     fn trial(&self, cell: usize, index: u64, scratch: &mut Self::Scratch, outcome: &mut Outcome)
     -> Result<(), Failure>;
 }
@@ -93,7 +96,8 @@ impl Outcome {
         Self { slots: quantities.iter().map(|q| (q.kind, None)).collect() }
     }
 
-    /// Records the number of the quantity at `position`. A number that is not finite is counted as refused.
+    /// Records the number of the quantity at `position`. A number that is not finite is counted as
+    /// refused.
     ///
     /// # Panics
     /// If there is no value at this position, or the trial has given it already.
@@ -141,7 +145,8 @@ impl Outcome {
         };
         let given = if matches!(found, Found::Value(_)) { Kind::Value } else { Kind::Event };
         assert!(*kind == given, "quantity {position} is of kind {kind:?}, the trial gave one of kind {given:?}");
-        // Two numbers of one trial are not independent: standard errors from them would be too small.
+        // Two numbers of one trial are not independent: standard errors from them would be too
+        // small.
         assert!(slot.is_none(), "the trial gave quantity {position} twice");
         *slot = Some(found);
     }

@@ -18,7 +18,8 @@ pub struct Values {
 }
 
 impl Values {
-    /// Adds a number. One that is not finite, or beyond [`Moments::LIMIT`], is counted as refused instead.
+    /// Adds a number. One that is not finite, or beyond [`Moments::LIMIT`], is counted as refused
+    /// instead.
     pub fn push(&mut self, x: f64) {
         if self.moments.push(x) {
             self.sketch.push(x);
@@ -42,8 +43,8 @@ impl Values {
         self.refused
     }
 
-    /// The number of rank `⌈q n⌉`, to within [`Sketch::RELATIVE_ERROR`] of itself, and never outside the extremes.
-    /// `None` without numbers, or if `q` is not in [0, 1].
+    /// The number of rank `⌈q n⌉`, to within [`Sketch::RELATIVE_ERROR`] of itself, and never
+    /// outside the extremes. `None` without numbers, or if `q` is not in [0, 1].
     pub fn quantile(&self, q: f64) -> Option<f64> {
         Some(self.sketch.quantile(q)?.clamp(self.moments.min()?, self.moments.max()?))
     }
@@ -127,8 +128,8 @@ impl Column {
     }
 }
 
-/// What is kept of a set of trials of one cell. For each quantity, trials that yielded it, gave something refused, or left
-/// it out add up to [`Tally::trials`].
+/// What is kept of a set of trials of one cell. For each quantity, trials that yielded it, gave
+/// something refused, or left it out add up to [`Tally::trials`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "UncheckedTally")]
 pub struct Tally {
@@ -153,7 +154,8 @@ impl Tally {
         Self { trials: 0, columns }
     }
 
-    /// Adds one trial. The outcome must be over the same quantities: what it lacks counts as absent.
+    /// Adds one trial. The outcome must be over the same quantities: what it lacks counts as
+    /// absent.
     pub fn push(&mut self, outcome: &Outcome) {
         self.trials += 1;
         for (position, column) in self.columns.iter_mut().enumerate() {

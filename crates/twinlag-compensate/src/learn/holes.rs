@@ -1,7 +1,8 @@
 //! A prior of readings that are partly missing, or uneven, by their exact likelihood.
 //!
-//! Straight lines between readings take high frequencies away, and a periodogram then shows a gas that is smoother than it was. Kalman's
-//! filter needs no such lines: what it leads to expect of each reading gives the likelihood of all of them.
+//! Straight lines between readings take high frequencies away, and a periodogram then shows a gas
+//! that is smoother than it was. Kalman's filter needs no such lines: what it leads to expect of
+//! each reading gives the likelihood of all of them.
 
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem};
 
@@ -13,7 +14,8 @@ use crate::reconstruct::reconstruct;
 use crate::rig::Rig;
 use crate::smooth::Form;
 
-/// Samples that the likelihood is taken of, at most: of uneven ones, each of which has a matrix exponential of its own, fewer.
+/// Samples that the likelihood is taken of, at most: of uneven ones, each of which has a matrix
+/// exponential of its own, fewer.
 const MOST: usize = 4096;
 const MOST_UNEVEN: usize = 1024;
 /// Evaluations of it for each candidate.
@@ -22,7 +24,8 @@ const EVALUATIONS: u64 = 120;
 const EDGE: f64 = 0.25;
 const SPREAD: f64 = 0.05;
 
-/// The likeliest of `found` and each kind of single part, with fitted numbers, allowing for their count.
+/// The likeliest of `found` and each kind of single part, with fitted numbers, allowing for their
+/// count.
 pub(super) fn choose(
     search: &Search<'_>,
     readings: &Readings,

@@ -35,21 +35,23 @@ pub(super) enum Part {
     /// No part of the gas: what the variances of both channels' noise are multiplied by.
     Noise([f64; 2]),
     Single(Term),
-    /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms with corners evenly spaced in their
-    /// logarithm from that one to the fastest that is sampled, their variances as `f^(−2/3)`.
+    /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms
+    /// with corners evenly spaced in their logarithm from that one to the fastest that is sampled,
+    /// their variances as `f^(−2/3)`.
     Turbulent {
         std_k: f64,
         corner_hz: f64,
         fastest_hz: f64,
     },
-    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as wide as the first.
+    /// Lines at the multiples of a frequency. Where the phase wanders, the `m`-th is `m²` times as
+    /// wide as the first.
     Comb {
         frequency_hz: f64,
         /// Half width of the first line.
         width_hz: f64,
         std_k: Vec<f64>,
-        /// Whether there are more beyond the last one that is seen: they then fall as `1/m²`, as those of a pulse with a kink do, and a band
-        /// has their power.
+        /// Whether there are more beyond the last one that is seen: they then fall as `1/m²`, as
+        /// those of a pulse with a kink do, and a band has their power.
         goes_on: bool,
     },
 }
@@ -168,8 +170,8 @@ impl Part {
     }
 }
 
-/// Where the lines go on: `Σ_{m > M} s² (M/m)⁴` is `s² M/3`, most of it just above the last one, of which `s` is the larger of it and
-/// its neighbour.
+/// Where the lines go on: `Σ_{m > M} s² (M/m)⁴` is `s² M/3`, most of it just above the last one, of
+/// which `s` is the larger of it and its neighbour.
 fn tail(frequency_hz: f64, std_k: &[f64]) -> Option<Term> {
     let last = std_k.len().checked_sub(1)?;
     let line_k = std_k[last].max(std_k[last.saturating_sub(1)] * (last as f64 / (last + 1) as f64).powi(2));

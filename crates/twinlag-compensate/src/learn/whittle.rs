@@ -7,12 +7,13 @@ use super::part::{self, Part};
 use crate::prior::Term;
 use crate::spectrum::Periodogram;
 
-/// Neighbouring bins of a periodogram with Hann's taper go together: this many are worth one, `1 + 2 ((2/3)² + (1/6)²)`.
+/// Neighbouring bins of a periodogram with Hann's taper go together: this many are worth one,
+/// `1 + 2 ((2/3)² + (1/6)²)`.
 pub(super) const BINS_PER_ONE: f64 = 1.944;
 /// Step of a logarithm in differences.
 const STEP: f64 = 1e-4;
-/// Prior standard deviation of the logarithm of each number: numbers that the readings do not determine are
-/// known within a factor of e.
+/// Prior standard deviation of the logarithm of each number: numbers that the readings do not
+/// determine are known within a factor of e.
 const LOG_STD: f64 = 1.0;
 
 /// Twice the negative logarithm of Whittle's likelihood.
@@ -24,8 +25,8 @@ pub(super) struct Whittle<'a> {
 }
 
 impl Whittle<'_> {
-    /// Fisher's information of the logarithms of the numbers, including their prior; the deviance is twice
-    /// the logarithm of the likelihood.
+    /// Fisher's information of the logarithms of the numbers, including their prior; the deviance
+    /// is twice the logarithm of the likelihood.
     pub(super) fn information(&self) -> Option<DMatrix<f64>> {
         let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
         let derivatives = self.derivatives(&values)?;
@@ -62,8 +63,8 @@ impl Periodogram {
         self.noise[0].iter().zip(&self.noise[1]).map(|(a, b)| first * a + second * b).collect()
     }
 
-    /// The deviance of `factors` of the noise, from the disagreement of both sensors and the prior of the
-    /// noise, with gradient and curvature.
+    /// The deviance of `factors` of the noise, from the disagreement of both sensors and the prior
+    /// of the noise, with gradient and curvature.
     pub(super) fn of_factors(&self, factors: [f64; 2]) -> (f64, [f64; 2], [[f64; 2]; 2]) {
         let prior = BINS_PER_ONE / (LOG_STD * LOG_STD);
         let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();

@@ -1,7 +1,8 @@
 //! Brent's search for the minimum in one variable, argmin's, between its bounds.
 //!
-//! It searches the whole interval; the start is one candidate, and no more. It never looks at the ends of the interval, so
-//! the end that is nearer to where it stopped is looked at here: a minimum on a bound is then found exactly.
+//! It searches the whole interval; the start is one candidate, and no more. It never looks at the
+//! ends of the interval, so the end that is nearer to where it stopped is looked at here: a minimum
+//! on a bound is then found exactly.
 
 use argmin::core::{CostFunction, Error, IterState};
 use argmin::solver::brent::BrentOpt;
@@ -9,10 +10,12 @@ use argmin::solver::brent::BrentOpt;
 use crate::adapter::{Objective, Outside, run as run_argmin};
 use crate::ledger::{Ledger, Stop};
 
-/// Stands in for an infinite value: the parabola through three points has to be one of numbers, or the search is lost.
+/// Stands in for an infinite value: the parabola through three points has to be one of numbers, or
+/// the search is lost.
 const VERY_HIGH: f64 = 1e100;
 
-/// Searches until the minimum is known to `step_tolerance`, or to the square root of the rounding of its coordinate.
+/// Searches until the minimum is known to `step_tolerance`, or to the square root of the rounding
+/// of its coordinate.
 pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     let (lower, upper) = ledger.problem().bounds()[0];
     let solver = BrentOpt::new(lower, upper).set_tolerance(f64::EPSILON.sqrt(), step_tolerance);

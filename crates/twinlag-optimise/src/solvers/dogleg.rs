@@ -1,8 +1,9 @@
 //! The dogleg step: an approximate minimum of the model `gᵀp + pᵀHp/2` within `|p| ≤ r`.
 //!
-//! Along the gradient to the model's minimum there, then straight to the Newton point, as far as the region goes. argmin's
-//! own inverts the Hessian, which it can do for external matrix types alone, and takes it to be positive definite. This one
-//! raises the diagonal until it is; with a positive definite Hessian the two are the same.
+//! Along the gradient to the model's minimum there, then straight to the Newton point, as far as
+//! the region goes. argmin's own inverts the Hessian, which it can do for external matrix types
+//! alone, and takes it to be positive definite. This one raises the diagonal until it is; with a
+//! positive definite Hessian the two are the same.
 //!
 //! # Source
 //! Nocedal and Wright, *Numerical Optimization*, 2006, section 4.1.
@@ -46,7 +47,8 @@ impl<O> Solver<O, State> for Dogleg {
     }
 }
 
-/// The step. Its length is at most `radius`, and the model falls along it unless the gradient is zero.
+/// The step. Its length is at most `radius`, and the model falls along it unless the gradient is
+/// zero.
 fn step(gradient: &[f64], hessian: &[Vec<f64>], radius: f64) -> Vec<f64> {
     let n = gradient.len();
     let mut raised = hessian.concat();
@@ -57,7 +59,8 @@ fn step(gradient: &[f64], hessian: &[Vec<f64>], radius: f64) -> Vec<f64> {
         if cholesky::solve(&mut matrix, &mut solution).is_some() && solution.iter().all(|s| s.is_finite()) {
             break solution;
         }
-        // Diagonally dominant, hence positive definite, once the raise exceeds n times the largest entry.
+        // Diagonally dominant, hence positive definite, once the raise exceeds n times the largest
+        // entry.
         let next = (10.0 * raise).max(1e-3 * size);
         (0..n).for_each(|i| raised[i * n + i] += next - raise);
         raise = next;
@@ -97,8 +100,9 @@ mod tests {
         (0..2).map(|i| p[i] * (gradient[i] + 0.5 * (0..2).map(|j| hessian[i][j] * p[j]).sum::<f64>())).sum()
     }
 
-    /// For a gradient (2, 2) and curvatures 1 and 4 the Newton point is (−2, −½), and the lowest along the gradient
-    /// −(2, 2)·8/20 = −(0.8, 0.8). Lengths 2.06 and 1.13: radii on the three parts of the path.
+    /// For a gradient (2, 2) and curvatures 1 and 4 the Newton point is (−2, −½), and the lowest
+    /// along the gradient −(2, 2)·8/20 = −(0.8, 0.8). Lengths 2.06 and 1.13: radii on the three
+    /// parts of the path.
     #[test]
     fn the_path_is_gradient_then_leg_then_newton_point() {
         let (gradient, hessian) = ([2.0, 2.0], [vec![1.0, 0.0], vec![0.0, 4.0]]);
@@ -111,7 +115,8 @@ mod tests {
         assert!((norm(&middle) - 1.5).abs() < 1e-15, "{middle:?}");
     }
 
-    /// argmin's dogleg takes the Newton point for a minimum where it is a saddle, and steps upwards.
+    /// argmin's dogleg takes the Newton point for a minimum where it is a saddle, and steps
+    /// upwards.
     #[test]
     fn the_model_falls_where_the_curvature_is_negative_or_none() {
         let gradient = [1.0, -2.0];

@@ -1,15 +1,16 @@
 //! Levenberg-Marquardt with bounds, which argmin's does not support.
 //!
-//! Each iteration solves `(H + μ diag H) s = −g` over the variables that are not held at a bound by the gradient, moves to
-//! the nearest point inside the bounds, and accepts a lower cost. `H` is whatever curvature the cost supplies: for sums of
-//! squares the Gauss-Newton matrix, otherwise the Hessian, made positive by the damping where it is not.
+//! Each iteration solves `(H + μ diag H) s = −g` over the variables that are not held at a bound by
+//! the gradient, moves to the nearest point inside the bounds, and accepts a lower cost. `H` is
+//! whatever curvature the cost supplies: for sums of squares the Gauss-Newton matrix, otherwise the
+//! Hessian, made positive by the damping where it is not.
 //!
-//! It runs on the ledger itself, without argmin between: on a cost of two variables that is cheap to evaluate, argmin's
-//! bookkeeping took longer than all the rest.
+//! It runs on the ledger itself, without argmin between: on a cost of two variables that is cheap
+//! to evaluate, argmin's bookkeeping took longer than all the rest.
 //!
 //! # Source
-//! Damping by the gain ratio: Nielsen, *Damping parameter in Marquardt's method*, 1999. Bounds by projection on the active
-//! set: Bertsekas, *Projected Newton methods*, 1982.
+//! Damping by the gain ratio: Nielsen, *Damping parameter in Marquardt's method*, 1999. Bounds by
+//! projection on the active set: Bertsekas, *Projected Newton methods*, 1982.
 
 use crate::cholesky;
 use crate::ledger::{Ledger, Refusal, Stop};
@@ -22,8 +23,8 @@ const DAMPING_LIMIT: f64 = 1e16;
 /// Longest step in any coordinate: a factor e² for logarithms.
 const LONGEST_STEP: f64 = 2.0;
 
-/// Minimises from the best point so far, which has to be known with its derivatives. Done when no coordinate would move by
-/// more than `step_tolerance`.
+/// Minimises from the best point so far, which has to be known with its derivatives. Done when no
+/// coordinate would move by more than `step_tolerance`.
 pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     let bounds = ledger.problem().bounds();
     let best = ledger.best();
@@ -101,7 +102,8 @@ fn longest(step: &[f64]) -> f64 {
     step.iter().fold(0.0_f64, |m, s| m.max(s.abs()))
 }
 
-/// The damped equations over the variables that can move, in memory that is used again in every iteration.
+/// The damped equations over the variables that can move, in memory that is used again in every
+/// iteration.
 struct System {
     free: Vec<usize>,
     matrix: Vec<f64>,
@@ -109,7 +111,8 @@ struct System {
 }
 
 impl System {
-    /// Writes the damped step to `step`, zero for variables that cannot move. False if the matrix is not positive definite.
+    /// Writes the damped step to `step`, zero for variables that cannot move. False if the matrix
+    /// is not positive definite.
     fn solve(&mut self, here: &Derivatives, damping: f64, step: &mut [f64]) -> bool {
         let m = self.free.len();
         for (p, &i) in self.free.iter().enumerate() {

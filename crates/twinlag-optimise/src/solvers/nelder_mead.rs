@@ -5,8 +5,8 @@ use argmin::solver::neldermead::NelderMead;
 use crate::adapter::{Objective, Outside, SolverState, run as run_argmin};
 use crate::ledger::{Ledger, Stop};
 
-/// Searches from the best point so far, and once more from where that ended: a simplex can shrink onto a point that is no
-/// minimum, and a second one started there then moves on.
+/// Searches from the best point so far, and once more from where that ended: a simplex can shrink
+/// onto a point that is no minimum, and a second one started there then moves on.
 pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, spread_tolerance: f64, edge: f64) -> Stop {
     match once(ledger, spread_tolerance, edge) {
         Stop::BySolver => once(ledger, spread_tolerance, edge),

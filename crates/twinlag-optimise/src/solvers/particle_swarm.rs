@@ -1,6 +1,7 @@
 //! Particle swarm, argmin's, over the whole of the bounds; then a local search.
 //!
-//! argmin's swarm has no rule for stopping: it runs for a number of generations, which is an option.
+//! argmin's swarm has no rule for stopping: it runs for a number of generations, which is an
+//! option.
 
 use argmin::core::{CostFunction, Error, KV, PopulationState, Problem, Solver, TerminationReason, TerminationStatus};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};

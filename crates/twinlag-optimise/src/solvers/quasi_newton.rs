@@ -6,8 +6,8 @@ use argmin::solver::quasinewton::{BFGS, LBFGS};
 use crate::adapter::{Objective, Outside, SolverState, run as run_argmin};
 use crate::ledger::{Ledger, Stop};
 
-/// BFGS with the whole inverse Hessian, which starts as the identity, since coordinates and values are of
-/// size one.
+/// BFGS with the whole inverse Hessian, which starts as the identity, since coordinates and values
+/// are of size one.
 pub(crate) fn bfgs(ledger: &Ledger<'_, '_, '_>, gradient_tolerance: f64) -> Stop {
     let z = ledger.best().z;
     let identity = (0..z.len()).map(|i| (0..z.len()).map(|j| f64::from(u8::from(i == j))).collect()).collect();

@@ -1,9 +1,11 @@
-//! Random numbers for the global solvers: from a seed that is an option, so that the same options give the same bytes.
+//! Random numbers for the global solvers: from a seed that is an option, so that the same options
+//! give the same bytes.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{RngCore, SeedableRng};
 
-/// The generator that argmin takes: it is of another generation of `rand` than the rest of the workspace.
+/// The generator that argmin takes: it is of another generation of `rand` than the rest of the
+/// workspace.
 pub(crate) type Generator = Xoshiro256PlusPlus;
 
 pub(crate) fn generator(seed: u64) -> Generator {

@@ -1,12 +1,14 @@
 //! Simulated annealing, argmin's, over the whole of the bounds; then a local search.
 //!
-//! argmin's annealing makes one move in an iteration and has no end of its own. Here an iteration is a sweep of moves, and
-//! there is a number of sweeps. The temperature falls by the same factor with every move, down to a share `cooling` of what
-//! it was; moves are uniform within a window whose width goes with the square root of the temperature, from the whole range
-//! of a coordinate: that is how wide a parabola is at the temperature's height.
+//! argmin's annealing makes one move in an iteration and has no end of its own. Here an iteration
+//! is a sweep of moves, and there is a number of sweeps. The temperature falls by the same factor
+//! with every move, down to a share `cooling` of what it was; moves are uniform within a window
+//! whose width goes with the square root of the temperature, from the whole range of a coordinate:
+//! that is how wide a parabola is at the temperature's height.
 //!
-//! The first temperature is a multiple of the median difference of values from that at the start, over as many random points
-//! as a sweep has moves. The value at the start itself is no measure: from the bottom of a well the walk would never leave.
+//! The first temperature is a multiple of the median difference of values from that at the start,
+//! over as many random points as a sweep has moves. The value at the start itself is no measure:
+//! from the bottom of a well the walk would never leave.
 
 use std::cell::RefCell;
 
@@ -66,7 +68,8 @@ struct Walk<'l, 'p, 'c, 'o> {
 }
 
 impl Walk<'_, '_, '_, '_> {
-    /// A point within `share` of the range of each coordinate to either side, and within the bounds.
+    /// A point within `share` of the range of each coordinate to either side, and within the
+    /// bounds.
     fn moved(&self, z: &[f64], share: f64) -> Vec<f64> {
         let bounds = self.objective.ledger().problem().bounds();
         let mut random = self.random.borrow_mut();
@@ -98,7 +101,8 @@ impl Anneal for Walk<'_, '_, '_, '_> {
     }
 }
 
-/// A solver of which one iteration is `moves` of its own, and which is done when no sweeps are left.
+/// A solver of which one iteration is `moves` of its own, and which is done when no sweeps are
+/// left.
 struct Sweeps<'l, 'p, 'c, 'o, S> {
     solver: S,
     ledger: &'l Ledger<'p, 'c, 'o>,

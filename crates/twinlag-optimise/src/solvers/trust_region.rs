@@ -16,8 +16,8 @@ const LARGEST_RADIUS: f64 = 2.0;
 
 /// A trust region whose step is found by conjugate gradients.
 pub(crate) fn steihaug(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
-    // n iterations solve the model but for rounding; without a limit there may be no end. The tolerance also says which
-    // gradient, relative to the value at the start, is none.
+    // n iterations solve the model but for rounding; without a limit there may be no end. The
+    // tolerance also says which gradient, relative to the value at the start, is none.
     let n = ledger.best().z.len() as u64;
     let step = Steihaug::new().with_max_iters(10 * n).with_epsilon(1e-12).expect("the tolerance is positive");
     run(ledger, step, step_tolerance)
@@ -39,7 +39,8 @@ where
     run_argmin(ledger, Objective::new(ledger, Outside::Wall), stopping, |s: State| s.param(z))
 }
 
-/// Stops when a step, or the region for the next, is no longer than the tolerance, and where nothing moves any more.
+/// Stops when a step, or the region for the next, is no longer than the tolerance, and where
+/// nothing moves any more.
 struct Stopping<S> {
     solver: S,
     step_tolerance: f64,
@@ -67,7 +68,8 @@ impl<O, S: Solver<O, State>> Solver<O, State> for Stopping<S> {
         self.done = if moved > 0.0 {
             moved <= self.step_tolerance
         } else {
-            // A refused step makes the region smaller. If it did not, the step was zero, and will be for ever.
+            // A refused step makes the region smaller. If it did not, the step was zero, and will
+            // be for ever.
             radius <= self.step_tolerance || radius == self.radius || radius.is_nan()
         };
         self.radius = if moved > 0.0 { f64::INFINITY } else { radius };

@@ -1,5 +1,5 @@
-//! A clock that loses its place: from one moment on the samples of this channel are those of an earlier time,
-//! `y(t) → y(t − by)` for `t ≥ at`. It is a delay that appears in mid-record.
+//! A clock that loses its place: from one moment on the samples of this channel are those of an
+//! earlier time, `y(t) → y(t − by)` for `t ≥ at`. It is a delay that appears in mid-record.
 
 use serde::{Deserialize, Serialize};
 

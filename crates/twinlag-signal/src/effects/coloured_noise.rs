@@ -1,5 +1,6 @@
-//! Noise that remembers: a stationary AR(1) process beside the channel's other noise, given by its correlation time:
-//! `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, `ρ = exp(−Ts/θ)`, autocorrelation `s² exp(−|t|/θ)`.
+//! Noise that remembers: a stationary AR(1) process beside the channel's other noise, given by its
+//! correlation time: `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, `ρ = exp(−Ts/θ)`, autocorrelation
+//! `s² exp(−|t|/θ)`.
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,8 @@ pub struct ColouredNoise {
 }
 
 impl ColouredNoise {
-    /// Noise of standard deviation `std_k` with autocorrelation `std_k² exp(−|t|/correlation_time_s)`.
+    /// Noise of standard deviation `std_k` with autocorrelation
+    /// `std_k² exp(−|t|/correlation_time_s)`.
     pub fn new(std_k: f64, correlation_time_s: f64) -> Self {
         Self { std_k, correlation_time_s }
     }

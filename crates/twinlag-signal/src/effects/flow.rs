@@ -1,5 +1,6 @@
 //! The flow past both sensors: it multiplies both first time constants with one function of time,
-//! `τ_i(t) = τ_i m(t)`. Second lags and slow modes are bodies that the gas does not touch; they keep theirs.
+//! `τ_i(t) = τ_i m(t)`. Second lags and slow modes are bodies that the gas does not touch; they
+//! keep theirs.
 
 use std::f64::consts::TAU;
 
@@ -34,7 +35,8 @@ pub struct FlowSine {
     pub phase_rad: f64,
 }
 
-/// `m(t) = 1 + (factor − 1) u`, where `u` goes from 0 to 1 as half a raised cosine from `at_s` to `at_s + over_s`.
+/// `m(t) = 1 + (factor − 1) u`, where `u` goes from 0 to 1 as half a raised cosine from `at_s` to
+/// `at_s + over_s`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]

@@ -1,9 +1,10 @@
-//! Play, as of a bearing with slack: the output stays where it is until the input has moved away from it by half the
-//! width, and is dragged along from there: `p ← max(T − w/2, min(T + w/2, p))`. It starts at the input.
+//! Play, as of a bearing with slack: the output stays where it is until the input has moved away
+//! from it by half the width, and is dragged along from there: `p ← max(T − w/2, min(T + w/2, p))`.
+//! It starts at the input.
 //!
-//! It acts on the junction's temperature, between the lags and the calibration. The operator depends on the extremes of
-//! its input only, and is stepped at every integration step: an extreme between two of them is missed by less than
-//! `h² |T″|/8`.
+//! It acts on the junction's temperature, between the lags and the calibration. The operator
+//! depends on the extremes of its input only, and is stepped at every integration step: an extreme
+//! between two of them is missed by less than `h² |T″|/8`.
 
 use serde::{Deserialize, Serialize};
 

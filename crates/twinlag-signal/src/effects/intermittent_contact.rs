@@ -1,5 +1,6 @@
-//! A contact that opens now and then: episodes begin as a Poisson process and last exponentially long. During each, a
-//! part of the reading's distance from a reference is lost: `y → y − d (y − r)`. The edges are sharp.
+//! A contact that opens now and then: episodes begin as a Poisson process and last exponentially
+//! long. During each, a part of the reading's distance from a reference is lost:
+//! `y → y − d (y − r)`. The edges are sharp.
 
 use rand::{Rng, RngExt};
 use rand_distr::Exp1;
@@ -20,8 +21,8 @@ pub struct IntermittentContact {
     pub mean_duration_s: f64,
     /// The part `d` that is lost, 0 to 1.
     pub drop_fraction: f64,
-    /// The reference `r` towards which the reading falls, °C, such as the temperature of the cold junction. The mean of
-    /// the channel's record if left out.
+    /// The reference `r` towards which the reading falls, °C, such as the temperature of the cold
+    /// junction. The mean of the channel's record if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub towards_c: Option<f64>,
 }
@@ -32,8 +33,8 @@ impl IntermittentContact {
         Self { rate_hz, mean_duration_s, drop_fraction, towards_c: None }
     }
 
-    /// Applies the episodes to the readings at the given times, which increase from zero. At time zero the contact is
-    /// in either state with its stationary probability.
+    /// Applies the episodes to the readings at the given times, which increase from zero. At time
+    /// zero the contact is in either state with its stationary probability.
     pub(crate) fn apply(&self, times_s: &[f64], readings_c: &mut [f64], rng: &mut impl Rng) {
         let mean_c = readings_c.iter().sum::<f64>() / readings_c.len() as f64;
         let towards_c = self.towards_c.unwrap_or(mean_c);

@@ -1,4 +1,5 @@
-//! Mains pick-up: a sine `A sin(2π f t + φ)` on the reading, time zero at the record's first sample.
+//! Mains pick-up: a sine `A sin(2π f t + φ)` on the reading, time zero at the record's first
+//! sample.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +13,8 @@ use crate::check::{finite, not_negative, positive};
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Mains {
-    /// Frequency, Hz. One above half the sampling rate shows at its alias, as in a logger without a filter.
+    /// Frequency, Hz. One above half the sampling rate shows at its alias, as in a logger without a
+    /// filter.
     pub frequency_hz: f64,
     /// Amplitude, K (half of peak to peak); 0 is allowed.
     pub amplitude_k: f64,

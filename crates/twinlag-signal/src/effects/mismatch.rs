@@ -1,8 +1,10 @@
-//! Two sensors, two places: one sensor meets `x(t) + m(t)` where the other meets the gas `x(t)`. `m` is stationary
-//! first-order Gaussian noise (Ornstein-Uhlenbeck), independent of the gas, added before the sensor.
+//! Two sensors, two places: one sensor meets `x(t) + m(t)` where the other meets the gas `x(t)`.
+//! `m` is stationary first-order Gaussian noise (Ornstein-Uhlenbeck), independent of the gas, added
+//! before the sensor.
 //!
-//! `m` is drawn on the gas's own grid: exact there, and nowhere smooth. So what the sensor makes of it is integrated to
-//! order `h`, and another oversampling gives another `m`, as with a gas of kind `broadband`.
+//! `m` is drawn on the gas's own grid: exact there, and nowhere smooth. So what the sensor makes of
+//! it is integrated to order `h`, and another oversampling gives another `m`, as with a gas of kind
+//! `broadband`.
 
 use rand::Rng;
 use serde::{Deserialize, Serialize};

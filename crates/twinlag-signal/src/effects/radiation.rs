@@ -1,9 +1,11 @@
 //! Radiation between the junction and a wall: the first body's heat balance becomes
-//! `τ dT/dt = (x − T) − k (T_K⁴ − W_K⁴)`, `T_K` and `W_K` the temperatures of body and wall in kelvin.
+//! `τ dT/dt = (x − T) − k (T_K⁴ − W_K⁴)`, `T_K` and `W_K` the temperatures of body and wall in
+//! kelvin.
 //!
-//! `k` is `ε σ / h`: emissivity and the Stefan-Boltzmann constant over the coefficient of convection, 1/K³. At rest in a
-//! gas hotter than the wall the sensor reads low by `k (T_K⁴ − W_K⁴)`, and near there it responds like a sensor of gain
-//! `1/(1 + 4 k T_K³)` and time constant `τ/(1 + 4 k T_K³)`.
+//! `k` is `ε σ / h`: emissivity and the Stefan-Boltzmann constant over the coefficient of
+//! convection, 1/K³. At rest in a gas hotter than the wall the sensor reads low by
+//! `k (T_K⁴ − W_K⁴)`, and near there it responds like a sensor of gain `1/(1 + 4 k T_K³)` and time
+//! constant `τ/(1 + 4 k T_K³)`.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +30,8 @@ impl Radiation {
         Self { coefficient_per_k3, wall_c }
     }
 
-    /// What the gas would have to be hotter by, to replace the heat that a body of `body_c` radiates, K.
+    /// What the gas would have to be hotter by, to replace the heat that a body of `body_c`
+    /// radiates, K.
     pub(crate) fn loss_k(&self, body_c: f64) -> f64 {
         // The fourth powers' difference without its cancellation: (a² + b²)(a + b)(a − b).
         let (body_k, wall_k) = (body_c + ZERO_CELSIUS_K, self.wall_c + ZERO_CELSIUS_K);

@@ -1,5 +1,6 @@
-//! Isolated outliers: each sample, independently, is a spike with a given probability and then reads off by
-//! `± size · u`, the sign a fair coin's, `u` uniform from 0.5 to 1.5. They are added after the noise.
+//! Isolated outliers: each sample, independently, is a spike with a given probability and then
+//! reads off by `± size · u`, the sign a fair coin's, `u` uniform from 0.5 to 1.5. They are added
+//! after the noise.
 
 use rand::{Rng, RngExt};
 use serde::{Deserialize, Serialize};

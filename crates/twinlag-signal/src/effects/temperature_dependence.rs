@@ -1,5 +1,5 @@
-//! A time constant that depends on the temperature of the body whose it is: `τ(T) = τ (T_K/R_K)^p`, `T_K` and `R_K` the
-//! body's and a reference temperature in kelvin. It acts on the first lag.
+//! A time constant that depends on the temperature of the body whose it is: `τ(T) = τ (T_K/R_K)^p`,
+//! `T_K` and `R_K` the body's and a reference temperature in kelvin. It acts on the first lag.
 
 use serde::{Deserialize, Serialize};
 

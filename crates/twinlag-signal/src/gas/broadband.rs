@@ -1,9 +1,10 @@
-//! First-order random noise (Ornstein-Uhlenbeck): autocorrelation `s² exp(−ω_c |t|)`, `ω_c = 2π f_c`, spectrum flat
-//! below the corner and falling as `f⁻²` above it. Exact at the grid points, by `x[j+1] = φ x[j] + √(1 − φ²) s ξ[j]`,
-//! `φ = exp(−ω_c Δ)`, from a stationary start.
+//! First-order random noise (Ornstein-Uhlenbeck): autocorrelation `s² exp(−ω_c |t|)`,
+//! `ω_c = 2π f_c`, spectrum flat below the corner and falling as `f⁻²` above it. Exact at the grid
+//! points, by `x[j+1] = φ x[j] + √(1 − φ²) s ξ[j]`, `φ = exp(−ω_c Δ)`, from a stationary start.
 //!
-//! Its paths are nowhere smooth: a sensor that follows the continuous one is integrated to order `h`, not `h⁴`, and the
-//! path itself depends on the oversampling. Held over each sample period it is exact in every respect.
+//! Its paths are nowhere smooth: a sensor that follows the continuous one is integrated to order
+//! `h`, not `h⁴`, and the path itself depends on the oversampling. Held over each sample period it
+//! is exact in every respect.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +17,8 @@ use crate::SignalError;
 use crate::check::positive;
 use crate::grid::Grid;
 
-/// Ornstein-Uhlenbeck noise; with [`Hold::ZeroOrder`](super::Hold::ZeroOrder), AR(1) noise from sample to sample.
+/// Ornstein-Uhlenbeck noise; with [`Hold::ZeroOrder`](super::Hold::ZeroOrder), AR(1) noise from
+/// sample to sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Broadband {

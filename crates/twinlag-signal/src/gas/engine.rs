@@ -1,10 +1,11 @@
-//! Pulsation of an engine's exhaust: in every cycle the gas rises within a fraction of the period to the cycle's peak
-//! (half a raised cosine, from wherever it was) and decays exponentially towards the base.
+//! Pulsation of an engine's exhaust: in every cycle the gas rises within a fraction of the period
+//! to the cycle's peak (half a raised cosine, from wherever it was) and decays exponentially
+//! towards the base.
 //!
-//! The mean of the cycle without variation, `A [ρ (1 + ε)/2 + δ (1 − ε)]` with the rise fraction `ρ`, the decay
-//! fraction `δ` and `ε = exp(−(1 − ρ)/δ)`, is taken off, so that the gas has the mean it is given. Variation from cycle
-//! to cycle is log-normal with mean one: peaks and periods stay positive. A model of the shape, not of an engine's gas
-//! exchange.
+//! The mean of the cycle without variation, `A [ρ (1 + ε)/2 + δ (1 − ε)]` with the rise fraction
+//! `ρ`, the decay fraction `δ` and `ε = exp(−(1 − ρ)/δ)`, is taken off, so that the gas has the
+//! mean it is given. Variation from cycle to cycle is log-normal with mean one: peaks and periods
+//! stay positive. A model of the shape, not of an engine's gas exchange.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -15,7 +16,8 @@ use crate::SignalError;
 use crate::check::{between, not_negative, path, positive};
 use crate::grid::Grid;
 
-/// Pulsation with a sharp rise and an exponential decay in each cycle. The first cycle starts with the run-in.
+/// Pulsation with a sharp rise and an exponential decay in each cycle. The first cycle starts with
+/// the run-in.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Engine {
@@ -29,7 +31,8 @@ pub struct Engine {
     /// Relative standard deviation of the periods from cycle to cycle, at most 1; 0 if left out.
     #[serde(default)]
     pub period_relative_std: f64,
-    /// Part of each period in which the gas rises, between 0 and 1 (both excluded); 0.08 if left out.
+    /// Part of each period in which the gas rises, between 0 and 1 (both excluded); 0.08 if left
+    /// out.
     #[serde(default = "default_rise_fraction")]
     pub rise_fraction: f64,
     /// Time constant of the decay as a part of the period; 0.25 if left out.
@@ -140,8 +143,9 @@ mod tests {
 
     use super::*;
 
-    /// A log-normal of relative standard deviation r has kurtosis `w⁴ + 2w³ + 3w² − 3`, `w = 1 + r²`, so the mean
-    /// square about 1 has standard error `r² √((kurtosis − 1)/n)`; the mean `r/√n`. Four of each.
+    /// A log-normal of relative standard deviation r has kurtosis `w⁴ + 2w³ + 3w² − 3`,
+    /// `w = 1 + r²`, so the mean square about 1 has standard error `r² √((kurtosis − 1)/n)`; the
+    /// mean `r/√n`. Four of each.
     #[test]
     fn cycles_vary_about_one_with_the_given_relative_deviation() {
         let (n, r) = (200_000, 0.2_f64);

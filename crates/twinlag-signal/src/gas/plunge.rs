@@ -1,6 +1,7 @@
-//! Random steps, as of a probe plunged from one bath into another: levels uniform over ±A, each reached by half a
-//! raised cosine. The time from one step to the next is the rise and then an exponential wait, so every level is
-//! reached, the temperature and its slope are continuous, and the mean time is the one given.
+//! Random steps, as of a probe plunged from one bath into another: levels uniform over ±A, each
+//! reached by half a raised cosine. The time from one step to the next is the rise and then an
+//! exponential wait, so every level is reached, the temperature and its slope are continuous, and
+//! the mean time is the one given.
 
 use rand::{Rng, RngExt};
 use rand_distr::Exp1;

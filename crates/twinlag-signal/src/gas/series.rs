@@ -1,5 +1,6 @@
-//! A given series, interpolated linearly between its points. Its first point is at the record's first sample, whatever
-//! its own time; during the run-in the gas has that first value. It must reach the record's end.
+//! A given series, interpolated linearly between its points. Its first point is at the record's
+//! first sample, whatever its own time; during the run-in the gas has that first value. It must
+//! reach the record's end.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,13 +13,14 @@ use crate::grid::Grid;
 
 /// A gas temperature given as numbers, linear between them, starting at the record's first sample.
 ///
-/// Linear interpolation takes off the high frequencies: a series as coarse as the record's sampling has less of them
-/// than the gas it was measured in.
+/// Linear interpolation takes off the high frequencies: a series as coarse as the record's sampling
+/// has less of them than the gas it was measured in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
 pub enum Series {
-    /// In a rig file: `path`. A text file with a line `time_s,value_c` for each point, times increasing. Its first line
-    /// may be a header; empty lines and those starting with `#` are skipped.
+    /// In a rig file: `path`. A text file with a line `time_s,value_c` for each point, times
+    /// increasing. Its first line may be a header; empty lines and those starting with `#` are
+    /// skipped.
     File {
         /// Relative paths are looked up in [`Rig::with_base_dir`](crate::Rig::with_base_dir).
         path: PathBuf,
@@ -81,7 +83,8 @@ impl Series {
         let points = self.points(base_dir)?;
         let needed_s = grid.time_s(grid.points - 1);
         let end_s = points.last().map_or(0.0, |&(time_s, _)| time_s);
-        // Times that are the same in decimals may differ in the last bit: the last value is held that far.
+        // Times that are the same in decimals may differ in the last bit: the last value is held
+        // that far.
         if end_s < needed_s * (1.0 - 1e-9) {
             return Err(SignalError::SeriesTooShort { end_s, needed_s });
         }
@@ -91,7 +94,8 @@ impl Series {
                 right += 1;
             }
             let ((t0, x0), (t1, x1)) = (points[right - 1], points[right]);
-            // Measured from the nearer end, so that a grid point on a series point has exactly its value.
+            // Measured from the nearer end, so that a grid point on a series point has exactly its
+            // value.
             let u = ((time_s - t0) / (t1 - t0)).clamp(0.0, 1.0);
             if u < 0.5 { x0 + u * (x1 - x0) } else { x1 - (1.0 - u) * (x1 - x0) }
         };

@@ -1,11 +1,11 @@
-//! Turbulence: Gaussian, with the one-sided spectrum `S(f) = S₀ min(1, (f/f_c)^(−5/3))` up to a cutoff (the inertial
-//! range of a passive scalar: Obukhov 1949, Corrsin 1951), and none above it.
+//! Turbulence: Gaussian, with the one-sided spectrum `S(f) = S₀ min(1, (f/f_c)^(−5/3))` up to a
+//! cutoff (the inertial range of a passive scalar: Obukhov 1949, Corrsin 1951), and none above it.
 //!
-//! A sum of sines at the multiples of `1/P` with Gaussian coefficients, of which the grid takes a part: `P` is longer
-//! than the run by five periods of the corner, so that its end does not know its start. The variances of the sines are
-//! scaled to add up to `std_k²`: the ensemble's standard deviation is exact, for any record. `P` is a whole number of
-//! sample periods and the coefficients are drawn from low to high frequencies, so they do not depend on the
-//! oversampling.
+//! A sum of sines at the multiples of `1/P` with Gaussian coefficients, of which the grid takes a
+//! part: `P` is longer than the run by five periods of the corner, so that its end does not know
+//! its start. The variances of the sines are scaled to add up to `std_k²`: the ensemble's standard
+//! deviation is exact, for any record. `P` is a whole number of sample periods and the coefficients
+//! are drawn from low to high frequencies, so they do not depend on the oversampling.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
@@ -18,11 +18,13 @@ use crate::check::{below, positive};
 use crate::grid::{self, Grid};
 use crate::{Record, SignalError};
 
-/// Gaussian random signal, its spectrum flat below a corner and falling as `f^(−5/3)` from there to a cutoff.
+/// Gaussian random signal, its spectrum flat below a corner and falling as `f^(−5/3)` from there to
+/// a cutoff.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turbulence {
-    /// Standard deviation over the ensemble, K. One record shows less if it is not long against `1/corner_hz`.
+    /// Standard deviation over the ensemble, K. One record shows less if it is not long against
+    /// `1/corner_hz`.
     pub std_k: f64,
     /// Frequency above which the spectrum falls, Hz.
     pub corner_hz: f64,
@@ -31,7 +33,8 @@ pub struct Turbulence {
 }
 
 impl Turbulence {
-    /// Sample periods in the synthesis period `P` of a run of `samples`: the next length with factors 2, 3, 5 only.
+    /// Sample periods in the synthesis period `P` of a run of `samples`: the next length with
+    /// factors 2, 3, 5 only.
     fn period_samples(&self, samples: f64, sample_period_s: f64) -> f64 {
         let least = (samples + 5.0 / (self.corner_hz * sample_period_s)).ceil();
         let mut best = f64::INFINITY;
@@ -40,7 +43,8 @@ impl Turbulence {
             let mut odd = five;
             while odd < best {
                 let length = odd * (least / odd).log2().ceil().max(0.0).exp2();
-                // The logarithm may be a hair off: a length that is too short is left to the next power of two.
+                // The logarithm may be a hair off: a length that is too short is left to the next
+                // power of two.
                 best = best.min(if length < least { 2.0 * length } else { length });
                 odd *= 3.0;
             }
@@ -63,7 +67,8 @@ impl Turbulence {
         for bin in 1..=bins {
             let (cosine, sine): (f64, f64) = (rng.sample(StandardNormal), rng.sample(StandardNormal));
             let std_k = (scale * shape(bin)).sqrt();
-            // On a coarse grid (a held gas) high frequencies show as low ones; that keeps the values and the variance.
+            // On a coarse grid (a held gas) high frequencies show as low ones; that keeps the
+            // values and the variance.
             let (place, sign) = match bin % length {
                 place if 2 * place <= length => (place, 1.0),
                 place => (length - place, -1.0),

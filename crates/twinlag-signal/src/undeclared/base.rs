@@ -29,8 +29,8 @@ pub(super) struct Base {
 }
 
 impl Base {
-    /// Everything but the gas signal's own random numbers, which are the rig's, is drawn from `rng`. Asking for a kind of
-    /// gas changes that alone.
+    /// Everything but the gas signal's own random numbers, which are the rig's, is drawn from
+    /// `rng`. Asking for a kind of gas changes that alone.
     pub(super) fn draw(gas_kind: Option<GasKind>, rig_seed: u64, rng: &mut impl Rng) -> Result<Self, SignalError> {
         let sample_period_s = one_of(&[0.0005, 0.001, 0.002, 0.005], rng);
         let samples = rng.random_range(9000..=18_000);
@@ -50,8 +50,8 @@ impl Base {
             sensor.noise = Some(Noise::white(std_k));
         }
         let mut record = Record::new(samples, sample_period_s);
-        // The same for every effect, so that it does not move the gas: of a slow mode at its slowest an eighth of the
-        // start is left.
+        // The same for every effect, so that it does not move the gas: of a slow mode at its
+        // slowest an eighth of the start is left.
         record.settle_s = Some(30.0 * slow_s);
         let signal = unit_signal(gas_kind, frequency_hz, sample_period_s, rng);
         let gas = scaled(Gas::new(0.0, signal), mean_c, scale_k, &record, rig_seed)?;
@@ -94,7 +94,8 @@ fn unit_signal(kind: GasKind, frequency_hz: f64, sample_period_s: f64, rng: &mut
             cutoff_hz: (20.0 * frequency_hz).min(0.45 / sample_period_s),
         }),
         GasKind::MultiTone => {
-            // From a twentieth of the characteristic frequency to three times it, weaker as they get faster.
+            // From a twentieth of the characteristic frequency to three times it, weaker as they
+            // get faster.
             let tones = (0..12).map(|i| {
                 let relative = 0.05 * 60.0_f64.powf((f64::from(i) + rng.random_range(0.0..1.0)) / 12.0);
                 Tone {
@@ -108,7 +109,8 @@ fn unit_signal(kind: GasKind, frequency_hz: f64, sample_period_s: f64, rng: &mut
     }
 }
 
-/// The gas with its signal scaled and shifted, so that over the record it has the given mean and standard deviation.
+/// The gas with its signal scaled and shifted, so that over the record it has the given mean and
+/// standard deviation.
 fn scaled(mut gas: Gas, mean_c: f64, scale_k: f64, record: &Record, rig_seed: u64) -> Result<Gas, SignalError> {
     // A signal's random numbers do not depend on the grid: the sample instants will do.
     let grid = Grid::new(record, record.settle_samples(0.0) as usize, Hold::ZeroOrder);

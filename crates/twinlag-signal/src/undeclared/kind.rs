@@ -101,7 +101,8 @@ impl Kind {
         Self::Crosstalk,
     ];
 
-    /// The kinds that no library of effects knows: here a diagnosis ought to say that it does not know.
+    /// The kinds that no library of effects knows: here a diagnosis ought to say that it does not
+    /// know.
     pub const ALIENS: [Self; 4] = [Self::Hysteresis, Self::IntermittentContact, Self::ClockSlip, Self::Replaced];
 
     /// The name in files, in kebab case.
@@ -133,8 +134,8 @@ impl Kind {
     }
 
     /// The name of this effect in a library of effects. Gain, offset and curvature share the name
-    /// `"calibration"`, because they are hard to distinguish from the readings alone. [`Kind::None`] and
-    /// the [aliens](Kind::ALIENS) have no name.
+    /// `"calibration"`, because they are hard to distinguish from the readings alone.
+    /// [`Kind::None`] and the [aliens](Kind::ALIENS) have no name.
     pub fn effect(self) -> Option<&'static str> {
         match self {
             Self::None | Self::Hysteresis | Self::IntermittentContact | Self::ClockSlip | Self::Replaced => None,
@@ -177,7 +178,8 @@ impl Kind {
 pub enum GasKind {
     /// Pulsation of an engine's exhaust, its cycles at about the characteristic frequency.
     Engine,
-    /// Random steps with long rests between them, each made within a part of the characteristic period.
+    /// Random steps with long rests between them, each made within a part of the characteristic
+    /// period.
     Plunge,
     /// Turbulence with its corner below the characteristic frequency.
     Turbulence,

@@ -37,8 +37,8 @@ impl Draft {
         Ok(rig)
     }
 
-    /// Adds one effect, its size drawn from `rng` and multiplied by `by`. Saturation must be placed last: it looks for
-    /// the hottest or coldest part of the record that the other effects leave.
+    /// Adds one effect, its size drawn from `rng` and multiplied by `by`. Saturation must be placed
+    /// last: it looks for the hottest or coldest part of the record that the other effects leave.
     pub(super) fn place(&mut self, kind: Kind, by: f64, rng: &mut impl Rng) -> Result<Placed, SignalError> {
         let channel = usize::from(rng.random::<bool>());
         let (size, channel) = match kind {
@@ -121,7 +121,8 @@ impl Draft {
                 sensor.offset_k
             }
             Kind::Curvature => {
-                // Were the reading Gaussian, (T − mean)² would have a root mean square of √3 scale².
+                // Were the reading Gaussian, (T − mean)² would have a root mean square of √3
+                // scale².
                 let rms_k = by * scale_k * log_uniform(0.005, 0.02, rng);
                 sensor.curvature_per_k = sign(rng) * rms_k / (3.0_f64.sqrt() * scale_k * scale_k);
                 sensor.curvature_about_c = mean_c;
