@@ -107,8 +107,8 @@ pub(crate) fn diagnosis(answer: &Diagnosis, console: Console) -> Result<(), Fail
     stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
 }
 
-/// Prints a summary of the gas temperature, as text or as JSON. The text goes to standard error if the
-/// table itself goes to standard output.
+/// Prints a summary of the gas temperature, as text or as JSON. The text goes to standard error if
+/// the table itself goes to standard output.
 pub(crate) fn compensation(
     answer: &Compensation,
     out: &Path,

@@ -304,7 +304,7 @@ fn a_second_lag_is_an_object_of_its_sensor_and_null_where_not_asked() {
     assert!(low < got && got < high);
     assert!(value["sensors"][1]["second_time_constant_s"].is_null());
     let text = bench.run(&["characterise", "run.csv", "--second-order", "T1,T2"]).stdout;
-    assert!(text.contains("second time constant 0.0") && text.contains("second time constant not seen"), "{text}");
+    assert!(text.contains("second time constant 0.0") && text.contains("second time constant not detected"), "{text}");
 }
 
 #[test]

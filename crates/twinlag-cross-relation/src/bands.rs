@@ -1,4 +1,5 @@
-//! Bins of a spectrum gathered into bands, in which a function that is smooth in `cos w` is interpolated.
+//! Bins of a spectrum gathered into bands, in which a function that is smooth in `cos w` is
+//! interpolated.
 
 /// Points in each band.
 pub(crate) const NODES: usize = 6;
@@ -62,7 +63,8 @@ impl Bands {
         out
     }
 
-    /// Points `x = cos w` and how many bins each stands for: `Σ_j f(x_j)` over all bins, for an `f` that is smooth in `x`.
+    /// Points `x = cos w` and how many bins each stands for: `Σ_j f(x_j)` over all bins, for an `f`
+    /// that is smooth in `x`.
     pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         self.nodes.iter().copied().zip(self.counts.iter().copied())
     }

@@ -1,15 +1,18 @@
-//! The whitened cost in a hundred terms instead of thousands: bins gathered into bands once, before any evaluation.
+//! The whitened cost in a hundred terms instead of thousands: bins gathered into bands once, before
+//! any evaluation.
 //!
-//! All that depends on data in the spectral cost is quadratic in a few series per bin, `D_i,j D_k,j`, and all that depends on
-//! the parameters is smooth in `x = cos w`. So in each band the function `1/λ(x)`, `λ = α + β x`, is interpolated at
-//! [`NODES`] Chebyshev points `x_q`: with `L_q` Lagrange's polynomials, `Σ_j (D_i D_k)_j/λ_j ≈ Σ_q G_ik,q/λ(x_q)`,
-//! `G_ik,q = Σ_j L_q(x_j) (D_i D_k)_j`. The same sum over points, of which there are about a hundred whatever the length of
-//! the record. Bands with no more bins than points keep their bins.
+//! All that depends on data in the spectral cost is quadratic in a few series per bin,
+//! `D_i,j D_k,j`, and all that depends on the parameters is smooth in `x = cos w`. So in each band
+//! the function `1/λ(x)`, `λ = α + β x`, is interpolated at [`NODES`] Chebyshev points `x_q`: with
+//! `L_q` Lagrange's polynomials, `Σ_j (D_i D_k)_j/λ_j ≈ Σ_q G_ik,q/λ(x_q)`,
+//! `G_ik,q = Σ_j L_q(x_j) (D_i D_k)_j`. The same sum over points, of which there are about a
+//! hundred whatever the length of the record. Bands with no more bins than points keep their bins.
 //!
-//! The error is known exactly: interpolating `1/λ` leaves the relative error `Π_q β (x − x_q)/λ(x_q)`, at most
-//! `ε = 2 (|β| h/2)^Q / Π_q λ(x_q)` in a band of half width `h`. Bands are a factor of two wide in `1 − x`, so `ε ≤ 5.1e-5`
-//! (`1/T₆(3)`) whatever the parameters, and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a bound on
-//! what the minimum can move.
+//! The error is known exactly: interpolating `1/λ` leaves the relative error
+//! `Π_q β (x − x_q)/λ(x_q)`, at most `ε = 2 (|β| h/2)^Q / Π_q λ(x_q)` in a band of half width `h`.
+//! Bands are a factor of two wide in `1 − x`, so `ε ≤ 5.1e-5` (`1/T₆(3)`) whatever the parameters,
+//! and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a
+//! bound on what the minimum can move.
 
 use num_dual::DualSVec64;
 
@@ -97,8 +100,9 @@ impl Compressed {
         }
     }
 
-    /// With `J_j (1 + ε_j)` in place of `J_j = r_j²`: `½ ∂(J ε) = r ∂r ε + ½ J ε ∂ ln ε`, Cauchy's inequality for the first
-    /// over a band, and `∂ ln ε = Σ_q ∂ ln(β/λ_q)`, the same for all its bins.
+    /// With `J_j (1 + ε_j)` in place of `J_j = r_j²`: `½ ∂(J ε) = r ∂r ε + ½ J ε ∂ ln ε`, Cauchy's
+    /// inequality for the first over a band, and `∂ ln ε = Σ_q ∂ ln(β/λ_q)`, the same for all its
+    /// bins.
     fn gradient_error_of_pairs<const P: usize, const G: usize>(
         &self,
         segment: &Transformed,
@@ -210,7 +214,8 @@ impl<const P: usize, const G: usize> Forms<P, G> {
         out
     }
 
-    /// The terms of `Σ r²/2`'s value, gradient and Gauss-Newton matrix at a point `x` with products `gram`.
+    /// The terms of `Σ r²/2`'s value, gradient and Gauss-Newton matrix at a point `x` with products
+    /// `gram`.
     #[inline]
     fn at(&self, gram: &[f64; G], weights: &Weights<P>, x: f64) -> Sums<P> {
         let dot = |form: &[f64; G]| -> f64 { (0..G).map(|g| form[g] * gram[g]).sum() };

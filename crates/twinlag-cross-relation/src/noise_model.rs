@@ -1,4 +1,5 @@
-//! What every form of the whitened cost takes for granted: what the gas does between samples, and the noise.
+//! What every form of the whitened cost takes for granted: what the gas does between samples, and
+//! the noise.
 
 use twinlag_sensor::Discretisation;
 

@@ -1,6 +1,7 @@
 //! The plan of an experiment: which records, which methods, how many trials.
 //!
-//! Cells are the product of all lists, in the order in which they stand here; every method answers the same records.
+//! Cells are the product of all lists, in the order in which they stand here; every method answers
+//! the same records.
 
 use serde::{Deserialize, Serialize};
 use twinlag::signal::{Gas, Noise, Record, Rig, Sensor};
@@ -58,10 +59,12 @@ pub struct Plan {
     pub noise_ar1: Vec<f64>,
     /// What answers each record.
     pub methods: Vec<Method>,
-    /// Time constants of a grid of starts (every pair of two of them), s, for methods that start there.
+    /// Time constants of a grid of starts (every pair of two of them), s, for methods that start
+    /// there.
     #[serde(default)]
     pub grid_s: Vec<f64>,
-    /// Whether the methods are timed as well; times go into a file of their own, since no two runs agree on them.
+    /// Whether the methods are timed as well; times go into a file of their own, since no two runs
+    /// agree on them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub timed: bool,
     /// Pictures of the table.

@@ -1,11 +1,13 @@
-//! From text to lines to cells. A cell that begins with a quotation mark ends with one; two inside it stand for one.
-//! Quoted cells do not run over the end of a line: no logger does that, and a stray mark would swallow the file.
+//! From text to lines to cells. A cell that begins with a quotation mark ends with one; two inside
+//! it stand for one. Quoted cells do not run over the end of a line: no logger does that, and a
+//! stray mark would swallow the file.
 
 use std::borrow::Cow;
 
 use crate::sign::Delimiter;
 
-/// Lines of a text with their numbers, from 1; ends are LF, CR LF or, if the text has no LF at all, CR.
+/// Lines of a text with their numbers, from 1; ends are LF, CR LF or, if the text has no LF at all,
+/// CR.
 pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.split(line_end(text)).enumerate().map(|(index, line)| (index + 1, line.trim_end_matches('\r')))
 }
@@ -98,14 +100,16 @@ mod tests {
     }
 
     proptest! {
-        /// Oracle: the csv crate writes and quotes, this module takes apart again. Blanks at the ends are trimmed here.
+        /// Oracle: the csv crate writes and quotes, this module takes apart again. Blanks at the
+        /// ends are trimmed here.
         #[test]
         fn what_the_csv_crate_writes_is_taken_apart(want in prop::collection::vec("[a-z\",; ]{0,6}", 2..6)) {
             for delimiter in [Delimiter::Comma, Delimiter::Semicolon] {
                 let mut writer = csv::WriterBuilder::new().delimiter(delimiter.byte()).from_writer(Vec::new());
                 writer.write_record(&want).unwrap();
                 let line = String::from_utf8(writer.into_inner().unwrap()).unwrap();
-                // The writer leaves blanks before a text without quotes; such cells are compared trimmed.
+                // The writer leaves blanks before a text without quotes; such cells are compared
+                // trimmed.
                 let trimmed: Vec<_> = want.iter().map(|cell| cell.trim().to_owned()).collect();
                 prop_assert_eq!(cells(line.trim_end_matches('\n'), delimiter), trimmed);
             }

@@ -1,5 +1,5 @@
-//! Which columns are time, T1 and T2: those that the caller names, else a guess from names and units. A
-//! guess is noted. If a header can be read in two ways, nothing is guessed.
+//! Which columns are time, T1 and T2: those that the caller names, else a guess from names and
+//! units. A guess is noted. If a header can be read in two ways, nothing is guessed.
 
 use crate::RecordError;
 use crate::clock;
@@ -136,9 +136,9 @@ fn first_word(column: &Column) -> String {
 /// Makes the choice, and notes what was guessed.
 ///
 /// # Errors
-/// Those of [`Table::find`]; [`RecordError::TimeAndPeriod`], [`RecordError::BadPeriod`], [`RecordError::NoTime`],
-/// [`RecordError::ChannelsUnclear`], [`RecordError::SameColumn`], [`RecordError::NoValues`],
-/// [`RecordError::NotATemperature`].
+/// Those of [`Table::find`]; [`RecordError::TimeAndPeriod`], [`RecordError::BadPeriod`],
+/// [`RecordError::NoTime`], [`RecordError::ChannelsUnclear`], [`RecordError::SameColumn`],
+/// [`RecordError::NoValues`], [`RecordError::NotATemperature`].
 pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>) -> Result<Chosen, RecordError> {
     let find = |wanted: &Option<_>| wanted.as_ref().map(|wanted| table.find(wanted)).transpose();
     let (named_time, named) = (find(&selection.time)?, [find(&selection.t1)?, find(&selection.t2)?]);
@@ -160,7 +160,8 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         Some(_) => None,
         None => guess_time(table, &taken),
     };
-    // Even where a period is given the time column is told, so that it is not taken for a temperature.
+    // Even where a period is given the time column is told, so that it is not taken for a
+    // temperature.
     let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
     let channels = match named {
         [Some(t1), Some(t2)] => [t1, t2],
@@ -182,7 +183,8 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
     let free = |index: &usize| !taken.contains(index);
     (0..columns.len()).filter(free).find(|&index| is_time(&columns[index])).or_else(|| {
-        // Without a telling name: the first column, if it rises from row to row and is not a row number.
+        // Without a telling name: the first column, if it rises from row to row and is not a row
+        // number.
         let first = columns.first().filter(|_| free(&0))?;
         let rises = first.raw().windows(2).all(|pair| pair[1] > pair[0]);
         let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !has(first, &APART);
@@ -288,8 +290,9 @@ fn clear_pair(columns: &[Column], named: [Option<usize>; 2], candidates: &[usize
     }
 }
 
-/// The first column that is a sensor by its name and none by its unit, as `T1 [mV]`; without such a name the first with
-/// such a unit, unless a column without unit leaves it open which ones are meant.
+/// The first column that is a sensor by its name and none by its unit, as `T1 [mV]`; without such a
+/// name the first with such a unit, unless a column without unit leaves it open which ones are
+/// meant.
 fn foreign_unit(columns: &[Column], named: [Option<usize>; 2], free: &[usize]) -> Option<usize> {
     let is_foreign = |index: &usize| matches!(columns[*index].unit(), Unit::Other(_));
     let numbers: Vec<usize> = free

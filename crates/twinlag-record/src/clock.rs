@@ -1,4 +1,5 @@
-//! Dates and times of day as loggers write them, to nanoseconds. Zones are applied; a stamp without one stays civil time.
+//! Dates and times of day as loggers write them, to nanoseconds. Zones are applied; a stamp without
+//! one stays civil time.
 
 use jiff::civil::{Date, date};
 
@@ -28,8 +29,8 @@ pub(crate) fn day_number(day: Date) -> i64 {
     day.duration_since(date(1970, 1, 1)).as_hours() / 24
 }
 
-/// Reads a stamp: `2026-01-31T10:00:00.5+01:00`, `2026/01/31 10:00`, `31.01.2026 10:00:00`, `01/31/2026 10:00:00 PM`,
-/// `31-Jan-2026 10:00:00`, `10:00:00,5`, `2026-01-31`.
+/// Reads a stamp: `2026-01-31T10:00:00.5+01:00`, `2026/01/31 10:00`, `31.01.2026 10:00:00`,
+/// `01/31/2026 10:00:00 PM`, `31-Jan-2026 10:00:00`, `10:00:00,5`, `2026-01-31`.
 pub(crate) fn parse(cell: &str) -> Option<Stamp> {
     let cell = cell.trim();
     if !cell.is_ascii() || !cell.starts_with(|c: char| c.is_ascii_digit()) {

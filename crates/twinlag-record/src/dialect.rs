@@ -1,6 +1,6 @@
-//! Which delimiter and which decimal sign a file uses. The delimiter is the one whose cells are most alike from line to
-//! line and most often numbers or times; the decimal sign is what the cells show. A file that shows both, or from which
-//! it cannot be determined, is refused.
+//! Which delimiter and which decimal sign a file uses. The delimiter is the one whose cells are
+//! most alike from line to line and most often numbers or times; the decimal sign is what the cells
+//! show. A file that shows both, or from which it cannot be determined, is refused.
 
 use std::borrow::Cow;
 
@@ -47,7 +47,8 @@ pub(crate) fn sniff_delimiter(sample: &[&str]) -> Option<Split> {
     let marked = splits.iter().rev().filter(|split| split.delimiter != Delimiter::Blank);
     let marked = marked.max_by(|a, b| score(a).total_cmp(&score(b))).copied();
     let blank = splits.iter().find(|split| split.delimiter == Delimiter::Blank).copied();
-    // Blanks stand inside cells (texts, date-times) too: they separate only if no other delimiter makes sense.
+    // Blanks stand inside cells (texts, date-times) too: they separate only if no other delimiter
+    // makes sense.
     match (marked, blank) {
         (Some(marked), Some(blank)) => {
             let flawless = blank.valid == 1.0 && marked.valid < 1.0 && blank.alike >= 0.8 * marked.alike;
@@ -134,7 +135,8 @@ impl Evidence {
             (None, _) => Ok(Decimal::Point),
             (Some(comma), Some(point)) => Err(Unclear::Mixed { comma, point }),
             (Some(comma), None) => {
-                // Fixed decimals have a comma in every cell; with parted thousands, whole numbers below 1000 have none.
+                // Fixed decimals have a comma in every cell; with parted thousands, whole numbers
+                // below 1000 have none.
                 let fixed = self.columns.iter().any(|&[all, commas, long]| all == commas && long > 0);
                 if self.sure || fixed {
                     Ok(Decimal::Comma)
@@ -185,7 +187,8 @@ mod tests {
         assert_eq!(decimal(&[&["0", "20.5"]]), Ok(Decimal::Point));
         assert_eq!(decimal(&[&["0", "20"]]), Ok(Decimal::Point));
         assert_eq!(decimal(&[&["0,000", "1,234"]]), Ok(Decimal::Comma));
-        // Three fixed decimals, 1 mK: as parted thousands it would be more than any thermocouple stands.
+        // Three fixed decimals, 1 mK: as parted thousands it would be more than any thermocouple
+        // stands.
         assert_eq!(decimal(&[&["0", "20,125"], &["1", "20,250"]]), Ok(Decimal::Comma));
         assert_eq!(decimal(&[&["0", "1,234"]]), Err(Unclear::Thousands { line: 1, cell: "1,234".to_owned() }));
         let mixed = Unclear::Mixed { comma: (2, "20,5".to_owned()), point: (1, "0.5".to_owned()) };

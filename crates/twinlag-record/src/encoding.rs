@@ -1,5 +1,6 @@
-//! From bytes to text: UTF-8 and UTF-16 by their byte-order marks, else UTF-8 if valid, else Windows-1252, which every
-//! byte sequence is. Zero bytes outside UTF-16 are in no text file, so that they mark a binary one.
+//! From bytes to text: UTF-8 and UTF-16 by their byte-order marks, else UTF-8 if valid, else
+//! Windows-1252, which every byte sequence is. Zero bytes outside UTF-16 are in no text file, so
+//! that they mark a binary one.
 
 use std::borrow::Cow;
 
@@ -31,7 +32,8 @@ pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<(Cow<'a, str>, &
 mod tests {
     use super::*;
 
-    /// The bytes are spelt out from the code pages: `°` is U+00B0, C2 B0 in UTF-8, B0 in Windows-1252.
+    /// The bytes are spelt out from the code pages: `°` is U+00B0, C2 B0 in UTF-8, B0 in
+    /// Windows-1252.
     #[test]
     fn each_encoding_gives_the_degree_sign() {
         let cases: [(&[u8], &str); 5] = [

@@ -124,8 +124,8 @@ impl Table {
     /// ```
     ///
     /// # Errors
-    /// [`RecordError::Empty`] if there is no column or no row, [`RecordError::LengthMismatch`] if columns differ in
-    /// length.
+    /// [`RecordError::Empty`] if there is no column or no row, [`RecordError::LengthMismatch`] if
+    /// columns differ in length.
     pub fn from_columns(
         source: impl Into<String>,
         columns: impl IntoIterator<Item = NamedColumn>,

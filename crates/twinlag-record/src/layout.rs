@@ -1,7 +1,8 @@
 //! Where in a file the header, the unit row and the rows of numbers are.
 //!
-//! The rows are known by the kinds of their cells (sampled from the end of the file, where there is no preamble); the
-//! header is the nearest line above them that has their number of cells and no number in it.
+//! The rows are known by the kinds of their cells (sampled from the end of the file, where there is
+//! no preamble); the header is the nearest line above them that has their number of cells and no
+//! number in it.
 
 use std::borrow::Cow;
 
@@ -28,15 +29,17 @@ pub(crate) struct Layout {
     pub(crate) head: Vec<String>,
 }
 
-/// Words under the names that say how a value was made, not its unit (Campbell's third and fourth header lines).
+/// Words under the names that say how a value was made, not its unit (Campbell's third and fourth
+/// header lines).
 const PROCESSING: [&str; 12] = ["avg", "smp", "min", "max", "std", "tot", "ts", "rn", "mean", "raw", "-", "--"];
 
 impl Layout {
     /// Finds the layout.
     ///
     /// # Errors
-    /// [`RecordError::Empty`], [`RecordError::NoData`], [`RecordError::OneColumn`], [`RecordError::CellCount`],
-    /// [`RecordError::DecimalCommaBetweenCommas`], [`RecordError::WholeNumbersWithoutHeader`].
+    /// [`RecordError::Empty`], [`RecordError::NoData`], [`RecordError::OneColumn`],
+    /// [`RecordError::CellCount`], [`RecordError::DecimalCommaBetweenCommas`],
+    /// [`RecordError::WholeNumbersWithoutHeader`].
     pub(crate) fn find(text: &str, file: &str) -> Result<Self, RecordError> {
         let file = || file.to_owned();
         let all: Vec<_> = lines_from_end(text).filter(|line| !is_idle(line)).take(401).collect();
@@ -60,7 +63,8 @@ impl Layout {
             if let Some(comment) = uncommented(line) {
                 comments.push((number, comment));
             } else if !line.trim().is_empty() {
-                // A line with an open quote is no row; if it stands among the rows, it is refused there.
+                // A line with an open quote is no row; if it stands among the rows, it is refused
+                // there.
                 if split(line, delimiter, &mut row).is_ok() && columns.fits(&row) {
                     first_line = Some(number);
                     break;
@@ -75,7 +79,8 @@ impl Layout {
         let counts = |cells: &[Cow<'_, str>]| columns.width_under(cells);
         let bottom = head.iter().rposition(|(_, _, cells)| counts(cells).is_some() && is_text_row(cells));
         let top = bottom.map(|bottom| {
-            // Unit and processing rows are peeled off from below, as long as a row of names stands above them.
+            // Unit and processing rows are peeled off from below, as long as a row of names stands
+            // above them.
             let mut top = bottom;
             while top > 0
                 && head[top].2.iter().all(|cell| is_unit_cell(cell))
@@ -92,7 +97,8 @@ impl Layout {
             width = counts(cells).unwrap_or(width);
             names = merged(cells, delimiter);
             header_line = Some(head[top].0);
-            // What is between the header and the first good row is rows too: they are judged as such.
+            // What is between the header and the first good row is rows too: they are judged as
+            // such.
             first_line = head.get(bottom + 1).map_or(first_line, |line| line.0);
             for (_, _, cells) in &head[top + 1..=bottom] {
                 let row = cells.iter().map(|cell| if is_processing(cell) { Unit::Unstated } else { Unit::parse(cell) });
@@ -121,7 +127,8 @@ impl Layout {
             }
         }
         if top.is_none() {
-            // Rows that do not fit but are no preamble either belong to the rows, to be refused there.
+            // Rows that do not fit but are no preamble either belong to the rows, to be refused
+            // there.
             let is_row = |row: &[Cow<'_, str>]| {
                 let numbers = row.iter().filter(|cell| matches!(look(cell), Look::Number | Look::Stamp)).count();
                 let texts = row.iter().filter(|cell| look(cell) == Look::Text).count();
@@ -144,8 +151,8 @@ impl Layout {
     }
 }
 
-/// Number of the first line that is a number or a time and nothing else; of the first that is not blank or a comment, if
-/// there is none.
+/// Number of the first line that is a number or a time and nothing else; of the first that is not
+/// blank or a comment, if there is none.
 fn first_number(text: &str) -> usize {
     let used = || lines(text).filter(|(_, line)| !is_idle(line));
     let is_value = |line: &str| matches!(look(line.trim().trim_matches('"').trim()), Look::Number | Look::Stamp);
@@ -178,7 +185,8 @@ fn is_unit_cell(cell: &str) -> bool {
     }
 }
 
-/// Whether the cells may be names: mostly text, the first of them too (a broken row still begins with its time).
+/// Whether the cells may be names: mostly text, the first of them too (a broken row still begins
+/// with its time).
 fn is_text_row(cells: &[Cow<'_, str>]) -> bool {
     let looks: Vec<_> = cells.iter().map(|cell| look(cell)).filter(|look| *look != Look::Missing).collect();
     let texts = looks.iter().filter(|look| **look == Look::Text).count();
@@ -191,7 +199,8 @@ fn commented_names<'a>(line: &'a str, delimiter: Delimiter, columns: &Columns) -
     (columns.width_under(&cells).is_some() && is_text_row(&cells)).then_some(cells)
 }
 
-/// Names without a trailing empty cell; where blanks separate, a bracketed unit belongs to the name before it.
+/// Names without a trailing empty cell; where blanks separate, a bracketed unit belongs to the name
+/// before it.
 fn merged(cells: &[Cow<'_, str>], delimiter: Delimiter) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for cell in cells {
@@ -215,7 +224,8 @@ struct Columns {
     looks: Vec<Look>,
     /// Whether every cell is a whole number.
     whole: bool,
-    /// Whether nothing stands behind the last delimiter; a word for a missing value would be something.
+    /// Whether nothing stands behind the last delimiter; a word for a missing value would be
+    /// something.
     last_empty: bool,
 }
 

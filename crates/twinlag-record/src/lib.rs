@@ -1,9 +1,10 @@
 //! Reading and writing records: delimited text, units, irregular sampling, gaps.
 //!
-//! For whoever has a file of two temperatures from a logger and wants vectors that can be trusted: it finds out by itself
-//! what kind of text it is, says in [`Record::notes`] what it made of it, and refuses, with line, column and remedy, what
-//! can be read in two ways. It knows nothing of estimators. If you want time constants, take the facade `twinlag`, which
-//! reads files through this crate; if you already have vectors, [`Record::from_channels`] checks them in the same way.
+//! For whoever has a file of two temperatures from a logger and wants vectors that can be trusted:
+//! it finds out by itself what kind of text it is, says in [`Record::notes`] what it made of it,
+//! and refuses, with line, column and remedy, what can be read in two ways. It knows nothing of
+//! estimators. If you want time constants, take the facade `twinlag`, which reads files through
+//! this crate; if you already have vectors, [`Record::from_channels`] checks them in the same way.
 //!
 //! ```
 //! use twinlag_record::{Record, SamplingKind, Selection, Table};

@@ -1,4 +1,5 @@
-//! What a reader should know of how a record was understood: nothing is guessed, converted or left out in silence.
+//! What a reader should know of how a record was understood: nothing is guessed, converted or left
+//! out in silence.
 
 use std::fmt;
 
@@ -7,7 +8,8 @@ use crate::sampling::{Sampling, SamplingKind};
 use crate::sign::{Decimal, Delimiter};
 use crate::wording::{Counted, brief};
 
-/// Stamps closer to even spacing than this part of the period are called uniform without further numbers.
+/// Stamps closer to even spacing than this part of the period are called uniform without further
+/// numbers.
 const EXACT: f64 = 1e-6;
 
 /// One remark on how a file was understood. Its `Display` is a sentence for people.
@@ -69,7 +71,8 @@ pub enum Note {
         /// How many it should have had.
         expected: usize,
     },
-    /// The very last line is a whole row, but no line break follows: what wrote it may have been stopped in mid-number.
+    /// The very last line is a whole row, but no line break follows: what wrote it may have been
+    /// stopped in mid-number.
     NoFinalLineBreak {
         /// The line.
         line: usize,

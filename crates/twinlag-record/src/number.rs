@@ -40,7 +40,8 @@ pub(crate) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     std::str::from_utf8(buffer).ok()?.parse().ok()
 }
 
-/// Empty, NaN, NA, N/A, null, inf, OL, OPEN, Over, or two and more dashes, in any case and with any sign.
+/// Empty, NaN, NA, N/A, null, inf, OL, OPEN, Over, or two and more dashes, in any case and with any
+/// sign.
 pub(crate) fn is_missing(cell: &str) -> bool {
     const WORDS: [&str; 9] = ["nan", "na", "n/a", "null", "inf", "infinity", "ol", "open", "over"];
     if cell.is_empty() || (cell.len() > 1 && cell.bytes().all(|byte| byte == b'-')) {

@@ -1,7 +1,7 @@
 //! Two temperatures over time, checked: what every estimator starts from.
 //!
-//! Nothing is resampled and nothing is filled: a missing temperature is NaN, and `segments` are the runs of rows between
-//! missing ones and gaps.
+//! Nothing is resampled and nothing is filled: a missing temperature is NaN, and `segments` are the
+//! runs of rows between missing ones and gaps.
 
 use std::io::Write;
 use std::ops::Range;
@@ -19,7 +19,8 @@ use crate::wording::plain;
 use crate::write::{Decimals, write_csv};
 use crate::{Place, RecordError};
 
-/// Fewest samples in segments that make a record. Fewer do not even determine two time constants and a noise level.
+/// Fewest samples in segments that make a record. Fewer do not even determine two time constants
+/// and a noise level.
 const LEAST_SAMPLES: usize = 8;
 /// Gaps that get a note each.
 const LISTED_GAPS: usize = 5;
@@ -44,7 +45,8 @@ pub struct Channels {
     pub reference_c: Option<Vec<f64>>,
 }
 
-/// Two temperatures over time. All vectors have one entry per row; built by its constructors alone, which check it.
+/// Two temperatures over time. All vectors have one entry per row; built by its constructors alone,
+/// which check it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Record {
@@ -60,13 +62,15 @@ pub struct Record {
     pub t2_c: Vec<f64>,
     /// A trusted temperature, if one was chosen; NaN where missing.
     pub reference_c: Option<Vec<f64>>,
-    /// A flow velocity or density in the unit of its column, if one was chosen; positive in every row that is used.
+    /// A flow velocity or density in the unit of its column, if one was chosen; positive in every
+    /// row that is used.
     pub flow: Option<Vec<f64>>,
     /// Rows in which T1 or T2 is missing.
     pub missing: usize,
     /// How the stamps lie in time.
     pub sampling: Sampling,
-    /// Maximal runs of rows with both temperatures and no gap in time; at least two rows each, in order.
+    /// Maximal runs of rows with both temperatures and no gap in time; at least two rows each, in
+    /// order.
     pub segments: Vec<Range<usize>>,
     /// How the file was understood.
     pub notes: Vec<Note>,
@@ -116,8 +120,9 @@ impl Record {
     /// Takes time and two temperatures from a table; converts them to s and °C, and checks them.
     ///
     /// # Errors
-    /// Every variant of [`RecordError`] on columns that cannot be identified or used, times that do not increase, and
-    /// temperatures that cannot be: out of range, missing throughout, constant, identical, or fewer than 8 usable.
+    /// Every variant of [`RecordError`] on columns that cannot be identified or used, times that do
+    /// not increase, and temperatures that cannot be: out of range, missing throughout, constant,
+    /// identical, or fewer than 8 usable.
     pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(table, selection, &mut notes)?;
@@ -194,9 +199,9 @@ impl Record {
     /// Makes a record of vectors, checked in the same way as a file.
     ///
     /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`], [`RecordError::TimeNotIncreasing`],
-    /// [`RecordError::OutOfRange`], [`RecordError::NoValues`], [`RecordError::TooShort`], [`RecordError::Constant`],
-    /// [`RecordError::Identical`].
+    /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`],
+    /// [`RecordError::TimeNotIncreasing`], [`RecordError::OutOfRange`], [`RecordError::NoValues`],
+    /// [`RecordError::TooShort`], [`RecordError::Constant`], [`RecordError::Identical`].
     pub fn from_channels(channels: Channels, sampling: SamplingChoice) -> Result<Self, RecordError> {
         let file = channels.source.clone();
         let names = [&channels.names[0], &channels.names[1], "reference"].map(str::to_owned);
@@ -299,7 +304,8 @@ impl Record {
         self.time_s.is_empty()
     }
 
-    /// Steps between the rows of a segment, `[n − 1]`: the period throughout if sampling is even, else as stamped.
+    /// Steps between the rows of a segment, `[n − 1]`: the period throughout if sampling is even,
+    /// else as stamped.
     ///
     /// - `segment`: rows, one of `segments` or a part of one. Panics beyond the record.
     pub fn steps_s(&self, segment: &Range<usize>) -> Vec<f64> {
@@ -309,8 +315,8 @@ impl Record {
         }
     }
 
-    /// Writes the record as `time_s,T1,T2[,Tref]`, missing temperatures as empty cells. With [`Decimals::Shortest`]
-    /// it reads back the same to the bit (select `Tref` as reference).
+    /// Writes the record as `time_s,T1,T2[,Tref]`, missing temperatures as empty cells. With
+    /// [`Decimals::Shortest`] it reads back the same to the bit (select `Tref` as reference).
     ///
     /// # Errors
     /// [`RecordError::CannotWrite`].

@@ -16,7 +16,8 @@ use crate::{Place, RecordError};
 /// One row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time since the first row of the table, s; `None` where the time column holds no plain numbers, or there is none.
+    /// Time since the first row of the table, s; `None` where the time column holds no plain
+    /// numbers, or there is none.
     pub time_s: Option<f64>,
     /// Both temperatures, °C; `None` for one that is missing.
     pub reading_c: [Option<f64>; 2],
@@ -80,8 +81,9 @@ impl RowReader {
     /// The row of line `number`, from 1; `None` for a blank or a comment.
     ///
     /// # Errors
-    /// [`RecordError::CellCount`], [`RecordError::OpenQuote`], [`RecordError::NotANumber`], [`RecordError::OutOfRange`]: what the row says is
-    /// not known then, those after it can still be read.
+    /// [`RecordError::CellCount`], [`RecordError::OpenQuote`], [`RecordError::NotANumber`],
+    /// [`RecordError::OutOfRange`]: what the row says is not known then, those after it can still
+    /// be read.
     pub fn read(&self, line: &str, number: usize) -> Result<Option<Row>, RecordError> {
         let line = line.trim_end_matches(['\n', '\r']);
         if is_idle(line) {

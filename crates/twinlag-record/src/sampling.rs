@@ -1,7 +1,9 @@
-//! How the stamps lie in time. An estimator needs the steps between samples; stamps are rounded, jitter, and skip.
+//! How the stamps lie in time. An estimator needs the steps between samples; stamps are rounded,
+//! jitter, and skip.
 //!
-//! Model: within a run without gaps `t[k] = t0 + k P + e[k]`; `P` by least squares over all runs, each with its own `t0`.
-//! That averages rounding away: stamps of a 24 Hz logger rounded to 10 µs give 1/24 s to many digits.
+//! Model: within a run without gaps `t[k] = t0 + k P + e[k]`; `P` by least squares over all runs,
+//! each with its own `t0`. That averages rounding away: stamps of a 24 Hz logger rounded to 10 µs
+//! give 1/24 s to many digits.
 
 use std::ops::Range;
 
@@ -16,8 +18,8 @@ use crate::selection::SamplingChoice;
 pub enum SamplingKind {
     /// Every step is the period, within a hundredth of it or the grid that stamps are printed on.
     Uniform,
-    /// Stamps lie on a grid that is coarse beside the period, and steps differ by one unit of it, as 3 s and 4 s with
-    /// stamps of 1 s: the samples are taken as evenly spaced.
+    /// Stamps lie on a grid that is coarse beside the period, and steps differ by one unit of it,
+    /// as 3 s and 4 s with stamps of 1 s: the samples are taken as evenly spaced.
     Rounded,
     /// Steps differ: each is used as stamped.
     Irregular,
@@ -26,14 +28,16 @@ pub enum SamplingKind {
 /// How the stamps lie in time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
-    /// Slope of the least-squares line through the stamps, gaps taken out; the median step if irregular.
+    /// Slope of the least-squares line through the stamps, gaps taken out; the median step if
+    /// irregular.
     pub period_s: f64,
-    /// Root mean square departure of the stamps from the line. A slow drift of the clock counts too.
+    /// Root mean square departure of the stamps from the line. A slow drift of the clock counts
+    /// too.
     pub jitter_s: f64,
     /// Largest departure of a stamp from the line.
     pub largest_departure_s: f64,
-    /// The grid that the stamps lie on, if any: the coarsest power of ten (or common divisor of the steps) of the
-    /// file's time unit that divides them all.
+    /// The grid that the stamps lie on, if any: the coarsest power of ten (or common divisor of the
+    /// steps) of the file's time unit that divides them all.
     pub stamp_resolution_s: Option<f64>,
     /// What they are taken to be.
     pub kind: SamplingKind,
@@ -45,8 +49,8 @@ const RAREST: usize = 50;
 const EXACT: f64 = 0.01;
 
 impl Sampling {
-    /// The step beyond which two rows do not belong together: 1.5 periods and the rounding of two stamps if evenly
-    /// spaced, 5 median steps if irregular.
+    /// The step beyond which two rows do not belong together: 1.5 periods and the rounding of two
+    /// stamps if evenly spaced, 5 median steps if irregular.
     pub fn gap_s(&self) -> f64 {
         match self.kind {
             SamplingKind::Irregular => 5.0 * self.period_s,
@@ -54,8 +58,8 @@ impl Sampling {
         }
     }
 
-    /// How much longer than true a step may seem: less than one unit of the grid, if that is finer than the period and stamps depart
-    /// from even ones at all.
+    /// How much longer than true a step may seem: less than one unit of the grid, if that is finer
+    /// than the period and stamps depart from even ones at all.
     fn rounding_s(&self) -> f64 {
         let is_exact = self.kind == SamplingKind::Uniform && self.largest_departure_s <= EXACT * self.period_s;
         self.stamp_resolution_s.filter(|&unit_s| unit_s < self.period_s && !is_exact).unwrap_or(0.0)
@@ -81,7 +85,8 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
 
     let even = line(time_s, limit);
     let period = even.slope_s;
-    // With more skips than one in twenty a record cut at each would be in shreds: then steps count as stamped.
+    // With more skips than one in twenty a record cut at each would be in shreds: then steps count
+    // as stamped.
     let is_whole = 20 * skips <= steps.len();
     let is_uniform = high - period <= 0.01 * period && period - low <= 0.01 * period;
     let is_rounded = grid.is_some_and(|unit| high - low <= 1.01 * unit && is_steady(time_s, limit, period, unit));
@@ -99,8 +104,9 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
     Sampling { period_s, jitter_s, largest_departure_s, stamp_resolution_s: grid, kind }
 }
 
-/// Whether the longer ones of `steps` are rows that were skipped: multiples of the median step, which do not come in the even beat of a
-/// period that is a little longer than the unit it is rounded to.
+/// Whether the longer ones of `steps` are rows that were skipped: multiples of the median step,
+/// which do not come in the even beat of a period that is a little longer than the unit it is
+/// rounded to.
 fn are_skips(steps: &[f64], median: f64) -> bool {
     if steps.iter().any(|step| off_grid(step / median) > EXACT) {
         return false;
@@ -112,8 +118,8 @@ fn are_skips(steps: &[f64], median: f64) -> bool {
     !long.is_empty() && !is_beat
 }
 
-/// A clock whose rate changes is not merely rounded: over blocks of 64 steps the mean step must stay within 2 % and the
-/// rounding of the two stamps at the block's ends.
+/// A clock whose rate changes is not merely rounded: over blocks of 64 steps the mean step must
+/// stay within 2 % and the rounding of the two stamps at the block's ends.
 fn is_steady(time_s: &[f64], limit_s: f64, period_s: f64, unit_s: f64) -> bool {
     runs(time_s, limit_s).all(|run| {
         let time_s = &time_s[run];
@@ -145,8 +151,8 @@ struct Line {
     largest_departure_s: f64,
 }
 
-/// One slope through all runs, an intercept for each. The sums are over departures from a first guess of the slope: of the
-/// stamps themselves they would lose half the digits in a million rows.
+/// One slope through all runs, an intercept for each. The sums are over departures from a first
+/// guess of the slope: of the stamps themselves they would lose half the digits in a million rows.
 fn line(time_s: &[f64], limit_s: f64) -> Line {
     let (mut length_s, mut steps) = (0.0, 0);
     for run in runs(time_s, limit_s) {
@@ -154,7 +160,8 @@ fn line(time_s: &[f64], limit_s: f64) -> Line {
         steps += run.len() - 1;
     }
     let guess_s = length_s / steps as f64;
-    // Of each row of a run: its place from the middle, its departure from the guess less the run's mean departure.
+    // Of each row of a run: its place from the middle, its departure from the guess less the run's
+    // mean departure.
     let departures = |run: Range<usize>| {
         let (first, middle) = (time_s[run.start], (run.len() - 1) as f64 / 2.0);
         let rest = move |(k, t): (usize, &f64)| t - first - k as f64 * guess_s;
@@ -177,7 +184,8 @@ fn line(time_s: &[f64], limit_s: f64) -> Line {
     Line { slope_s: guess_s + correction_s, jitter_s, largest_departure_s: largest }
 }
 
-/// The grid of the stamps. A stamp may miss its grid point by a hundredth of the unit: differences of large stamps do.
+/// The grid of the stamps. A stamp may miss its grid point by a hundredth of the unit: differences
+/// of large stamps do.
 fn grid(time_s: &[f64], steps: &[f64], unit_s: f64) -> Option<f64> {
     let first = *time_s.first()?;
     let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
@@ -210,8 +218,8 @@ mod tests {
         judge(time_s, Some(1.0), SamplingChoice::Auto)
     }
 
-    /// Rounding to q leaves errors of standard deviation q/√12, so the slope over n points has (q/√12) √12 n^-3/2 = 5e-12 s
-    /// at most for n = 16 000: ten of these are 5e-11 s.
+    /// Rounding to q leaves errors of standard deviation q/√12, so the slope over n points has
+    /// (q/√12) √12 n^-3/2 = 5e-12 s at most for n = 16 000: ten of these are 5e-11 s.
     #[test]
     fn rounded_stamps_of_a_24_hz_logger_give_its_period_to_many_digits() {
         let time_s: Vec<f64> = (0..16_000).map(|k| (f64::from(k) / 24.0 * 1e5).round() / 1e5).collect();
@@ -222,7 +230,8 @@ mod tests {
         assert!((got.stamp_resolution_s.unwrap() - 1e-5).abs() < 1e-12);
     }
 
-    /// 3.86 s with stamps cut to whole seconds: steps of 3 and 4 s. The slope's error is below the unit over the length.
+    /// 3.86 s with stamps cut to whole seconds: steps of 3 and 4 s. The slope's error is below the
+    /// unit over the length.
     #[test]
     fn steps_of_three_and_four_seconds_are_rounded_even_sampling() {
         let time_s: Vec<f64> = (0..2000).map(|k| (f64::from(k) * 3.86).floor()).collect();
@@ -251,7 +260,8 @@ mod tests {
         assert_eq!((got.kind, got.period_s), (SamplingKind::Irregular, 10.0));
     }
 
-    /// A period that is itself a unit of the clock: rows are missing, one at a time, and stamps are as exact as before.
+    /// A period that is itself a unit of the clock: rows are missing, one at a time, and stamps are
+    /// as exact as before.
     #[test]
     fn single_missing_rows_are_gaps_whatever_the_period() {
         for (period_s, places) in [(0.01, 2), (0.02, 2), (0.005, 3), (1.0, 0)] {
@@ -286,7 +296,8 @@ mod tests {
         assert_eq!(runs(&time_s, got.gap_s()).collect::<Vec<_>>(), [0..100, 100..490]);
     }
 
-    /// A stamp of up to 2000 s is a double to 2.3e-13 s, and so is its difference from the line: four of these.
+    /// A stamp of up to 2000 s is a double to 2.3e-13 s, and so is its difference from the line:
+    /// four of these.
     #[test]
     fn a_million_exact_stamps_depart_by_rounding_alone() {
         let time_s: Vec<f64> = (0..1_000_000).map(|k| f64::from(k) / 500.0).collect();
@@ -304,7 +315,8 @@ mod tests {
         assert_eq!(judge(&even, Some(1.0), SamplingChoice::AsStamped).kind, SamplingKind::Irregular);
     }
 
-    /// Minutes printed to two decimals lie on a grid of 0.6 s, which no power of ten of a second is.
+    /// Minutes printed to two decimals lie on a grid of 0.6 s, which no power of ten of a second
+    /// is.
     #[test]
     fn the_grid_is_one_of_the_printed_unit() {
         let time_s: Vec<f64> = (0..300).map(|k| 60.0 * (f64::from(k) * 1.7 / 60.0 * 100.0).round() / 100.0).collect();

@@ -47,8 +47,8 @@ pub enum SamplingChoice {
     AsStamped,
 }
 
-/// What to read from a table. What is `None` is guessed from the header, and the guess is noted; the reference is never
-/// guessed.
+/// What to read from a table. What is `None` is guessed from the header, and the guess is noted;
+/// the reference is never guessed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     /// The time column.

@@ -1,4 +1,5 @@
-//! A table of cells as it stands in the file, read once; numbers are parsed, everything else is kept as text.
+//! A table of cells as it stands in the file, read once; numbers are parsed, everything else is
+//! kept as text.
 
 use std::borrow::Cow;
 use std::fs;
@@ -48,18 +49,20 @@ impl Table {
         }
     }
 
-    /// Takes text apart: encoding, delimiter, decimal sign, preamble, header, unit row and rows are found by looking.
+    /// Takes text apart: encoding, delimiter, decimal sign, preamble, header, unit row and rows are
+    /// found by looking.
     ///
     /// - `bytes`: the whole file; UTF-8, UTF-16 with byte-order mark, or Windows-1252
     /// - `source`: its name in messages
     ///
-    /// Comment lines (`#`, `%`, `//`), blank lines, a header that comes again and a cut-off very last line are left out,
-    /// the latter two with a note. A very last row that no line break follows is read, with a note. A cell that is not a
-    /// number is no error here, only when its column is used.
+    /// Comment lines (`#`, `%`, `//`), blank lines, a header that comes again and a cut-off very
+    /// last line are left out, the latter two with a note. A very last row that no line break
+    /// follows is read, with a note. A cell that is not a number is no error here, only when its
+    /// column is used.
     ///
     /// # Errors
-    /// The variants of [`RecordError`] on binary, empty and one-column input, on ambiguous decimal signs, on open
-    /// quotation marks, and on lines with too many or too few cells.
+    /// The variants of [`RecordError`] on binary, empty and one-column input, on ambiguous decimal
+    /// signs, on open quotation marks, and on lines with too many or too few cells.
     pub fn read(bytes: &[u8], source: &str) -> Result<Self, RecordError> {
         let (text, encoding) = encoding::decode(bytes, source)?;
         let layout = Layout::find(&text, source)?;
@@ -86,7 +89,8 @@ impl Table {
         let mut rows = lines(text).skip(layout.first_line - 1).filter(|(_, line)| !is_idle(line)).peekable();
         while let Some((line, content)) = rows.next() {
             let is_last = rows.peek().is_none();
-            // A header that comes again begins like no number does, so that good rows need no comparison.
+            // A header that comes again begins like no number does, so that good rows need no
+            // comparison.
             let odd = !content.trim_start().starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
             if odd && layout.head.iter().any(|head| head.trim() == content.trim()) {
                 repeated += 1;
@@ -147,7 +151,8 @@ impl Table {
         }
     }
 
-    /// Where a row is from: its line in the file, or its number from 1 if the table never was a file.
+    /// Where a row is from: its line in the file, or its number from 1 if the table never was a
+    /// file.
     ///
     /// - `row`: from 0. Panics if a file has no such row.
     pub fn place_of(&self, row: usize) -> Place {
@@ -167,8 +172,9 @@ impl Table {
     /// - `index`: from 0. Panics if there is no such column.
     ///
     /// # Errors
-    /// [`RecordError::TextColumn`] if it is text or date-times throughout, else [`RecordError::NotANumber`] for the
-    /// first cell that is neither a number nor a word for a missing one.
+    /// [`RecordError::TextColumn`] if it is text or date-times throughout, else
+    /// [`RecordError::NotANumber`] for the first cell that is neither a number nor a word for a
+    /// missing one.
     pub fn numbers(&self, index: usize) -> Result<&[f64], RecordError> {
         let column = &self.columns[index];
         let Some((row, cell)) = column.texts.iter().next() else {
@@ -183,8 +189,8 @@ impl Table {
         })
     }
 
-    /// The index, from 0, of a column: by exact name, by name without unit, then both in any case; by number, unless a
-    /// column has exactly that name.
+    /// The index, from 0, of a column: by exact name, by name without unit, then both in any case;
+    /// by number, unless a column has exactly that name.
     ///
     /// # Errors
     /// [`RecordError::UnknownColumn`], [`RecordError::AmbiguousName`].

@@ -128,7 +128,8 @@ fn elapsed(table: &Table, index: usize, stamps: &[Stamp], notes: &mut Vec<Note>)
                 }
             }
             None => {
-                // Back by more than half a day: past midnight. By less: a mistake, found when the order is checked.
+                // Back by more than half a day: past midnight. By less: a mistake, found when the
+                // order is checked.
                 time_ns += days_on * DAY_NS;
                 if before_ns != i64::MIN && time_ns < before_ns - DAY_NS / 2 {
                     days_on += 1;

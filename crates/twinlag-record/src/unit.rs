@@ -1,4 +1,5 @@
-//! Units in column headers: `T1 [°C]`, `T1 (degC)`, `T1 / K`, `T1 °C`, `T_K`, `temp_F`, `time [ms]`, `t_min`.
+//! Units in column headers: `T1 [°C]`, `T1 (degC)`, `T1 / K`, `T1 °C`, `T_K`, `temp_F`,
+//! `time [ms]`, `t_min`.
 
 use std::fmt;
 
@@ -45,7 +46,8 @@ impl Unit {
             "d" | "day" | "days" | "tage" => return time("d", 86_400.0),
             _ => {}
         }
-        // `º` is the ordinal sign and U+FFFD what a wrong encoding left of `°`; both are met in real files.
+        // `º` is the ordinal sign and U+FFFD what a wrong encoding left of `°`; both are met in
+        // real files.
         let bare: String = lower.chars().filter(|c| !c.is_whitespace() && !"°º\u{FFFD}._*'".contains(*c)).collect();
         match bare.strip_prefix("degrees").or_else(|| bare.strip_prefix("deg")).unwrap_or(&bare) {
             "c" | "℃" | "celsius" | "centigrade" => Some(Self::Celsius),
@@ -55,8 +57,8 @@ impl Unit {
         }
     }
 
-    /// Splits a header into the name and its unit. Where a known unit is not set off by brackets it must follow `_`,
-    /// `/`, `,`, ` in ` or a blank; brackets always hold a unit, known or not.
+    /// Splits a header into the name and its unit. Where a known unit is not set off by brackets it
+    /// must follow `_`, `/`, `,`, ` in ` or a blank; brackets always hold a unit, known or not.
     pub fn split_header(header: &str) -> (String, Self) {
         let header = header.trim();
         for (open, close) in [('[', ']'), ('(', ')'), ('{', '}')] {
@@ -93,7 +95,8 @@ impl Unit {
         matches!(self, Self::Celsius | Self::Kelvin | Self::Fahrenheit)
     }
 
-    /// A temperature in °C; `None` if this is no unit of temperature. An unstated unit is taken to be °C.
+    /// A temperature in °C; `None` if this is no unit of temperature. An unstated unit is taken to
+    /// be °C.
     pub fn to_celsius(&self, value: f64) -> Option<f64> {
         match self {
             Self::Celsius | Self::Unstated => Some(value),

@@ -12,7 +12,8 @@ impl Display for Counted {
     }
 }
 
-/// A number with the fewest digits that give it again, and with an exponent where it would be all zeros: `1e37`.
+/// A number with the fewest digits that give it again, and with an exponent where it would be all
+/// zeros: `1e37`.
 pub(crate) fn plain(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 || !size.is_finite() || (1e-6..1e15).contains(&size) {
@@ -22,7 +23,8 @@ pub(crate) fn plain(value: f64) -> String {
     }
 }
 
-/// A number with at most six significant digits if these are it to a part in 10⁹, else with at most nine.
+/// A number with at most six significant digits if these are it to a part in 10⁹, else with at most
+/// nine.
 pub(crate) fn brief(value: f64) -> String {
     let rounded = |digits: usize| format!("{value:.0$e}", digits - 1).parse().unwrap_or(value);
     let six: f64 = rounded(6);

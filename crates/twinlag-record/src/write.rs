@@ -1,4 +1,5 @@
-//! Columns of numbers as comma-separated text with decimal points: what this crate, and everything else, can read.
+//! Columns of numbers as comma-separated text with decimal points: what this crate, and everything
+//! else, can read.
 
 use std::io::{self, BufWriter, Write};
 
@@ -14,7 +15,8 @@ pub enum Decimals {
     Fixed(usize),
 }
 
-/// Writes a header and one row per entry. Cells that are not finite stay empty: they read as missing.
+/// Writes a header and one row per entry. Cells that are not finite stay empty: they read as
+/// missing.
 ///
 /// - `columns`: name and values, `[n]` each
 ///

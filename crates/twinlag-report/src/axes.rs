@@ -8,7 +8,8 @@ pub(crate) const LABEL_SIZE: u32 = 13;
 /// Height of a line of tick labels.
 pub(crate) const TICK_LINE_PX: f64 = 14.0;
 
-/// The label of a tick below the axis; names of categories are broken at spaces to fit their places.
+/// The label of a tick below the axis; names of categories are broken at spaces to fit their
+/// places.
 pub(crate) fn x_lines(axis: &Axis, tick: &Tick, (low, high): (f64, f64), width: f64) -> Vec<String> {
     if !axis.has_categories() {
         return vec![tick.label.clone()];

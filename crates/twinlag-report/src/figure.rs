@@ -45,7 +45,8 @@ impl From<Surface> for Panel {
     }
 }
 
-/// Panels in a grid, row by row, under one title. Series of one name have one colour and one marker in all panels.
+/// Panels in a grid, row by row, under one title. Series of one name have one colour and one marker
+/// in all panels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
     title: String,
@@ -66,7 +67,8 @@ impl Figure {
         Self { columns, ..self }
     }
 
-    /// Width and height of a panel, labels included; 440 by 330 px unless set. Text has a fixed size in pixels.
+    /// Width and height of a panel, labels included; 440 by 330 px unless set. Text has a fixed
+    /// size in pixels.
     #[must_use]
     pub fn panel_size(self, width_px: f64, height_px: f64) -> Self {
         Self { panel_px: (width_px, height_px), ..self }
@@ -82,7 +84,8 @@ impl Figure {
     /// The figure as SVG. The same figure gives the same bytes.
     ///
     /// # Errors
-    /// Any [`ReportError`]: no panels, panels without data, lengths that do not fit, invalid ranges.
+    /// Any [`ReportError`]: no panels, panels without data, lengths that do not fit, invalid
+    /// ranges.
     pub fn to_svg(&self) -> Result<String, ReportError> {
         if self.panels.is_empty() {
             return Err(ReportError::NoPanels { figure: self.title.clone() });
@@ -100,8 +103,8 @@ impl Figure {
         let rows = self.panels.len().div_ceil(columns);
         let mut plans: Vec<Plan> =
             self.panels.iter().map(|p| Plan::new(&p.0, self.panel_px, &styles)).collect::<Result<_, _>>()?;
-        // Aligned axes may leave less room than a panel alone: a legend that then hides data moves above them, which takes
-        // room from its row, and so on; at most once for each panel.
+        // Aligned axes may leave less room than a panel alone: a legend that then hides data moves
+        // above them, which takes room from its row, and so on; at most once for each panel.
         for _ in 0..plans.len() {
             let crowded = (0..plans.len()).find_map(|k| match &self.panels[k].0 {
                 Kind::Chart(chart) if !plans[k].legend_above => {
@@ -140,8 +143,8 @@ impl Figure {
         Ok(canvas.into_svg())
     }
 
-    /// The axes of a panel whose upper left corner is the origin; those of one column, and of one row, begin and end
-    /// together.
+    /// The axes of a panel whose upper left corner is the origin; those of one column, and of one
+    /// row, begin and end together.
     fn frame(&self, plans: &[Plan], columns: usize, k: usize) -> Frame {
         let widest = |of_column: bool, margin: fn(&Margins) -> f64| {
             plans
@@ -201,7 +204,8 @@ impl Plan {
                 ([x, y], value, [&surface.x, &surface.y])
             }
         };
-        // How many ticks there are depends on the room, which depends on the ticks: room for the widest of some guesses.
+        // How many ticks there are depends on the room, which depends on the ticks: room for the
+        // widest of some guesses.
         let heights = [height - 60.0, height - 80.0, height - 110.0];
         let widest = heights
             .iter()

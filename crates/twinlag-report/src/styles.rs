@@ -2,8 +2,9 @@
 
 use crate::palette::{CYCLE, Colour};
 
-/// Colour and marker of each name, by a number: the least that no series has with which the name shares a panel. So names
-/// that never meet may share a colour, and a figure of many panels does not run out of them.
+/// Colour and marker of each name, by a number: the least that no series has with which the name
+/// shares a panel. So names that never meet may share a colour, and a figure of many panels does
+/// not run out of them.
 pub(crate) struct Styles(Vec<(String, usize)>);
 
 impl Styles {

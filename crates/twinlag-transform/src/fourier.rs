@@ -1,5 +1,6 @@
-//! The discrete Fourier transform of a real series, and back: `X[j] = Σ_k x[k] e^(−2πi jk/n)`, `j = 0 … ⌊n/2⌋`, the other
-//! half of the spectrum being its complex conjugate. Neither direction is scaled: there and back multiplies by `n`.
+//! The discrete Fourier transform of a real series, and back: `X[j] = Σ_k x[k] e^(−2πi jk/n)`,
+//! `j = 0 … ⌊n/2⌋`, the other half of the spectrum being its complex conjugate. Neither direction
+//! is scaled: there and back multiplies by `n`.
 
 use std::fmt;
 use std::sync::Arc;
@@ -41,8 +42,9 @@ impl Forward {
         spectrum
     }
 
-    /// The spectrum of `values` `[samples]`, which are overwritten, in `spectrum` `[bins]`. `scratch` grows as needed: called
-    /// with what an earlier call has left there, this allocates nothing.
+    /// The spectrum of `values` `[samples]`, which are overwritten, in `spectrum` `[bins]`.
+    /// `scratch` grows as needed: called with what an earlier call has left there, this allocates
+    /// nothing.
     ///
     /// # Panics
     /// If a length is another.
@@ -58,7 +60,8 @@ impl fmt::Debug for Forward {
     }
 }
 
-/// The transform of spectra of real series of one length into these series, multiplied by their length.
+/// The transform of spectra of real series of one length into these series, multiplied by their
+/// length.
 #[derive(Clone)]
 pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 
@@ -78,8 +81,9 @@ impl Inverse {
         self.0.complex_len()
     }
 
-    /// The series `[samples]` of `spectrum` `[bins]`, times the number of samples. The imaginary part that a real series cannot have,
-    /// at zero frequency and at half the sampling frequency, is left out.
+    /// The series `[samples]` of `spectrum` `[bins]`, times the number of samples. The imaginary
+    /// part that a real series cannot have, at zero frequency and at half the sampling frequency,
+    /// is left out.
     ///
     /// # Panics
     /// If `spectrum` has another length than [`Self::bins`].
@@ -109,7 +113,8 @@ mod tests {
         (0..n).map(|k| (1.3 * k as f64).sin() + 0.2 * (0.7 * (k * k) as f64).cos()).collect()
     }
 
-    /// Lengths even, odd, prime and composite, against the sum itself; `n` terms of at most 1.2, each to `n` roundings of the angle.
+    /// Lengths even, odd, prime and composite, against the sum itself; `n` terms of at most 1.2,
+    /// each to `n` roundings of the angle.
     #[test]
     fn spectrum_is_the_sum_that_defines_it() {
         for n in [1, 2, 3, 4, 7, 12, 97, 100, 256, 1031] {

@@ -1,9 +1,10 @@
 //! Fourier and sine transforms of real series of any length, and tapers.
 //!
 //! For the other crates of the workspace. Nothing here is generic, so the many kernels of
-//! [rustfft](https://docs.rs/rustfft) are compiled once, with this crate, and not with each crate that transforms
-//! something. Plans are kept, shared by all threads: asking for one again costs a look-up. Whoever wants complex input,
-//! `f32`, or more than one dimension is better served by rustfft itself.
+//! [rustfft](https://docs.rs/rustfft) are compiled once, with this crate, and not with each crate
+//! that transforms something. Plans are kept, shared by all threads: asking for one again costs a
+//! look-up. Whoever wants complex input, `f32`, or more than one dimension is better served by
+//! rustfft itself.
 //!
 //! ```
 //! use twinlag_transform::{Complex64, Forward, Inverse};

@@ -1,8 +1,10 @@
-//! The sine transform of type I, from the Fourier transform of the series with as many zeros after it and two more.
+//! The sine transform of type I, from the Fourier transform of the series with as many zeros after
+//! it and two more.
 
 use crate::fourier::Forward;
 
-/// `Σ_k x[k] sin(π (j+1)(k+1)/(n+1))` for `j = 0 … n−1`, of `n` values; its own inverse but for a factor `2/(n+1)`.
+/// `Σ_k x[k] sin(π (j+1)(k+1)/(n+1))` for `j = 0 … n−1`, of `n` values; its own inverse but for a
+/// factor `2/(n+1)`.
 pub fn sine_transform(values: &[f64]) -> Vec<f64> {
     let n = values.len();
     // One zero in front, so that the first value lies at the first step of the angle.

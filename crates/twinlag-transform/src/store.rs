@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
-/// Samples of all plans of one direction that are kept; what was asked for longest ago goes first. A plan holds some 20 bytes for each
-/// sample.
+/// Samples of all plans of one direction that are kept; what was asked for longest ago goes first.
+/// A plan holds some 20 bytes for each sample.
 const KEPT_SAMPLES: usize = 1 << 22;
 
 /// Plans by length, what was asked for last in front.
@@ -29,7 +29,8 @@ impl<P: ?Sized> Store<P> {
     }
 }
 
-/// The plan to transform `samples` values. What panics while it plans leaves the store as it was: a poisoned lock is no harm.
+/// The plan to transform `samples` values. What panics while it plans leaves the store as it was: a
+/// poisoned lock is no harm.
 pub(crate) fn forward(samples: usize) -> Arc<dyn RealToComplex<f64>> {
     static KEPT: Mutex<Store<dyn RealToComplex<f64>>> = Mutex::new(Store(Vec::new()));
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -51,7 +51,8 @@ impl Tapered {
         self.plan.transform(&tapered)
     }
 
-    /// The pieces of `values`, each from the middle of the one before it on (Welch 1967); a rest that is shorter is left out.
+    /// The pieces of `values`, each from the middle of the one before it on (Welch 1967); a rest
+    /// that is shorter is left out.
     pub fn halves<'a, T>(&self, values: &'a [T]) -> impl Iterator<Item = &'a [T]> + use<'a, T> {
         let length = self.taper.len();
         values.windows(length).step_by(length / 2)
@@ -62,8 +63,8 @@ impl Tapered {
 mod tests {
     use super::*;
 
-    /// The closed forms: `Σ w = n/2` and `Σ w² = 3n/8`; between the zeros, of `n + 1`. Each of `n` additions to a sum of up to `n/2`
-    /// rounds by `ε/2` of it, and each term by a few `ε`.
+    /// The closed forms: `Σ w = n/2` and `Σ w² = 3n/8`; between the zeros, of `n + 1`. Each of `n`
+    /// additions to a sum of up to `n/2` rounds by `ε/2` of it, and each term by a few `ε`.
     #[test]
     fn hann_has_the_mean_and_the_energy_of_its_closed_form() {
         for n in [5, 8, 257] {
@@ -85,7 +86,8 @@ mod tests {
         assert_eq!(pieces, [&[0, 1, 2, 3][..], &[2, 3, 4, 5], &[4, 5, 6, 7]]);
     }
 
-    /// A constant under Hann's taper: half the length at zero frequency, a quarter beside it, nothing beyond.
+    /// A constant under Hann's taper: half the length at zero frequency, a quarter beside it,
+    /// nothing beyond.
     #[test]
     fn a_constant_leaks_into_the_next_bin_alone() {
         let n = 16;

@@ -55,8 +55,8 @@ fn is_column(name: &str) -> bool {
     LABELS.contains(&name) || COLUMNS.contains(&name)
 }
 
-/// Refuses names of a plan that mean nothing: `file` that is no plain file name, `columns` that no table has, methods
-/// `named` that are not among `methods`.
+/// Refuses names of a plan that mean nothing: `file` that is no plain file name, `columns` that no
+/// table has, methods `named` that are not among `methods`.
 pub(crate) fn check_names<'n>(
     methods: &[Method],
     file: &str,

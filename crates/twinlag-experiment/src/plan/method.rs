@@ -6,16 +6,16 @@ use twinlag::estimate::NoiseKnowledge;
 use twinlag::optimise::Optimiser;
 use twinlag::sensor::Discretisation;
 
-/// What a method is told of the noise.
+/// The knowledge of the noise that a method is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Told {
     /// Both levels and the colour.
     #[default]
     Known,
-    /// Nothing; white noise is supposed.
+    /// Nothing; white noise is assumed.
     Found,
-    /// Nothing; autoregressive noise is supposed.
+    /// Nothing; autoregressive noise is assumed.
     FoundAutoregressive,
     /// The ratio of the levels.
     Ratio,
@@ -25,12 +25,12 @@ pub enum Told {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {
-    /// Where it thinks best.
+    /// At the start that the method chooses itself.
     #[default]
     Own,
     /// At these time constants, s.
     At([f64; 2]),
-    /// Trial `i` at point `i` of the plan's grid, round and round.
+    /// Trial `i` at point `i` of the plan's grid, cyclically.
     Grid,
 }
 
@@ -42,16 +42,17 @@ pub struct Method {
     pub name: String,
     /// The estimator, by name: one of the family, or one that the experiment is given.
     pub estimator: String,
-    /// The optimiser: its name, or its name with options; or the name of one that the experiment is given.
+    /// The optimiser: its name, or its name with options; or the name of one that the experiment is
+    /// given.
     #[serde(default)]
     pub optimiser: OptimiserChoice,
-    /// What it is told of the noise.
+    /// The knowledge of the noise that the method is given.
     #[serde(default)]
     pub noise: Told,
-    /// The levels that it is told are the true ones with their *variances* times these.
+    /// Factors on the true *variances* of the noise before they are given to the method.
     #[serde(default = "default_factor")]
     pub variance_factor: [f64; 2],
-    /// Where it starts.
+    /// Where the method starts.
     #[serde(default)]
     pub start: Start,
     /// What it takes the gas to do between samples.
@@ -86,8 +87,8 @@ impl Default for OptimiserChoice {
 }
 
 impl Method {
-    /// What this method is told of noise that is `std_k` and `ar1`. Noise of zero is told as next to nothing, for the sake of
-    /// weights.
+    /// The knowledge that this method is given of noise with `std_k` and `ar1`. Noise of zero is stated
+    /// as a very small number, so that weights stay finite.
     pub(crate) fn told(&self, std_k: [f64; 2], ar1: f64) -> NoiseKnowledge {
         let least = 1e-6;
         match self.noise {

@@ -39,7 +39,8 @@ pub struct PictureSpec {
     /// Panels side by side.
     #[serde(default = "two")]
     pub columns: usize,
-    /// Whether methods are drawn as groups of bars: a method called "a, b" is series a in category b, and `x` is not used.
+    /// Whether methods are drawn as groups of bars: a method called "a, b" is series a in category
+    /// b, and `x` is not used.
     #[serde(default)]
     pub bars: bool,
     /// Width and height of a panel, pixels.

@@ -7,7 +7,8 @@ use crate::error::ExperimentError;
 use crate::plan::columns::check_names;
 use crate::plan::method::Method;
 
-/// Digits behind the decimal point that a table may show: numbers in results have seven significant digits.
+/// Digits behind the decimal point that a table may show: numbers in results have seven significant
+/// digits.
 const MAX_DECIMALS: usize = 9;
 
 /// A table with a row for each combination of labels and a column for each method.
