@@ -6,7 +6,6 @@ use std::path::Path;
 use criterion::{Criterion, criterion_group, criterion_main};
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use realfft::RealFftPlanner;
 use twinlag::bias::{Compensated, Noise};
 use twinlag::cross_relation::{CostValue, CrossRelation, Form, Readings, Whitened};
 use twinlag::estimate::{Estimate, NoiseKnowledge, Task};
@@ -16,6 +15,7 @@ use twinlag::sensor::Discretisation;
 use twinlag::{Estimator, Hold, Options, characterise};
 use twinlag_experiment::{Experiment, Plan};
 use twinlag_study::{Outcome, Study};
+use twinlag_transform::{Complex64, Forward};
 
 /// What the SciPy script starts from, discards, and is told.
 const START_S: [f64; 2] = [0.01, 0.05];
@@ -104,9 +104,8 @@ fn trials(c: &mut Criterion) {
     let experiment = Experiment::new(&plan).expect("valid");
     let bench = plan.bench(&plan.cells()[0], 0).expect("valid");
     let n = plan.samples[0];
-    let fourier = RealFftPlanner::<f64>::new().plan_fft_forward(2 * n);
-    let (mut input, mut output, mut scratch) =
-        (fourier.make_input_vec(), fourier.make_output_vec(), fourier.make_scratch_vec());
+    let fourier = Forward::of(2 * n);
+    let (mut input, mut output, mut scratch) = (vec![0.0; 2 * n], vec![Complex64::ZERO; fourier.bins()], Vec::new());
     let mut index = 0;
     c.bench_function("noise-and-transforms", |b| {
         b.iter(|| {
@@ -116,7 +115,7 @@ fn trials(c: &mut Criterion) {
                     *value = rng.sample(StandardNormal);
                 }
                 input[n..].fill(0.0);
-                fourier.process_with_scratch(&mut input, &mut output, &mut scratch).expect("buffers of the plan");
+                fourier.transform_into(&mut input, &mut output, &mut scratch);
                 black_box(&output);
             }
         });

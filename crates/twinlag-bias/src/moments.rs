@@ -15,9 +15,8 @@
 //! Own derivation; docs, chapter "Theory", section 5.
 
 use nalgebra::{Matrix2, Vector2};
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
 use twinlag_cross_relation::InferredInputs;
+use twinlag_transform::{Complex64, Tapered, hann_between};
 
 /// Width of a band: this factor in frequency, and at least [`LEAST`] bins.
 const RATIO: f64 = 1.25;
@@ -76,18 +75,14 @@ impl JointLevels {
 impl NoiseMoments {
     /// Moments of `inputs`; `None` if no stretch has 64 samples.
     pub fn new(inputs: &InferredInputs) -> Option<Self> {
-        let mut planner = RealFftPlanner::new();
         let mut bins: Vec<(f64, Vector2<f64>, f64, f64)> = Vec::new();
         for [f1, f2] in inputs.segments.iter().filter(|s| s[0].len() >= SHORTEST) {
             let n = f1.len();
             let mean = 0.5 * (f1.iter().sum::<f64>() + f2.iter().sum::<f64>()) / n as f64;
-            let angle = |k: usize| std::f64::consts::TAU * (k + 1) as f64 / (n + 1) as f64;
-            let window: Vec<f64> = (0..n).map(|k| 0.5 * (1.0 - angle(k).cos())).collect();
-            let energy: f64 = window.iter().map(|w| w * w).sum();
-            let plan = planner.plan_fft_forward(n);
-            let transform =
-                |value: &dyn Fn(usize) -> f64| spectrum(&*plan, (0..n).map(|k| window[k] * value(k)).collect());
-            let (first, difference) = (transform(&|k| f1[k] - mean), transform(&|k| f1[k] - f2[k]));
+            let tapered = Tapered::new(hann_between(n));
+            let energy = tapered.energy();
+            let first = tapered.transform(f1.iter().map(|f| f - mean));
+            let difference = tapered.transform(f1.iter().zip(f2).map(|(f1, f2)| f1 - f2));
             // Neither the mean nor the bin at half the sampling rate has an independent imaginary
             // part.
             for k in 1..n.div_ceil(2) {
@@ -186,18 +181,11 @@ impl NoiseMoments {
     }
 }
 
-/// The Fourier transform of `input`, whose length is the plan's.
-fn spectrum(plan: &dyn RealToComplex<f64>, mut input: Vec<f64>) -> Vec<Complex<f64>> {
-    let mut output = plan.make_output_vec();
-    plan.process(&mut input, &mut output).expect("buffers are those of the plan");
-    output
-}
-
 impl Band {
     fn of(bins: &[(f64, Vector2<f64>, f64, f64)], filters: &[Vec<f64>; 2]) -> Self {
         let count = bins.len() as f64;
-        let gain = |filter: &[f64], turn: Complex<f64>| {
-            filter.iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr()
+        let gain = |filter: &[f64], turn: Complex64| {
+            filter.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr()
         };
         Self {
             moments: bins.iter().map(|b| b.1).sum::<Vector2<f64>>() / count,
@@ -206,7 +194,7 @@ impl Band {
             bins: bins
                 .iter()
                 .map(|b| {
-                    let turn = Complex::from_polar(1.0, std::f64::consts::TAU * b.0);
+                    let turn = Complex64::from_polar(1.0, std::f64::consts::TAU * b.0);
                     (turn.re, [gain(&filters[0], turn), gain(&filters[1], turn)])
                 })
                 .collect(),

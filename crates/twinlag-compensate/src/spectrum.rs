@@ -2,10 +2,9 @@
 //! show.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use num_complex::Complex64;
-use realfft::{RealFftPlanner, RealToComplex};
+use twinlag_transform::{Forward, Inverse, Tapered, hann};
 
 use crate::prior::Term;
 use crate::readings::Readings;
@@ -48,12 +47,12 @@ pub(crate) struct Periodogram {
     /// Autocorrelation of the taper.
     taper: Vec<f64>,
     /// The transform of twice the length.
-    plan: Arc<dyn RealToComplex<f64>>,
+    plan: Forward,
 }
 
 /// Hann's taper, of unit energy.
 fn taper(n: usize) -> Vec<f64> {
-    let raw: Vec<f64> = (0..n).map(|k| (std::f64::consts::PI * (k as f64 + 0.5) / n as f64).sin().powi(2)).collect();
+    let raw = hann(n);
     let energy = raw.iter().map(|w| w * w).sum::<f64>().sqrt();
     raw.iter().map(|w| w / energy).collect()
 }
@@ -71,15 +70,8 @@ impl Periodogram {
         let even = [0, 1].map(|i| on_grid(readings, i, first_s, period_s, all));
         let count = if all > LONGEST { 2 * all.div_ceil(LONGEST) - 1 } else { 1 };
         let samples = 2 * all / (count + 1);
-        let window = taper(samples);
-        let mut planner = RealFftPlanner::<f64>::new();
-        let plan = planner.plan_fft_forward(samples);
-        let transform = |values: &[f64]| {
-            let mut tapered: Vec<f64> = values.iter().zip(&window).map(|(y, w)| (y - level_c) * w).collect();
-            let mut out = plan.make_output_vec();
-            plan.process(&mut tapered, &mut out).expect("lengths agree");
-            out
-        };
+        let tapered = Tapered::new(taper(samples));
+        let transform = |values: &[f64]| tapered.transform(values.iter().map(|y| y - level_c));
         let pieces: Vec<[Vec<Complex64>; 2]> = (0..count)
             .map(|k| k * (all - samples) / count.saturating_sub(1).max(1))
             .map(|from| [0, 1].map(|i| transform(&even[i][from..from + samples])))
@@ -122,8 +114,8 @@ impl Periodogram {
             [power / (first + second), first / (first + second)]
         });
         let disagreement = disagreement.collect();
-        let taper = autocorrelation(&window);
-        let plan = planner.plan_fft_forward(2 * samples);
+        let taper = autocorrelation(tapered.taper());
+        let plan = Forward::of(2 * samples);
         let pieces = if count > 1 { OVERLAP * count as f64 } else { 1.0 };
         let flattened = flattened.to_vec();
         Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
@@ -137,16 +129,14 @@ impl Periodogram {
     /// of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
         let n = self.samples;
-        let plan = &self.plan;
-        let mut input = plan.make_input_vec();
+        let mut input = vec![0.0; 2 * n];
         for term in terms {
             add_autocovariances(term, self.period_s, &mut input[..n]);
         }
         input.iter_mut().zip(&self.taper).for_each(|(r, a)| *r *= a);
         let (lags, mirrored) = input.split_at_mut(n);
         mirrored[1..].iter_mut().rev().zip(&lags[1..]).for_each(|(to, from)| *to = *from);
-        let mut out = plan.make_output_vec();
-        plan.process(&mut input, &mut out).expect("lengths agree");
+        let out = self.plan.transform(&input);
         let mut expected: Vec<f64> = (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect();
         for (away_hz, taken_off) in &self.flattened {
             for ((sum, hz), share) in expected.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
@@ -192,15 +182,9 @@ fn add_autocovariances(term: &Term, period_s: f64, out: &mut [f64]) {
 
 fn autocorrelation(window: &[f64]) -> Vec<f64> {
     let n = window.len();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(2 * n), planner.plan_fft_inverse(2 * n));
-    let mut padded = window.to_vec();
-    padded.resize(2 * n, 0.0);
-    let mut spectrum = forward.make_output_vec();
-    forward.process(&mut padded, &mut spectrum).expect("lengths agree");
+    let mut spectrum = Forward::of(2 * n).transform(window);
     spectrum.iter_mut().for_each(|s| *s = Complex64::new(s.norm_sqr() / (2 * n) as f64, 0.0));
-    let mut out = inverse.make_output_vec();
-    inverse.process(&mut spectrum, &mut out).expect("lengths agree");
+    let mut out = Inverse::of(2 * n).transform(spectrum);
     out.truncate(n);
     out
 }
@@ -231,13 +215,7 @@ fn on_grid(readings: &Readings, channel: usize, first_s: f64, period_s: f64, sam
 pub fn power_spectrum(values: &[f64], period_s: f64) -> (Vec<f64>, Vec<f64>) {
     let n = values.len();
     let mean = values.iter().sum::<f64>() / (n as f64).max(1.0);
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n.max(2));
-    let mut input: Vec<f64> = values.iter().zip(taper(n)).map(|(v, w)| (v - mean) * w).collect();
-    input.resize(n.max(2), 0.0);
-    let mut spectrum = plan.make_output_vec();
-    if plan.process(&mut input, &mut spectrum).is_err() {
-        return (Vec::new(), Vec::new());
-    }
+    let spectrum = if n > 0 { Tapered::new(taper(n)).transform(values.iter().map(|v| v - mean)) } else { Vec::new() };
     let (mut hz, mut density) = (Vec::new(), Vec::new());
     let mut from = 1;
     while from < spectrum.len() {

@@ -15,7 +15,7 @@
 //! Derivation: docs, chapter "Theory", section 6.
 
 use nalgebra::{Complex, DMatrix, DVector};
-use rustdct::DctPlanner;
+use twinlag_transform::sine_transform;
 
 use crate::inverse::row;
 use crate::parameters::{Pair, parts};
@@ -227,19 +227,17 @@ impl Whitened<'_> {
 
     /// `Σ_w S_w d_w d_w'` over the sine transform of the residual in time and of its derivatives.
     fn score_variance<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
-        let mut planner = DctPlanner::new();
         let mut out = [[0.0; P]; P];
         for segment in self.jacobian(theta) {
             let n = segment.len();
             if n == 0 {
                 continue;
             }
-            let plan = planner.plan_dst1(n);
             let scale = (2.0 / (n + 1) as f64).sqrt();
-            let transform = |mut x: Vec<f64>| {
-                plan.process_dst1(&mut x);
-                x.iter_mut().for_each(|v| *v *= scale);
-                x
+            let transform = |x: Vec<f64>| {
+                let mut bins = sine_transform(&x);
+                bins.iter_mut().for_each(|v| *v *= scale);
+                bins
             };
             let spectrum = smoothed(&transform(segment.iter().map(|s| s.0).collect()));
             let slopes: [Vec<f64>; P] = std::array::from_fn(|i| transform(segment.iter().map(|s| s.1[i]).collect()));

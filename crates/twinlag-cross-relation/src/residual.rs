@@ -1,8 +1,8 @@
 //! Whether anything is left in the whitened residual that noise would not leave.
 
-use rustdct::DctPlanner;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+use twinlag_transform::sine_transform;
 
 /// One test of the residual against white noise of unit variance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -57,12 +57,10 @@ fn two_sided(deviate: f64) -> f64 {
 
 fn band_energy(segments: &[Vec<f64>]) -> Option<ResidualTest> {
     // Bins of all segments by frequency in cycles per sample.
-    let mut planner = DctPlanner::new();
     let mut bins: Vec<(f64, f64)> = Vec::new();
     for r in segments.iter().filter(|r| !r.is_empty()) {
         let n = r.len();
-        let mut spectrum = r.clone();
-        planner.plan_dst1(n).process_dst1(&mut spectrum);
+        let spectrum = sine_transform(r);
         let scale = 2.0 / (n + 1) as f64;
         bins.extend(spectrum.iter().enumerate().map(|(j, v)| (0.5 * (j + 1) as f64 / (n + 1) as f64, scale * v * v)));
     }

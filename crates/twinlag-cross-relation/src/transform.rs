@@ -14,8 +14,7 @@
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use twinlag_transform::{Complex64, Forward};
 
 use crate::bands::Bands;
 use crate::readings::{Segment, Steps};
@@ -26,7 +25,7 @@ const KEPT: usize = 4;
 /// What the transforms of all segments of one length share.
 pub(crate) struct Plan {
     samples: usize,
-    fourier: Arc<dyn RealToComplex<f64>>,
+    fourier: Forward,
     /// `cos w_j`, `j = 1 … N−1`.
     pub(crate) cosines: Vec<f64>,
     sines: Vec<f64>,
@@ -46,22 +45,23 @@ impl Plan {
     /// The plan for `samples`, from this thread's store where it is kept.
     pub(crate) fn of(samples: usize) -> Arc<Self> {
         thread_local! {
-            static STORE: RefCell<(RealFftPlanner<f64>, Vec<Arc<Plan>>)> = RefCell::new((RealFftPlanner::new(), Vec::new()));
+            static STORE: RefCell<Vec<Arc<Plan>>> = const { RefCell::new(Vec::new()) };
         }
-        STORE.with_borrow_mut(|(planner, kept)| {
+        STORE.with_borrow_mut(|kept| {
             if let Some(place) = kept.iter().position(|p| p.samples == samples) {
                 kept[..=place].rotate_right(1);
             } else {
                 kept.truncate(KEPT - 1);
-                kept.insert(0, Arc::new(Self::new(samples, planner.plan_fft_forward(2 * samples))));
+                kept.insert(0, Arc::new(Self::new(samples)));
             }
             kept[0].clone()
         })
     }
 
-    fn new(samples: usize, fourier: Arc<dyn RealToComplex<f64>>) -> Self {
+    fn new(samples: usize) -> Self {
         let angles = (1..samples).map(|j| std::f64::consts::PI * j as f64 / samples as f64);
         let (sines, cosines) = angles.map(f64::sin_cos).unzip();
+        let fourier = Forward::of(2 * samples);
         Self { samples, fourier, cosines, sines, ones: OnceLock::new(), bands: OnceLock::new() }
     }
 
@@ -108,16 +108,15 @@ impl Transformed {
     pub(crate) fn new(segment: &Segment) -> Option<Self> {
         let Steps::Even(period_s) = *segment.steps() else { return None };
         let plan = Plan::of(segment.len());
-        let (mut padded, mut spectrum) = (plan.fourier.make_input_vec(), plan.fourier.make_output_vec());
-        let mut scratch = plan.fourier.make_scratch_vec();
+        let mut padded = vec![0.0; plan.fourier.samples()];
+        let mut spectrum = vec![Complex64::ZERO; plan.fourier.bins()];
+        let mut scratch = Vec::new();
         let mut transform = |y: &[f64]| {
             padded[..y.len()].copy_from_slice(y);
             padded[y.len()..].fill(0.0);
-            plan.fourier
-                .process_with_scratch(&mut padded, &mut spectrum, &mut scratch)
-                .expect("buffers are those of the plan");
+            plan.fourier.transform_into(&mut padded, &mut spectrum, &mut scratch);
             let scale = plan.scale();
-            let both = |(y, (cosine, sine)): (&Complex<f64>, (&f64, &f64))| {
+            let both = |(y, (cosine, sine)): (&Complex64, (&f64, &f64))| {
                 let without_last = scale * (sine * y.re - cosine * y.im);
                 (without_last, -scale * y.im - without_last)
             };

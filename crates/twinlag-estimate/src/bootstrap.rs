@@ -11,9 +11,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
 use twinlag_cross_relation::{CostError, InferredInputs, Readings, Segment, Steps, inferred_inputs};
+use twinlag_transform::{Complex64, Forward, Inverse};
 
 use crate::error::EstimateError;
 use crate::task::{Estimate, Outcome, Task};
@@ -119,25 +118,18 @@ impl Bootstrap {
 
 /// Readings without noise whose gas has the power that `inputs` show: both channels of each stretch.
 fn clean_readings(inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) -> Vec<[Vec<f64>; 2]> {
-    let mut planner = RealFftPlanner::new();
     inputs
         .segments
         .iter()
         .map(|[f1, f2]| {
-            let gas = gas([f1, f2], inputs, levels_k, ar1, &mut planner);
+            let gas = gas([f1, f2], inputs, levels_k, ar1);
             [0, 1].map(|i| undo(&inputs.filters[i], &gas))
         })
         .collect()
 }
 
 /// The best combination of both inferred inputs, its noise's power taken off.
-fn gas(
-    f: [&[f64]; 2],
-    inputs: &InferredInputs,
-    levels_k: [f64; 2],
-    ar1: [f64; 2],
-    planner: &mut RealFftPlanner<f64>,
-) -> Vec<f64> {
+fn gas(f: [&[f64]; 2], inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) -> Vec<f64> {
     let n = f[0].len();
     // A straight line through all samples is taken off before the circular transform, and put back after it. (One between the ends
     // would hold their noise, ten times that of the readings, as a slow gas signal.)
@@ -147,21 +139,17 @@ fn gas(
     let along = |f: &[f64]| -> f64 { f.iter().enumerate().map(|(k, v)| (k as f64 - centre) * v).sum() };
     let slope = 0.5 * (along(f[0]) + along(f[1])) / moment;
     let line = |k: usize| mean + slope * (k as f64 - centre);
-    let (forward, back) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
-    let [first, second] = f.map(|f| {
-        let mut input: Vec<f64> = f.iter().enumerate().map(|(k, v)| v - line(k)).collect();
-        let mut output = forward.make_output_vec();
-        forward.process(&mut input, &mut output).expect("buffers are those of the plan");
-        output
-    });
+    let forward = Forward::of(n);
+    let [first, second] =
+        f.map(|f| forward.transform(&f.iter().enumerate().map(|(k, v)| v - line(k)).collect::<Vec<f64>>()));
     let noise = |i: usize, bin: usize| {
-        let turn = Complex::from_polar(1.0, std::f64::consts::TAU * bin as f64 / n as f64);
-        let gain = inputs.filters[i].iter().rev().fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr();
+        let turn = Complex64::from_polar(1.0, std::f64::consts::TAU * bin as f64 / n as f64);
+        let gain = inputs.filters[i].iter().rev().fold(Complex64::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr();
         let phi = ar1[i];
         let colour = (1.0 - phi * phi) / (1.0 + phi * phi - 2.0 * phi * turn.re);
         n as f64 * levels_k[i].powi(2) * gain * colour
     };
-    let mut spectrum: Vec<(Complex<f64>, f64)> = (0..first.len())
+    let mut spectrum: Vec<(Complex64, f64)> = (0..first.len())
         .map(|bin| {
             let (n1, n2) = (noise(0, bin), noise(1, bin));
             ((first[bin] * n2 + second[bin] * n1) / (n1 + n2), n1 * n2 / (n1 + n2))
@@ -173,13 +161,7 @@ fn gas(
         // Power, not the series itself, is what the replicates have to have right.
         *x *= gas_share(&ratios, bin, bins).sqrt();
     }
-    let mut spectrum: Vec<Complex<f64>> = spectrum.into_iter().map(|(x, _)| x).collect();
-    spectrum[0].im = 0.0;
-    if n.is_multiple_of(2) {
-        spectrum[bins - 1].im = 0.0;
-    }
-    let mut out = back.make_output_vec();
-    back.process(&mut spectrum, &mut out).expect("real at both ends");
+    let out = Inverse::of(n).transform(spectrum.into_iter().map(|(x, _)| x).collect());
     out.iter().enumerate().map(|(k, v)| v / n as f64 + line(k)).collect()
 }
 

@@ -17,8 +17,8 @@
 //! ```
 
 mod fourier;
+mod kept;
 mod sine;
-mod store;
 mod taper;
 
 pub use fourier::{Forward, Inverse};

@@ -11,11 +11,11 @@ use std::sync::OnceLock;
 use anyhow::{Context, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
-use realfft::RealFftPlanner;
 use serde::{Deserialize, Serialize};
 use twinlag::signal::{Record as Sampling, Rig};
 use twinlag::{CompensateOptions, Estimator, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
+use twinlag_transform::{Complex64, Forward, Inverse};
 
 use super::pair::{self, LEVEL_C, Named, OTHERS};
 use super::stored::{Head, Stored};
@@ -114,18 +114,13 @@ impl Moments {
     fn of(plan: &Plan, gas: usize) -> Result<Self, Failure> {
         let (n, m) = (plan.samples, plan.samples * LONGER);
         let rig = plan.rig(gas, None, m)?;
-        let mut planner = RealFftPlanner::<f64>::new();
-        let (forward, inverse) = (planner.plan_fft_forward(2 * m), planner.plan_fft_inverse(2 * m));
-        let mut sums: [[Vec<_>; 3]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| inverse.make_input_vec()));
+        let (forward, inverse) = (Forward::of(2 * m), Inverse::of(2 * m));
+        let mut sums: [[Vec<_>; 3]; 3] =
+            std::array::from_fn(|_| std::array::from_fn(|_| vec![Complex64::ZERO; inverse.bins()]));
         for record in 0..RECORDS {
             let simulated = rig.simulate_trial(OTHERS + record)?;
-            let spectra = [&simulated.gas_c, &simulated.t1_c, &simulated.t2_c].map(|values| {
-                let mut padded: Vec<f64> = values.iter().map(|v| v - LEVEL_C).collect();
-                padded.resize(2 * m, 0.0);
-                let mut out = forward.make_output_vec();
-                forward.process(&mut padded, &mut out).expect("lengths agree");
-                out
-            });
+            let spectra = [&simulated.gas_c, &simulated.t1_c, &simulated.t2_c]
+                .map(|values| forward.transform(&values.iter().map(|v| v - LEVEL_C).collect::<Vec<f64>>()));
             for (a, row) in sums.iter_mut().enumerate() {
                 for (b, sum) in row.iter_mut().enumerate() {
                     for (s, (x, y)) in sum.iter_mut().zip(spectra[a].iter().zip(&spectra[b])) {
@@ -135,13 +130,8 @@ impl Moments {
             }
         }
         let at = sums.map(|row| {
-            row.map(|mut sum| {
-                let mut out = inverse.make_output_vec();
-                sum[0].im = 0.0;
-                if let Some(last) = sum.last_mut() {
-                    last.im = 0.0;
-                }
-                inverse.process(&mut sum, &mut out).expect("lengths agree");
+            row.map(|sum| {
+                let out = inverse.transform(sum);
                 let scale = 1.0 / (2.0 * m as f64 * m as f64 * RECORDS as f64);
                 out[..n].iter().map(|v| v * scale).collect()
             })

@@ -9,9 +9,8 @@
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
+use twinlag_transform::{Complex64, Inverse};
 
 use super::Resolution;
 use crate::check::{below, positive};
@@ -62,8 +61,8 @@ impl Turbulence {
         let shape = |bin: usize| (bin as f64 * spacing_hz / self.corner_hz).max(1.0).powf(-5.0 / 3.0);
         let scale = self.std_k * self.std_k / (1..=bins).map(shape).sum::<f64>();
 
-        let inverse = RealFftPlanner::<f64>::new().plan_fft_inverse(length);
-        let mut spectrum = inverse.make_input_vec();
+        let inverse = Inverse::of(length);
+        let mut spectrum = vec![Complex64::ZERO; inverse.bins()];
         for bin in 1..=bins {
             let (cosine, sine): (f64, f64) = (rng.sample(StandardNormal), rng.sample(StandardNormal));
             let std_k = (scale * shape(bin)).sqrt();
@@ -79,10 +78,7 @@ impl Turbulence {
                 Complex64::new(0.5 * std_k * cosine, -0.5 * sign * std_k * sine)
             };
         }
-        let mut values_k = inverse.make_output_vec();
-        inverse
-            .process(&mut spectrum, &mut values_k)
-            .expect("the planner's own buffers fit, and the first and last bins are real");
+        let mut values_k = inverse.transform(spectrum);
         values_k.truncate(grid.points);
         values_k
     }

@@ -1,8 +1,8 @@
 //! The sensors' differential equations against their transfer functions.
 
-use realfft::num_complex::Complex64;
 use std::f64::consts::TAU;
 use twinlag_signal::{Broadband, Gas, MultiTone, Record, Rig, Sensor, Series, Signal, SlowMode, Tone, Turbulence};
+use twinlag_transform::Complex64;
 
 use super::{assert_close, coarse, held, mean_square, rig, rig_with};
 

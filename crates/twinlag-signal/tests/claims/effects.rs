@@ -2,11 +2,11 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use realfft::num_complex::Complex64;
 use twinlag_signal::{
     Clean, ClockSlip, ColouredNoise, Flow, FlowSine, FlowStep, Gas, Hysteresis, IntermittentContact, Mains, Mismatch,
     Noise, Radiation, Record, Replaced, Rig, Sensor, Series, Signal, SignalError, Spikes, TemperatureDependence, Tone,
 };
+use twinlag_transform::Complex64;
 
 use super::{assert_close, coarse, held, lagged, mean_square, rig, rig_with};
 

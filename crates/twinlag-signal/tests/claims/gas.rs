@@ -2,8 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use realfft::RealFftPlanner;
 use twinlag_signal::{Broadband, Engine, Gas, Hold, Plunge, Rig, Sensor, Series, Signal, SignalError, Turbulence};
+use twinlag_transform::Forward;
 
 use super::{assert_close, coarse, held, lagged, mean_square, rig, rig_with};
 
@@ -16,11 +16,8 @@ fn periodogram(x: &[f64], sample_period_s: f64) -> Vec<f64> {
     let n = x.len();
     let window = |k: usize| (std::f64::consts::PI * k as f64 / n as f64).sin().powi(2);
     let power: f64 = (0..n).map(|k| window(k).powi(2)).sum();
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(n);
-    let mut input: Vec<f64> = x.iter().enumerate().map(|(k, x)| window(k) * x).collect();
-    let mut output = forward.make_output_vec();
-    forward.process(&mut input, &mut output).expect("own buffers");
-    output.iter().map(|z| 2.0 * sample_period_s * z.norm_sqr() / power).collect()
+    let spectrum = Forward::of(n).transform(&x.iter().enumerate().map(|(k, x)| window(k) * x).collect::<Vec<f64>>());
+    spectrum.iter().map(|z| 2.0 * sample_period_s * z.norm_sqr() / power).collect()
 }
 
 const TURBULENCE: Turbulence = Turbulence { std_k: 20.0, corner_hz: 5.0, cutoff_hz: 500.0 };
