@@ -1,16 +1,9 @@
-//! The one module that knows kuva: a sheet on which the others draw lines, areas and text in
-//! pixels, `y` downwards.
-//!
-//! We use the scene of kuva and its writer, not its charts. Those were tried first (0.6.0): a heat
-//! map has cells equally wide in value only, which is not a grid of time constants in equal ratios,
-//! and shows seams between them on a logarithmic axis; tick labels mix notations (`1e-2`, `0.020`);
-//! a line has no markers.
+//! A sheet on which the others draw lines, areas and text in pixels, `y` downwards, and the writer
+//! of its SVG: two elements, `path` and `text`, are all that the figures are made of.
 
-use kuva::backend::svg::SvgBackend;
-use kuva::plot::ColorMap;
-use kuva::render::color::Color;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
 use std::fmt::Write;
+
+use crate::escape::escaped;
 
 /// `DejaVu Sans` first: the widths of [`text_width`] are its widths, and it is wider than the
 /// others.
@@ -195,29 +188,36 @@ impl<'a> Ink<'a> {
     }
 }
 
-pub(crate) struct Canvas(Scene);
+pub(crate) struct Canvas {
+    width: f64,
+    height: f64,
+    elements: String,
+}
 
 impl Canvas {
     pub(crate) fn new(width: f64, height: f64) -> Self {
-        let mut scene = Scene::new(width, height);
-        scene.font_family = Some(FONT.to_owned());
-        scene.text_color = Some(INK.to_owned());
-        Self(scene)
+        Self { width, height, elements: String::new() }
+    }
+
+    fn put(&mut self, text: std::fmt::Arguments<'_>) {
+        // A String takes whatever is written to it.
+        let _ = self.elements.write_fmt(text);
     }
 
     pub(crate) fn draw(&mut self, outline: &Outline, ink: Ink<'_>) {
         if outline.is_empty() {
             return;
         }
-        let colour = |c: Option<&str>| c.map_or(Color::None, Color::from);
-        self.0.add(Primitive::Path(Box::new(PathData {
-            d: outline.0.clone(),
-            fill: ink.fill.map(Color::from),
-            stroke: colour(ink.stroke),
-            stroke_width: ink.width,
-            opacity: ink.fill_opacity,
-            stroke_dasharray: ink.dash.map(str::to_owned),
-        })));
+        let (stroke, width) = (ink.stroke.unwrap_or("none"), Short(ink.width));
+        self.put(format_args!(r#"<path d="{}" stroke="{stroke}" stroke-width="{width}""#, outline.0));
+        self.put(format_args!(r#" fill="{}""#, ink.fill.unwrap_or("none")));
+        if let Some(opacity) = ink.fill_opacity {
+            self.put(format_args!(r#" fill-opacity="{}""#, Short(opacity)));
+        }
+        if let Some(dash) = ink.dash {
+            self.put(format_args!(r#" stroke-dasharray="{dash}""#));
+        }
+        self.put(format_args!(" />"));
     }
 
     pub(crate) fn line(&mut self, points: &[(f64, f64)], ink: Ink<'_>) {
@@ -235,35 +235,42 @@ impl Canvas {
     }
 
     pub(crate) fn text(&mut self, (x, y): (f64, f64), content: &str, style: Text) {
-        self.0.add(Primitive::Text {
-            // Half pixels: shorter numbers, and steadier glyphs.
-            x: (x * 2.0).round() / 2.0,
-            y: (y * 2.0).round() / 2.0,
-            // kuva would read `$…$` as mathematics, and lets through what XML forbids.
-            content: content.replace(char::is_whitespace, " ").replace(is_unprintable, "\u{fffd}").replace('$', "\\$"),
-            size: style.size,
-            anchor: match style.anchor {
-                Anchor::Start => TextAnchor::Start,
-                Anchor::Middle => TextAnchor::Middle,
-                Anchor::End => TextAnchor::End,
-            },
-            rotate: style.upwards.then_some(-90.0),
-            bold: style.bold,
-            color: None,
-        });
+        // Half pixels: shorter numbers, and steadier glyphs.
+        let [x, y] = [x, y].map(|v| Short((v * 2.0).round() / 2.0));
+        let anchor = match style.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        self.put(format_args!(r#"<text x="{x}" y="{y}" font-size="{}" text-anchor="{anchor}""#, style.size));
+        if style.bold {
+            self.put(format_args!(r#" font-weight="bold""#));
+        }
+        if style.upwards {
+            self.put(format_args!(r#" transform="rotate(-90,{x},{y})""#));
+        }
+        self.put(format_args!(">{}</text>", escaped(&content.replace(char::is_whitespace, " "))));
     }
 
     pub(crate) fn into_svg(self) -> String {
-        let (width, height) = (self.0.width, self.0.height);
-        let svg = SvgBackend::new().render_scene(&self.0);
-        // kuva leaves out the view box; without it a page cannot scale the picture.
-        svg.replacen("<svg ", &format!("<svg viewBox=\"0 0 {width} {height}\" "), 1)
+        let (width, height) = (Short(self.width), Short(self.height));
+        format!(
+            "<svg viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
+             font-family=\"{FONT}\" fill=\"{INK}\"><rect width=\"100%\" height=\"100%\" fill=\"white\" />{}</svg>",
+            self.elements
+        )
     }
 }
 
-/// What no page may hold, and marks of direction, which would turn what follows them.
-pub(crate) fn is_unprintable(c: char) -> bool {
-    c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
+/// A number as it stands in the file: to hundredths, and no more digits than it takes.
+#[derive(Clone, Copy)]
+struct Short(f64);
+
+impl std::fmt::Display for Short {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // `+ 0.0` turns −0 into 0.
+        write!(f, "{}", (self.0 * 100.0).round() / 100.0 + 0.0)
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -291,9 +298,9 @@ impl Text {
 /// The colour of a heat map at `t` in [0, 1]: pale yellow to dark violet, viridis from its end,
 /// lightened by a quarter so that lines and marks stand out.
 pub(crate) fn heat(t: f64) -> String {
-    let (r, g, b) = ColorMap::Viridis.map_rgb(1.0 - t).unwrap_or((255, 255, 255));
-    let light = |c: u8| c + (255 - c) / 4;
-    format!("#{:02x}{:02x}{:02x}", light(r), light(g), light(b))
+    let colour = colorous::VIRIDIS.eval_continuous((1.0 - t).clamp(0.0, 1.0));
+    let [r, g, b] = colour.as_array().map(|c| c + (255 - c) / 4);
+    format!("#{r:02x}{g:02x}{b:02x}")
 }
 
 /// Width of a text in pixels: the advance widths of `DejaVu Sans`, by classes of characters, to

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use crate::canvas::is_unprintable;
+use crate::escape::escaped;
 
 /// A page of text, tables and pictures, as one file that can be mailed, printed and kept.
 ///
@@ -265,27 +265,6 @@ fn aside(out: &mut String, class: &str, label: &str, text: &str) {
     put(out, format_args!("<p class=\"{class}\" role=\"note\"><strong>{label}</strong> {}</p>\n", escaped(text)));
 }
 
-/// Text that is text wherever it stands, between tags or in an attribute. Characters that no page
-/// may hold become `�`.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            '\n' | '\t' => out.push(c),
-            // A carriage return would be read as a new line.
-            '\r' => {}
-            c if is_unprintable(c) => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
-}
-
 /// A picture as a part of the page: what comes before `<svg` left out, `id`s and references to them
 /// its own, named by its caption. The name space is left out as well: within a page it is known.
 fn inlined(svg: &str, figure: usize) -> String {
@@ -472,8 +451,7 @@ mod tests {
         assert_eq!(full(NASTY).to_html(), full(NASTY).to_html());
     }
 
-    /// kuva writes no `id` for what is drawn here today; clip paths and gradients of others' SVG
-    /// have them.
+    /// What is drawn here has no `id`; clip paths and gradients of others' SVG have them.
     #[test]
     fn ids_of_two_pictures_do_not_meet() {
         let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><defs>\

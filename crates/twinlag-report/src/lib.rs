@@ -7,8 +7,7 @@
 //! so figures can be kept under version control and compared. A [`Document`] puts figures, tables
 //! and text on a page that needs no network and no script; [`plus_minus`] and its like round the
 //! numbers. What it does not do: interaction, three dimensions, filled contours. Whoever wants
-//! those, or a kind of chart that is not here, is better served by [kuva](https://docs.rs/kuva),
-//! which writes the SVG here too but does not show in the signatures.
+//! those, or a kind of chart that is not here, is better served by [kuva](https://docs.rs/kuva).
 //!
 //! ```
 //! use twinlag_report::{Axis, Chart, Figure, Mark, Reference, Series, Surface};
@@ -24,8 +23,9 @@
 //!     .iter()
 //!     .flat_map(|t2| tau_s.iter().map(move |t1| 0.1 + (t1 / 0.023).ln().powi(2) + (t2 / 0.05).ln().powi(2)))
 //!     .collect();
-//! let axes = [Axis::logarithmic("τ₁ (s)"), Axis::logarithmic("τ₂ (s)"), Axis::logarithmic("cost (K²)")];
-//! let cost = Surface::new("Cost", axes, tau_s.clone(), tau_s, cost).mark(Mark::cross("truth", 0.023, 0.05));
+//! let axes = [Axis::logarithmic("τ₁ (s)"), Axis::logarithmic("τ₂ (s)"), Axis::logarithmic("cost
+//! (K²)")]; let cost = Surface::new("Cost", axes, tau_s.clone(), tau_s,
+//! cost).mark(Mark::cross("truth", 0.023, 0.05));
 //!
 //! let svg = Figure::new("Two thermocouples").panel(bias).panel(cost).to_svg()?;
 //! assert!(svg.starts_with("<svg") && svg.len() < 60_000);
@@ -41,6 +41,7 @@ mod contour;
 mod decimate;
 mod document;
 mod error;
+mod escape;
 mod figure;
 mod number;
 mod palette;

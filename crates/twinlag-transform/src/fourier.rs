@@ -105,7 +105,8 @@ impl fmt::Debug for Inverse {
     }
 }
 
-/// The plan to transform `samples` values. What panics while it plans leaves the store as it was: a poisoned lock is no harm.
+/// The plan to transform `samples` values. What panics while it plans leaves the store as it was: a
+/// poisoned lock is no harm.
 fn forward(samples: usize) -> Arc<dyn RealToComplex<f64>> {
     static KEPT: Mutex<Kept<dyn RealToComplex<f64>>> = Mutex::new(Kept(Vec::new()));
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-/// Samples of all plans of one direction that are kept; what was asked for longest ago goes first. A plan holds some 20 bytes for each
-/// sample.
+/// Samples of all plans of one direction that are kept; what was asked for longest ago goes first.
+/// A plan holds some 20 bytes for each sample.
 pub(crate) const KEPT_SAMPLES: usize = 1 << 21;
 
 /// Plans by length, what was asked for last in front.

@@ -6,7 +6,8 @@ fn series(n: usize) -> Vec<f64> {
     (0..n).map(|k| (1.3 * k as f64).sin() + 0.2 * (0.7 * (k * k) as f64).cos()).collect()
 }
 
-/// Lengths even, odd, prime and composite, against the sum itself; `n` terms of at most 1.2, each to `n` roundings of the angle.
+/// Lengths even, odd, prime and composite, against the sum itself; `n` terms of at most 1.2, each
+/// to `n` roundings of the angle.
 #[test]
 fn spectrum_is_the_sum_that_defines_it() {
     for n in [0, 1, 2, 3, 4, 7, 12, 97, 100, 256, 1031] {

@@ -1,6 +1,7 @@
 //! Transforms and tapers against the sums and closed forms that define them.
 //!
-//! Here and not beside the code: the crate's own tests would compile all kernels of rustfft once more.
+//! Here and not beside the code: the crate's own tests would compile all kernels of rustfft once
+//! more.
 
 mod fourier;
 mod sine;

@@ -2,8 +2,8 @@
 
 use twinlag_transform::{Tapered, hann, hann_between};
 
-/// The closed forms: `Σ w = n/2` and `Σ w² = 3n/8`; between the zeros, of `n + 1`. Each of `n` additions to a sum of up to `n/2`
-/// rounds by `ε/2` of it, and each term by a few `ε`.
+/// The closed forms: `Σ w = n/2` and `Σ w² = 3n/8`; between the zeros, of `n + 1`. Each of `n`
+/// additions to a sum of up to `n/2` rounds by `ε/2` of it, and each term by a few `ε`.
 #[test]
 fn hann_has_the_mean_and_the_energy_of_its_closed_form() {
     for n in [5, 8, 257] {
@@ -25,7 +25,8 @@ fn pieces_overlap_by_half() {
     assert_eq!(pieces, [&[0, 1, 2, 3][..], &[2, 3, 4, 5], &[4, 5, 6, 7]]);
 }
 
-/// A constant under Hann's taper: half the length at zero frequency, a quarter beside it, nothing beyond.
+/// A constant under Hann's taper: half the length at zero frequency, a quarter beside it, nothing
+/// beyond.
 #[test]
 fn a_constant_leaks_into_the_next_bin_alone() {
     let n = 16;
