@@ -8,10 +8,10 @@
 //! ```
 //!
 //! exactly for gas held between samples. All three estimators here minimise a ratio
-//! `Σ (η' x[k])² / η' W η` over the direction of `η`; they differ in `W`, which says how noise is
-//! taken to be spread over the three columns of `x`. No start is needed, and no sample is
-//! discarded. Noise of neighbouring `x` is correlated, which none of them uses: the whitened cost
-//! does, and is more precise.
+//! `Σ (η' x[k])² / η' W η` over the direction of `η`; they differ in `W`, the assumed distribution
+//! of the noise over the three columns of `x`. No start is needed, and no sample is discarded.
+//! Noise of neighbouring `x` is correlated, which none of them uses: the whitened cost does, and is
+//! more precise.
 
 use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, Side};
@@ -24,12 +24,12 @@ use crate::readings::Readings;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DifferenceEquationEstimator {
     /// `W = diag(0, 0, 1)`, all the noise in the third column: least squares by QR factorisation.
-    /// Noise in the regressors biases it, badly from a few per cent on; with sensor 1 the faster,
-    /// to short time constants.
+    /// Noise in the regressors biases it, badly from a few per cent on; towards short time
+    /// constants if sensor 1 is the faster.
     LeastSquares,
     /// `W = 1`, equal and independent noise in the three columns: the smallest right singular
     /// vector. But all three hold `y2[k−1]`, and their noise is neither equal nor independent, so
-    /// it stays biased, and at high noise wildly.
+    /// it is biased, strongly so at high noise.
     TotalLeastSquares,
     /// `W` the covariance that white noise gives the three columns: consistent. The smallest right
     /// singular vector of the columns whitened by its Cholesky factor.
@@ -45,7 +45,7 @@ impl DifferenceEquationEstimator {
     ///
     /// # Errors
     /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for an invalid noise ratio;
-    /// [`CostError::Singular`] where the solution is no pair of positive time constants.
+    /// [`CostError::Singular`] if the solution is not a pair of positive time constants.
     ///
     /// # Source
     /// Difference equation: Hung, McLoone, Irwin, Kee, *A difference equation approach to
@@ -79,9 +79,9 @@ impl DifferenceEquationEstimator {
     /// to the time constants by the delta method. `M` is the variance of the score
     /// `Σ r (x − r W η/η'Wη)`, `r = η' x`, a quadratic form of noise that neighbouring `k` share:
     /// the products of signal and noise from the sums at lags −1, 0 and 1 of the data, less what
-    /// noise adds to these, and the products of noise with noise. It says how the estimate scatters
-    /// about its own limit, which for least squares and for total least squares is not the truth:
-    /// not how far it is off.
+    /// noise adds to these, and the products of noise with noise. It describes the scatter of the
+    /// estimate about its own limit, which for least squares and for total least squares is not the
+    /// truth. It does not include that bias.
     ///
     /// # Errors
     /// As [`DifferenceEquationEstimator::estimate`]; [`CostError::Singular`] also where no positive
@@ -168,8 +168,8 @@ impl DifferenceEquationEstimator {
     }
 }
 
-/// Time constants `[τ1, τ2]` (s) by least squares on the difference equation: a start for nothing,
-/// not an estimate.
+/// Time constants `[τ1, τ2]` (s) by least squares on the difference equation: a start that costs
+/// almost nothing, not an estimate.
 ///
 /// # Errors
 /// As [`DifferenceEquationEstimator::estimate`].

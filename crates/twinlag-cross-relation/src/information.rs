@@ -23,10 +23,10 @@ use crate::sandwich::{inverse, sandwich};
 use crate::transform::Plan;
 use crate::whitened::Whitened;
 
-/// What the variance of the gradient is taken from.
+/// How the variance of the gradient is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Middle {
-    /// White noise of the stated levels, the noise-noise term included.
+    /// From white noise of the stated levels, including the noise-noise term.
     WhiteNoise,
     /// The residual's own smoothed spectrum, for records in which model error is not small against
     /// noise.
@@ -64,8 +64,7 @@ impl Whitened<'_> {
     /// Cramér-Rao bound: the covariance that no unbiased estimate goes below, `[P][P]`, zero for
     /// parameters not in `free`, for noise of the stated levels and a gas that is unknown and not
     /// random.
-    ///
-    /// To be asked of the cost on readings *without* noise, at the `theta` that made them:
+    /// Call this on the cost of readings *without* noise, at the `theta` that made them:
     /// `(Σ_w d_w d_w')⁻¹` with `d` the derivative of the whitened residual, which is the exact
     /// finite-record form of `d = (∂H2 H1 − ∂H1 H2) X/√(s1² |H2|² + s2² |H1|²)` summed over all
     /// frequencies. On noisy readings noise would count as signal. `None` where the record
@@ -137,14 +136,14 @@ impl Whitened<'_> {
         statistic.is_finite().then_some(statistic)
     }
 
-    /// How much of what the residual seems to say about parameter `index`, the other `free` ones
-    /// following it, is noise multiplied by noise: `v'Ev / v'Gv` with the Gauss-Newton matrix `G`,
-    /// along the direction `v` in which the cost's profile runs.
+    /// Share of noise multiplied by noise in the apparent information of the residual about
+    /// parameter `index`, with the other `free` ones following it: `v'Ev / v'Gv` with the
+    /// Gauss-Newton matrix `G`, along the direction `v` in which the cost's profile runs.
     ///
     /// It falls towards zero as the signal determines the parameter, and is of the order of one
-    /// where the signal says nothing: the cost then still has some shape, but no interval can be
-    /// read from it. Zero where the residual does not depend on the parameter at all, as on the
-    /// time constant of a sensor that is far faster than the sampling.
+    /// where the signal does not determine it: the cost then still has some shape, but no interval
+    /// can be read from it. Zero where the residual does not depend on the parameter at all, as on
+    /// the time constant of a sensor that is far faster than the sampling.
     pub fn noise_share<const P: usize>(&self, theta: &[f64; P], free: &[usize], index: usize) -> f64 {
         let (g, e) = (self.evaluate(theta).hessian, self.noise_noise(theta));
         let rest: Vec<usize> = free.iter().copied().filter(|&i| i != index).collect();
@@ -388,7 +387,8 @@ mod tests {
             wald += off * off / all[2][2] / 400.0;
         }
         assert!((mean[0] - 2.0).abs() < 0.4, "at the truth: mean {}", mean[0]);
-        assert!((mean[1] / (2.0 + wald) - 1.0).abs() < 0.33, "at a gain off: mean {}, Wald {}", mean[1], 2.0 + wald);
+        assert!((mean[1] / (2.0 + wald) - 1.0).abs() < 0.33, "at a gain off: mean {}, Wald \
+            {}", mean[1], 2.0 + wald);
         assert!(wald > 20.0, "the signal must show the error at all: {wald}");
     }
 

@@ -1,8 +1,7 @@
-//! Monte-Carlo experiments with two-sensor estimators, each described by one file.
-//!
-//! For researchers who compare estimators, optimisers and noise levels over many simulated records,
-//! and want a table and pictures that anyone can make again to the byte. A [`Plan`] is a TOML file;
-//! [`Experiment`] makes a study of it that `twinlag-study` runs on all cores, in shards, with
+//! Monte-Carlo experiments with two-sensor estimators, each described by one file. This crate is
+//! for researchers who compare estimators, optimisers and noise levels over many simulated records,
+//! and want a table and pictures that anyone can reproduce byte for byte. A [`Plan`] is a TOML
+//! file; [`Experiment`] makes a study of it that `twinlag-study` runs on all cores, in shards, with
 //! restarts; [`Table`] holds bias, scatter, coverage and success with their own standard errors,
 //! beside the Cramér-Rao bound. For a single record take `twinlag`; for a study of something else,
 //! `twinlag-study`.

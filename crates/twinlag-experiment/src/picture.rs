@@ -35,7 +35,7 @@ impl PictureSpec {
     /// The figure of `table`, as SVG.
     ///
     /// # Errors
-    /// For a column that the table has not, or nothing to draw.
+    /// For a column that the table does not have, or if there is nothing to draw.
     pub fn draw(&self, table: &Table) -> Result<String, ExperimentError> {
         let rows: Vec<&Row> =
             table.rows.iter().filter(|row| self.only.iter().all(|(label, value)| has(row, label, value))).collect();

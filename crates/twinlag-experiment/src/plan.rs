@@ -1,6 +1,6 @@
 //! The plan of an experiment: which records, which methods, how many trials.
 //!
-//! Cells are the product of all lists, in the order in which they stand here; every method answers
+//! Cells are the product of all lists, in the order in which they stand here; every method analyses
 //! the same records.
 
 use serde::{Deserialize, Serialize};
@@ -48,7 +48,7 @@ pub struct Plan {
     pub time_constants_s: Vec<[f64; 2]>,
     /// Noise standard deviations, per cent; the louder channel's where the levels differ.
     pub noise_percent: Vec<f64>,
-    /// Per cent of what.
+    /// The signal to whose standard deviation the per cent refer.
     #[serde(default = "default_noise_of")]
     pub noise_of: Vec<NoiseOf>,
     /// Noise of channel 2 over that of channel 1.
@@ -57,7 +57,7 @@ pub struct Plan {
     /// First-order autoregressive coefficient of both noises.
     #[serde(default = "default_white")]
     pub noise_ar1: Vec<f64>,
-    /// What answers each record.
+    /// The methods that analyse each record.
     pub methods: Vec<Method>,
     /// Time constants of a grid of starts (every pair of two of them), s, for methods that start
     /// there.
@@ -107,7 +107,7 @@ pub struct NamedGas {
     pub gas: Gas,
 }
 
-/// What noise is measured against.
+/// The signal against which noise is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseOf {
@@ -140,7 +140,7 @@ pub struct Cell {
     pub tau_s: [f64; 2],
     /// Noise, per cent.
     pub noise_percent: f64,
-    /// Per cent of what.
+    /// The signal to whose standard deviation the per cent refer.
     pub noise_of: NoiseOf,
     /// Noise of channel 2 over that of channel 1.
     pub noise_ratio: f64,
@@ -161,7 +161,7 @@ impl Plan {
     /// Reads a plan.
     ///
     /// # Errors
-    /// For text that is no plan, with the line at fault, and for a plan that cannot run.
+    /// For text that is not a plan, with the line at fault, and for a plan that cannot run.
     pub fn from_toml(text: &str) -> Result<Self, ExperimentError> {
         let plan: Self = toml::from_str(text).map_err(|e| ExperimentError::Plan(e.to_string()))?;
         plan.check()?;
@@ -255,7 +255,7 @@ impl Plan {
     /// The rig of a cell, the `index`-th: each has a seed of its own.
     ///
     /// # Errors
-    /// For a rig that cannot be.
+    /// For an impossible rig.
     pub fn bench(&self, cell: &Cell, index: usize) -> Result<Bench, ExperimentError> {
         let seed = self.seed.wrapping_add(index as u64 * 0x9E37_79B9);
         let sensor = |channel: &str, tau_s: f64, noise: Option<Noise>| {

@@ -31,7 +31,7 @@ impl Table {
     /// The table of `results`, which must be those of `plan`.
     ///
     /// # Errors
-    /// For a rig that cannot be.
+    /// For an impossible rig.
     pub fn new(plan: &Plan, results: &Results) -> Result<Self, ExperimentError> {
         Self::of(&Experiment::new(plan)?, results)
     }
@@ -39,7 +39,7 @@ impl Table {
     /// The table of `results`, which must be those of `experiment`.
     ///
     /// # Errors
-    /// For a rig that cannot be.
+    /// For an impossible rig.
     pub fn of(experiment: &Experiment<'_>, results: &Results) -> Result<Self, ExperimentError> {
         let plan = experiment.source();
         let mut rows = Vec::new();

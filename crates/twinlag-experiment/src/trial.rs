@@ -137,7 +137,7 @@ impl<'a> Experiment<'a> {
     /// and an unknown gas, on trial 0's gas. `None` without noise.
     ///
     /// # Errors
-    /// For a rig that cannot be.
+    /// For an impossible rig.
     pub fn bound(&self, cell: usize) -> Result<Option<[f64; 2]>, ExperimentError> {
         let (cell, bench) = (&self.cells[cell], self.plan.bench(&self.cells[cell], cell)?);
         if bench.noise_std_k.contains(&0.0) {

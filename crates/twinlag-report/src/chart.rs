@@ -172,14 +172,14 @@ impl Chart {
         Self { title: title.into(), x, y, series, references, dodge_px: 0.0, legend: true }
     }
 
-    /// With one series more, drawn above the earlier ones.
+    /// Adds a series, drawn above the earlier ones.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// With one reference line more.
+    /// Adds a reference line.
     #[must_use]
     pub fn reference(mut self, reference: Reference) -> Self {
         self.references.push(reference);
@@ -193,7 +193,7 @@ impl Chart {
         Self { dodge_px: step_px, ..self }
     }
 
-    /// Without a legend: another panel has it.
+    /// Leaves out the legend, for example because another panel has it.
     #[must_use]
     pub fn without_legend(self) -> Self {
         Self { legend: false, ..self }

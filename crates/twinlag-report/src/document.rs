@@ -1,5 +1,5 @@
-//! Documents: one HTML page that needs nothing but itself. Text, tables and pictures go in as
-//! blocks, in their order.
+//! Documents: one self-contained HTML page. Text, tables and pictures are added as blocks, in their
+//! order.
 
 use std::fmt::Write;
 
@@ -65,15 +65,14 @@ impl Table {
         Self { header: strings(header), rows: Vec::new(), caption: String::new() }
     }
 
-    /// With one row more. A row that is short ends in empty cells; one that is long widens the
-    /// table.
+    /// Adds a row. A short row ends in empty cells; a long one widens the table.
     #[must_use]
     pub fn row<S: Into<String>>(mut self, cells: impl IntoIterator<Item = S>) -> Self {
         self.rows.push(strings(cells));
         self
     }
 
-    /// With a line of text above.
+    /// Adds a line of text above the table.
     #[must_use]
     pub fn caption(self, caption: impl Into<String>) -> Self {
         Self { caption: caption.into(), ..self }
@@ -121,49 +120,49 @@ impl Document {
         self
     }
 
-    /// With the heading of a section.
+    /// Adds the heading of a section.
     #[must_use]
     pub fn heading(self, text: impl Into<String>) -> Self {
         self.with(Block::Heading(text.into()))
     }
 
-    /// With a heading within a section.
+    /// Adds a heading within a section.
     #[must_use]
     pub fn subheading(self, text: impl Into<String>) -> Self {
         self.with(Block::Subheading(text.into()))
     }
 
-    /// With a paragraph that stands out: what somebody reads who reads one sentence.
+    /// Adds a paragraph that stands out, for readers who read only one sentence.
     #[must_use]
     pub fn lead(self, text: impl Into<String>) -> Self {
         self.with(Block::Lead(text.into()))
     }
 
-    /// With a paragraph.
+    /// Adds a paragraph.
     #[must_use]
     pub fn paragraph(self, text: impl Into<String>) -> Self {
         self.with(Block::Paragraph(text.into()))
     }
 
-    /// With a list of points; an empty one takes no room.
+    /// Adds a list of points; an empty one takes no room.
     #[must_use]
     pub fn list<S: Into<String>>(self, items: impl IntoIterator<Item = S>) -> Self {
         self.with(Block::List(strings(items)))
     }
 
-    /// With a table of names and what they stand for; an empty one takes no room.
+    /// Adds a table of names and their meanings; an empty one takes no room.
     #[must_use]
     pub fn facts<K: Into<String>, V: Into<String>>(self, facts: impl IntoIterator<Item = (K, V)>) -> Self {
         self.with(Block::Facts(facts.into_iter().map(|(k, v)| (k.into(), v.into())).collect()))
     }
 
-    /// With a table.
+    /// Adds a table.
     #[must_use]
     pub fn table(self, table: Table) -> Self {
         self.with(Block::Table(table))
     }
 
-    /// With a picture and what it shows; pictures are numbered.
+    /// Adds a picture with its caption; pictures are numbered.
     ///
     /// - `svg`: what [`Figure::to_svg`](crate::Figure::to_svg) gives, or any SVG of one's own
     ///   making. It is the one thing that goes in as markup: whoever takes it from a stranger takes
@@ -174,19 +173,19 @@ impl Document {
         self.with(Block::Figure { svg: svg.into(), caption: caption.into() })
     }
 
-    /// With text as it was typed: a command, a piece of a file.
+    /// Adds text as it was typed: a command, a piece of a file.
     #[must_use]
     pub fn command(self, text: impl Into<String>) -> Self {
         self.with(Block::Command(text.into()))
     }
 
-    /// With a remark.
+    /// Adds a remark.
     #[must_use]
     pub fn note(self, text: impl Into<String>) -> Self {
         self.with(Block::Note(text.into()))
     }
 
-    /// With a remark that must not be missed.
+    /// Adds a remark that must not be missed.
     #[must_use]
     pub fn warning(self, text: impl Into<String>) -> Self {
         self.with(Block::Warning(text.into()))

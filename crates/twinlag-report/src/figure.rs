@@ -74,7 +74,7 @@ impl Figure {
         Self { panel_px: (width_px, height_px), ..self }
     }
 
-    /// With one panel more.
+    /// Adds a panel.
     #[must_use]
     pub fn panel(mut self, panel: impl Into<Panel>) -> Self {
         self.panels.push(panel.into());

@@ -1,13 +1,13 @@
 //! Pictures of numerical experiments as small, deterministic SVG: charts, cost surfaces, grouped
 //! bars; and pages of them with text and tables, as one HTML file each.
 //!
-//! For anyone who has numbers and wants a figure for a report, without a plotting environment:
-//! error bars and intervals, logarithmic axes, reference lines, contour lines, one
-//! colour-blind-safe palette, and a legend that hides no data. The same data give the same bytes,
-//! so figures can be kept under version control and compared. A [`Document`] puts figures, tables
-//! and text on a page that needs no network and no script; [`plus_minus`] and its like round the
-//! numbers. What it does not do: interaction, three dimensions, filled contours. Whoever wants
-//! those, or a kind of chart that is not here, is better served by [kuva](https://docs.rs/kuva).
+//! This crate is for anyone who has numbers and wants a figure for a report, without a plotting
+//! environment. It has error bars and intervals, logarithmic axes, reference lines, contour lines,
+//! one colour-blind-safe palette, and a legend that hides no data. Equal data give equal bytes, so
+//! figures can be kept under version control and compared. A [`Document`] puts figures, tables and
+//! text on a page that needs no network and no script; [`plus_minus`] and its like round the
+//! numbers. There is no interaction, nothing in three dimensions, and no filled contours. For
+//! those, or for another kind of chart, use [kuva](https://docs.rs/kuva).
 //!
 //! ```
 //! use twinlag_report::{Axis, Chart, Figure, Mark, Reference, Series, Surface};

@@ -1,9 +1,9 @@
-//! Numbers as a reader wants them: rounded to what is known of them, with a proper minus sign,
-//! never `NaN`.
+//! Numbers for readers: rounded to the digits that are known, with a proper minus sign, never
+//! `NaN`.
 
 use crate::axis::superscript;
 
-/// What stands where there is no number.
+/// The text in place of a missing number.
 const ABSENT: &str = "not determined";
 
 /// The exponent of ten of a number as it is after rounding to so many significant digits: that of

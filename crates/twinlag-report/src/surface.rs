@@ -63,7 +63,7 @@ impl Surface {
         Self { levels: Some(levels.into()), ..self }
     }
 
-    /// With one marked point more; outside the grid, or not finite, it is not drawn.
+    /// Adds a marked point; one outside the grid, or not finite, is not drawn.
     #[must_use]
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);

@@ -33,7 +33,7 @@ pub struct Gas {
     /// Mean temperature, °C, about which the signal moves; added to a series. 0 if left out.
     #[serde(default)]
     pub mean_c: f64,
-    /// What happens between the samples.
+    /// How the gas moves between the samples.
     #[serde(default)]
     pub hold: Hold,
     /// Whether every trial has its own signal; otherwise all have that of trial 0, and differ by
@@ -47,14 +47,14 @@ pub struct Gas {
     pub signal: Signal,
 }
 
-/// What the gas does between two sample instants.
+/// How the gas moves between two sample instants.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
-    /// It goes on as the signal does.
+    /// The gas follows the continuous signal.
     #[default]
     Continuous,
-    /// It keeps the value of the sample instant until the next (zero-order hold), so that the
+    /// The gas keeps the value of the sample instant until the next (zero-order hold), so that the
     /// discrete model `y[k+1] = a y[k] + (1 − a) x[k]`, `a = exp(−Ts/τ)`, of a first-order sensor
     /// is exact.
     ZeroOrder,

@@ -4,13 +4,11 @@
 //! it is read: it is a TOML (or JSON) file, or built in Rust. [`Rig::simulate`] returns the record
 //! that such a rig would have written, with the true gas temperature beside it. The sensors are
 //! differential equations, integrated by the classical fourth-order Runge-Kutta rule on a grid much
-//! finer than the sampling; noise and rounding come last.
-//!
-//! Who should use it: someone who tests an identification method, or teaches one, and needs records
-//! whose truth is known. Someone who wants the *formulae* of a sensor (its discrete pole, its
-//! inverse, its frequency response) should take `twinlag-sensor` instead, and someone with measured
-//! records `twinlag-record`. This crate depends on neither, on purpose: a record is never made by
-//! the code that explains it.
+//! finer than the sampling; noise and rounding come last. Use this crate to test or teach an
+//! identification method with records whose truth is known. For the *formulae* of a sensor (its
+//! discrete pole, its inverse, its frequency response) use `twinlag-sensor` instead, and for
+//! measured records `twinlag-record`. This crate deliberately depends on neither, so that the code
+//! that explains a record never made it.
 //!
 //! # Example
 //!

@@ -18,7 +18,7 @@ const CASCADE: usize = 4;
 /// Noise has at least this share of the variance that it was thought to have.
 const LEAST_NOISE: f64 = 1e-3;
 
-/// A part of the swing that is none.
+/// A part of the swing this small counts as zero.
 const NOTHING: f64 = 1e-5;
 
 /// What bounds are made from.

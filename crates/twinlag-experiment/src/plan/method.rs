@@ -87,8 +87,8 @@ impl Default for OptimiserChoice {
 }
 
 impl Method {
-    /// The knowledge that this method is given of noise with `std_k` and `ar1`. Noise of zero is stated
-    /// as a very small number, so that weights stay finite.
+    /// The knowledge that this method is given of noise with `std_k` and `ar1`. Noise of zero is
+    /// stated as a very small number, so that weights stay finite.
     pub(crate) fn told(&self, std_k: [f64; 2], ar1: f64) -> NoiseKnowledge {
         let least = 1e-6;
         match self.noise {

@@ -41,7 +41,7 @@ pub struct FlowSine {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct FlowStep {
-    /// What the time constants are multiplied with in the end.
+    /// Final factor on the time constants.
     pub factor: f64,
     /// When the change begins, s after the record's first sample.
     pub at_s: f64,
@@ -64,7 +64,7 @@ impl FlowStep {
 }
 
 impl Flow {
-    /// What both time constants are multiplied with at a time after the first sample, `m(t)`.
+    /// Factor on both time constants at a time after the first sample, `m(t)`.
     pub fn factor(&self, time_s: f64) -> f64 {
         match self {
             Self::Sine(sine) => 1.0 + sine.depth * (TAU * time_s / sine.period_s + sine.phase_rad).sin(),

@@ -1,4 +1,4 @@
-//! Two sensors, two places: one sensor meets `x(t) + m(t)` where the other meets the gas `x(t)`.
+//! Two sensors in two places: one sees `x(t) + m(t)`, the other sees the gas `x(t)`.
 //! `m` is stationary first-order Gaussian noise (Ornstein-Uhlenbeck), independent of the gas, added
 //! before the sensor.
 //!
@@ -14,12 +14,12 @@ use crate::gas::Resolution;
 use crate::grid::Grid;
 use crate::{Broadband, SignalError};
 
-/// What one sensor's gas differs by from the other's, which is the true one.
+/// Difference of one sensor's gas from the other's, which is the true gas.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Mismatch {
-    /// Name of the channel whose sensor meets other gas; the second one if left out.
+    /// Name of the channel whose sensor sees a different gas; the second one if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub channel: Option<String>,
     /// Standard deviation, K.
@@ -29,7 +29,7 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
-    /// Other gas for the second sensor.
+    /// A different gas for the second sensor.
     pub fn new(std_k: f64, corner_hz: f64) -> Self {
         Self { channel: None, std_k, corner_hz }
     }

@@ -30,7 +30,7 @@ impl Radiation {
         Self { coefficient_per_k3, wall_c }
     }
 
-    /// What the gas would have to be hotter by, to replace the heat that a body of `body_c`
+    /// How much hotter the gas would have to be to replace the heat that a body of `body_c`
     /// radiates, K.
     pub(crate) fn loss_k(&self, body_c: f64) -> f64 {
         // The fourth powers' difference without its cancellation: (a² + b²)(a + b)(a − b).

@@ -1,4 +1,4 @@
-//! A time constant that depends on the temperature of the body whose it is: `τ(T) = τ (T_K/R_K)^p`,
+//! A time constant that depends on the temperature of its own body: `τ(T) = τ (T_K/R_K)^p`,
 //! `T_K` and `R_K` the body's and a reference temperature in kelvin. It acts on the first lag.
 
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ impl TemperatureDependence {
         Self { exponent, reference_c }
     }
 
-    /// What the time constant is multiplied with at `body_c`.
+    /// Factor on the time constant at `body_c`.
     pub(crate) fn factor(&self, body_c: f64) -> f64 {
         ((body_c + ZERO_CELSIUS_K) / (self.reference_c + ZERO_CELSIUS_K)).powf(self.exponent)
     }

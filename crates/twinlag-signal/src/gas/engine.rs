@@ -3,9 +3,9 @@
 //! towards the base.
 //!
 //! The mean of the cycle without variation, `A [ρ (1 + ε)/2 + δ (1 − ε)]` with the rise fraction
-//! `ρ`, the decay fraction `δ` and `ε = exp(−(1 − ρ)/δ)`, is taken off, so that the gas has the
-//! mean it is given. Variation from cycle to cycle is log-normal with mean one: peaks and periods
-//! stay positive. A model of the shape, not of an engine's gas exchange.
+//! `ρ`, the decay fraction `δ` and `ε = exp(−(1 − ρ)/δ)`, is subtracted, so that the gas has the
+//! given mean. Variation from cycle to cycle is log-normal with mean one: peaks and periods stay
+//! positive. A model of the shape, not of an engine's gas exchange.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

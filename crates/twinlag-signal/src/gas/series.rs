@@ -12,8 +12,7 @@ use crate::check::{at_least, finite, positive};
 use crate::grid::Grid;
 
 /// A gas temperature given as numbers, linear between them, starting at the record's first sample.
-///
-/// Linear interpolation takes off the high frequencies: a series as coarse as the record's sampling
+/// Linear interpolation removes high frequencies: a series as coarse as the record's sampling
 /// has less of them than the gas it was measured in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Unchecked", into = "Unchecked")]
