@@ -88,7 +88,7 @@ impl<'a> Compensated<'a> {
 
 /// Covariance `[P][P]` of the minimum `theta` of the *plain* cross-relation cost under white noise
 /// of `noise_std` `[s1, s2]` (K), zero for parameters not in `free`; `None` where `theta` is no
-/// minimum. It says how the estimate scatters, not how far it is off.
+/// minimum. It describes the scatter of the estimate, not its bias.
 pub fn plain_covariance<const P: usize>(
     cost: &CrossRelation<'_>,
     theta: &[f64; P],

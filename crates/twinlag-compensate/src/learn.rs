@@ -250,7 +250,7 @@ impl Search<'_> {
         fitted
     }
 
-    /// Those of `candidates` for which `parts` leave room.
+    /// The `candidates` for which `parts` leave room.
     fn within(&self, parts: &[Part], candidates: Vec<Part>) -> Vec<Part> {
         let room = self.room.saturating_sub(states(parts));
         candidates.into_iter().filter(|p| states(std::slice::from_ref(p)) <= room).collect()
@@ -294,7 +294,7 @@ impl Search<'_> {
         moved.collect()
     }
 
-    /// Of each kind of single part the one that explains most.
+    /// The single part of each kind that explains most.
     fn best_of_each_kind(&self) -> Vec<Part> {
         let nothing = Fitted::unknown(Vec::new());
         self.kinds().into_iter().flat_map(|kind| self.best(&nothing, kind).parts).collect()

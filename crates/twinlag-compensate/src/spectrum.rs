@@ -27,7 +27,7 @@ pub(crate) struct Periodogram {
     pub(crate) period_s: f64,
     /// Instants of the even grid.
     pub(crate) all: usize,
-    /// Of a piece.
+    /// Samples of a piece.
     pub(crate) samples: usize,
     /// Pieces that the mean is of, counted as if they did not overlap.
     pub(crate) pieces: f64,
@@ -41,8 +41,8 @@ pub(crate) struct Periodogram {
     /// over what it is expected to be, and the share of the first channel in that; the lowest bins
     /// are left out, where the taper lets the gas through.
     pub(crate) disagreement: Vec<[f64; 2]>,
-    /// Of power that the gas has beyond the sampling and folds back, what the sensors take off, in
-    /// each bin: by multiples of the sampling frequency.
+    /// The part of the folded-back power that the sensors remove, in each bin, by multiples of the
+    /// sampling frequency.
     flattened: Vec<(f64, Vec<f64>)>,
     /// Autocorrelation of the taper.
     taper: Vec<f64>,
@@ -58,7 +58,8 @@ fn taper(n: usize) -> Vec<f64> {
 }
 
 impl Periodogram {
-    /// Of `readings` about `level_c`, on an even grid with straight lines over what is missing.
+    /// The periodogram of `readings` about `level_c`, on an even grid with straight lines over
+    /// missing readings.
     ///
     /// The inferred gas is `Σ H_i* Y_i/N_i` over `Σ |H_i|²/N_i`, which has the least noise of all
     /// that are true to the gas.

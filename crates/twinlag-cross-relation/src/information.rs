@@ -141,7 +141,7 @@ impl Whitened<'_> {
     /// Gauss-Newton matrix `G`, along the direction `v` in which the cost's profile runs.
     ///
     /// It falls towards zero as the signal determines the parameter, and is of the order of one
-    /// where the signal does not determine it: the cost then still has some shape, but no interval
+    /// where the signal does not determine it. The cost then still has some shape, but no interval
     /// can be read from it. Zero where the residual does not depend on the parameter at all, as on
     /// the time constant of a sensor that is far faster than the sampling.
     pub fn noise_share<const P: usize>(&self, theta: &[f64; P], free: &[usize], index: usize) -> f64 {

@@ -1,7 +1,7 @@
 //! The account of a fit so far, and the one place through which every solver reaches the cost.
 //!
 //! Every call of the cost passes here, is counted as the cost sees it, and is refused once the
-//! budget is spent. The best point is kept here too, so it survives whatever becomes of the solver.
+//! budget is spent. The best point is kept here too, so it survives any failure of the solver.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -40,7 +40,7 @@ pub(crate) enum Refusal {
     None(#[from] NoDerivatives),
 }
 
-/// Whoever watches a fit.
+/// The observer of a fit.
 pub(crate) type Observer<'o> = &'o mut dyn FnMut(&Progress);
 
 /// The account of one fit.

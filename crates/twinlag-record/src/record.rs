@@ -79,7 +79,7 @@ pub struct Record {
 /// What is known of the rows besides their numbers, for messages.
 struct Origin<'a> {
     file: &'a str,
-    /// With the columns of time, T1, T2 and the reference.
+    /// The columns of time, T1, T2 and the reference.
     table: Option<(&'a Table, &'a Chosen)>,
     columns: [String; 3],
     units: [Unit; 3],

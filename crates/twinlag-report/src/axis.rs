@@ -286,7 +286,7 @@ fn logarithmic_ticks(low: f64, high: f64, at_most: usize) -> Vec<Tick> {
     ticks
 }
 
-/// With the hyphen replaced by a proper minus sign.
+/// Replaces the hyphen by a proper minus sign.
 fn minus(number: &str) -> String {
     number.replace('-', "−")
 }

@@ -212,7 +212,7 @@ impl Legend {
         SAMPLE_PX + 6.0 + text
     }
 
-    /// Width and height with so many columns.
+    /// Width and height of the legend with a given number of columns.
     fn size(&self, columns: usize) -> (f64, f64) {
         let gaps = 14.0 * (columns as f64 - 1.0) + 14.0;
         (self.entry_width() * columns as f64 + gaps, ROW_PX * self.entries.len().div_ceil(columns) as f64 + 7.0)

@@ -23,9 +23,8 @@
 //!     .iter()
 //!     .flat_map(|t2| tau_s.iter().map(move |t1| 0.1 + (t1 / 0.023).ln().powi(2) + (t2 / 0.05).ln().powi(2)))
 //!     .collect();
-//! let axes = [Axis::logarithmic("τ₁ (s)"), Axis::logarithmic("τ₂ (s)"), Axis::logarithmic("cost
-//! (K²)")]; let cost = Surface::new("Cost", axes, tau_s.clone(), tau_s,
-//! cost).mark(Mark::cross("truth", 0.023, 0.05));
+//! let axes = [Axis::logarithmic("τ₁ (s)"), Axis::logarithmic("τ₂ (s)"), Axis::logarithmic("cost (K²)")];
+//! let cost = Surface::new("Cost", axes, tau_s.clone(), tau_s, cost).mark(Mark::cross("truth", 0.023, 0.05));
 //!
 //! let svg = Figure::new("Two thermocouples").panel(bias).panel(cost).to_svg()?;
 //! assert!(svg.starts_with("<svg") && svg.len() < 60_000);

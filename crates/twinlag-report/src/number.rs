@@ -6,8 +6,8 @@ use crate::axis::superscript;
 /// The text in place of a missing number.
 const ABSENT: &str = "not determined";
 
-/// The exponent of ten of a number as it is after rounding to so many significant digits: that of
-/// 9.99 is 1 with two.
+/// The exponent of ten of a number after rounding to a number of significant digits: that of 9.99
+/// is 1 with two digits.
 fn exponent(value: f64, significant: usize) -> i32 {
     let text = format!("{value:.*e}", significant.saturating_sub(1));
     text.rsplit('e').next().and_then(|e| e.parse().ok()).unwrap_or(0)

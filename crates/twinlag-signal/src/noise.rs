@@ -1,5 +1,6 @@
-//! Channel noise: Gaussian, white or AR(1): `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, started in its
-//! stationary state, so that its standard deviation is `s` at every sample.
+//! Channel noise, which is Gaussian and either white or AR(1):
+//! `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, started in its stationary state, so that its standard
+//! deviation is `s` at every sample.
 
 use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;

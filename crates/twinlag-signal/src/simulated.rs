@@ -11,8 +11,8 @@ use crate::Sensor;
 pub struct Clean {
     /// Sample instants, s, `[n]`; the first is 0.
     pub time_s: Vec<f64>,
-    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds
-    /// from there on.
+    /// True gas temperature at the sample instants, °C, `[n]`. For a held gas it is the value that
+    /// holds from then on.
     pub gas_c: Vec<f64>,
     /// Both sensors' readings with calibration and disturbances, before noise, spikes and ADC, °C,
     /// `[n]` each.
@@ -31,8 +31,8 @@ pub struct Simulated {
     pub t1_c: Vec<f64>,
     /// Readings of the second channel, °C, `[n]`.
     pub t2_c: Vec<f64>,
-    /// True gas temperature at the sample instants, °C, `[n]`. Of a held gas, the value that holds
-    /// from there on.
+    /// True gas temperature at the sample instants, °C, `[n]`. For a held gas it is the value that
+    /// holds from then on.
     pub gas_c: Vec<f64>,
     /// Names of the two channels.
     pub channels: [String; 2],

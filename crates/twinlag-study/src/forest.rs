@@ -33,8 +33,8 @@ pub enum ForestError {
     OtherTree { expected: u64, got: u64 },
 }
 
-/// The merged nodes of a binary tree over block indices. Of the first `b` blocks it holds at most
-/// `log2 b + 1` nodes, of `b` neighbours anywhere at most `2 log2 b + 1`, and so of `g + 1` runs
+/// The merged nodes of a binary tree over block indices. For the first `b` blocks it holds at most
+/// `log2 b + 1` nodes, for `b` neighbours anywhere at most `2 log2 b + 1`, and so for `g + 1` runs
 /// with `g` gaps between them at most `g + 1` times that.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "Unchecked<T>", bound(deserialize = "T: Deserialize<'de>"))]

@@ -99,8 +99,8 @@ impl Moments {
         (self.n > 1).then(|| (self.m2 / (self.n - 1) as f64).sqrt())
     }
 
-    /// Root mean square about zero, `√(μ² + M₂/n)`; `None` without values. Of errors, this is the
-    /// RMSE.
+    /// Root mean square about zero, `√(μ² + M₂/n)`; `None` without values. If the values are
+    /// errors, this is the RMSE.
     pub fn root_mean_square(&self) -> Option<f64> {
         Some((self.mean()?.powi(2) + self.central(2)?).sqrt())
     }

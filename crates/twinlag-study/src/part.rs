@@ -268,7 +268,7 @@ impl Part {
         &self.header
     }
 
-    /// Which part it is.
+    /// The shard to which this part belongs.
     pub fn shard(&self) -> Shard {
         self.shard
     }
@@ -308,7 +308,8 @@ impl Part {
 
     pub(crate) fn insert(&mut self, job: u64, tally: Tally) {
         let blocks = self.header.blocks();
-        self.cells[(job / blocks) as usize].insert(job % blocks, tally).expect("each job is taken once, and exists");
+        self.cells[(job / blocks) as usize].insert(job % blocks, tally).expect("each job is taken once, and \
+            exists");
     }
 
     /// Jobs in `range` that are not there.
@@ -389,7 +390,7 @@ impl Header {
     }
 }
 
-/// What a study found: a tally for each cell. Of equal studies it has equal bytes.
+/// What a study found: a tally for each cell. Equal studies give equal bytes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "UncheckedResults")]
 pub struct Results {

@@ -24,9 +24,9 @@ pub trait Study: Sync {
     /// How many trials each cell has.
     fn trials(&self) -> u64;
 
-    /// How many trials make a block. It decides the order of additions and so the last digits: it
-    /// is part of the plan, and not to be derived from the machine. A block should take some tens
-    /// of milliseconds.
+    /// How many trials make a block. It determines the order of additions and so the last digits.
+    /// It is part of the plan, and must not depend on the machine. A block should take some tens of
+    /// milliseconds.
     fn block(&self) -> u64;
 
     /// What a trial of this cell measures; [`Outcome`] refers to it by position.

@@ -9,10 +9,12 @@
 //! ```
 //! use twinlag_transform::{Complex64, Forward, Inverse};
 //!
-//! let wave: Vec<f64> = (0..12).map(|k| (std::f64::consts::TAU * 2.0 * f64::from(k) /
-//! 12.0).cos()).collect(); let spectrum = Forward::of(12).transform(&wave); assert!((spectrum[2] -
-//! Complex64::new(6.0, 0.0)).norm() < 1e-14); let twelve_times =
-//! Inverse::of(12).transform(spectrum); assert!((twelve_times[1] / 12.0 - 0.5).abs() < 1e-15);
+//! let angle = std::f64::consts::TAU * 2.0 / 12.0;
+//! let wave: Vec<f64> = (0..12).map(|k| (angle * f64::from(k)).cos()).collect();
+//! let spectrum = Forward::of(12).transform(&wave);
+//! assert!((spectrum[2] - Complex64::new(6.0, 0.0)).norm() < 1e-14);
+//! let twelve_times = Inverse::of(12).transform(spectrum);
+//! assert!((twelve_times[1] / 12.0 - 0.5).abs() < 1e-15);
 //! ```
 
 mod fourier;

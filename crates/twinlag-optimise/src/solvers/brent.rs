@@ -1,8 +1,6 @@
-//! Brent's search for the minimum in one variable, argmin's, between its bounds.
-//!
-//! It searches the whole interval; the start is one candidate, and no more. It never looks at the
-//! ends of the interval, so the end that is nearer to where it stopped is looked at here: a minimum
-//! on a bound is then found exactly.
+//! Brent's search for the minimum in one variable, argmin's, between its bounds. It searches the
+//! whole interval; the start is only one candidate. It never evaluates the ends of the interval, so
+//! the end nearer to where it stopped is evaluated here, which finds a minimum on a bound exactly.
 
 use argmin::core::{CostFunction, Error, IterState};
 use argmin::solver::brent::BrentOpt;

@@ -1,5 +1,5 @@
 //! Noise with a memory: a stationary AR(1) process beside the channel's other noise, given by its
-//! correlation time: `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, `ρ = exp(−Ts/θ)`, autocorrelation
+//! correlation time, `e[k] = ρ e[k−1] + √(1 − ρ²) s ξ[k]`, `ρ = exp(−Ts/θ)`, autocorrelation
 //! `s² exp(−|t|/θ)`.
 
 use rand::Rng;

@@ -1,5 +1,5 @@
 //! Play, as of a bearing with slack: the output stays where it is until the input has moved away
-//! from it by half the width, and is dragged along from there: `p ← max(T − w/2, min(T + w/2, p))`.
+//! from it by half the width, and is dragged along from there, `p ← max(T − w/2, min(T + w/2, p))`.
 //! It starts at the input.
 //!
 //! It acts on the junction's temperature, between the lags and the calibration. The operator

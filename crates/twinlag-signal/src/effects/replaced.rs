@@ -1,5 +1,5 @@
-//! A sensor that is replaced in mid-record: from one moment on the channel is read from another
-//! sensor, the same but for its time constant, which has been in the gas all along.
+//! A sensor that is replaced in mid-record. From one moment on the channel is read from another
+//! sensor, which differs only in its time constant and has been in the gas all along.
 
 use serde::{Deserialize, Serialize};
 
