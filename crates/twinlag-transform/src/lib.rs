@@ -9,8 +9,8 @@
 //! ```
 //! use twinlag_transform::{Complex64, Forward, Inverse};
 //!
-//! let angle = std::f64::consts::TAU * 2.0 / 12.0;
-//! let wave: Vec<f64> = (0..12).map(|k| (angle * f64::from(k)).cos()).collect();
+//! let wave_at = |k: i32| (std::f64::consts::TAU * 2.0 * f64::from(k) / 12.0).cos();
+//! let wave: Vec<f64> = (0..12).map(wave_at).collect();
 //! let spectrum = Forward::of(12).transform(&wave);
 //! assert!((spectrum[2] - Complex64::new(6.0, 0.0)).norm() < 1e-14);
 //! let twelve_times = Inverse::of(12).transform(spectrum);
