@@ -10,9 +10,6 @@ use twinlag_model::{Extended, Fitted, Identifier, Observations};
 
 use crate::search::{FALSE_ALARM, FAR_OFF, threshold};
 
-/// Effects that turn phases at frequencies where the gas may not be.
-const TURNS_PHASES: [Identifier; 3] = [Identifier::Delay, Identifier::SecondOrder, Identifier::SlowMode];
-
 /// Whether `effect` with `added` parameters, which takes `without` to `with`, makes the readings more probable, and by more than chance
 /// does, where that might have brought it about.
 pub(crate) fn is_confirmed(
@@ -22,7 +19,7 @@ pub(crate) fn is_confirmed(
     with: &Fitted,
     observations: &Observations,
 ) -> bool {
-    if !TURNS_PHASES.contains(&effect) || without.mean_energy() > FAR_OFF {
+    if !effect.about().turns_phases || without.mean_energy() > FAR_OFF {
         return true;
     }
     let [before, after] = std::thread::scope(|scope| {

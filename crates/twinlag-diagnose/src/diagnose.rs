@@ -63,10 +63,10 @@ impl State {
         search.look(&self.current);
         let tried = search.try_all(&self.current, self.current.mean_energy() > FAR_OFF);
         let Some((chosen, ties)) = search.choose(&self.current, &tried) else { return false };
-        self.current = chosen.fitted.clone().larger_lag_first();
+        self.current = chosen.fitted.clone().in_order();
         let effect = chosen.effect.clone();
         self.steps.push((chosen, ties));
-        if effect.identifier() == Identifier::MainsPickup {
+        if effect.about().is_narrow {
             // A line is in the third differences as well.
             prepared.find_levels(&self.current, settings);
             (self.current, self.base) = (prepared.refit(&self.current), prepared.refit(&self.base));
@@ -92,14 +92,14 @@ impl State {
         }
         for index in 0..self.steps.len() {
             let alike = search.look_alikes(&self.current, index, &self.steps[index].0);
-            let is_static = |t: &Tried| t.effect.identifier() == Identifier::Calibration;
+            let is_static = |t: &Tried| t.effect.about().is_static;
             let is_imitator =
-                matches!(self.steps[index].0.effect.identifier(), Identifier::Radiation | Identifier::Drift);
+                self.steps[index].0.effect.about().imitates_static;
             // A static disagreement before its subtler imitators.
             let better =
                 alike.iter().find(|t| t.advantage > TIE || (is_imitator && is_static(t) && t.advantage > -TIE));
             if let Some(better) = better.cloned() {
-                self.current = better.fitted.clone().larger_lag_first();
+                self.current = better.fitted.clone().in_order();
                 let before = std::mem::replace(&mut self.steps[index].0, better);
                 self.remarks.push(format!(
                     "{} was taken up first and replaced once more was known: {} explains more",
@@ -205,7 +205,7 @@ impl State {
         let is_refused = tones == Some(SINGLE);
         let (observations, everything) = (&prepared.observations, &prepared.everything);
         let to_the_end = |fitted: &Fitted| {
-            fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).larger_lag_first()
+            fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
         };
         let last = to_the_end(&self.current);
         let summary = |fitted: &Fitted| summarise(fitted, observations, everything, &prepared.levels);
@@ -232,7 +232,7 @@ impl State {
         let left = what_is_left(&last_fit);
         let has = |is_one: fn(Identifier) -> bool| found.iter().any(|f| is_one(f.effect));
         let is_blind = last_fit.time_constants.iter().all(|t| t.value_s.is_none());
-        if is_blind && has(|effect| effect == Identifier::Delay) {
+        if is_blind && has(|effect| effect == Identifier::DELAY) {
             self.remarks.push(
                 "time constants and delay are not told apart: the difference is how much later channel 2 is as a whole, \
                  τ2 − τ1 + delay"

@@ -22,7 +22,7 @@
 //!
 //! let answer = diagnose(&observations, &Settings::default(), &|_, _, _| ())?;
 //! assert_eq!(answer.verdict, Verdict::Explained);
-//! assert_eq!(answer.effects[0].effect, Identifier::Calibration);
+//! assert_eq!(answer.effects[0].effect, Identifier::CALIBRATION);
 //! let error = answer.error.held_out_normalised_rms;
 //! assert!(error.after < 1.1 && error.after < error.before);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

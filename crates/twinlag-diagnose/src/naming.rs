@@ -89,7 +89,7 @@ pub(crate) fn widen<'a>(
 ) {
     let mut widened = Vec::new();
     for tie in ties {
-        let other = tie.fitted.model.fit(&tie.fitted.theta, observations, selection, Effort::Finish).larger_lag_first();
+        let other = tie.fitted.model.fit(&tie.fitted.theta, observations, selection, Effort::Finish).in_order();
         let Some(covariance) = covariance(&other, observations, selection, false) else { continue };
         for i in 0..2 {
             let (value, se) = (other.theta[i], covariance[i][i].max(0.0).sqrt());

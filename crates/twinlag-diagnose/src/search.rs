@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
     /// Both gains of a candidate. A line has its own frequency, and is judged there: with no weight over frequency, and no free
     /// level in a band that is wider than it.
     fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> (f64, f64) {
-        if effect.identifier() != Identifier::MainsPickup {
+        if !effect.about().is_narrow {
             return (Self::gain(before, after), robust);
         }
         let energy = |fitted: &Fitted| {
@@ -135,14 +135,14 @@ impl<'a> Search<'a> {
     /// - `thorough`: where the model is far off, the score at it says little, and every candidate is fitted, from a grid of time
     ///   constants as well
     pub(crate) fn try_all(&self, current: &Fitted, thorough: bool) -> Vec<Tried> {
-        let all: Vec<Shared> = candidates(&self.context)
+        let all: Vec<Shared> = candidates(self.allowed, &self.context)
             .into_iter()
-            .filter(|c| self.allowed.contains(&c.identifier()) && Self::is_new(current, c))
+            .filter(|c| Self::is_new(current, c))
             .collect();
         let robust_before = self.robust(current);
         let now = (!thorough).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
         let promises = self.in_parallel(&all, |effect| {
-            let is_line = effect.identifier() == Identifier::MainsPickup;
+            let is_line = effect.about().is_narrow;
             let promise = if effect.is_noise() || is_line || thorough {
                 f64::INFINITY
             } else {
@@ -208,21 +208,14 @@ impl<'a> Search<'a> {
     }
 
     fn fits(model: &Model, candidate: &Shared) -> bool {
-        let effects = &model.effects;
-        let has = |name: &str| model.parameters().any(|p| p.name == name);
-        let repeats = effects.iter().any(|e| {
-            e.identifier() == candidate.identifier()
-                && (e.channel() == candidate.channel() || candidate.identifier() != Identifier::MainsPickup)
+        let id = candidate.identifier();
+        let repeats = model.effects.iter().any(|e| {
+            e.identifier() == id && (e.channel() == candidate.channel() || !candidate.about().is_narrow)
         });
-        let clashes = candidate.parameters().iter().any(|p| p.name == "offset" && has("offset"));
-        let radiates = |id: Identifier| id == Identifier::Radiation || id == Identifier::Calibration;
-        // The loss of radiation is an offset.
-        let has_offset = candidate.parameters().iter().any(|p| p.name == "offset") || has("offset");
-        let twice = has_offset && radiates(candidate.identifier()) && effects.iter().any(|e| radiates(e.identifier()));
-        // A share of the other channel is a gain and another time constant: both together are not told apart.
-        let scales = |id: Identifier| id == Identifier::Crosstalk || id == Identifier::Calibration;
-        let same = scales(candidate.identifier()) && effects.iter().any(|e| scales(e.identifier()));
-        !repeats && !clashes && !twice && !same
+        let excluded = model.effects.iter().any(|e| e.identifier().excludes(id));
+        let determined: Vec<_> = model.parameters().filter_map(|p| p.determines).collect();
+        let twice = candidate.parameters().iter().filter_map(|p| p.determines).any(|f| determined.contains(&f));
+        !repeats && !excluded && !twice
     }
 
     /// What a candidate would take off the energy if the residual were linear in everything, from the best of its starts.
@@ -250,15 +243,15 @@ impl<'a> Search<'a> {
     /// For each candidate that the model lacks, the smallest size that the search would have seen: the square root of the threshold
     /// times the standard error that its main parameter would have.
     pub(crate) fn limits(&self, current: &Fitted) -> Vec<Limit> {
-        let all: Vec<Shared> = candidates(&self.context)
+        let all: Vec<Shared> = candidates(self.allowed, &self.context)
             .into_iter()
-            .filter(|c| self.allowed.contains(&c.identifier()) && Self::is_new(current, c) && !c.is_noise())
-            .filter(|c| !c.neutral().is_empty())
+            .filter(|c| Self::is_new(current, c) && !c.is_noise())
+            .filter(|c| c.main().is_some())
             .collect();
         let count = all.len().max(1) as f64;
         let now = current.model.linearised(&current.theta, self.observations, self.selection);
         let found = self.in_parallel(&all, |effect| {
-            let &(main, _) = effect.neutral().first()?;
+            let main = effect.main()?;
             let model = current.model.with(effect.clone());
             let mut theta = current.theta.clone();
             theta.extend_from_slice(effect.starts().first()?);
@@ -307,7 +300,7 @@ impl<'a> Search<'a> {
     /// Effect `index` of `current` with one parameter more, where the data support that.
     pub(crate) fn grown(&self, current: &Fitted, index: usize, tried: &Tried) -> Option<Tried> {
         let range = current.model.range(index);
-        let (effect, start) = tried.effect.grown(&current.theta[range.clone()])?;
+        let (effect, start) = tried.effect.extended(&current.theta[range.clone()])?;
         if !Self::fits(&current.model.without(index), &effect) {
             return None;
         }
@@ -340,12 +333,11 @@ impl<'a> Search<'a> {
         }
         let is_alike = |c: &Shared| {
             let other = c.identifier();
-            let confusable = id.about().confusable.contains(&other) || other.about().confusable.contains(&id);
-            confusable || (other == id && c.channel() != effect.channel())
+            id.resembles(other) || (other == id && c.channel() != effect.channel())
         };
-        let all: Vec<Shared> = candidates(&self.context)
+        let all: Vec<Shared> = candidates(self.allowed, &self.context)
             .into_iter()
-            .filter(|c| self.allowed.contains(&c.identifier()) && !c.is_noise() && is_alike(c) && Self::fits(&rest, c))
+            .filter(|c| !c.is_noise() && is_alike(c) && Self::fits(&rest, c))
             .collect();
         let range = current.model.range(index);
         let replaced = self.in_parallel(&all, |other| {
@@ -417,7 +409,7 @@ impl<'a> Search<'a> {
             fitted,
             held_out_nats: 0.0,
             advantage: 0.0,
-            share: if effect.identifier() == Identifier::MainsPickup { self.selection.weighting.mean() } else { 1.0 },
+            share: if effect.about().is_narrow { self.selection.weighting.mean() } else { 1.0 },
         }
     }
 
@@ -520,12 +512,12 @@ impl<'a> Search<'a> {
             // A static disagreement comes before its subtler imitators, and where no single effect explains the record, since that
             // is the part of it that depends least on the rest.
             let is_far_off = near[0].fitted.mean_energy() > INCOMPLETE;
-            let imitates = matches!(near[0].effect.identifier(), Identifier::Radiation | Identifier::Drift);
+            let imitates = near[0].effect.about().imitates_static;
             if imitates || is_far_off {
                 let calibration = near
                     .iter()
                     .chain(&all_mean)
-                    .filter(|t| t.effect.identifier() == Identifier::Calibration)
+                    .filter(|t| t.effect.about().is_static)
                     .max_by(|a, b| a.score().total_cmp(&b.score()))
                     .filter(|t| {
                         best - t.score() < TIE || (is_far_off && t.score() > STATIC * best && t.robust_gain > 0.0)

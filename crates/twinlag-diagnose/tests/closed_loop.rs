@@ -83,7 +83,7 @@ fn is_not_misnamed(observations: &Observations, effect: Identifier) {
     assert!(d.effects.iter().all(|f| f.effect != effect && !f.alternatives.contains(&effect)), "{told}");
     assert_ne!(d.verdict, Verdict::Adequate, "{told}");
     if d.verdict == Verdict::Explained {
-        let look_alikes = effect.about().confusable;
+        let look_alikes: Vec<Identifier> = effect.imitates().collect();
         assert!(d.effects.iter().all(|f| look_alikes.contains(&f.effect)), "{told}");
     }
 }
@@ -118,94 +118,94 @@ fn chance_alignments_of_noise_are_no_delay() {
 fn a_delay_in_ramps_is_found() {
     let simulated = readings(SEED, ramps(SEED), |sensors| sensors[0].delay_s = 5.0 * DELAY_S);
     let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
-    assert_eq!(d.effects[0].effect, Identifier::Delay, "{}", told(&d));
+    assert_eq!(d.effects[0].effect, Identifier::DELAY, "{}", told(&d));
 }
 
 #[test]
 fn an_offset_is_found() {
     let d = found(&record(SEED, offset));
-    is_sized(is_inferred(&d, Identifier::Calibration), "offset", OFFSET_K);
+    is_sized(is_inferred(&d, Identifier::CALIBRATION), "offset", OFFSET_K);
 }
 
 #[test]
 fn an_unknown_offset_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, offset), Identifier::Calibration);
+    is_not_misnamed(&record(SEED, offset), Identifier::CALIBRATION);
 }
 
 /// Only the difference of both delays is seen: T1 late is T2 early.
 #[test]
 fn a_delay_is_found() {
     let d = found(&record(SEED, delay));
-    let effect = is_inferred(&d, Identifier::Delay);
+    let effect = is_inferred(&d, Identifier::DELAY);
     let sign = if effect.channel == Some(0) { 1.0 } else { -1.0 };
     is_sized(effect, "delay", sign * DELAY_S);
 }
 
 #[test]
 fn an_unknown_delay_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, delay), Identifier::Delay);
+    is_not_misnamed(&record(SEED, delay), Identifier::DELAY);
 }
 
 #[test]
 fn a_second_lag_is_found() {
     let d = found(&record(SEED, second_order));
-    let effect = is_inferred(&d, Identifier::SecondOrder);
+    let effect = is_inferred(&d, Identifier::SECOND_ORDER);
     assert_eq!(effect.channel, Some(1), "{}", told(&d));
     is_sized(effect, "second_time_constant", SECOND_S);
 }
 
 #[test]
 fn an_unknown_second_lag_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, second_order), Identifier::SecondOrder);
+    is_not_misnamed(&record(SEED, second_order), Identifier::SECOND_ORDER);
 }
 
 #[test]
 fn a_drift_is_found() {
     let d = found(&record(SEED, drift));
-    is_sized(is_inferred(&d, Identifier::Drift), "drift", DRIFT_K_PER_S);
+    is_sized(is_inferred(&d, Identifier::DRIFT), "drift", DRIFT_K_PER_S);
 }
 
 /// Failed: "explained" by coloured noise, correlated over 0.15 s of 3 s.
 #[test]
 fn an_unknown_drift_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, drift), Identifier::Drift);
+    is_not_misnamed(&record(SEED, drift), Identifier::DRIFT);
 }
 
 /// A defect is seen, not inferred: there is no fit without it, and no evidence.
 #[test]
 fn a_converter_that_saturates_is_found() {
     let d = found(&record(SEED, limited(SEED, 0)));
-    let effect = is_explained_by(&d, Identifier::Saturation);
+    let effect = is_explained_by(&d, Identifier::SATURATION);
     assert_eq!((effect.channel, effect.evidence), (Some(0), None), "{}", told(&d));
     assert!(effect.seen.is_some(), "{}", told(&d));
 }
 
 #[test]
 fn an_unknown_saturation_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, limited(SEED, 0)), Identifier::Saturation);
+    is_not_misnamed(&record(SEED, limited(SEED, 0)), Identifier::SATURATION);
 }
 
 #[test]
 fn spikes_are_found() {
     let d = found(&record(SEED, spikes));
-    let effect = is_explained_by(&d, Identifier::Spikes);
+    let effect = is_explained_by(&d, Identifier::SPIKES);
     assert_eq!((effect.channel, effect.evidence), (Some(1), None), "{}", told(&d));
 }
 
 #[test]
 fn unknown_spikes_are_not_misnamed() {
-    is_not_misnamed(&record(SEED, spikes), Identifier::Spikes);
+    is_not_misnamed(&record(SEED, spikes), Identifier::SPIKES);
 }
 
 #[test]
 fn coloured_noise_is_found() {
     let d = found(&record(SEED, coloured_noise));
-    is_inferred(&d, Identifier::ColouredNoise);
+    is_inferred(&d, Identifier::COLOURED_NOISE);
 }
 
 #[test]
 fn unknown_coloured_noise_is_not_misnamed() {
-    is_not_misnamed(&record(SEED, coloured_noise), Identifier::ColouredNoise);
+    is_not_misnamed(&record(SEED, coloured_noise), Identifier::COLOURED_NOISE);
 }
 
 /// The effects of a rig, as they were measured once, and another record of it: the oracle is the rig's own numbers.
@@ -213,12 +213,12 @@ fn unknown_coloured_noise_is_not_misnamed() {
 fn a_known_effect_gives_the_time_constants_of_another_record() {
     let known = [
         KnownEffect {
-            effect: Identifier::SecondOrder,
+            effect: Identifier::SECOND_ORDER,
             channel: Some(1),
             parameters: vec![("second_time_constant".into(), SECOND_S)],
         },
         KnownEffect {
-            effect: Identifier::Calibration,
+            effect: Identifier::CALIBRATION,
             channel: Some(1),
             parameters: vec![("offset".into(), OFFSET_K)],
         },
@@ -239,7 +239,7 @@ fn a_known_effect_gives_the_time_constants_of_another_record() {
 #[test]
 fn a_known_effect_of_unknown_parameters_is_refused() {
     let known =
-        KnownEffect { effect: Identifier::Delay, channel: Some(1), parameters: vec![("lateness".into(), DELAY_S)] };
+        KnownEffect { effect: Identifier::DELAY, channel: Some(1), parameters: vec![("lateness".into(), DELAY_S)] };
     let error = fit_with(&record(SEED, |_| ()), &Settings::default(), &[known]).expect_err("a delay has no lateness");
     assert!(error.to_string().contains("delay"), "{error}");
 }
@@ -248,7 +248,7 @@ fn a_known_effect_of_unknown_parameters_is_refused() {
 /// dealt with as in a diagnosis.
 #[test]
 fn a_known_effect_of_spikes_takes_those_of_another_record_out() {
-    let known = KnownEffect { effect: Identifier::Spikes, channel: Some(1), parameters: Vec::new() };
+    let known = KnownEffect { effect: Identifier::SPIKES, channel: Some(1), parameters: Vec::new() };
     let later = record(SEED + 1, spikes);
     let fit = fit_with(&later, &Settings::default(), &[known]).expect("a record and an effect of this version").fit;
     let tests: Vec<(&str, f64)> = fit.tests.iter().map(|t| (t.test.as_str(), t.p_value)).collect();
@@ -260,7 +260,7 @@ fn a_known_effect_of_spikes_takes_those_of_another_record_out() {
 #[test]
 fn spikes_of_the_fast_channel_are_found() {
     let d = found(&record(SEED, |sensors| sensors[0].spikes = Some(Spikes::new(0.005, 20.0 * NOISE_K))));
-    is_explained_by(&d, Identifier::Spikes);
+    is_explained_by(&d, Identifier::SPIKES);
 }
 
 /// Named in the channel that has it, or in none.
@@ -268,6 +268,6 @@ fn spikes_of_the_fast_channel_are_found() {
 fn coloured_noise_of_the_fast_channel_is_not_put_into_the_other() {
     let noise = ColouredNoise::new(2.0 * NOISE_K, 15.0 * PERIOD_S);
     let d = found(&record(SEED, |sensors| sensors[0].coloured_noise = Some(noise)));
-    let effect = is_inferred(&d, Identifier::ColouredNoise);
+    let effect = is_inferred(&d, Identifier::COLOURED_NOISE);
     assert_ne!(effect.channel, Some(1), "{}", told(&d));
 }

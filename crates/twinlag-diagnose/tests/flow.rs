@@ -37,7 +37,7 @@ fn the_power_of_a_measured_velocity_is_found() {
     let told = told(&d);
     assert_eq!(d.verdict, Verdict::Explained, "{told}");
     let [effect] = &d.effects[..] else { panic!("{told}") };
-    assert_eq!(effect.effect, Identifier::VaryingTimeConstant, "{told}");
+    assert_eq!(effect.effect, Identifier::VARYING_TIME_CONSTANT, "{told}");
     let [exponent] = &effect.parameters[..] else { panic!("{told}") };
     let error = exponent.standard_error.expect("a fitted number has one");
     assert_eq!(exponent.name, "exponent");
@@ -46,7 +46,7 @@ fn the_power_of_a_measured_velocity_is_found() {
 
     // The same with the exponent known.
     let known = KnownEffect {
-        effect: Identifier::VaryingTimeConstant,
+        effect: Identifier::VARYING_TIME_CONSTANT,
         channel: None,
         parameters: vec![("exponent".into(), -0.5)],
     };
@@ -63,7 +63,7 @@ fn a_column_that_does_not_matter_is_not_used() {
     let observations = record(|factor| 1.0 + (50.0 * factor).sin().abs()).expect("positive");
     let d = found(&observations);
     let told = told(&d);
-    assert_eq!(d.effects[0].effect, Identifier::VaryingTimeConstant, "{told}");
+    assert_eq!(d.effects[0].effect, Identifier::VARYING_TIME_CONSTANT, "{told}");
     assert!(d.effects[0].parameters.iter().all(|p| p.name != "exponent"), "{told}");
 }
 

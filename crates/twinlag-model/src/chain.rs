@@ -1,117 +1,38 @@
 //! From readings to inferred gas temperature, one first-order factor after the other, with the noise carried along.
 //!
-//! A sensor `(1 + τ₁ s)(1 + τ₂ s) … y = x` is inverted factor by factor. On evenly spaced samples both operators of a factor
-//! are those of the cubic spline through the samples,
+//! A sensor `(1 + τ₁ s)(1 + τ₂ s) … y = x` is inverted factor by factor. On evenly spaced samples both operators of a
+//! factor are those of the cubic spline through the samples,
 //!
 //! `S₀ = (z + 4 + z⁻¹)/6`, `S₁ = (z − z⁻¹)/(2 Ts)`, so that `S₁/S₀ = s (1 − (ω Ts)⁴/180 + …)`:
 //!
-//! a factor gives `S₀ v + τ S₁ v = S₀ (v + τ v')`. `S₀` cannot be taken off (its inverse is not local), so both sensors' chains get
-//! the same number of factors and are compared with all their `S₀` on. On uneven samples the operators are the mean and the
-//! slope of each interval. Every value is a local function of a few readings; its derivatives with respect to them are the rows
-//! that carry the noise.
+//! a factor gives `S₀ v + τ S₁ v = S₀ (v + τ v')`. `S₀` cannot be taken off (its inverse is not local), so both
+//! sensors' chains get the same number of factors and are compared with all their `S₀` on. On uneven samples the
+//! operators are the mean and the slope of each interval. Every value is a local function of a few readings; its
+//! derivatives with respect to them are the [`Rows`] that carry the noise.
+//!
+//! Chains are computed in plain numbers or in numbers with a derivative ([`crate::Number`]), and keep their memory
+//! from one evaluation to the next.
 
+use crate::number::{Curve, Real};
 use crate::observations::Stretch;
+use crate::rows::Rows;
 
 /// How many samples a delay may reach where they are uneven.
-pub const UNEVEN_REACH: usize = 3;
+pub(crate) const UNEVEN_REACH: usize = 3;
 
-/// The derivatives of each value with respect to the readings: row `k` belongs to the samples `start + k …`.
-#[derive(Clone, Debug)]
-pub struct Rows {
-    pub width: usize,
-    pub start: usize,
-    /// One row if all are the same, otherwise all of them.
-    data: Vec<f64>,
-    is_same: bool,
-}
-
-impl Rows {
-    pub fn identity() -> Self {
-        Self { width: 1, start: 0, data: vec![1.0], is_same: true }
-    }
-
-    pub fn at(&self, k: usize) -> &[f64] {
-        let from = if self.is_same { 0 } else { k * self.width };
-        &self.data[from..from + self.width]
-    }
-
-    pub fn is_same(&self) -> bool {
-        self.is_same
-    }
-
-    /// Each row times its own factor.
-    fn scale_each(&mut self, factors: &[f64]) {
-        let width = self.width;
-        let data = (0..factors.len()).flat_map(|k| self.at(k).iter().map(move |c| c * factors[k])).collect();
-        (self.data, self.is_same, self.width) = (data, false, width);
-    }
-
-    pub fn scale(&mut self, factor: f64) {
-        self.data.iter_mut().for_each(|c| *c *= factor);
-    }
-
-    /// `self + factor · other`, which belongs to the same values.
-    pub fn plus(&self, other: &Self, factor: f64, values: usize) -> Self {
-        let start = self.start.min(other.start);
-        let end = (self.start + self.width).max(other.start + other.width);
-        let width = end - start;
-        let is_same = self.is_same && other.is_same;
-        let count = if is_same { 1 } else { values };
-        let mut data = vec![0.0; count * width];
-        for k in 0..count {
-            let row = &mut data[k * width..(k + 1) * width];
-            self.at(k).iter().enumerate().for_each(|(j, c)| row[self.start - start + j] += c);
-            other.at(k).iter().enumerate().for_each(|(j, c)| row[other.start - start + j] += factor * c);
-        }
-        Self { width, start, data, is_same }
-    }
-
-    /// Rows of `Σ_j taps(k)[j] · v[k + j]`, of which there are `values`.
-    fn combine(&self, values: usize, length: usize, taps: &Taps) -> Self {
-        let width = self.width + length - 1;
-        let is_same = self.is_same && taps.is_same();
-        let count = if is_same { 1 } else { values };
-        let mut data = vec![0.0; count * width];
-        for (k, row) in data.chunks_exact_mut(width).enumerate() {
-            for j in 0..length {
-                let tap = taps.at(k, j);
-                for (c, old) in row[j..].iter_mut().zip(self.at(k + j)) {
-                    *c += tap * old;
-                }
-            }
-        }
-        Self { width, start: self.start, data, is_same }
-    }
-}
-
-/// The weights of neighbouring values.
-enum Taps {
-    Same(Vec<f64>),
-    Each { length: usize, data: Vec<f64> },
-}
-
-impl Taps {
-    fn is_same(&self) -> bool {
-        matches!(self, Self::Same(_))
-    }
-
-    fn at(&self, k: usize, j: usize) -> f64 {
-        match self {
-            Self::Same(taps) => taps[j],
-            Self::Each { length, data } => data[k * length + j],
-        }
-    }
-}
+/// Samples beside the reach that a delay takes: the four taps of a spline, less one.
+pub(crate) const DELAY_TAPS: usize = 4;
 
 /// A number that may change along the record.
-pub enum Along {
-    Same(f64),
+#[derive(Clone, Copy)]
+pub(crate) enum Along<'a, T> {
+    Same(T),
     /// One for each value that the factor gives.
-    Each(Vec<f64>),
+    Each(&'a [T]),
 }
 
-impl Along {
-    fn at(&self, k: usize) -> f64 {
+impl<T: Real> Along<'_, T> {
+    fn at(&self, k: usize) -> T {
         match self {
             Self::Same(x) => *x,
             Self::Each(all) => all[k],
@@ -119,33 +40,72 @@ impl Along {
     }
 }
 
-/// A function of each value, with its derivative.
-pub struct Pointwise {
-    pub value: Vec<f64>,
-    pub derivative: Vec<f64>,
+/// What a factor does beside its time constant: `S₀ F(v) + τ S₁ G(v)`.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Curves<'a> {
+    /// `F`, the identity if there is none.
+    pub(crate) value: Option<&'a Curve>,
+    /// `G`, the identity if there is none.
+    pub(crate) slope: Option<&'a Curve>,
 }
 
 /// Values on their own instants, and how they depend on the readings of one channel.
 #[derive(Clone, Debug)]
-pub struct Chain {
-    pub time_s: Vec<f64>,
-    pub value: Vec<f64>,
-    pub rows: Rows,
+pub(crate) struct Chain<T> {
+    /// Instants, s; the first `skipped` of them belong to no value any more.
+    time_s: Vec<f64>,
+    skipped: usize,
+    pub(crate) value: Vec<T>,
+    pub(crate) rows: Rows<T>,
     period_s: Option<f64>,
+    memory: Memory<T>,
 }
 
-impl Chain {
-    pub fn of(stretch: &Stretch, channel: usize, period_s: Option<f64>) -> Self {
+/// Memory that a factor works in.
+#[derive(Clone, Debug)]
+struct Memory<T> {
+    /// Values of `F` and of `G`, each with its slope.
+    curves: [Vec<(T, T)>; 2],
+    taps: Vec<T>,
+}
+
+impl<T: Real> Chain<T> {
+    pub(crate) fn empty() -> Self {
         Self {
-            time_s: stretch.time_s.clone(),
-            value: stretch.reading_c[channel].clone(),
+            time_s: Vec::new(),
+            skipped: 0,
+            value: Vec::new(),
             rows: Rows::identity(),
-            period_s,
+            period_s: None,
+            memory: Memory { curves: [Vec::new(), Vec::new()], taps: Vec::new() },
         }
     }
 
-    pub fn len(&self) -> usize {
+    /// Readings of a channel as they are.
+    pub(crate) fn of(stretch: &Stretch, channel: usize, period_s: Option<f64>) -> Self {
+        let mut out = Self::empty();
+        out.begin(stretch, channel, period_s);
+        out
+    }
+
+    /// Begins again, with the readings of a channel as they are.
+    pub(crate) fn begin(&mut self, stretch: &Stretch, channel: usize, period_s: Option<f64>) {
+        self.time_s.clear();
+        self.time_s.extend_from_slice(&stretch.time_s);
+        self.skipped = 0;
+        self.value.clear();
+        self.value.extend(stretch.reading_c[channel].iter().map(|y| T::from(*y)));
+        self.rows.begin();
+        self.period_s = period_s;
+    }
+
+    pub(crate) fn len(&self) -> usize {
         self.value.len()
+    }
+
+    /// Instants of the values, s.
+    pub(crate) fn times_s(&self) -> &[f64] {
+        &self.time_s[self.skipped..self.skipped + self.len()]
     }
 
     /// Taps of a factor.
@@ -154,163 +114,197 @@ impl Chain {
     }
 
     /// Values after another factor.
-    pub fn after_factor(&self) -> usize {
+    pub(crate) fn after_factor(&self) -> usize {
         self.len() + 1 - self.length()
     }
 
-    /// Instants after another factor, s.
-    pub fn times_after_factor(&self) -> Vec<f64> {
-        match self.period_s {
-            Some(_) => self.time_s[1..self.len() - 1].to_vec(),
-            None => self.time_s.windows(2).map(|t| 0.5 * (t[0] + t[1])).collect(),
+    /// The instant of value `k` after another factor, s.
+    pub(crate) fn time_after_factor_s(&self, k: usize) -> f64 {
+        let times_s = self.times_s();
+        if self.period_s.is_some() { times_s[k + 1] } else { 0.5 * (times_s[k] + times_s[k + 1]) }
+    }
+
+    /// Adds to every value what depends on time alone.
+    pub(crate) fn add(&mut self, what: impl Fn(f64) -> T) {
+        let times_s = &self.time_s[self.skipped..];
+        for (v, t) in self.value.iter_mut().zip(times_s) {
+            *v += what(*t);
         }
     }
 
-    /// Adds to every value what depends on time alone, and multiplies: `(v + add(t)) · by`.
-    pub fn affine(&mut self, add: impl Fn(f64) -> f64, by: f64) {
-        for (v, t) in self.value.iter_mut().zip(&self.time_s) {
-            *v = (*v + add(*t)) * by;
-        }
+    /// Multiplies every value.
+    pub(crate) fn scale(&mut self, by: T) {
+        self.value.iter_mut().for_each(|v| *v *= by);
         self.rows.scale(by);
     }
 
-    /// Each value through a function that returns value and derivative.
-    pub fn map(&mut self, f: impl Fn(f64) -> (f64, f64)) {
-        let (value, derivative): (Vec<f64>, Vec<f64>) = self.value.iter().map(|v| f(*v)).unzip();
-        self.value = value;
-        self.rows.scale_each(&derivative);
+    /// Takes each value through a curve.
+    pub(crate) fn map(&mut self, curve: &Curve) {
+        let slopes = &mut self.memory.taps;
+        slopes.clear();
+        for v in &mut self.value {
+            let (value, slope) = through(curve, *v);
+            *v = value;
+            slopes.push(slope);
+        }
+        self.rows.scale_each(slopes);
     }
 
-    /// `S₀ F(v) + τ S₁ G(v)`, where `F` and `G` are the identity unless given.
-    pub fn factor(&mut self, tau_s: &Along, value: Option<&Pointwise>, slope: Option<&Pointwise>) {
-        let count = self.after_factor();
-        let length = self.length();
-        let times = self.times_after_factor();
+    /// `S₀ F(v) + τ S₁ G(v)`.
+    pub(crate) fn factor(&mut self, tau_s: Along<'_, T>, curves: Curves<'_>) {
+        let (count, length) = (self.after_factor(), self.length());
         let even = self.period_s.map(|t| ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5 / t, 0.0, 0.5 / t]));
-        // Weights of F and of G in value k.
-        let weights = |k: usize, j: usize| {
-            if let Some((mean, difference)) = even {
-                return (mean[j], difference[j]);
-            }
-            let step_s = self.time_s[k + 1] - self.time_s[k];
-            (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
-        };
-        let taps = if let (Along::Same(tau), None, None, Some((mean, difference))) = (tau_s, value, slope, even) {
-            Taps::Same((0..3).map(|j| mean[j] + tau * difference[j]).collect())
-        } else {
-            let mut data = Vec::with_capacity(count * length);
+        if let (Along::Same(tau), None, None, Some((mean, difference))) = (tau_s, curves.value, curves.slope, even) {
+            let taps = [0, 1, 2].map(|j| T::from(mean[j]) + tau * difference[j]);
             for k in 0..count {
-                let tau = tau_s.at(k);
-                for j in 0..length {
-                    let (mean, difference) = weights(k, j);
-                    let df = value.map_or(1.0, |f| f.derivative[k + j]);
-                    let dg = slope.map_or(1.0, |g| g.derivative[k + j]);
-                    data.push(mean * df + tau * difference * dg);
-                }
+                let v = &mut self.value[k..k + 3];
+                v[0] = taps[0] * v[0] + taps[1] * v[1] + taps[2] * v[2];
             }
-            Taps::Each { length, data }
-        };
-        let new = if value.is_none() && slope.is_none() {
-            (0..count).map(|k| (0..length).map(|j| taps.at(k, j) * self.value[k + j]).sum()).collect()
+            self.rows.combine_same(&taps);
         } else {
-            let (f, g) = (value.map_or(&self.value, |f| &f.value), slope.map_or(&self.value, |g| &g.value));
-            (0..count)
-                .map(|k| {
-                    let tau = tau_s.at(k);
-                    (0..length)
-                        .map(|j| {
-                            let (mean, difference) = weights(k, j);
-                            mean * f[k + j] + tau * difference * g[k + j]
-                        })
-                        .sum()
-                })
-                .collect()
-        };
-        self.rows = self.rows.combine(count, length, &taps);
-        (self.value, self.time_s) = (new, times);
+            self.factor_each(count, length, even, tau_s, curves);
+        }
+        self.value.truncate(count);
+        if self.period_s.is_some() {
+            self.skipped += 1;
+        } else {
+            for k in 0..count {
+                self.time_s[k] = 0.5 * (self.time_s[k] + self.time_s[k + 1]);
+            }
+        }
     }
 
-    /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the spline's own
-    /// values between the samples. On uneven samples other cubics stand in, and the reach is three.
-    pub fn advance(&mut self, delay_s: f64, reach: usize) {
+    /// A factor whose weights change from value to value.
+    fn factor_each(
+        &mut self,
+        count: usize,
+        length: usize,
+        even: Option<([f64; 3], [f64; 3])>,
+        tau_s: Along<'_, T>,
+        curves: Curves<'_>,
+    ) {
+        let Memory { curves: [of_f, of_g], taps } = &mut self.memory;
+        for (out, curve) in [(&mut *of_f, curves.value), (&mut *of_g, curves.slope)] {
+            out.clear();
+            if let Some(curve) = curve {
+                out.extend(self.value.iter().map(|v| through(curve, *v)));
+            }
+        }
+        taps.clear();
+        for k in 0..count {
+            let tau = tau_s.at(k);
+            let mut sum = T::from(0.0);
+            for j in 0..length {
+                // Weights of F and of G in value k.
+                let (mean, difference) = if let Some((mean, difference)) = even {
+                    (mean[j], difference[j])
+                } else {
+                    let step_s = self.time_s[k + 1] - self.time_s[k];
+                    (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
+                };
+                let plain = (self.value[k + j], T::from(1.0));
+                let (f, df) = of_f.get(k + j).copied().unwrap_or(plain);
+                let (g, dg) = of_g.get(k + j).copied().unwrap_or(plain);
+                sum += f * mean + tau * g * difference;
+                taps.push(df * mean + tau * dg * difference);
+            }
+            // Later values need those from the next one on.
+            self.value[k] = sum;
+        }
+        self.rows.combine_each(count, length, taps);
+    }
+
+    /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the
+    /// spline's own values between the samples. On uneven samples other cubics stand in, and the reach is three.
+    pub(crate) fn advance(&mut self, delay_s: T, reach: usize) {
         let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
         let shift = delay_s / period_s;
-        let whole = shift.floor().clamp(-(reach as f64), reach as f64 - 1.0);
+        let whole = shift.value().floor().clamp(-(reach as f64), reach as f64 - 1.0);
         let d = shift - whole;
         // The cubic B-spline at the four samples around, and nothing at the fifth.
-        let c = 1.0 - d;
-        let taps = vec![
-            c * c * c / 6.0,
-            (4.0 - 6.0 * d * d + 3.0 * d * d * d) / 6.0,
-            (4.0 - 6.0 * c * c + 3.0 * c * c * c) / 6.0,
-            d * d * d / 6.0,
-        ];
+        let taps = crate::spline::weights(d);
         // Value k is of sample k + reach + 1; its first tap is one sample before that.
         let first = (reach as f64 + whole) as usize;
-        let count = self.len() - 2 * reach - 3;
-        let new = (0..count).map(|k| (0..4).map(|j| taps[j] * self.value[first + k + j]).sum()).collect();
-        let mut rows = Self::skip(&self.rows, first);
-        rows = rows.combine(count, 4, &Taps::Same(taps));
-        rows.start = self.rows.start + first;
-        self.rows = rows;
-        self.value = new;
-        self.time_s = self.time_s[reach + 1..reach + 1 + count].to_vec();
+        let count = self.len() - 2 * reach - DELAY_TAPS + 1;
+        for k in 0..count {
+            let mut sum = T::from(0.0);
+            for (tap, v) in taps.iter().zip(&self.value[first + k..]) {
+                sum += *tap * *v;
+            }
+            self.value[k] = sum;
+        }
+        self.value.truncate(count);
+        self.rows.skip(first);
+        self.rows.combine_values(count, &taps);
+        self.skipped += reach + 1;
     }
 
-    /// The values in the middle of each interval, later by `delay_s`: on cubics with the slopes of Catmull and Rom between the
-    /// samples, so that they change smoothly with the delay.
-    fn advance_uneven(&mut self, delay_s: f64) {
+    /// The values in the middle of each interval, later by `delay_s`: on cubics with the slopes of Catmull and Rom
+    /// between the samples, so that they change smoothly with the delay.
+    fn advance_uneven(&mut self, delay_s: T) {
         let reach = UNEVEN_REACH;
-        let length = 2 * reach + 4;
+        let length = 2 * reach + DELAY_TAPS;
         let count = self.len() - length + 1;
-        let middle = |k: usize| 0.5 * (self.time_s[k + reach + 1] + self.time_s[k + reach + 2]);
-        let mut data = vec![0.0; count * length];
-        for (k, taps) in data.chunks_exact_mut(length).enumerate() {
+        let taps = &mut self.memory.taps;
+        taps.clear();
+        taps.resize(count * length, T::from(0.0));
+        for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
             let window = &self.time_s[k..k + length];
-            let at = middle(k) + delay_s;
-            let j = window.partition_point(|t| *t <= at).clamp(2, length - 2) - 1;
+            let middle_s = 0.5 * (window[reach + 1] + window[reach + 2]);
+            let at = delay_s + middle_s;
+            let j = window.partition_point(|t| *t <= at.value()).clamp(2, length - 2) - 1;
             let step_s = window[j + 1] - window[j];
-            let u = ((at - window[j]) / step_s).clamp(0.0, 1.0);
-            taps[j] += (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u);
-            taps[j + 1] += (3.0 - 2.0 * u) * u * u;
+            let mut u = (at - window[j]) / step_s;
+            if u.value() < 0.0 || u.value() > 1.0 {
+                u = T::from(u.value().clamp(0.0, 1.0));
+            }
+            let one = T::from(1.0);
+            taps[j] += (one + u * 2.0) * (one - u) * (one - u);
+            taps[j + 1] += (T::from(3.0) - u * 2.0) * u * u;
             // The slope at a sample is that from the one before it to the one after it.
-            for (i, weight) in [(j, u * (1.0 - u) * (1.0 - u)), (j + 1, -u * u * (1.0 - u))] {
-                let per_k = weight * step_s / (window[i + 1] - window[i - 1]);
+            for (i, weight) in [(j, u * (one - u) * (one - u)), (j + 1, -(u * u * (one - u)))] {
+                let per_k = weight * (step_s / (window[i + 1] - window[i - 1]));
                 taps[i + 1] += per_k;
                 taps[i - 1] -= per_k;
             }
         }
-        let times = (0..count).map(middle).collect();
-        let new = data
-            .chunks_exact(length)
-            .enumerate()
-            .map(|(k, taps)| taps.iter().zip(&self.value[k..]).map(|(t, v)| t * v).sum())
-            .collect();
-        self.rows = self.rows.combine(count, length, &Taps::Each { length, data });
-        (self.value, self.time_s) = (new, times);
+        for (k, taps) in taps.chunks_exact(length).enumerate() {
+            let mut sum = T::from(0.0);
+            for (tap, v) in taps.iter().zip(&self.value[k..]) {
+                sum += *tap * *v;
+            }
+            self.value[k] = sum;
+            // Instants before this one are needed no more.
+            self.time_s[k] = 0.5 * (self.time_s[k + reach + 1] + self.time_s[k + reach + 2]);
+        }
+        self.value.truncate(count);
+        self.rows.combine_each(count, length, taps);
     }
 
     /// `v[k+1] − ρ v[k]`.
-    pub fn difference(&mut self, rho: f64) {
+    pub(crate) fn difference(&mut self, rho: f64) {
         let count = self.len() - 1;
-        self.value = self.value.windows(2).map(|v| v[1] - rho * v[0]).collect();
-        self.rows = self.rows.combine(count, 2, &Taps::Same(vec![-rho, 1.0]));
-        self.time_s.remove(0);
-    }
-
-    fn skip(rows: &Rows, first: usize) -> Rows {
-        if rows.is_same || first == 0 {
-            return rows.clone();
+        for k in 0..count {
+            self.value[k] = self.value[k + 1] - self.value[k] * rho;
         }
-        Rows { data: rows.data[first * rows.width..].to_vec(), ..rows.clone() }
+        self.value.truncate(count);
+        self.rows.difference(rho, count);
+        self.skipped += 1;
     }
+}
+
+fn through<T: Real>(curve: &Curve, v: T) -> (T, T) {
+    let (value, slope) = curve(v.number());
+    (T::of(value), T::of(slope))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
 
-    fn chain(value: impl Fn(f64) -> f64, time_s: Vec<f64>, period_s: Option<f64>) -> Chain {
+    fn chain(value: impl Fn(f64) -> f64, time_s: Vec<f64>, period_s: Option<f64>) -> Chain<f64> {
         let reading: Vec<f64> = time_s.iter().map(|t| value(*t)).collect();
         Chain::of(&Stretch::new(time_s, [reading.clone(), reading]), 0, period_s)
     }
@@ -322,9 +316,9 @@ mod tests {
         let (omega, tau_s) = (0.06, 10.0);
         let times: Vec<f64> = (0..400).map(f64::from).collect();
         let mut got = chain(|t| (omega * t).sin(), times, Some(1.0));
-        got.factor(&Along::Same(tau_s), None, None);
+        got.factor(Along::Same(tau_s), Curves::default());
         let smooth = (2.0 + omega.cos()) / 3.0;
-        for (v, t) in got.value.iter().zip(&got.time_s) {
+        for (v, t) in got.value.iter().zip(got.times_s()) {
             let want = smooth * ((omega * t).sin() + omega * tau_s * (omega * t).cos());
             assert!((v - want).abs() < 2e-7, "at {t}: got {v}, want {want}");
         }
@@ -338,7 +332,7 @@ mod tests {
             for delay_s in [-2.4, -1.0, 0.0, 0.3, 1.0, 2.49] {
                 let mut got = chain(|t| 3.0 - 0.5 * t, times.clone(), period_s);
                 got.advance(delay_s, 4);
-                for (v, t) in got.value.iter().zip(&got.time_s) {
+                for (v, t) in got.value.iter().zip(got.times_s()) {
                     let want = 3.0 - 0.5 * (t + delay_s);
                     assert!((v - want).abs() < 1e-12, "{period_s:?}, {delay_s} at {t}: got {v}, want {want}");
                 }
@@ -356,8 +350,10 @@ mod tests {
             if let Some(k) = moved {
                 chain.value[k] += 1e-6;
             }
-            chain.map(|v| (v + 0.05 * v * v, 1.0 + 0.1 * v));
-            chain.factor(&Along::Each((0..28).map(|k| 2.0 + 0.1 * f64::from(k)).collect()), None, None);
+            let bent: Curve = Arc::new(|v| (v + v * v * 0.05, v * 0.1 + 1.0));
+            chain.map(&bent);
+            let tau_s: Vec<f64> = (0..28).map(|k| 2.0 + 0.1 * f64::from(k)).collect();
+            chain.factor(Along::Each(&tau_s), Curves::default());
             chain.advance(0.3, 2);
             chain
         };

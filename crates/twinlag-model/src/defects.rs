@@ -7,7 +7,7 @@ use twinlag_cross_relation::{Readings, Segment, Steps};
 use twinlag_transform::Forward;
 
 use crate::observations::Observations;
-use crate::plant::{Evaluation, Part};
+use crate::implied::{Evaluation, Part, median};
 
 /// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
 const COARSE: f64 = 0.5;
@@ -120,27 +120,9 @@ pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2
 
 /// What the best single change of each reading would take off, in robust standard deviations.
 fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
-    let weighted = part.whitened.weighted();
-    let rows = &part.sources[channel].rows;
-    let mut out = vec![0.0; samples];
-    for (k, w) in weighted.iter().enumerate() {
-        for (j, c) in rows.at(k).iter().enumerate() {
-            if let Some(s) = out.get_mut(rows.start + k + j) {
-                *s += c * w;
-            }
-        }
-    }
-    let scale = 1.4826 * median(out.iter().map(|s| s.abs()));
+    let out = part.scores(channel, samples);
+    let scale = 1.4826 * median(out.iter().map(|s| s.abs()).collect());
     out.iter().map(|s| if scale > 0.0 { s / scale } else { 0.0 }).collect()
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    if all.is_empty() {
-        return 0.0;
-    }
-    let middle = all.len() / 2;
-    *all.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
@@ -167,7 +149,7 @@ pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) ->
                     y[k] - (4.0 * (y[k - 1] + y[k + 1]) - y[k - 2] - y[k + 2]) / 6.0
                 })
                 .collect();
-            let scale = 1.4826 * median(beside.iter().map(|b| b.abs()));
+            let scale = 1.4826 * median(beside.iter().map(|b| b.abs()).collect());
             let other = &stretch.reading_c[1 - channel];
             let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
             let mut slopes: Vec<f64> = (0..n).map(slope).collect();
@@ -179,7 +161,7 @@ pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) ->
                 let is_far = (scores[k].abs() > far && sticks_out > far)
                     || (scores[k].abs() > 0.5 * far && sticks_out > PLAIN * far);
                 if is_peak && is_far && !stretch.masked[channel][k] {
-                    found.push(part.first_sample + k);
+                    found.push(part.before + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
                 }
             }
@@ -256,7 +238,7 @@ pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl F
         // Around it, the peak itself left out.
         let (from, to) = (bin.saturating_sub(60).max(1), (bin + 61).min(power.len()));
         let around = (from..to).filter(|j| j.abs_diff(bin) > 5).map(|j| power[j]);
-        let level = median(around) / std::f64::consts::LN_2;
+        let level = median(around.collect()) / std::f64::consts::LN_2;
         if is_peak && level > 0.0 {
             let ratio = power[bin] / level;
             // Of exponentially distributed powers the largest of all exceeds this once in a thousand records.

@@ -19,6 +19,19 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
+/// Products of columns with each other, `CᵀC`; an empty column has none.
+pub fn gram(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = columns.len();
+    let mut out = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            out[i][j] = dot(&columns[i], &columns[j]);
+            out[j][i] = out[i][j];
+        }
+    }
+    out
+}
+
 /// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without
 /// any weight stay zero. `None` where it is singular.
 pub fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {

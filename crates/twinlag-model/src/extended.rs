@@ -6,9 +6,11 @@ use std::sync::Arc;
 use twinlag_compensate::{Coloured, Local, Readings, Rig, Sensor, SlowPath};
 
 use crate::error::DiagnoseError;
-use crate::model::{Fitted, Model};
+use crate::fit::Fitted;
+use crate::model::Model;
 use crate::observations::Observations;
-use crate::plant::{Place, Plant, ZERO_CELSIUS_K};
+use crate::number::Number;
+use crate::plant::{Place, Plant};
 
 /// Two lags and the effects that were found, with the record that they were fitted to.
 #[derive(Clone)]
@@ -45,14 +47,15 @@ impl Extended {
     /// Both time constants at `time_s` with other `parameters`, s: where they change along the record, as they do then.
     pub fn time_constants_s(&self, parameters: &[f64], time_s: &[f64]) -> [Vec<f64>; 2] {
         let plant = self.model.plant(parameters, &self.observations);
-        [0, 1].map(|i| time_s.iter().map(|t| plant.sensors[i].tau_s * (1.0 + plant.change(i, *t)).max(0.02)).collect())
+        [0, 1].map(|i| time_s.iter().map(|t| (plant.sensors[i].tau_s * plant.sensors[i].tau_factor_at(*t)).re).collect())
     }
 
     /// Gain and offset of the second channel against the first, 1 and K.
     pub fn calibration(&self, parameters: &[f64]) -> [f64; 2] {
         let plant = self.model.plant(parameters, &self.observations);
         let [first, second] = [0, 1].map(|i| &plant.sensors[i].reading);
-        [second.gain / first.gain, second.offset_k - first.offset_k * second.gain / first.gain]
+        let gain = second.gain.re / first.gain.re;
+        [gain, second.offset_k.re - first.offset_k.re * gain]
     }
 
     /// The sensors' temperatures at every sample of the record, and the sensors, with other `parameters`.
@@ -89,34 +92,31 @@ fn rig(plant: &Plant) -> Rig {
     };
     let sensors = [0, 1].map(|i| {
         let sensor = &plant.sensors[i];
-        let gain = sensor.reading.gain.abs();
+        let gain = sensor.reading.gain.re.abs();
         Sensor {
-            tau_s: sensor.tau_s,
-            second_tau_s: sensor.second_tau_s,
-            slow: sensor.slow.map(|[share, tau_s]| SlowPath { share, tau_s }),
+            tau_s: sensor.tau_s.re,
+            second_tau_s: sensor.second_tau_s.map(|tau_s| tau_s.re),
+            slow: sensor.slow.map(|slow| SlowPath { share: slow.share.re, tau_s: slow.tau_s.re }),
             noise_std_k: plant.noise_std_k[i] / gain,
             coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
         }
     });
-    Rig { sensors, delay_s: plant.delay_s.unwrap_or(0.0), clock: 0, mismatch: extra(Place::Gas) }
+    Rig { sensors, delay_s: plant.delay_s.map_or(0.0, |delay_s| delay_s.re), clock: 0, mismatch: extra(Place::Gas) }
 }
 
 /// What each sensor does at each instant, where that changes.
 fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<Local>; 2]> {
-    let changes = plant.changes(1) || plant.sensors.iter().any(|s| s.radiation.is_some() || s.exponent.is_some());
-    changes.then(|| {
+    let changes = |s: &crate::plant::Sensor| !s.changes.is_empty() || s.rest.is_some() || s.heat.is_some();
+    plant.sensors.iter().any(changes).then(|| {
         [0, 1].map(|i| {
             let sensor = &plant.sensors[i];
             let each = time_s.iter().zip(&temperature_c[i]).map(|(&time_s, &c)| {
-                let change = plant.change(i, time_s);
-                let with_temperature = sensor
-                    .exponent
-                    .map_or(1.0, |[p, reference_k]| ((c + ZERO_CELSIUS_K).max(1.0) / reference_k).powf(p));
-                let (loss_k, loss_slope) = sensor.radiation.map_or((0.0, 0.0), |radiation| {
-                    let (with, slope) = radiation.add_to(c);
-                    (with - c, slope - 1.0)
-                });
-                Local { tau_factor: (1.0 + change).max(0.02) * with_temperature, loss_k, loss_slope }
+                let temperature_c = Number::from(c);
+                // The slope of the heat that it holds is the factor of its time constant.
+                let with_temperature = sensor.heat.as_ref().map_or(1.0, |heat| heat(temperature_c).1.re);
+                let rest = sensor.rest.as_ref().map(|rest| rest(temperature_c));
+                let (loss_k, loss_slope) = rest.map_or((0.0, 0.0), |(with, slope)| (with.re - c, slope.re - 1.0));
+                Local { tau_factor: sensor.tau_factor_at(time_s).re * with_temperature, loss_k, loss_slope }
             });
             each.collect()
         })

@@ -5,8 +5,9 @@
 //! are in neither.
 
 use crate::dense;
-use crate::model::{Fitted, Selection};
+use crate::fit::Fitted;
 use crate::observations::Observations;
+use crate::selection::Selection;
 
 /// Blocks along the record.
 const BLOCKS: usize = 40;

@@ -1,20 +1,28 @@
 //! Two first-order sensors with any physical effects beside: the inverse of the whole rig with its noise, and its fit.
 
 mod chain;
+mod cost;
 mod defects;
 pub mod dense;
+mod disagreement;
 mod effect;
 mod error;
 mod extended;
+mod fit;
 mod fitted;
 mod flow;
 mod held_out;
+mod implied;
+mod inverse;
 mod known;
 mod model;
+mod number;
 mod observations;
 mod plant;
 mod prepare;
 mod residual;
+mod rows;
+mod selection;
 mod settings;
 mod spectrum;
 mod spline;
@@ -24,18 +32,28 @@ mod weighting;
 mod whitening;
 
 pub use defects::{Levels, levels, line_channel, lines};
-pub use effect::{About, Context, Derived, Effect, Identifier, OfParameters, Parameter, Shared, candidates};
+pub use cost::Linearised;
+pub use effect::{
+    About, Context, Derived, Domain, Effect, Freedom, Identifier, OfParameters, Parameter, Seat, Shared, candidates,
+    described_by,
+};
 pub use error::DiagnoseError;
 pub use extended::Extended;
 pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Trace, Value};
 pub use held_out::{held_out_energy, held_out_gain};
 pub use known::fit_with;
-pub use model::{Effort, Fitted, KnownTimeConstant, Linearised, Model, Selection};
+pub use fit::{Effort, Fitted};
+pub use flow::Flow;
+pub use implied::Evaluation;
+pub use model::{KnownTimeConstant, Model};
+pub use number::{Curve, Number, TimeFunction};
 pub use observations::{Observations, Stretch};
-pub use plant::{Evaluation, Place, Plant};
+pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
 pub use prepare::Prepared;
+pub use selection::Selection;
 pub use settings::{KnownEffect, Settings, Watch};
 pub use spectrum::{Bands, fit_noise, runs};
+pub use spline::Spline;
 pub use summary::{LEFT_OVER, Z_975, covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};
 pub use weighting::Weighting;

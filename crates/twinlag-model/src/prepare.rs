@@ -4,9 +4,11 @@ use crate::defects::{self, Levels};
 use crate::fitted::Defect;
 use crate::effect::{Context, Identifier};
 use crate::error::DiagnoseError;
-use crate::model::{Effort, Fitted, Model, Selection};
+use crate::fit::{Effort, Fitted};
+use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::reach;
+use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::spectrum::runs;
 use crate::weighting::Weighting;
@@ -82,7 +84,7 @@ impl Prepared {
         let mut base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
         // A wrong reading hides its neighbours: once more where there were some.
         for _ in 0..SPIKE_ROUNDS {
-            if !settings.effects.contains(&Identifier::Spikes) || !self.mask_spikes(&base) {
+            if !settings.effects.contains(&Identifier::SPIKES) || !self.mask_spikes(&base) {
                 break;
             }
             base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
@@ -96,7 +98,7 @@ impl Prepared {
 
     /// The two-lag model of the record as it came, where `base` is that of the record with defects masked; none where none is.
     pub fn unmasked(&self, base: &Fitted) -> Option<Fitted> {
-        if self.found.iter().all(|f| f.effect == Identifier::Quantisation) {
+        if self.found.iter().all(|f| f.effect == Identifier::QUANTISATION) {
             return None;
         }
         let (observations, levels) = &self.raw;
@@ -105,7 +107,7 @@ impl Prepared {
     }
 
     pub fn mask_spikes(&mut self, base: &Fitted) -> bool {
-        let evaluation = base.model.plant(&base.theta, &self.observations).whitened(&self.observations, true);
+        let evaluation = base.model.evaluate(&base.theta, &self.observations);
         let mut counts = [0; 2];
         for far in [SPIKE, SPIKE_AMONG_OTHERS] {
             let spikes = defects::spikes(&self.observations, &evaluation, far);
@@ -119,15 +121,15 @@ impl Prepared {
         }
         for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
             self.spikes[i] += count;
-            self.found.retain(|f| f.effect != Identifier::Spikes || f.channel != i);
-            self.found.push(defect(Identifier::Spikes, i, format!("{} single readings", self.spikes[i])));
+            self.found.retain(|f| f.effect != Identifier::SPIKES || f.channel != i);
+            self.found.push(defect(Identifier::SPIKES, i, format!("{} single readings", self.spikes[i])));
         }
         counts != [0; 2]
     }
 
-    /// Levels again, without what is masked and without the lines of `fitted`, unless they were given.
+    /// Levels again, without what is masked and without the disturbances of `fitted`, unless they were given.
     pub fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
-        let found = defects::levels(&fitted.model.without_lines(&fitted.theta, &self.observations));
+        let found = defects::levels(&fitted.model.without_disturbances(&fitted.theta, &self.observations));
         if let (None, Some(found)) = (settings.noise_std_k, found) {
             self.levels = Levels { step_k: self.levels.step_k, ..found };
         }
@@ -146,7 +148,7 @@ impl Prepared {
         }
         self.levels.scale(energy.sqrt());
         self.context = context(&self.observations, &self.levels);
-        if settings.effects.contains(&Identifier::Quantisation) {
+        if settings.effects.contains(&Identifier::QUANTISATION) {
             self.found.extend(coarse_steps(&self.levels));
         }
         true
@@ -193,13 +195,13 @@ impl Prepared {
 /// Saturation and coarse converters, masked and named.
 fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Identifier]) -> Vec<Defect> {
     let mut out = Vec::new();
-    if allowed.contains(&Identifier::Saturation) {
+    if allowed.contains(&Identifier::SATURATION) {
         let counts = defects::mask_saturation(observations, levels.coarse_step_k());
         for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
-            out.push(defect(Identifier::Saturation, i, format!("{count} readings at an end of the range")));
+            out.push(defect(Identifier::SATURATION, i, format!("{count} readings at an end of the range")));
         }
     }
-    if allowed.contains(&Identifier::Quantisation) {
+    if allowed.contains(&Identifier::QUANTISATION) {
         out.extend(coarse_steps(levels));
     }
     out
@@ -207,7 +209,7 @@ fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Ide
 
 fn coarse_steps(levels: &Levels) -> impl Iterator<Item = Defect> {
     let steps = levels.coarse_step_k().into_iter().enumerate();
-    steps.filter_map(|(i, step)| Some(defect(Identifier::Quantisation, i, format!("steps of {:.4} K", step?))))
+    steps.filter_map(|(i, step)| Some(defect(Identifier::QUANTISATION, i, format!("steps of {:.4} K", step?))))
 }
 
 fn defect(effect: Identifier, channel: usize, seen: String) -> Defect {

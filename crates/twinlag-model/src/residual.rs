@@ -9,9 +9,10 @@ use twinlag_cross_relation::ResidualTest;
 use twinlag_transform::{Complex64, Forward, Tapered, hann};
 
 use crate::dense;
-use crate::model::{Fitted, Selection};
+use crate::fit::Fitted;
 use crate::observations::Observations;
 use crate::plant::Place;
+use crate::selection::Selection;
 use crate::weighting::Weighting;
 
 /// Points of a segment for the coherence.
@@ -31,16 +32,16 @@ struct Pairs {
 impl Pairs {
     fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
-        let evaluation = plant.whitened(observations, true);
+        let evaluation = plant.evaluate(observations);
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
-        let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s < plant.sensors[0].tau_s));
+        let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
         let mut cleaned = vec![f64::NAN; observations.samples()];
         for part in &evaluation.parts {
             let stretch = &observations.stretches[part.stretch];
             let noise = part.noise_of(channel, stretch.len());
             for (k, (y, n)) in stretch.reading_c[channel].iter().zip(noise).enumerate() {
-                cleaned[part.first_sample + k] = y - n;
+                cleaned[part.before + k] = y - n;
             }
         }
         let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
@@ -71,7 +72,7 @@ impl Pairs {
 /// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
 pub fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
-    let evaluation = plant.whitened(observations, true);
+    let evaluation = plant.evaluate(observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
     let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
     let mut out = Vec::with_capacity(evaluation.residual.len());
@@ -79,7 +80,7 @@ pub fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
         let stretch = &observations.stretches[part.stretch];
         let noise = part.noise_of(channel, stretch.len());
         let chain = &part.inferred[channel];
-        let mut gas: Vec<f64> = (0..part.whitened.residual.len())
+        let mut gas: Vec<f64> = (0..part.len())
             .map(|k| {
                 let k = k + part.skipped;
                 let first = chain.rows.start + k;

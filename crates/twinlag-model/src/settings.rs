@@ -31,5 +31,12 @@ pub struct KnownEffect {
     pub parameters: Vec<(String, f64)>,
 }
 
+impl KnownEffect {
+    /// The value of a parameter, by its name.
+    pub fn parameter(&self, name: &str) -> Option<f64> {
+        self.parameters.iter().find(|(n, _)| n == name).map(|(_, value)| *value)
+    }
+}
+
 /// Told how far a diagnosis has come: what it is doing, how much of that is done, of how much.
 pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);

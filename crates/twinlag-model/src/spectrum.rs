@@ -7,9 +7,10 @@ use num_complex::Complex64;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 use twinlag_transform::Forward;
 
-use crate::effect::coloured_noise::{LONGEST, SHORTEST};
+use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
 use crate::observations::Observations;
-use crate::plant::{Evaluation, Extra, Place, Plant};
+use crate::implied::Evaluation;
+use crate::plant::{Extra, Place, Plant};
 
 /// Longest block, samples.
 const LONGEST_BLOCK: usize = 1024;
@@ -242,7 +243,6 @@ pub fn fit_noise(
     let paths = Paths::of(plant, observations);
     let base: Vec<f64> =
         bands.0.iter().map(|b| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE)).collect();
-    let [first, last] = observations.ends_s();
     let solve = |half: Half| -> (Vec<f64>, f64) {
         let cost = NoiseCost { bands, paths: &paths, base: &base, place, half, is_coarse };
         let mut variables =
@@ -253,8 +253,8 @@ pub fn fit_noise(
             variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
             variables.push(Variable::logarithmic(
                 "correlation time",
-                SHORTEST * observations.step_s(),
-                LONGEST * (last - first),
+                MIN_CORRELATION_STEPS * observations.step_s(),
+                MAX_CORRELATION_SPANS * observations.span_s(),
             ));
             all = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
         }

@@ -1,50 +1,65 @@
 //! A smooth function of time with mean zero: a cubic spline on even knots, straight at both ends.
 
-/// Coefficients of the cubic B-splines over `[from, to]`.
-#[derive(Clone, Debug, PartialEq)]
+use num_dual::DualNum;
+
+use crate::number::Number;
+
+/// Points of the midpoint rule by which the mean is taken off, for each coefficient: exact for cubics to some parts in
+/// a million.
+const POINTS_PER_COEFFICIENT: usize = 40;
+
+/// Weights of the four cubic B-splines that reach a point, from its place `d` in `[0, 1]` between two knots.
+pub(crate) fn weights<T: DualNum<Primitive = f64> + Copy>(d: T) -> [T; 4] {
+    let c = -d + 1.0;
+    let inner = |x: T| (x * x * x * 3.0 - x * x * 6.0 + 4.0) / 6.0;
+    [c * c * c / 6.0, inner(d), inner(c), d * d * d / 6.0]
+}
+
+/// A smooth function of time with mean zero: a cubic spline on even knots, straight at both ends.
+#[derive(Clone, Debug)]
 pub struct Spline {
     from_s: f64,
     to_s: f64,
-    coefficients: Vec<f64>,
-    mean: f64,
+    coefficients: Vec<Number>,
+    mean: Number,
 }
 
 impl Spline {
-    /// - `free`: coefficients of the splines that have their middle on the knots from the second on, at least 3. That of the first
-    ///   knot is minus their sum; those beyond either end make the second derivative there zero: the record says little of them
-    pub fn new(from_s: f64, to_s: f64, free: &[f64]) -> Self {
+    /// The spline over `[from_s, to_s]`.
+    ///
+    /// - `free`: coefficients of the B-splines that have their middle on the knots from the second on, at least 3. That
+    ///   of the first knot is minus their sum; those beyond either end make the second derivative there zero, since the
+    ///   record says little of them
+    pub fn new(from_s: f64, to_s: f64, free: &[Number]) -> Self {
         let on_knots = on_knots(free);
         let last = on_knots.len() - 1;
-        let mut coefficients = vec![2.0 * on_knots[0] - on_knots[1]];
+        let mut coefficients = vec![on_knots[0] * 2.0 - on_knots[1]];
         coefficients.extend_from_slice(&on_knots);
-        coefficients.push(2.0 * on_knots[last] - on_knots[last - 1]);
-        let mut out = Self { from_s, to_s, coefficients, mean: 0.0 };
-        let points = 40 * out.coefficients.len();
-        let total: f64 = (0..points).map(|i| out.at(from_s + (to_s - from_s) * (i as f64 + 0.5) / points as f64)).sum();
-        out.mean = total / points as f64;
+        coefficients.push(on_knots[last] * 2.0 - on_knots[last - 1]);
+        let mut out = Self { from_s, to_s, coefficients, mean: Number::from(0.0) };
+        let points = POINTS_PER_COEFFICIENT * out.coefficients.len();
+        let midpoint_s = |i: usize| from_s + (to_s - from_s) * (i as f64 + 0.5) / points as f64;
+        out.mean = (0..points).map(|i| out.at(midpoint_s(i))).sum::<Number>() / points as f64;
         out
     }
 
-    pub fn at(&self, time_s: f64) -> f64 {
+    /// Its value at an instant.
+    pub fn at(&self, time_s: f64) -> Number {
         let pieces = (self.coefficients.len() - 3) as f64;
         let x = ((time_s - self.from_s) / (self.to_s - self.from_s)).clamp(0.0, 1.0) * pieces;
         let piece = x.floor().min(pieces - 1.0);
-        let d = x - piece;
-        let c = 1.0 - d;
-        let weights = [
-            c * c * c / 6.0,
-            (4.0 - 6.0 * d * d + 3.0 * d * d * d) / 6.0,
-            (4.0 - 6.0 * c * c + 3.0 * c * c * c) / 6.0,
-            d * d * d / 6.0,
-        ];
-        let from = piece as usize;
-        weights.iter().zip(&self.coefficients[from..]).map(|(w, a)| w * a).sum::<f64>() - self.mean
+        let mut sum = -self.mean;
+        for (weight, coefficient) in weights(x - piece).iter().zip(&self.coefficients[piece as usize..]) {
+            sum += *coefficient * *weight;
+        }
+        sum
     }
 }
 
 /// The coefficients on knots: the first is minus the sum of the others.
-pub fn on_knots(free: &[f64]) -> Vec<f64> {
-    [-free.iter().sum::<f64>()].into_iter().chain(free.iter().copied()).collect()
+pub(crate) fn on_knots<T: DualNum + Copy>(free: &[T]) -> Vec<T> {
+    let sum: T = free.iter().copied().sum();
+    [-sum].into_iter().chain(free.iter().copied()).collect()
 }
 
 #[cfg(test)]
@@ -55,14 +70,14 @@ mod tests {
     /// million.
     #[test]
     fn the_mean_is_zero_and_a_slope_is_a_straight_line() {
-        let spline = Spline::new(2.0, 7.0, &[0.3, -0.2, 0.5, 0.1, 0.0]);
-        let mean: f64 = (0..100_000).map(|i| spline.at(2.0 + 5.0 * (f64::from(i) + 0.5) / 1e5)).sum::<f64>() / 1e5;
+        let spline = Spline::new(2.0, 7.0, &[0.3, -0.2, 0.5, 0.1, 0.0].map(Number::from));
+        let mean: f64 = (0..100_000).map(|i| spline.at(2.0 + 5.0 * (f64::from(i) + 0.5) / 1e5).re).sum::<f64>() / 1e5;
         assert!(mean.abs() < 1e-4, "mean {mean}");
         // Even steps from knot to knot, centred: −0.2, −0.1, 0, 0.1, 0.2.
-        let line = Spline::new(0.0, 1.0, &[-0.1, 0.0, 0.1, 0.2]);
+        let line = Spline::new(0.0, 1.0, &[-0.1, 0.0, 0.1, 0.2].map(Number::from));
         for i in 0..=10 {
             let t = 0.1 * f64::from(i);
-            let (got, want) = (line.at(t), 0.4 * (t - 0.5));
+            let (got, want) = (line.at(t).re, 0.4 * (t - 0.5));
             assert!((got - want).abs() < 1e-12, "at {t}: got {got}, want {want}");
         }
     }

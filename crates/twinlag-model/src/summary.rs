@@ -5,11 +5,12 @@ use twinlag_cross_relation::residual_tests;
 use crate::defects::Levels;
 use crate::dense;
 use crate::fitted::{ModelFit, TimeConstant, Trace};
-use crate::effect::Identifier;
 use crate::extended::Extended;
-use crate::model::{Effort, Fitted, LONGEST, Selection};
+use crate::fit::{Effort, Fitted};
+use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::prepare::is_judge;
+use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
 
 /// 97.5 % point of the normal distribution.
@@ -27,8 +28,7 @@ pub const LEFT_OVER: f64 = 1e-4;
 
 /// Whether a time constant is shorter than the samples tell, or as long as the record.
 pub fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
-    let [first, last] = observations.ends_s();
-    let seen = UNRESOLVED * observations.step_s()..0.9 * LONGEST * (last - first);
+    let seen = UNRESOLVED * observations.step_s()..0.9 * MAX_TAU_SPANS * observations.span_s();
     (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
 }
 
@@ -118,11 +118,11 @@ pub fn summarise(
     let evaluation = fitted.model.evaluate(&fitted.theta, observations);
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
-    let mut tests = residual_tests(&residual_runs, fitted.model.fitted(), level_std);
+    let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
     let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
     tests.extend(crate::residual::tests(fitted, observations, selection, is_coarse));
     let count: usize = residual_runs.iter().map(Vec::len).sum();
-    let dof = count.saturating_sub(fitted.model.fitted()).max(1);
+    let dof = count.saturating_sub(fitted.model.free_count()).max(1);
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
     let rejects = tests.iter().any(|t| t.p_value < LEFT_OVER);
     let covariance = covariance(fitted, observations, selection, rejects);
@@ -151,9 +151,9 @@ pub fn summarise(
     let variance = |i: usize| c.map(|c| c[i][i]);
     let unresolved = is_unresolved(fitted, observations) || is_flat(fitted, observations, selection, variance(0));
     // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
-    let delay = fitted.model.effects.iter().position(|e| e.identifier() == Identifier::Delay);
+    let delay = fitted.model.parameters().position(|p| p.is_lateness);
     let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
-        Some(index) => vec![(0, -1.0), (1, 1.0), (fitted.model.range(index).start, 1.0)],
+        Some(index) => vec![(0, -1.0), (1, 1.0), (2 + index, 1.0)],
         None => vec![(0, -1.0), (1, 1.0)],
     };
     let difference_value: f64 = lag.iter().map(|(i, s)| s * theta[*i]).sum();

@@ -4,18 +4,17 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::dense;
 use crate::fitted::ModelFit;
-use crate::effect::{Context, Identifier, Shared, varying};
+use crate::effect::{Context, Shared, varying};
 use crate::error::DiagnoseError;
 use crate::known::Known;
-use crate::model::{Effort, Fitted, Selection};
+use crate::fit::{Effort, Fitted};
 use crate::observations::Observations;
 use crate::prepare::Prepared;
+use crate::selection::Selection;
 use crate::settings::{KnownEffect, Settings, Watch};
 use crate::summary::summarise;
 
-/// Most coefficients of the shared change, and samples for each.
-const COEFFICIENTS: usize = 32;
-const SAMPLES_EACH: usize = 60;
+/// Fewest coefficients of the shared change.
 const LEAST_COEFFICIENTS: usize = 3;
 /// Strengths of its curvature that are tried: the least lets it change by a tenth along the record, each is twice the one before.
 const CURVATURE: f64 = 0.25;
@@ -105,16 +104,16 @@ pub fn track(
     watch: Watch<'_>,
 ) -> Result<Track, DiagnoseError> {
     let others: Vec<KnownEffect> =
-        effects.iter().filter(|e| e.effect != Identifier::VaryingTimeConstant).cloned().collect();
+        effects.iter().filter(|e| !e.effect.about().changes_time_constants).cloned().collect();
     let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others)?;
-    let has_delay = constant.model.effects.iter().any(|e| e.identifier() == Identifier::Delay);
+    let has_delay = constant.model.parameters().any(|p| p.is_lateness);
     let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
     let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);
     let search = Tracker { prepared: &prepared, selection: &selection };
     let mut best = (Change::Constant, constant.clone(), score(&constant, 0.0));
     let mut consider = |change: Change, fitted: Fitted, numbers: f64| {
         // Without what is known of its shape, which the others have nothing like.
-        let known: f64 = fitted.model.prior(&fitted.theta).iter().map(|p| p * p).sum();
+        let known: f64 = fitted.model.prior_energy(&fitted.theta);
         let data = Fitted { chi2: fitted.chi2 - known, count: constant.count, ..fitted.clone() };
         let score = score(&data, numbers);
         if score < best.2 && fitted.end.is_usable() {
@@ -188,7 +187,7 @@ impl Tracker<'_> {
     /// The smooth change under which the record is most likely, and its effective number of coefficients.
     fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(f64, Fitted)> {
         let Context { ends_s, samples, .. } = self.prepared.context;
-        let size = COEFFICIENTS.min(samples / SAMPLES_EACH);
+        let size = varying::MAX_COEFFICIENTS.min(samples / varying::SAMPLES_PER_COEFFICIENT);
         if size < LEAST_COEFFICIENTS {
             return None;
         }
@@ -293,9 +292,9 @@ impl Tracker<'_> {
 
     fn ratio(&self, fitted: &Fitted) -> RatioTest {
         let effect = varying::ratio(self.prepared.context.ends_s);
-        let other = self.fit(fitted, effect, &[0.0; varying::RATIO], Effort::Finish);
+        let other = self.fit(fitted, effect, &[0.0; varying::RATIO_SIZE], Effort::Finish);
         let statistic = (score(fitted, 0.0) - score(&other, 0.0)).max(0.0);
-        let chi2 = ChiSquared::new(varying::RATIO as f64).expect("a positive number of degrees of freedom");
-        RatioTest { statistic, degrees_of_freedom: varying::RATIO, p_value: chi2.sf(statistic) }
+        let chi2 = ChiSquared::new(varying::RATIO_SIZE as f64).expect("a positive number of degrees of freedom");
+        RatioTest { statistic, degrees_of_freedom: varying::RATIO_SIZE, p_value: chi2.sf(statistic) }
     }
 }

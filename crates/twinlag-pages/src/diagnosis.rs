@@ -175,7 +175,7 @@ impl Page<'_> {
             facts.push(("What to do", sentence(about.advice)));
             facts.push(("Explains this record as well", identifiers(&found.alternatives)));
             let confusable: Vec<Identifier> =
-                about.confusable.iter().copied().filter(|other| !found.alternatives.contains(other)).collect();
+                found.effect.imitates().filter(|other| !found.alternatives.contains(other)).collect();
             facts.push(("Resembles, where it is small", identifiers(&confusable)));
             facts.retain(|(_, text)| !text.is_empty());
             document = document.subheading(capital(&words(found.effect))).facts(facts);
@@ -665,7 +665,7 @@ mod tests {
         let time_s: Vec<f64> = (0..200).map(f64::from).collect();
         let gaps = vec![f64::NAN; 200];
         let found = Found {
-            effect: Identifier::Delay,
+            effect: Identifier::DELAY,
             channel: Some(1),
             fitted_in: Some(1),
             parameters: vec![Value {
@@ -682,7 +682,7 @@ mod tests {
                 held_out_gain_nats: f64::NAN,
                 robust_statistic: None,
             }),
-            alternatives: vec![Identifier::SecondOrder],
+            alternatives: vec![Identifier::SECOND_ORDER],
             seen: None,
         };
         let left =

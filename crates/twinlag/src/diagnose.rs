@@ -496,7 +496,7 @@ fn with_effects(base: &Characterisation, core: &Core, options: &DiagnoseOptions)
         _ => Status::ModelRejected,
     };
     let free = |name: &str| {
-        core.effects.iter().filter(|f| f.effect == Identifier::Calibration).flat_map(|f| &f.parameters).find_map(|p| {
+        core.effects.iter().filter(|f| f.effect == Identifier::CALIBRATION).flat_map(|f| &f.parameters).find_map(|p| {
             let interval_95 = p.interval_95?;
             (p.name == name).then_some(Estimate { value: p.value, standard_error: p.standard_error, interval_95 })
         })

@@ -47,7 +47,7 @@ fn a_missing_reading_near_the_start_is_no_obstacle() {
     let whole = rig(11, "", &format!("delay_s = {DELAY_S}"));
     for row in [8, 50, 107] {
         let answer = found(&without(&whole, |k| k == row));
-        assert_eq!(answer.effects[0].effect, Identifier::Delay, "row {row}: {:?}", answer.effects);
+        assert_eq!(answer.effects[0].effect, Identifier::DELAY, "row {row}: {:?}", answer.effects);
         recovers(&answer.last, TAU_S, 4.0);
     }
 }
@@ -102,10 +102,10 @@ fn a_saved_model_holds_for_another_record_of_the_rig() {
 #[test]
 fn a_saved_crosstalk_gives_its_own_record_the_same_time_constants() {
     let record = rig(11, "crosstalk = 0.05", "");
-    let without = vec![Identifier::Calibration, Identifier::Radiation, Identifier::SlowMode];
+    let without = vec![Identifier::CALIBRATION, Identifier::RADIATION, Identifier::SLOW_MODE];
     let options = DiagnoseOptions { without, ..DiagnoseOptions::default() };
     let answer = diagnose(&record, &options, &|_, _, _| ()).expect("a record that can be diagnosed");
-    assert_eq!(answer.effects[0].effect, Identifier::Crosstalk, "{:?}", answer.effects);
+    assert_eq!(answer.effects[0].effect, Identifier::CROSSTALK, "{:?}", answer.effects);
     let fitted = characterise_with(&record, &answer.model(), &Options::default()).expect("its own model");
     for (one, other) in answer.last.sensors.iter().zip(&fitted.sensors) {
         let (one, other) = (one.time_constant_s.expect("determined"), other.time_constant_s.expect("determined"));

@@ -138,7 +138,7 @@ impl Study for Plan {
         }
         // With full confidence, and none of those that look like it.
         let looks_like =
-            |e: &twinlag::NamedEffect| own().any(|o| o == e.effect || o.about().confusable.contains(&e.effect));
+            |e: &twinlag::NamedEffect| own().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()));
         let is_confident = answer.verdict == Verdict::Explained;
         outcome.event(WRONG, is_confident && first.is_some_and(|e| e.alternatives.is_empty() && !looks_like(e)));
         // The scatter that is due: that of the same estimator where it is told which effects there are.

@@ -13,26 +13,26 @@ use super::{Case, case};
 const CASES: &[Case<Diagnosis>] = &[
     case("block100/run_004.csv", ["ref_C", "dut_C"], "", |answer| {
         calibration(answer, 0.9955, -0.169)?;
-        parameter(answer, Identifier::Calibration, "curvature").map(|_| ())
+        parameter(answer, Identifier::CALIBRATION, "curvature").map(|_| ())
     }),
     case("block100/run_010_DS18B20_ORG.csv", ["ref_C", "dut_C"], "", |answer| {
         calibration(answer, 0.9950, -0.221)?;
-        parameter(answer, Identifier::Calibration, "curvature").map(|_| ())
+        parameter(answer, Identifier::CALIBRATION, "curvature").map(|_| ())
     }),
     case("block100/run_012b.csv", ["ref2_C", "dut_C"], "", |answer| calibration(answer, 0.9907, 0.056)),
     case("seaexplorer_sea046/dive12_1hz.csv", ["T1_gpctd_C", "T2_arod_C"], "", rejected),
     case("seaexplorer_sea046/dive12_1hz.csv", ["T1_gpctd_C", "T2_arod_C"], "T1.time_constant_s=0.5", rejected),
     case("seaglider_sg542/dive305.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "", rejected),
     case("seaglider_sg542/dive305.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "T1.time_constant_s=0.6", |answer| {
-        let share = parameter(answer, Identifier::SlowMode, "share")?;
-        let tau_s = parameter(answer, Identifier::SlowMode, "slow_time_constant")?;
+        let share = parameter(answer, Identifier::SLOW_MODE, "share")?;
+        let tau_s = parameter(answer, Identifier::SLOW_MODE, "slow_time_constant")?;
         ensure!((0.02..0.06).contains(&share), "the slow mode has a share of {share}");
         ensure!((450.0..800.0).contains(&tau_s), "the slow mode has {tau_s} s");
         Ok(())
     }),
     case("seaglider_sg542/dive306.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "", rejected),
     case("seaglider_sg542/dive306.csv", ["T1_ct_raw_C", "T2_aa4330_C"], "T1.time_constant_s=0.6", |answer| {
-        parameter(answer, Identifier::SlowMode, "share").map(|_| ())
+        parameter(answer, Identifier::SLOW_MODE, "share").map(|_| ())
     }),
     case("ctd911/g01mcan03c.csv", ["T1_t090_C", "T2_t190_C"], "", |answer| {
         let claimed = answer.last.sensors.iter().any(|s| s.time_constant_s.is_some());
@@ -42,7 +42,7 @@ const CASES: &[Case<Diagnosis>] = &[
         Ok(())
     }),
     case("sp_column_fire/Diesel_1p1.csv", ["tc025_3m_C", "pt_3m_C"], "", |answer| {
-        let exponent = parameter(answer, Identifier::TemperatureDependentTimeConstant, "exponent")?;
+        let exponent = parameter(answer, Identifier::TEMPERATURE_DEPENDENT_TIME_CONSTANT, "exponent")?;
         ensure!(exponent < 0.0, "the plate's time constant grows with temperature: {exponent}");
         Ok(())
     }),
@@ -66,9 +66,9 @@ fn parameter(answer: &Diagnosis, effect: Identifier, name: &str) -> Result<f64> 
 }
 
 fn calibration(answer: &Diagnosis, gain: f64, offset_k: f64) -> Result<()> {
-    let got = parameter(answer, Identifier::Calibration, "gain")?;
+    let got = parameter(answer, Identifier::CALIBRATION, "gain")?;
     ensure!((got - gain).abs() <= 0.003, "gain {got}, the plateaus have {gain} ± 0.003");
-    let got = parameter(answer, Identifier::Calibration, "offset")?;
+    let got = parameter(answer, Identifier::CALIBRATION, "offset")?;
     ensure!((got - offset_k).abs() <= 0.1, "offset {got} K, the plateaus have {offset_k} ± 0.1 K");
     Ok(())
 }

@@ -1,19 +1,30 @@
 //! Relative calibration: `y₂ = g T + o` in units of channel 1, and a static curvature beside the straight line, with as many of the
 //! three as the data support.
 
-use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Shared};
-use crate::plant::{Curvature, Plant};
 use std::sync::Arc;
+
+use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
-pub const ABOUT: About = About {
-    name: "calibration",
-    explanation: "the two channels do not agree when everything is at rest: gain, offset or curvature of one against the other",
-    advice: "calibrate both sensors against each other at two or three steady temperatures; check reference junctions and \
-             types of thermocouple wire",
-    confusable: &[Identifier::Radiation, Identifier::Drift],
-    unseen: "gain and offset that both channels share",
+use crate::effect::{
+    About, Context, Derived, Domain, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by,
 };
+use crate::error::DiagnoseError;
+use crate::number::{Curve, Number};
+use crate::plant::Plant;
+use crate::settings::KnownEffect;
+
+pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
+    .in_words(
+        "the two channels do not agree when everything is at rest: gain, offset or curvature of one against the other",
+        "calibrate both sensors against each other at two or three steady temperatures; check reference junctions and \
+             types of thermocouple wire",
+        "gain and offset that both channels share",
+    )
+    .imitating(&["radiation", "drift"])
+    .at_rest()
+    .streamable()
+    .restored_by(restore);
 
 /// Which of them are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,11 +37,11 @@ enum Kind {
 
 struct Calibration {
     kind: Kind,
-    parameters: Vec<Parameter>,
+    seat: Seat,
     context: Context,
 }
 
-pub fn candidates(context: &Context) -> Vec<Shared> {
+fn candidates(context: &Context) -> Vec<Shared> {
     [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved].into_iter().map(|kind| of_kind(kind, context)).collect()
 }
 
@@ -39,8 +50,11 @@ fn of_kind(kind: Kind, context: &Context) -> Shared {
     let widest = 10.0 * context.swing_k + (m1 - m2).abs() + m1.abs().max(m2.abs());
     // Solvers take steps of a few of these: an offset at 0 °C goes far where the gain changes a little.
     let typical_k = context.typical_k(1);
-    let offset = Parameter::new("offset", "K", Variable::linear("offset", typical_k, -widest, widest));
-    let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.03, 0.2, 5.0));
+    let offset = Parameter::new("offset", "K", Variable::linear("offset", typical_k, -widest, widest))
+        .determining(Freedom::Offset);
+    let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.03, 0.2, 5.0))
+        .within(Domain::NotZero)
+        .determining(Freedom::Gain);
     let bend = 0.3 / (4.0 * context.swing_k);
     let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-2 * bend, -bend, bend));
     let parameters = match kind {
@@ -49,20 +63,20 @@ fn of_kind(kind: Kind, context: &Context) -> Shared {
         Kind::Both => vec![gain, offset],
         Kind::Curved => vec![gain, offset, curvature],
     };
-    Arc::new(Calibration { kind, parameters, context: context.clone() })
+    let seat = Seat::new(Identifier::CALIBRATION, Some(1), parameters);
+    Arc::new(Calibration { kind, seat, context: context.clone() })
+}
+
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+    // A curvature is meant about the temperatures of the record that it was found in.
+    let names = ["curvature_about", "curvature_variance", "curvature_skew"];
+    let moments = [0, 1, 2].map(|i| known.parameter(names[i]).unwrap_or(context.moments[i]));
+    Ok(described_by(known, candidates(&Context { moments, ..context.clone() })))
 }
 
 impl Effect for Calibration {
-    fn identifier(&self) -> Identifier {
-        Identifier::Calibration
-    }
-
-    fn channel(&self) -> Option<usize> {
-        Some(1)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn seat(&self) -> &Seat {
+        &self.seat
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -76,7 +90,7 @@ impl Effect for Calibration {
         }
     }
 
-    fn grown(&self, values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+    fn extended(&self, values: &[f64]) -> Option<(Shared, Vec<f64>)> {
         let (kind, start) = match self.kind {
             Kind::Offset => (Kind::Both, vec![1.0, values[0]]),
             Kind::Gain => (Kind::Both, vec![values[0], 0.0]),
@@ -86,7 +100,7 @@ impl Effect for Calibration {
         Some((of_kind(kind, &self.context), start))
     }
 
-    fn install(&self, values: &[f64], plant: &mut Plant) {
+    fn install(&self, values: &[Number], plant: &mut Plant) {
         let reading = &mut plant.sensors[1].reading;
         match self.kind {
             Kind::Offset => reading.offset_k += values[0],
@@ -97,28 +111,37 @@ impl Effect for Calibration {
             }
         }
         if self.kind == Kind::Curved {
-            reading.curvature = Some(Curvature { per_k: values[2], moments: self.context.moments });
+            reading.straighten = Some(straighten(values[2], self.context.moments));
         }
     }
 
     fn derived(&self) -> Vec<Derived> {
         let [mean_c, variance_k2, skew_k] = self.context.moments;
-        let about = |name, unit, value| Derived { name, unit, of: Box::new(move |_| value) };
         match self.kind {
             Kind::Curved => vec![
-                about("curvature_about", "°C", mean_c),
-                about("curvature_variance", "K²", variance_k2),
-                about("curvature_skew", "K", skew_k),
+                Derived::constant("curvature_about", "°C", mean_c),
+                Derived::constant("curvature_variance", "K²", variance_k2),
+                Derived::constant("curvature_skew", "K", skew_k),
             ],
             _ => Vec::new(),
         }
     }
+}
 
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        match self.kind {
-            Kind::Offset => vec![(0, 0.0)],
-            Kind::Gain => vec![(0, 1.0)],
-            Kind::Both | Kind::Curved => vec![(0, 1.0), (1, 0.0)],
-        }
-    }
+/// Least square of the slope of the characteristic: flatter than a fifth, a reading has no temperature any more.
+const MIN_SQUARED_SLOPE: f64 = 0.04;
+
+/// The temperature that a characteristic `T + κ ((T − m)² − v − c (T − m))` reads as `r`.
+///
+/// With mean `m`, variance `v` and third moment over variance `c` of the record's temperatures, gain and offset stay
+/// those of the straight line through the record whatever the curvature `κ`, 1/K, is.
+fn straighten(per_k: Number, [mean_c, variance_k2, skew_k]: [f64; 3]) -> Curve {
+    Arc::new(move |reading_c| {
+        // (1 − κ c) d + κ d² = r − m + κ v, d = T − m: the root near the reading.
+        let linear = -per_k * skew_k + 1.0;
+        let from = reading_c - mean_c + per_k * variance_k2;
+        let square = linear * linear + per_k * from * 4.0;
+        let root = if square.re < MIN_SQUARED_SLOPE { Number::from(MIN_SQUARED_SLOPE) } else { square }.sqrt();
+        (from * 2.0 / (linear + root) + mean_c, root.recip())
+    })
 }

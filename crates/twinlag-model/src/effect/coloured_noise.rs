@@ -1,77 +1,71 @@
 //! Noise of one reading that is not white: autoregressive of first order beside the white noise.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
-use crate::plant::{Extra, Place, Plant};
 use std::sync::Arc;
+
 use twinlag_optimise::Variable;
 
-pub const ABOUT: About = About {
-    name: "coloured-noise",
-    explanation: "one channel has noise that lasts from sample to sample: an amplifier, a filter, electromagnetic interference",
-    advice: "nothing is wrong with the sensors; the weights and intervals take it into account. A better amplifier lowers it",
-    confusable: &[Identifier::InputMismatch, Identifier::Drift],
-    unseen: "which channel slow noise belongs to, where both sensors follow it",
-};
+use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared};
+use crate::number::Number;
+use crate::plant::{Extra, Place, Plant};
+
+pub(crate) static ABOUT: About = About::new("coloured-noise", 13, candidates)
+    .in_words(
+        "one channel has noise that lasts from sample to sample: an amplifier, a filter, electromagnetic interference",
+        "nothing is wrong with the sensors; the weights and intervals take it into account. A better amplifier lowers it",
+        "which channel slow noise belongs to, where both sensors follow it",
+    )
+    .imitating(&["input-mismatch", "drift"])
+    .of_noise()
+    .streamable();
 
 struct ColouredNoise {
     channel: usize,
-    parameters: Vec<Parameter>,
+    seat: Seat,
     step_s: f64,
     noise_std_k: f64,
 }
 
 /// Shortest correlation, of a step: what lasts shorter is white.
-pub const SHORTEST: f64 = 1.0;
+pub(crate) const MIN_CORRELATION_STEPS: f64 = 1.0;
 /// Longest correlation, of the record: what lasts longer is a drift.
-pub const LONGEST: f64 = 0.05;
+pub(crate) const MAX_CORRELATION_SPANS: f64 = 0.05;
 
 /// Parameters of extra noise: its standard deviation, how long it lasts.
-pub fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
+pub(super) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
     vec![
         Parameter::new("noise_std", "K", Variable::logarithmic("noise std", 1e-3 * typical_k, 10.0 * context.swing_k)),
         Parameter::new(
             "correlation_time",
             "s",
-            Variable::logarithmic("correlation time", SHORTEST * context.step_s, LONGEST * context.span_s()),
+            Variable::logarithmic("correlation time", MIN_CORRELATION_STEPS * context.step_s, MAX_CORRELATION_SPANS * context.span_s()),
         ),
     ]
 }
 
-pub fn candidates(context: &Context) -> Vec<Shared> {
+fn candidates(context: &Context) -> Vec<Shared> {
     if !context.is_even {
         return Vec::new();
     }
     (0..2)
         .map(|channel| {
             let noise_std_k = context.noise_std_k[channel];
-            let parameters = extra(context, noise_std_k);
-            Arc::new(ColouredNoise { channel, parameters, step_s: context.step_s, noise_std_k }) as Shared
+            let seat = Seat::new(Identifier::COLOURED_NOISE, Some(channel), extra(context, noise_std_k));
+            Arc::new(ColouredNoise { channel, seat, step_s: context.step_s, noise_std_k }) as Shared
         })
         .collect()
 }
 
 impl Effect for ColouredNoise {
-    fn identifier(&self) -> Identifier {
-        Identifier::ColouredNoise
-    }
-
-    fn channel(&self) -> Option<usize> {
-        Some(self.channel)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn seat(&self) -> &Seat {
+        &self.seat
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
         [3.0, 20.0].into_iter().map(|steps| vec![self.noise_std_k, steps * self.step_s]).collect()
     }
 
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.extra.push(Extra { place: Place::Reading(self.channel), std_k: values[0], correlation_s: values[1] });
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        vec![(0, 0.0)]
+    fn install(&self, values: &[Number], plant: &mut Plant) {
+        let [std_k, correlation_s] = [values[0].re, values[1].re];
+        plant.extra.push(Extra { place: Place::Reading(self.channel), std_k, correlation_s });
     }
 }

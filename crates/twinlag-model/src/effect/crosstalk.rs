@@ -5,68 +5,67 @@
 //! tells it from a gain of `1 + ε` and another `τ₂`. If the share takes the place of a part of the reading, so that the static gain
 //! stays 1, it is a wrong `τ₂` and nothing else, and cannot be seen at all.
 
-use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Shared};
-use crate::plant::Plant;
 use std::sync::Arc;
+
 use twinlag_optimise::Variable;
 
-pub const ABOUT: About = About {
-    name: "crosstalk",
-    explanation: "a share of one channel's reading is the other's: wires that touch, a multiplexer that has not settled",
-    advice: "separate the wires, lower the source impedance, let the multiplexer settle longer",
-    confusable: &[Identifier::Calibration, Identifier::SlowMode],
-    unseen: "crosstalk that takes the place of a part of the reading: with it one time constant is a mixture of both",
-};
+use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
+use crate::error::DiagnoseError;
+use crate::number::Number;
+use crate::plant::Plant;
+use crate::settings::KnownEffect;
+
+pub(crate) static ABOUT: About = About::new("crosstalk", 8, candidates)
+    .in_words(
+        "a share of one channel's reading is the other's: wires that touch, a multiplexer that has not settled",
+        "separate the wires, lower the source impedance, let the multiplexer settle longer",
+        "crosstalk that takes the place of a part of the reading: with it one time constant is a mixture of both",
+    )
+    .imitating(&["calibration", "slow-mode"])
+    .excluding(&["calibration"])
+    .restored_by(restore);
 
 /// Largest share: of more, wires are not crossed but swapped.
-const LARGEST: f64 = 0.25;
+const MAX_SHARE: f64 = 0.25;
 
 struct Crosstalk {
     channel: usize,
     /// Temperature of the other channel that adds nothing, °C.
     about_c: f64,
-    parameters: Vec<Parameter>,
+    seat: Seat,
 }
 
-pub fn candidates(context: &Context) -> Vec<Shared> {
-    let mut out = Vec::new();
-    for channel in 0..2 {
-        let share = Parameter::new("share", "1", Variable::linear("share", 0.03, -LARGEST, LARGEST));
-        for about_c in [0.0, context.mean_c[1 - channel]] {
-            out.push(Arc::new(Crosstalk { channel, about_c, parameters: vec![share.clone()] }) as Shared);
-        }
-    }
-    out
+fn candidates(context: &Context) -> Vec<Shared> {
+    let both = |channel: usize| [0.0, context.mean_c[1 - channel]].map(|about_c| about(channel, about_c));
+    (0..2).flat_map(both).collect()
+}
+
+fn about(channel: usize, about_c: f64) -> Shared {
+    let variable = Variable::linear("share", 0.03, -MAX_SHARE, MAX_SHARE);
+    let share = Parameter::new("share", "1", variable).within(Domain::Share);
+    Arc::new(Crosstalk { channel, about_c, seat: Seat::new(Identifier::CROSSTALK, Some(channel), vec![share]) })
+}
+
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+    let neutral_c = |channel: usize| known.parameter("neutral_temperature").unwrap_or(context.mean_c[1 - channel]);
+    Ok(described_by(known, (0..2).map(|channel| about(channel, neutral_c(channel))).collect()))
 }
 
 impl Effect for Crosstalk {
-    fn identifier(&self) -> Identifier {
-        Identifier::Crosstalk
-    }
-
-    fn channel(&self) -> Option<usize> {
-        Some(self.channel)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn seat(&self) -> &Seat {
+        &self.seat
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
         vec![vec![0.03]]
     }
 
-    fn install(&self, values: &[f64], plant: &mut Plant) {
+    fn install(&self, values: &[Number], plant: &mut Plant) {
         let reading = &mut plant.sensors[self.channel].reading;
         (reading.crosstalk, reading.crosstalk_about_c) = (values[0], self.about_c);
     }
 
     fn derived(&self) -> Vec<Derived> {
-        let about_c = self.about_c;
-        vec![Derived { name: "neutral_temperature", unit: "°C", of: Box::new(move |_| about_c) }]
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        vec![(0, 0.0)]
+        vec![Derived::constant("neutral_temperature", "°C", self.about_c)]
     }
 }

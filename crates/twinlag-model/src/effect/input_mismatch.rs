@@ -1,33 +1,39 @@
 //! Sensors that do not see the same gas: a difference of the gas temperatures that is independent of them, autoregressive of
 //! first order.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared, coloured_noise};
-use crate::plant::{Extra, Place, Plant};
 use std::sync::Arc;
 
-pub const ABOUT: About = About {
-    name: "input-mismatch",
-    explanation: "the two sensors do not see the same gas: eddies smaller than their distance, a wake, a gradient",
-    advice: "mount the junctions closer together, across the flow, away from walls; the weights and intervals take it into \
+use super::coloured_noise;
+use crate::effect::{About, Context, Effect, Identifier, Seat, Shared};
+use crate::number::Number;
+use crate::plant::{Extra, Place, Plant};
+
+pub(crate) static ABOUT: About = About::new("input-mismatch", 14, candidates)
+    .in_words(
+        "the two sensors do not see the same gas: eddies smaller than their distance, a wake, a gradient",
+        "mount the junctions closer together, across the flow, away from walls; the weights and intervals take it into \
              account",
-    confusable: &[Identifier::ColouredNoise],
-    unseen: "what both sensors see and the gas elsewhere does not",
-};
+        "what both sensors see and the gas elsewhere does not",
+    )
+    .imitating(&["coloured-noise"])
+    .of_noise()
+    .streamable();
 
 struct InputMismatch {
-    parameters: Vec<Parameter>,
+    seat: Seat,
     step_s: f64,
     tau_s: f64,
     swing_k: f64,
 }
 
-pub fn candidates(context: &Context) -> Vec<Shared> {
+fn candidates(context: &Context) -> Vec<Shared> {
     if !context.is_even {
         return Vec::new();
     }
     let tau_s = context.tau_s[0].min(context.tau_s[1]).clamp(2.0 * context.step_s, 0.1 * context.span_s());
+    let parameters = coloured_noise::extra(context, 0.01 * context.swing_k);
     vec![Arc::new(InputMismatch {
-        parameters: coloured_noise::extra(context, 0.01 * context.swing_k),
+        seat: Seat::new(Identifier::INPUT_MISMATCH, None, parameters),
         step_s: context.step_s,
         tau_s,
         swing_k: context.swing_k,
@@ -35,16 +41,8 @@ pub fn candidates(context: &Context) -> Vec<Shared> {
 }
 
 impl Effect for InputMismatch {
-    fn identifier(&self) -> Identifier {
-        Identifier::InputMismatch
-    }
-
-    fn channel(&self) -> Option<usize> {
-        None
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn seat(&self) -> &Seat {
+        &self.seat
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -54,11 +52,8 @@ impl Effect for InputMismatch {
             .collect()
     }
 
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        plant.extra.push(Extra { place: Place::Gas, std_k: values[0], correlation_s: values[1] });
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        vec![(0, 0.0)]
+    fn install(&self, values: &[Number], plant: &mut Plant) {
+        let [std_k, correlation_s] = [values[0].re, values[1].re];
+        plant.extra.push(Extra { place: Place::Gas, std_k, correlation_s });
     }
 }

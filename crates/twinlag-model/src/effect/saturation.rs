@@ -2,10 +2,9 @@
 
 use crate::effect::About;
 
-pub const ABOUT: About = About {
-    name: "saturation",
-    explanation: "one channel sticks at an end of its range: the amplifier or the converter is at its limit",
-    advice: "widen the input range; the readings at the limit are left out of the fit",
-    confusable: &[],
-    unseen: "what the temperature was beyond the limit, except as the other sensor tells",
-};
+pub(crate) static ABOUT: About = About::defect("saturation", 0)
+    .in_words(
+        "one channel sticks at an end of its range: the amplifier or the converter is at its limit",
+        "widen the input range; the readings at the limit are left out of the fit",
+        "what the temperature was beyond the limit, except as the other sensor tells",
+    );

@@ -2,27 +2,44 @@
 //! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_mean)^p`
 //! with the geometric mean of its velocity or density, at which `τᵢ` is then what is found.
 
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Shared};
-use crate::flow::Flow;
-use crate::plant::{Modulation, Plant};
-use crate::spline::Spline;
 use std::sync::Arc;
+
+use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
-pub const ABOUT: About = About {
-    name: "varying-time-constant",
-    explanation: "both time constants change along the record by the same share, as they do when the flow changes",
-    advice: "log the flow velocity, or take records at steady flow",
-    confusable: &[Identifier::TemperatureDependentTimeConstant],
-    unseen: "which of the two a change of their ratio belongs to",
-};
+use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared, described_by};
+use crate::error::DiagnoseError;
+use crate::flow::Flow;
+use crate::number::{Number, TimeFunction};
+use crate::plant::Plant;
+use crate::settings::KnownEffect;
+use crate::spline::{Spline, on_knots};
 
-/// Coefficients that it is looked for with.
-const FIRST: usize = 12;
-/// Those of a change of the ratio.
-pub const RATIO: usize = 4;
-/// Those that are tried once it is found.
-const SIZES: [usize; 4] = [3, 5, 8, 19];
+pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
+    .in_words(
+        "both time constants change along the record by the same share, as they do when the flow changes",
+        "log the flow velocity, or take records at steady flow",
+        "which of the two a change of their ratio belongs to",
+    )
+    .imitating(&["temperature-dependent-time-constant"])
+    .changing_time_constants()
+    .restored_by(restore);
+
+/// Coefficients that a change is looked for with: enough for six swings along the record.
+const FIRST_SIZE: usize = 12;
+/// Numbers of coefficients that are tried once it is found.
+const OTHER_SIZES: [usize; 4] = [3, 5, 8, 19];
+/// Coefficients of a change of the ratio.
+pub(crate) const RATIO_SIZE: usize = 4;
+/// Samples for each coefficient of a spline.
+pub(crate) const SAMPLES_PER_COEFFICIENT: usize = 60;
+/// Most coefficients of a spline.
+pub(crate) const MAX_COEFFICIENTS: usize = NAMES.len();
+const NAMES: [&str; 32] = [
+    "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17", "m18",
+    "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
+];
+const RATIO_NAMES: [&str; RATIO_SIZE] = ["ratio1", "ratio2", "ratio3", "ratio4"];
 
 /// What `m` is a function of.
 enum Of {
@@ -30,7 +47,8 @@ enum Of {
     Time {
         ends_s: [f64; 2],
         samples: usize,
-        /// Strength of the white noise that its curvature is beforehand, by which it is smooth; `None` for one that need not be.
+        /// Strength of the white noise that its curvature is beforehand, by which it is smooth; `None` for one that
+        /// need not be.
         curvature: Option<f64>,
     },
     /// A measured flow.
@@ -43,77 +61,92 @@ enum Of {
 
 struct Varying {
     of: Of,
-    parameters: Vec<Parameter>,
+    seat: Seat,
 }
 
-pub fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
+impl Varying {
+    fn shared(of: Of, names: &[&'static str], largest: f64) -> Shared {
+        let channel = matches!(of, Of::Ratio { .. }).then_some(1);
+        let share = |name: &&'static str| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, largest));
+        let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, channel, names.iter().map(share).collect());
+        Arc::new(Self { of, seat })
+    }
+}
+
+/// A smooth change of `size` coefficients; none where the record is too short for them.
+pub(crate) fn of_size(size: usize, ends_s: [f64; 2], samples: usize) -> Option<Shared> {
     of_time(size, ends_s, samples, None)
 }
 
-/// A spline of `size` coefficients whose second derivative by the record's share is white noise of the strength `curvature`
-/// beforehand, that is, `∫ m''² du / curvature²` is added to the energy. For [`crate::track()`].
-pub fn smooth(size: usize, ends_s: [f64; 2], samples: usize, curvature: f64) -> Option<Shared> {
+/// A spline of `size` coefficients whose second derivative by the record's share is white noise of the strength
+/// `curvature` beforehand: `∫ m''² du / curvature²` is added to the energy. For [`crate::track()`].
+pub(crate) fn smooth(size: usize, ends_s: [f64; 2], samples: usize, curvature: f64) -> Option<Shared> {
     of_time(size, ends_s, samples, Some(curvature))
 }
 
 fn of_time(size: usize, ends_s: [f64; 2], samples: usize, curvature: Option<f64>) -> Option<Shared> {
-    const NAMES: [&str; 32] = [
-        "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
-        "m18", "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
-    ];
-    let parameters =
-        NAMES[..size].iter().map(|name| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, 3.0))).collect();
-    (60 * size <= samples)
-        .then(|| Arc::new(Varying { of: Of::Time { ends_s, samples, curvature }, parameters }) as Shared)
+    (SAMPLES_PER_COEFFICIENT * size <= samples)
+        .then(|| Varying::shared(Of::Time { ends_s, samples, curvature }, &NAMES[..size], 3.0))
 }
 
 /// A step at an instant, for [`crate::track()`]: the search knows smooth changes alone.
-pub fn step(at_s: f64) -> Shared {
-    let parameters = vec![Parameter::new("change", "1", Variable::linear("change", 0.05, -0.9, 9.0))];
-    Arc::new(Varying { of: Of::Step { at_s }, parameters })
+pub(crate) fn step(at_s: f64) -> Shared {
+    Varying::shared(Of::Step { at_s }, &["change"], 9.0)
 }
 
-/// A smooth change of the ratio of both time constants, of [`RATIO`] coefficients, for its test.
-pub fn ratio(ends_s: [f64; 2]) -> Shared {
-    let names: [&str; RATIO] = ["ratio1", "ratio2", "ratio3", "ratio4"];
-    let parameters = names.map(|name| Parameter::new(name, "1", Variable::linear(name, 0.05, -0.9, 3.0)));
-    Arc::new(Varying { of: Of::Ratio { ends_s }, parameters: parameters.to_vec() })
+/// A smooth change of the ratio of both time constants, for its test.
+pub(crate) fn ratio(ends_s: [f64; 2]) -> Shared {
+    Varying::shared(Of::Ratio { ends_s }, &RATIO_NAMES, 3.0)
 }
 
-pub fn candidates(context: &Context) -> Vec<Shared> {
+fn candidates(context: &Context) -> Vec<Shared> {
     let of_flow = context.flow.as_ref().map(|flow| {
-        let parameters = vec![Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0))];
-        Arc::new(Varying { of: Of::Flow(flow.clone()), parameters }) as Shared
+        let exponent = Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0));
+        let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, None, vec![exponent]);
+        Arc::new(Varying { of: Of::Flow(flow.clone()), seat }) as Shared
     });
-    of_size(FIRST, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
+    of_size(FIRST_SIZE, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
+}
+
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+    if known.parameter("exponent").is_some() && context.flow.is_none() {
+        return Err(DiagnoseError::NeedsFlow);
+    }
+    Ok(described_by(known, candidates(context)))
 }
 
 impl Effect for Varying {
-    fn identifier(&self) -> Identifier {
-        Identifier::VaryingTimeConstant
-    }
-
-    fn channel(&self) -> Option<usize> {
-        matches!(self.of, Of::Ratio { .. }).then_some(1)
-    }
-
-    fn parameters(&self) -> &[Parameter] {
-        &self.parameters
+    fn seat(&self) -> &Seat {
+        &self.seat
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.0; self.parameters.len()]]
+        vec![vec![0.0; self.seat.parameters.len()]]
     }
 
-    fn install(&self, values: &[f64], plant: &mut Plant) {
-        match &self.of {
-            Of::Time { ends_s: [first_s, last_s], .. } => {
-                plant.modulation = Some(Modulation::Spline(Spline::new(*first_s, *last_s, values)));
+    fn install(&self, values: &[Number], plant: &mut Plant) {
+        let change: TimeFunction = match &self.of {
+            Of::Time { ends_s: [first_s, last_s], .. } | Of::Ratio { ends_s: [first_s, last_s] } => {
+                let spline = Spline::new(*first_s, *last_s, values);
+                Arc::new(move |time_s| spline.at(time_s))
             }
-            Of::Flow(of) => plant.modulation = Some(Modulation::Flow { exponent: values[0], of: of.clone() }),
-            Of::Step { at_s } => plant.modulation = Some(Modulation::Step { at_s: *at_s, change: values[0] }),
-            Of::Ratio { ends_s: [first_s, last_s] } => plant.ratio = Some(Spline::new(*first_s, *last_s, values)),
+            Of::Flow(flow) => {
+                let (exponent, flow) = (values[0], flow.clone());
+                Arc::new(move |time_s| (exponent * flow.log_ratio_at(time_s)).exp_m1())
+            }
+            Of::Step { at_s } => {
+                let (change, at_s) = (values[0], *at_s);
+                Arc::new(move |time_s| if time_s < at_s { Number::from(0.0) } else { change })
+            }
+        };
+        if !matches!(self.of, Of::Ratio { .. }) {
+            plant.sensors[0].changes.push(change.clone());
         }
+        plant.sensors[1].changes.push(change);
+    }
+
+    fn main(&self) -> Option<usize> {
+        (self.seat.parameters.len() == 1).then_some(0)
     }
 
     fn is_of_the_record(&self) -> bool {
@@ -121,27 +154,15 @@ impl Effect for Varying {
     }
 
     fn sizes(&self) -> Vec<Shared> {
-        match self.of {
-            Of::Time { ends_s, samples, .. } => {
-                SIZES.into_iter().filter_map(|size| of_size(size, ends_s, samples)).collect()
-            }
-            Of::Flow(_) | Of::Step { .. } | Of::Ratio { .. } => Vec::new(),
-        }
+        let Of::Time { ends_s, samples, .. } = self.of else { return Vec::new() };
+        OTHER_SIZES.into_iter().filter_map(|size| of_size(size, ends_s, samples)).collect()
     }
 
-    fn prior(&self, values: &[f64]) -> Vec<f64> {
+    fn prior(&self, values: &[Number]) -> Vec<Number> {
         let Of::Time { curvature: Some(curvature), .. } = self.of else { return Vec::new() };
-        let on_knots = crate::spline::on_knots(values);
         // Second differences over squares of the distance of knots, each for one such distance.
         let scale = (values.len() as f64).powf(1.5) / curvature;
-        on_knots.windows(3).map(|c| scale * (c[0] - 2.0 * c[1] + c[2])).collect()
-    }
-
-    fn neutral(&self) -> Vec<(usize, f64)> {
-        match self.of {
-            Of::Time { .. } | Of::Ratio { .. } => Vec::new(),
-            Of::Flow(_) | Of::Step { .. } => vec![(0, 0.0)],
-        }
+        on_knots(values).windows(3).map(|c| (c[0] - c[1] * 2.0 + c[2]) * scale).collect()
     }
 }
 
@@ -155,9 +176,9 @@ mod tests {
         let (size, curvature) = (10_usize, 3.0);
         let squares: Vec<f64> = (0..=size).map(|k| (k as f64 / size as f64).powi(2)).collect();
         let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        let values: Vec<f64> = squares[1..].iter().map(|v| v - mean).collect();
+        let values: Vec<Number> = squares[1..].iter().map(|v| Number::from(v - mean)).collect();
         let effect = smooth(size, [0.0, 5.0], 2500, curvature).expect("enough samples");
-        let got: f64 = effect.prior(&values).iter().map(|p| p * p).sum();
+        let got: f64 = effect.prior(&values).iter().map(|p| p.re * p.re).sum();
         let want = 4.0 * (size - 1) as f64 / size as f64 / (curvature * curvature);
         assert!((got - want).abs() < 1e-10, "got {got}, want {want}");
     }

@@ -1,0 +1,216 @@
+//! The whitened disagreement of a plant along a record, and its derivative with respect to one parameter: what a fit
+//! evaluates again and again, so it computes nothing else, and keeps its memory.
+//!
+//! The derivative is exact: the inverse is computed in numbers that carry it along. Where the parameter moves none of
+//! the rows that carry noise, as an offset does, the factor of the residual whitens the derivative as well.
+
+use crate::inverse::Inverse;
+use crate::number::{Number, Real};
+use crate::observations::{Observations, Stretch};
+use crate::plant::{Place, Plant};
+use crate::rows::Rows;
+use crate::whitening::{Factor, Source, Variance};
+
+/// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
+/// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
+const MASKED_NOISE_SWINGS: f64 = 20.0;
+/// Fewest disagreements of a stretch: one of fewer is left out.
+const MIN_DISAGREEMENTS: usize = 4;
+/// Part of a step by which the instant of a value may differ from its sample's.
+const SAME_INSTANT_STEPS: f64 = 0.25;
+
+/// Where the residuals of a stretch belong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Piece {
+    /// Which of the stretches.
+    pub(crate) stretch: usize,
+    /// Residuals of it.
+    pub(crate) count: usize,
+    /// The sample, counted through all stretches, in the middle of the first residual's reach.
+    pub(crate) first_sample: usize,
+}
+
+/// Variance of each reading of a stretch, K².
+#[derive(Clone, Debug)]
+pub(crate) enum ReadingVariance {
+    Same(f64),
+    /// Boundless, to all purposes, where a reading is masked.
+    Masked(Vec<f64>),
+}
+
+impl ReadingVariance {
+    pub(crate) fn of(noise_std_k: f64, masked: &[bool], swing_k: f64) -> Self {
+        let variance = noise_std_k * noise_std_k;
+        if !masked.contains(&true) {
+            return Self::Same(variance);
+        }
+        let boundless = (MASKED_NOISE_SWINGS * swing_k).powi(2);
+        Self::Masked(masked.iter().map(|m| if *m { boundless } else { variance }).collect())
+    }
+
+    pub(crate) fn as_variance(&self) -> Variance<'_> {
+        match self {
+            Self::Same(v) => Variance::Same(*v),
+            Self::Masked(all) => Variance::Each(all),
+        }
+    }
+}
+
+/// The disagreement of one stretch, ready to be whitened, in memory that is used again.
+#[derive(Clone, Debug)]
+pub(crate) struct Disagreement<T> {
+    pub(crate) inverse: Inverse<T>,
+    /// How noise of either reading enters.
+    pub(crate) reading_rows: [Rows<T>; 2],
+    /// How innovations of each extra noise enter.
+    pub(crate) extra_rows: Vec<Rows<T>>,
+    /// The disagreement, and then the residual.
+    pub(crate) values: Vec<T>,
+}
+
+impl<T: Real> Disagreement<T> {
+    pub(crate) fn empty() -> Self {
+        Self {
+            inverse: Inverse::empty(),
+            reading_rows: [Rows::identity(), Rows::identity()],
+            extra_rows: Vec::new(),
+            values: Vec::new(),
+        }
+    }
+
+    /// From the inverse of a stretch to its disagreement: the differences that whiten extra noise, and the rows.
+    pub(crate) fn compare(&mut self, plant: &Plant, step_s: f64) {
+        let has_gas = plant.extra.iter().any(|e| e.place == Place::Gas);
+        self.extra_rows.resize_with(plant.extra.len(), Rows::identity);
+        for (index, extra) in plant.extra.iter().enumerate() {
+            let rho = extra.rho(step_s);
+            let (before, rest) = self.extra_rows.split_at_mut(index);
+            match extra.place {
+                Place::Reading(i) => self.inverse.disagreement_rows(plant, i, &mut rest[0]),
+                Place::Gas => rest[0].copy(&self.inverse.gas.rows),
+            }
+            // Its innovations come with the next value; noise that is there already has one more difference.
+            rest[0].start += 1;
+            let count = self.inverse.count() - 1;
+            before.iter_mut().for_each(|rows| rows.difference(rho, count));
+            self.inverse.difference(rho, has_gas);
+        }
+        for (i, rows) in self.reading_rows.iter_mut().enumerate() {
+            self.inverse.disagreement_rows(plant, i, rows);
+        }
+        let [one, two] = &self.inverse.chains;
+        self.values.clear();
+        self.values.extend(one.value.iter().zip(&two.value).map(|(a, b)| *a - *b));
+    }
+
+    /// What brings noise in, of readings with `variances`.
+    pub(crate) fn sources<'a>(
+        &'a self,
+        plant: &Plant,
+        step_s: f64,
+        variances: &'a [ReadingVariance; 2],
+    ) -> Vec<Source<'a, T>> {
+        let readings = self.reading_rows.iter().zip(variances);
+        let readings = readings.map(|(rows, variance)| Source { rows, variance: variance.as_variance() });
+        let extra = self.extra_rows.iter().zip(&plant.extra).map(|(rows, extra)| {
+            let rho = extra.rho(step_s);
+            Source { rows, variance: Variance::Same(extra.std_k * extra.std_k * (1.0 - rho * rho)) }
+        });
+        readings.chain(extra).collect()
+    }
+
+    /// Whether no row has a derivative.
+    fn is_equally_noisy(&self) -> bool {
+        self.reading_rows.iter().chain(&self.extra_rows).all(Rows::is_constant)
+    }
+}
+
+/// Whether a stretch has disagreements under `plant`.
+pub(crate) fn is_long_enough(stretch: &Stretch, plant: &Plant, is_even: bool) -> bool {
+    stretch.len() >= plant.consumed(is_even) + MIN_DISAGREEMENTS
+}
+
+/// The sample of a stretch whose instant the first value of a disagreement has.
+pub(crate) fn first_sample(stretch: &Stretch, first_s: f64, step_s: f64) -> usize {
+    stretch.time_s.partition_point(|t| *t < first_s - SAME_INSTANT_STEPS * step_s)
+}
+
+/// Evaluates plants of one record, one after the other.
+pub(crate) struct Evaluator<'a> {
+    observations: &'a Observations,
+    variances: Vec<[ReadingVariance; 2]>,
+    plain: Disagreement<f64>,
+    moved: Disagreement<Number>,
+    factors: Vec<Factor<f64>>,
+    moved_factor: Factor<Number>,
+    /// Pieces of the last evaluation.
+    pub(crate) pieces: Vec<Piece>,
+    /// Its whitened residual.
+    pub(crate) residual: Vec<f64>,
+}
+
+impl<'a> Evaluator<'a> {
+    /// - `noise_std_k`: white noise of the channels, which all plants have
+    pub(crate) fn new(observations: &'a Observations, noise_std_k: [f64; 2]) -> Self {
+        let of_stretch =
+            |s: &Stretch| [0, 1].map(|i| ReadingVariance::of(noise_std_k[i], &s.masked[i], observations.swing_k()));
+        Self {
+            observations,
+            variances: observations.stretches.iter().map(of_stretch).collect(),
+            plain: Disagreement::empty(),
+            moved: Disagreement::empty(),
+            factors: Vec::new(),
+            moved_factor: Factor::empty(),
+            pieces: Vec::new(),
+            residual: Vec::new(),
+        }
+    }
+
+    /// The whitened residual of `plant`, into [`Self::residual`].
+    pub(crate) fn evaluate(&mut self, plant: &Plant) {
+        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
+        self.pieces.clear();
+        self.residual.clear();
+        let mut before = 0;
+        for (index, stretch) in self.observations.stretches.iter().enumerate() {
+            if is_long_enough(stretch, plant, period_s.is_some()) {
+                self.plain.inverse.invert(plant, stretch, period_s);
+                self.plain.compare(plant, step_s);
+                let count = self.plain.values.len();
+                let first_s = self.plain.inverse.chains[0].times_s()[0];
+                let first_sample = before + first_sample(stretch, first_s, step_s);
+                if self.factors.len() == self.pieces.len() {
+                    self.factors.push(Factor::empty());
+                }
+                let factor = &mut self.factors[self.pieces.len()];
+                factor.compute(&self.plain.sources(plant, step_s, &self.variances[index]), count);
+                factor.whiten(&mut self.plain.values);
+                self.pieces.push(Piece { stretch: index, count, first_sample });
+                self.residual.extend_from_slice(&self.plain.values);
+            }
+            before += stretch.len();
+        }
+    }
+
+    /// The derivative of the residual, into `out`, at the values of the plant that was evaluated last: `plant` has
+    /// them, with the derivatives of what the parameter moves.
+    pub(crate) fn derivative(&mut self, plant: &Plant, out: &mut Vec<f64>) {
+        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
+        out.clear();
+        for (piece, factor) in self.pieces.iter().zip(&self.factors) {
+            let stretch = &self.observations.stretches[piece.stretch];
+            self.moved.inverse.invert(plant, stretch, period_s);
+            self.moved.compare(plant, step_s);
+            let from = out.len();
+            if self.moved.is_equally_noisy() {
+                out.extend(self.moved.values.iter().map(|v| v.eps));
+                factor.whiten(&mut out[from..]);
+            } else {
+                let sources = self.moved.sources(plant, step_s, &self.variances[piece.stretch]);
+                self.moved_factor.compute(&sources, self.moved.values.len());
+                self.moved_factor.whiten(&mut self.moved.values);
+                out.extend(self.moved.values.iter().map(|v| v.eps));
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! What candidates are made from.
+
+use std::sync::Arc;
+
+use crate::flow::Flow;
+
+/// What is known of a record, and of the model so far, when effects are looked for.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Context {
+    /// Ends of the record, s.
+    pub ends_s: [f64; 2],
+    /// Mean time from sample to sample, s.
+    pub step_s: f64,
+    /// Whether samples are evenly spaced.
+    pub is_even: bool,
+    /// Number of samples.
+    pub samples: usize,
+    /// Samples that a delay may reach.
+    pub reach: usize,
+    /// Mean of each channel, °C.
+    pub mean_c: [f64; 2],
+    /// Mean in °C, variance in K², and third central moment over variance in K, of the mean of both channels.
+    pub moments: [f64; 3],
+    /// Standard deviation of the livelier channel, K.
+    pub swing_k: f64,
+    /// White noise of the channels, K.
+    pub noise_std_k: [f64; 2],
+    /// Channels whose converter is coarse beside the noise.
+    pub is_coarse: [bool; 2],
+    /// Time constants of the model so far, s.
+    pub tau_s: [f64; 2],
+    /// Flow, where it was measured and changes.
+    pub flow: Option<Arc<Flow>>,
+    /// Lines that stand out of the residual: frequency in Hz, and the channel that shows them, 0 or 1.
+    pub lines: Vec<(f64, usize)>,
+}
+
+/// Share of the swing that a step of a solver may change a temperature by.
+const TYPICAL_SWING_SHARE: f64 = 0.1;
+/// The same where nothing moves, K.
+const LEAST_TYPICAL_K: f64 = 1e-9;
+
+impl Context {
+    /// A temperature that a step of a solver may change, K: not so small that a large offset is far away.
+    pub fn typical_k(&self, channel: usize) -> f64 {
+        (TYPICAL_SWING_SHARE * self.swing_k).max(self.noise_std_k[channel]).max(LEAST_TYPICAL_K)
+    }
+
+    /// Time from the first to the last sample, s.
+    pub fn span_s(&self) -> f64 {
+        self.ends_s[1] - self.ends_s[0]
+    }
+}

@@ -1,0 +1,198 @@
+//! Least-squares fits of a model to the whitened disagreement.
+
+use twinlag_optimise::{Budget, End, Fit, Minimiser, Optimiser, Problem};
+
+use crate::cost::{Linearised, ResidualCost};
+use crate::dense;
+use crate::model::Model;
+use crate::observations::Observations;
+use crate::selection::Selection;
+
+/// Parameters whose second derivatives are taken. Those of many, all of one effect, are given by products of first
+/// ones: what second ones add is of the time constants.
+const MAX_EXACT_CURVATURES: usize = 7;
+/// Step of second derivatives, in standard errors of a parameter: derivatives of the gradient over it average the
+/// curvature where the parameter may be.
+const CURVATURE_STEP_SE: f64 = 0.3;
+/// Time constants of the grid for each sensor.
+const GRID_POINTS: usize = 7;
+/// Shortest of them, in sample periods, and longest, in lengths of the record.
+const GRID_MIN_STEPS: f64 = 1.5;
+const GRID_MAX_SPANS: f64 = 0.1;
+/// Iterations, and the relative step at which a fit ends: to be ranked, and to the end.
+const LOOK: (u64, f64) = (10, 2e-2);
+const FINISH: (u64, f64) = (40, 1e-4);
+/// Evaluations for each iteration.
+const EVALUATIONS_PER_ITERATION: u64 = 4;
+
+/// How hard a fit tries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// Enough to rank it.
+    Look,
+    /// To the end.
+    Finish,
+}
+
+/// A fitted model.
+#[derive(Clone)]
+pub struct Fitted {
+    /// The model.
+    pub model: Model,
+    /// Its parameters.
+    pub theta: Vec<f64>,
+    /// Energy of the residuals that count, as the fit weighs frequencies.
+    pub chi2: f64,
+    /// Their number, as the fit weighs frequencies.
+    pub count: f64,
+    /// How the fit ended.
+    pub end: End,
+    /// The report of the solver.
+    pub report: Fit,
+}
+
+impl Fitted {
+    /// This fit with parameters in their conventional order, where the model is the same for several.
+    #[must_use]
+    pub fn in_order(mut self) -> Self {
+        let is_free = |sensor: usize| self.model.known.iter().all(|k| k.sensor != sensor);
+        for (index, effect) in self.model.effects.iter().enumerate() {
+            if effect.channel().is_some_and(is_free) {
+                let range = self.model.range(index);
+                let (tau_s, rest) = self.theta.split_at_mut(2);
+                effect.order(&mut rest[range.start - 2..range.end - 2], tau_s);
+            }
+        }
+        self
+    }
+
+    /// Model and parameters without effect `index`.
+    pub fn without(&self, index: usize) -> (Model, Vec<f64>) {
+        let mut theta = self.theta.clone();
+        theta.drain(self.model.range(index));
+        (self.model.without(index), theta)
+    }
+
+    /// Energy per residual that counts.
+    pub fn mean_energy(&self) -> f64 {
+        self.chi2 / self.count.max(1.0)
+    }
+}
+
+impl Model {
+    /// The fit from `start`, noise parameters held.
+    pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
+        let cost = ResidualCost::new(self, start, observations, selection);
+        let (iterations, step_tolerance) = match effort {
+            Effort::Look => LOOK,
+            Effort::Finish => FINISH,
+        };
+        let problem = Problem::new(&cost, cost.variables.clone());
+        let problem = problem.expect("bounds are in order and the time constants are free");
+        let budget = Budget { iterations, evaluations: EVALUATIONS_PER_ITERATION * iterations };
+        let fit = Optimiser::LevenbergMarquardt { step_tolerance }
+            .minimise(&problem, start, &budget)
+            .expect("the start is finite and there are derivatives");
+        let count = cost.count() as f64 * selection.weighting.mean();
+        Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
+    }
+
+    /// The energy at a point.
+    pub fn energy(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
+        ResidualCost::new(self, theta, observations, selection).energy(theta)
+    }
+
+    /// The best fit with effect values as given, from the best `most` points of a grid of time constants.
+    pub fn fit_over_grid(
+        &self,
+        rest: &[f64],
+        most: usize,
+        observations: &Observations,
+        selection: &Selection,
+    ) -> Fitted {
+        let (low_s, high_s) = (GRID_MIN_STEPS * observations.step_s(), GRID_MAX_SPANS * observations.span_s());
+        let at = |i: usize| low_s * (high_s / low_s).powf(i as f64 / (GRID_POINTS - 1) as f64);
+        let pairs = (0..GRID_POINTS).flat_map(|i| (0..GRID_POINTS).map(move |j| (i, j))).filter(|(i, j)| i != j);
+        let points: Vec<Vec<f64>> =
+            pairs.map(|(i, j)| [at(i), at(j)].into_iter().chain(rest.iter().copied()).collect()).collect();
+        let cost = ResidualCost::new(self, &points[0], observations, selection);
+        let mut starts: Vec<(f64, Vec<f64>)> = points.into_iter().map(|p| (cost.energy(&p), p)).collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Of either order the best.
+        let is_first_faster = |theta: &[f64]| theta[0] < theta[1];
+        let mut chosen: Vec<Vec<f64>> = starts.iter().take(most).map(|s| s.1.clone()).collect();
+        let order = is_first_faster(&chosen[0]);
+        if let Some(other) = starts.iter().find(|s| is_first_faster(&s.1) != order) {
+            chosen.push(other.1.clone());
+        }
+        chosen
+            .iter()
+            .map(|start| self.fit(start, observations, selection, Effort::Look))
+            .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+            .map(|best| self.fit(&best.theta, observations, selection, Effort::Finish))
+            .expect("at least one start")
+    }
+
+    /// Residual and its derivatives at a point, in units of the parameters, for the samples that count.
+    pub fn linearised(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> Linearised {
+        ResidualCost::new(self, theta, observations, selection).linearised(theta, 0)
+    }
+
+    /// Residual and its derivatives at a point of this model, which is another one, `known`, and an effect of no size.
+    ///
+    /// Where both have residuals for the same samples, the columns of the parameters that both have are those of
+    /// `known`: what an effect of no size does not change.
+    pub fn linearised_beside(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        known: Option<&Linearised>,
+    ) -> Linearised {
+        let cost = ResidualCost::new(self, theta, observations, selection);
+        let Some(known) = known.filter(|k| k.samples == cost.samples(theta)) else { return cost.linearised(theta, 0) };
+        let mut out = cost.linearised(theta, known.columns.len());
+        out.columns[..known.columns.len()].clone_from_slice(&known.columns);
+        out
+    }
+
+    /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive
+    /// definite.
+    pub(crate) fn curvature(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        lin: &Linearised,
+    ) -> Option<Vec<Vec<f64>>> {
+        let p = theta.len();
+        let cost = ResidualCost::new(self, theta, observations, selection);
+        let variables = &cost.variables;
+        let products = dense::gram(&lin.columns);
+        let exact = p.min(MAX_EXACT_CURVATURES);
+        let mut second = products.clone();
+        for i in 0..exact {
+            if variables[i].lower == variables[i].upper {
+                second[i].fill(0.0);
+                continue;
+            }
+            let step = CURVATURE_STEP_SE / products[i][i].max(f64::MIN_POSITIVE).sqrt();
+            let moved = |by: f64| {
+                let mut at = theta.to_vec();
+                at[i] = (at[i] + by).clamp(variables[i].lower, variables[i].upper);
+                (at[i] - theta[i], cost.linearised(&at, 0).slope())
+            };
+            let ((up, above), (down, below)) = (moved(step), moved(-step));
+            for j in 0..p {
+                second[i][j] = (above[j] - below[j]) / (up - down);
+            }
+        }
+        let between = |i: usize, j: usize| match (i < exact, j < exact) {
+            (true, false) => second[i][j],
+            (false, true) => second[j][i],
+            _ => 0.5 * (second[i][j] + second[j][i]),
+        };
+        let symmetric: Vec<Vec<f64>> = (0..p).map(|i| (0..p).map(|j| between(i, j)).collect()).collect();
+        dense::inverse(&symmetric).or_else(|| dense::inverse(&products))
+    }
+}
