@@ -82,18 +82,11 @@ impl Live {
         }
         let mut model = options.model.clone().unwrap_or_else(|| Model::of_two_lags(record.channels.clone()));
         // What masks readings belongs to a record; what changes the time constants is what is followed.
-        let is_of_the_record = |effect: Identifier| {
-            use Identifier::{Quantisation, Saturation, Spikes, VaryingTimeConstant};
-            [Saturation, Quantisation, Spikes, VaryingTimeConstant].contains(&effect)
-        };
+        let is_of_the_record = |effect: Identifier| effect.about().is_defect || effect.about().changes_time_constants;
         model.effects.retain(|e| !is_of_the_record(e.effect));
-        let can_be_undone = |effect: Identifier| {
-            use Identifier::{Calibration, ColouredNoise, InputMismatch, SecondOrder, SlowMode};
-            [Calibration, ColouredNoise, InputMismatch, SecondOrder, SlowMode].contains(&effect)
-        };
         let is_curved = |name: &str| name.starts_with("curvature");
         for e in &model.effects {
-            if !can_be_undone(e.effect) || e.parameters.iter().any(|p| is_curved(&p.name)) {
+            if !e.effect.about().is_streamable || e.parameters.iter().any(|p| is_curved(&p.name)) {
                 return Err(Error::LiveEffect { effect: e.effect.name() });
             }
         }
