@@ -58,6 +58,8 @@ mod readings;
 mod reconstruct;
 mod rig;
 #[cfg(feature = "std")]
+mod slopes;
+#[cfg(feature = "std")]
 mod smooth;
 #[cfg(feature = "std")]
 mod spectrum;

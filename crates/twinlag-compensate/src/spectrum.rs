@@ -9,6 +9,7 @@ use twinlag_transform::{Forward, Inverse, Tapered, hann};
 use crate::prior::Term;
 use crate::readings::Readings;
 use crate::rig::Rig;
+use crate::slopes::{Direction, add_autocovariance_slope, density_slope};
 
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
 /// lasts longer the smoother sees all the same.
@@ -129,11 +130,29 @@ impl Periodogram {
     /// `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)` comes off, `G` what both sensors together make
     /// of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
+        let mut expected = self.expected_signed(terms);
+        expected.iter_mut().for_each(|sum| *sum = sum.max(0.0));
+        expected
+    }
+
+    /// As [`Periodogram::expected`], below zero where what folds back is more than there is.
+    pub(crate) fn expected_signed(&self, terms: &[Term]) -> Vec<f64> {
+        let add = |lags: &mut [f64]| terms.iter().for_each(|term| add_autocovariances(term, self.period_s, lags));
+        self.tapered(add, |hz| terms.iter().map(|term| term.density_k2_per_hz(hz)).sum())
+    }
+
+    /// How fast [`Periodogram::expected_signed`] changes where the numbers of terms change at these rates.
+    pub(crate) fn expected_slope(&self, directions: &[Direction]) -> Vec<f64> {
+        let add = |lags: &mut [f64]| directions.iter().for_each(|by| add_autocovariance_slope(by, self.period_s, lags));
+        self.tapered(add, |hz| directions.iter().map(|by| density_slope(by, hz)).sum())
+    }
+
+    /// What a periodogram shows of an autocovariance, which `add` adds at multiples of the period, and of the density beyond
+    /// the sampling.
+    fn tapered(&self, add: impl Fn(&mut [f64]), density: impl Fn(f64) -> f64) -> Vec<f64> {
         let n = self.samples;
         let mut input = vec![0.0; 2 * n];
-        for term in terms {
-            add_autocovariances(term, self.period_s, &mut input[..n]);
-        }
+        add(&mut input[..n]);
         input.iter_mut().zip(&self.taper).for_each(|(r, a)| *r *= a);
         let (lags, mirrored) = input.split_at_mut(n);
         mirrored[1..].iter_mut().rev().zip(&lags[1..]).for_each(|(to, from)| *to = *from);
@@ -141,10 +160,9 @@ impl Periodogram {
         let mut expected: Vec<f64> = (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect();
         for (away_hz, taken_off) in &self.flattened {
             for ((sum, hz), share) in expected.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
-                *sum -= share * terms.iter().map(|t| t.density_k2_per_hz(hz + away_hz)).sum::<f64>();
+                *sum -= share * density(hz + away_hz);
             }
         }
-        expected.iter_mut().for_each(|sum| *sum = sum.max(0.0));
         expected
     }
 }

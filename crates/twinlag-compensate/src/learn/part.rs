@@ -3,6 +3,7 @@
 use twinlag_optimise::Variable;
 
 use crate::prior::Term;
+use crate::slopes::Direction;
 
 /// Bounds of a quality, and of frequencies in units of `1/T` and of `1/Ts`.
 const QUALITY: [f64; 2] = [0.02, 1e4];
@@ -80,6 +81,52 @@ impl Part {
                     Term::Resonance { std_k: *std_k, frequency_hz: m * frequency_hz, quality }
                 });
                 lines.chain(goes_on.then(|| tail(*frequency_hz, std_k)).flatten()).collect()
+            }
+        }
+    }
+
+    /// Its terms, and how fast their numbers change with number `a` of [`Part::values`]; terms that do not are left out.
+    pub(super) fn directions(&self, a: usize) -> Vec<Direction> {
+        match self {
+            Self::Noise(_) => Vec::new(),
+            Self::Single(term) => vec![(*term, std::array::from_fn(|i| if i == a { 1.0 } else { 0.0 }))],
+            Self::Turbulent { std_k, corner_hz, fastest_hz } => {
+                // The step between corners is `(F/c)^(1/(n−1))`, and shares of the variance go with `step^(−2k/3)`.
+                let by_corner = -1.0 / ((CASCADE - 1) as f64 * corner_hz);
+                let terms = self.terms();
+                let share_by = |k: usize| -2.0 / 3.0 * k as f64 * by_corner;
+                let share = |term: &Term| (term.std_k() / std_k).powi(2);
+                let mean: f64 = terms.iter().enumerate().map(|(k, term)| share(term) * share_by(k)).sum();
+                let of = |(k, term): (usize, &Term)| {
+                    let corner_k_hz = corner_hz * (fastest_hz / corner_hz).powf(k as f64 / (CASCADE - 1) as f64);
+                    let by = match a {
+                        0 => [term.std_k() / std_k, 0.0, 0.0],
+                        _ => [
+                            0.5 * term.std_k() * (share_by(k) - mean),
+                            corner_k_hz * (1.0 / corner_hz + k as f64 * by_corner),
+                            0.0,
+                        ],
+                    };
+                    (*term, by)
+                };
+                terms.iter().enumerate().map(of).collect()
+            }
+            Self::Comb { frequency_hz, std_k, .. } => {
+                let lines = std_k.len();
+                let of = |(k, term): (usize, Term)| {
+                    let Term::Resonance { quality, .. } = term else { return None };
+                    // A line as wide as its frequency is as wide as a line can be.
+                    let is_narrow = quality > 0.5 && k < lines;
+                    let by_shared = |by: f64| if is_narrow { by } else { 0.0 };
+                    let by = match a {
+                        _ if a < lines && k < lines => [if a == k { 1.0 } else { 0.0 }, 0.0, 0.0],
+                        _ if a < lines => [tail_by(std_k, a), 0.0, 0.0],
+                        _ if a == lines => [0.0, (k + 1) as f64, by_shared(quality / frequency_hz)],
+                        _ => [0.0, 0.0, by_shared(-quality / self.values()[lines + 1])],
+                    };
+                    (by != [0.0; 3]).then_some((term, by))
+                };
+                self.terms().into_iter().enumerate().filter_map(of).collect()
             }
         }
     }
@@ -167,6 +214,19 @@ impl Part {
                 std_k.iter().map(|_| std()).chain([near, width]).collect()
             }
         }
+    }
+}
+
+/// How the standard deviation of [`tail`] changes with the `a`-th of those of the lines.
+fn tail_by(std_k: &[f64], a: usize) -> f64 {
+    let last = std_k.len() - 1;
+    let of_neighbour = (last as f64 / (last + 1) as f64).powi(2);
+    let is_of_neighbour = last > 0 && std_k[last - 1] * of_neighbour > std_k[last];
+    let size = ((last + 1) as f64 / 3.0).sqrt();
+    match (is_of_neighbour, last - a) {
+        (false, 0) => size,
+        (true, 1) => size * of_neighbour,
+        _ => 0.0,
     }
 }
 
