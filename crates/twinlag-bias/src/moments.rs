@@ -18,19 +18,19 @@ use nalgebra::{Matrix2, Vector2};
 use twinlag_cross_relation::InferredInputs;
 use twinlag_transform::{Complex64, Tapered, hann_between};
 
-/// Width of a band: this factor in frequency, and at least [`LEAST`] bins.
-const RATIO: f64 = 1.25;
-const LEAST: usize = 12;
-/// Fewest samples of a stretch that is used.
-const SHORTEST: usize = 64;
+/// Width of a band: this factor in frequency, and at least [`MIN_BAND_BINS`] bins.
+const BAND_FREQUENCY_RATIO: f64 = 1.25;
+const MIN_BAND_BINS: usize = 12;
+/// Samples of a stretch that is used, at least: its 31 bins make two bands.
+const MIN_STRETCH_SAMPLES: usize = 64;
 /// Neighbouring bins of a Hann window share power: a mean over them has the variance of this many
 /// times fewer bins, `1 + 2 (2/3)² + 2 (1/6)²`.
-const SHARED: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
+const BINS_PER_INDEPENDENT_BIN: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 /// A level is taken to be no less than this share of the other: below it hardly matters, and
 /// weights stay finite.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_LEVEL_RATIO: f64 = 0.1;
 /// Steps towards weights that agree with the levels they give.
-const STEPS: usize = 6;
+const REWEIGHTINGS: usize = 6;
 
 /// Moments of the inferred inputs per band.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ impl NoiseMoments {
     /// Moments of `inputs`; `None` if no stretch has 64 samples.
     pub fn new(inputs: &InferredInputs) -> Option<Self> {
         let mut bins: Vec<(f64, Vector2<f64>, f64, f64)> = Vec::new();
-        for [f1, f2] in inputs.segments.iter().filter(|s| s[0].len() >= SHORTEST) {
+        for [f1, f2] in inputs.segments.iter().filter(|s| s[0].len() >= MIN_STRETCH_SAMPLES) {
             let n = f1.len();
             let mean = 0.5 * (f1.iter().sum::<f64>() + f2.iter().sum::<f64>()) / n as f64;
             let tapered = Tapered::new(hann_between(n));
@@ -99,9 +99,9 @@ impl NoiseMoments {
         let mut bands = Vec::new();
         let mut from = 0;
         while from < bins.len() {
-            let edge = bins[from].0 * RATIO;
-            let mut to = bins.partition_point(|b| b.0 <= edge).max(from + LEAST).min(bins.len());
-            if bins.len() - to < LEAST {
+            let edge = bins[from].0 * BAND_FREQUENCY_RATIO;
+            let mut to = bins.partition_point(|b| b.0 <= edge).max(from + MIN_BAND_BINS).min(bins.len());
+            if bins.len() - to < MIN_BAND_BINS {
                 to = bins.len();
             }
             bands.push(Band::of(&bins[from..to], &inputs.filters));
@@ -120,7 +120,7 @@ impl NoiseMoments {
         let shapes = self.shapes(ar1);
         let mut std_k = start_std_k;
         let mut out = None;
-        for _ in 0..STEPS {
+        for _ in 0..REWEIGHTINGS {
             let found = self.step(&shapes, &self.weights(&shapes, std_k)?)?;
             std_k = found.std_k;
             out = Some(found);
@@ -157,10 +157,10 @@ impl NoiseMoments {
         let mut is_held = [false; 2];
         for i in 0..2 {
             let other = 1 - i;
-            if found[i] < LEAST_SHARE * LEAST_SHARE * found[other] {
+            if found[i] < MIN_LEVEL_RATIO * MIN_LEVEL_RATIO * found[other] {
                 // The other one alone explains the moments.
                 found[other] = right[other] / normal[(other, other)];
-                found[i] = LEAST_SHARE * LEAST_SHARE * found[other];
+                found[i] = MIN_LEVEL_RATIO * MIN_LEVEL_RATIO * found[other];
                 is_held[i] = true;
                 break;
             }
@@ -190,7 +190,7 @@ impl Band {
         Self {
             moments: bins.iter().map(|b| b.1).sum::<Vector2<f64>>() / count,
             gas: (bins.iter().map(|b| b.2).sum::<f64>() / count).max(0.0),
-            weight: count / SHARED,
+            weight: count / BINS_PER_INDEPENDENT_BIN,
             bins: bins
                 .iter()
                 .map(|b| {

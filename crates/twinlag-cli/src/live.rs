@@ -15,7 +15,7 @@ use crate::print;
 
 const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
 /// Number of warnings about bad rows that are printed one by one.
-const SHOWN: usize = 5;
+const MAX_WARNINGS: usize = 5;
 
 pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Console) -> Result<u8, Failure> {
     if console.json {
@@ -222,13 +222,13 @@ struct Bad {
 impl Bad {
     fn say(&mut self, what: &impl ToString, console: Console) {
         self.count += 1;
-        if self.count <= SHOWN {
+        if self.count <= MAX_WARNINGS {
             console.note(|| format!("warning: {}", what.to_string()));
         }
     }
 
     fn sum(&self, console: Console) {
-        if self.count > SHOWN {
+        if self.count > MAX_WARNINGS {
             console.note(|| format!("warning: {} rows could not be used", self.count));
         }
     }

@@ -228,7 +228,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
         if let Some(seen) = &effect.seen {
             lines.push(format!("    {seen}"));
         }
-        for p in effect.parameters.iter().take(MOST_PARAMETERS) {
+        for p in effect.parameters.iter().take(MAX_PARAMETERS) {
             let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
             let number = match p.interval_95 {
                 Some([low, high]) => interval(p.value, low, high, &unit),
@@ -236,8 +236,8 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
             };
             lines.push(format!("    {} {number}", p.name.replace('_', " ")));
         }
-        if effect.parameters.len() > MOST_PARAMETERS {
-            lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MOST_PARAMETERS));
+        if effect.parameters.len() > MAX_PARAMETERS {
+            lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
         }
         if let Some(e) = &effect.evidence {
             let plural = if e.dof == 1 { "" } else { "s" };
@@ -294,7 +294,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
 }
 
 /// Number of parameters of one effect that are printed.
-const MOST_PARAMETERS: usize = 4;
+const MAX_PARAMETERS: usize = 4;
 
 fn verdict(verdict: Verdict) -> &'static str {
     match verdict {

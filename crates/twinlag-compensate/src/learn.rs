@@ -14,34 +14,39 @@ use twinlag_optimise::{Budget, Minimiser, Optimiser, Problem};
 use crate::error::CompensateError;
 use crate::prior::{Prior, Term};
 use crate::readings::Readings;
-use crate::reconstruct::MOST_STATES;
+use crate::reconstruct::MAX_STATES;
 use crate::rig::Rig;
 use crate::spectrum::Periodogram;
 use crate::system::states as states_of;
 use part::{Limits, Part};
 use whittle::{BINS_PER_ONE, Whittle};
 
-/// Most states of the gas.
-const MOST_OF_GAS: usize = 20;
+/// States of the gas, at most: what is left of [`MAX_STATES`] beside two sensors of two states each.
+const MAX_GAS_STATES: usize = 20;
 /// Harmonics of a comb, at most and at least.
-const HARMONICS: usize = 8;
-const FEWEST_HARMONICS: usize = 3;
-/// Fewest samples with both readings.
-const FEWEST: usize = 32;
+const MAX_HARMONICS: usize = 8;
+const MIN_HARMONICS: usize = 3;
+/// Samples with both readings, at least: the periodogram then has 15 bins, worth eight independent
+/// ones.
+const MIN_SAMPLES: usize = 32;
 /// Share of instants that may be missing, and by which steps may differ, before the lines between
 /// them matter.
-const FEW_MISSING: f64 = 0.01;
+const MAX_MISSING_SHARE: f64 = 0.01;
 /// What a harmonic must gain to count as one: chance gains less, 19 times in 20.
-const HARMONIC_GAIN: f64 = 1.0;
+const MIN_HARMONIC_GAIN: f64 = 1.0;
 /// Candidates that are fitted to the end, after all were begun.
-const PROMISING: usize = 4;
-/// Differences of scores: what fits that end early leave; beyond which fitting all numbers together
-/// is not tried; and within which parts of other kinds are nearly as likely, one to twenty.
-const NOTHING_GAINED: f64 = 0.5;
-const HOPELESS: f64 = 15.0;
-const NEARLY: f64 = 6.0;
+const CANDIDATES_FITTED: usize = 4;
+/// Scores are twice a negative logarithm of a probability. Below this gain a part is not better than
+/// none: fits that end early leave as much.
+const MIN_SCORE_GAIN: f64 = 0.5;
+/// Behind the best by more than this, a candidate is not fitted with all numbers together: at odds of
+/// `e^7.5`, 1800 to one, that would not make up for it.
+const MAX_SCORE_DEFICIT: f64 = 15.0;
+/// Behind the best by less than this, parts of other kinds are nearly as likely: odds of `e³`, twenty
+/// to one.
+const MAX_ALTERNATIVE_DEFICIT: f64 = 6.0;
 /// Priors beside the best one, at most.
-const MOST_OTHERS: usize = 4;
+const MAX_ALTERNATIVES: usize = 4;
 
 /// A prior for the gas, and how well the readings determine it.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,11 +55,11 @@ pub struct Learned {
     pub prior: Prior,
     /// The prior with its numbers moved by a standard error, a column of the covariance's Cholesky
     /// factor at a time.
-    pub deviations: Vec<Prior>,
+    pub sigma_priors: Vec<Prior>,
     /// Alternative priors that fit almost as well, with their posterior weights (`prior` has the
     /// remainder). They matter because the readings do not determine how the spectrum continues
     /// below the noise floor.
-    pub others: Vec<(f64, Prior)>,
+    pub alternatives: Vec<(f64, Prior)>,
     /// Factors on the standard deviations of both channels' noise; 1 if these are known.
     pub noise_factor: [f64; 2],
 }
@@ -103,8 +108,8 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());
     let got = (0..readings.len()).filter(both).count();
-    if got < FEWEST {
-        return Err(CompensateError::TooShort { needed: FEWEST, got });
+    if got < MIN_SAMPLES {
+        return Err(CompensateError::TooShort { needed: MIN_SAMPLES, got });
     }
     let known = || (0..readings.len()).flat_map(|k| (0..2).filter_map(move |i| readings.reading_c(i, k)));
     let (sum, count) = known().fold((0.0, 0.0), |(sum, n), y| (sum + y, n + 1.0));
@@ -113,14 +118,14 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let periodogram = Periodogram::of(readings, rig, level_c);
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
-    let room = MOST_STATES.saturating_sub(states_of(rig, &[])).min(MOST_OF_GAS);
+    let room = MAX_STATES.saturating_sub(states_of(rig, &[])).min(MAX_GAS_STATES);
     let search = Search { periodogram: &periodogram, limits, room, ask };
     let (best, mut others) = search.run();
     let score = best.score();
     let mut parts = best.parts;
     let missing = 1.0 - got as f64 / periodogram.all as f64;
-    let is_uneven = readings.unevenness() > FEW_MISSING;
-    if missing > FEW_MISSING || is_uneven {
+    let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
+    if missing > MAX_MISSING_SHARE || is_uneven {
         parts.retain(|part| part.noise().is_none());
         parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
         others.clear();
@@ -129,11 +134,11 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     // Kinds were equally probable before the readings.
     let weights: Vec<f64> = others.iter().map(|o| (0.5 * (score - o.score())).exp()).collect();
     let all = 1.0 + weights.iter().sum::<f64>();
-    let others = weights.iter().zip(&others).map(|(weight, other)| (weight / all, prior(&other.parts))).collect();
+    let alternatives = weights.iter().zip(&others).map(|(weight, other)| (weight / all, prior(&other.parts))).collect();
     Ok(Learned {
         prior: prior(&parts),
-        deviations: search.deviations(&parts).iter().map(|p| prior(p)).collect(),
-        others,
+        sigma_priors: search.sigma_points(&parts).iter().map(|p| prior(p)).collect(),
+        alternatives,
         noise_factor: parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt)),
     })
 }
@@ -181,7 +186,7 @@ impl Search<'_> {
             let others = if self.ask == Ask::GasQuickly { Vec::new() } else { self.exchanged(&current) };
             seen.extend(others.iter().cloned());
             let better = likeliest(&others);
-            if better.score() >= current.score() - NOTHING_GAINED {
+            if better.score() >= current.score() - MIN_SCORE_GAIN {
                 break;
             }
             seen.extend(self.grown(better));
@@ -191,11 +196,11 @@ impl Search<'_> {
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
         seen.retain(|other| {
             let kinds = kinds(&other.parts);
-            let is_new = !told.contains(&kinds) && other.score() < current.score() + NEARLY;
+            let is_new = !told.contains(&kinds) && other.score() < current.score() + MAX_ALTERNATIVE_DEFICIT;
             told.push(kinds);
             is_new
         });
-        seen.truncate(MOST_OTHERS);
+        seen.truncate(MAX_ALTERNATIVES);
         (current, seen)
     }
 
@@ -205,7 +210,7 @@ impl Search<'_> {
         loop {
             let current = &out[out.len() - 1];
             let next = self.jointly(self.best(current, self.within(&current.parts, self.more(current))));
-            if next.score() >= current.score() - NOTHING_GAINED {
+            if next.score() >= current.score() - MIN_SCORE_GAIN {
                 return out;
             }
             out.push(next);
@@ -222,7 +227,7 @@ impl Search<'_> {
             let others = self.jointly(Fitted::unknown(parts));
             for kind in self.kinds() {
                 let other = self.best(&others, self.within(&others.parts, kind));
-                if other.score() < current.score() + HOPELESS {
+                if other.score() < current.score() + MAX_SCORE_DEFICIT {
                     out.push(self.jointly(other));
                 }
             }
@@ -261,7 +266,7 @@ impl Search<'_> {
         let others = self.expected(&current.parts);
         let mut begun: Vec<Fitted> = candidates.into_iter().map(|part| self.fit(&[part], &others, 3)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        begun.truncate(PROMISING);
+        begun.truncate(CANDIDATES_FITTED);
         let noise = current.parts.iter().filter_map(Part::noise);
         let of_noise: f64 = noise.map(|factors| self.periodogram.of_factors(factors).0).sum();
         let added = begun.into_iter().map(|begun| self.fit(&begun.parts, &others, 12));
@@ -281,7 +286,7 @@ impl Search<'_> {
     }
 
     /// `parts` with their numbers moved by a standard error, one column at a time.
-    fn deviations(&self, parts: &[Part]) -> Vec<Vec<Part>> {
+    fn sigma_points(&self, parts: &[Part]) -> Vec<Vec<Part>> {
         let cost = Whittle { periodogram: self.periodogram, others: &self.beside(parts), parts };
         let Some(information) = cost.information() else { return Vec::new() };
         let values: Vec<f64> = parts.iter().flat_map(Part::values).collect();
@@ -357,11 +362,11 @@ impl Search<'_> {
         };
         // Bins count from the second one; a quarter of a bin of the highest harmonic is the step.
         let bins = ratio.len() as f64;
-        let per_bin = 4 * HARMONICS;
+        let per_bin = 4 * MAX_HARMONICS;
         let at =
             |first: f64, m: usize| ((first * m as f64).round() as usize).checked_sub(1).filter(|j| *j < ratio.len());
         let total = |first: f64| {
-            let gains = (1..=HARMONICS).filter_map(|m| Some(gain(at(first, m)?) - HARMONIC_GAIN));
+            let gains = (1..=MAX_HARMONICS).filter_map(|m| Some(gain(at(first, m)?) - MIN_HARMONIC_GAIN));
             // Up to the harmonic at which the sum is largest.
             let sums = gains.scan(0.0, |sum, g| {
                 *sum += g;
@@ -369,14 +374,14 @@ impl Search<'_> {
             });
             sums.enumerate().map(|(m, sum)| (sum, m + 1)).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0))
         };
-        let steps = 3 * per_bin..(bins / FEWEST_HARMONICS as f64) as usize * per_bin;
+        let steps = 3 * per_bin..(bins / MIN_HARMONICS as f64) as usize * per_bin;
         let best = steps
             .map(|s| s as f64 / per_bin as f64)
             .map(|first| (first, total(first)))
             .max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let Some((first, (_, harmonics))) = best else { return Vec::new() };
         let std_k = (1..=harmonics).map_while(|m| Some(excess_k(at(first, m)?, 2))).collect::<Vec<f64>>();
-        if std_k.len() < FEWEST_HARMONICS {
+        if std_k.len() < MIN_HARMONICS {
             return Vec::new();
         }
         let [frequency_hz, width_hz] = [first / self.limits.span_s, 0.1 / self.limits.span_s];

@@ -6,7 +6,7 @@
 //! fast the gas fluctuates. [`reconstruct()`] gives its temperature with a band at every sample:
 //! from the whole record (Kalman's filter and a smoother), from the readings so far, or with a
 //! fixed lag. [`Stream`] filters sample by sample, and [`Tracker`] does so while the flow changes
-//! the time constants. The model ([`Rig`], [`Local`]) covers uneven sampling, missing readings, a
+//! the time constants. The model ([`Rig`], [`SensorAt`]) covers uneven sampling, missing readings, a
 //! delay between the channels, second lags, slow paths, noise that is not white, time constants
 //! that change, and radiation. The crate knows neither files nor how a model is found: for logger
 //! files use `twinlag`, for the model `twinlag-diagnose`.
@@ -79,11 +79,11 @@ pub use prior::Term;
 pub use readings::Readings;
 #[cfg(feature = "std")]
 pub use reconstruct::{bandwidth_hz, reconstruct};
-pub use rig::{Coloured, Local, Rig, Sensor, SlowPath};
+pub use rig::{Coloured, Rig, Sensor, SensorAt, SlowPath};
 #[cfg(feature = "std")]
 pub use smooth::{Form, Gas};
 #[cfg(feature = "std")]
 pub use spectrum::power_spectrum;
-pub use stream::{Now, Stream};
+pub use stream::{Filtered, Stream};
 #[cfg(feature = "std")]
-pub use tracker::{Push, Tracked, Tracker, tracker};
+pub use tracker::{Tracker, TrackerFn, TrackerState, tracker};

@@ -1,7 +1,7 @@
 //! What is compensated.
 
 use crate::error::CompensateError;
-use crate::rig::Local;
+use crate::rig::SensorAt;
 
 /// Temperatures of two sensors: readings with whatever their calibration does to them already taken
 /// off.
@@ -10,7 +10,7 @@ pub struct Readings {
     time_s: Vec<f64>,
     reading_c: [Vec<f64>; 2],
     missing: [Vec<bool>; 2],
-    locals: Option<[Vec<Local>; 2]>,
+    locals: Option<[Vec<SensorAt>; 2]>,
 }
 
 impl Readings {
@@ -52,7 +52,7 @@ impl Readings {
     ///
     /// # Errors
     /// [`CompensateError::Lengths`].
-    pub fn with_locals(self, locals: [Vec<Local>; 2]) -> Result<Self, CompensateError> {
+    pub fn with_locals(self, locals: [Vec<SensorAt>; 2]) -> Result<Self, CompensateError> {
         let expected = self.len();
         match locals.iter().map(Vec::len).find(|n| *n != expected) {
             Some(got) => Err(CompensateError::Lengths { expected, got }),
@@ -94,7 +94,7 @@ impl Readings {
 
     /// Both sensors at instant `k`, each with its reading about `level_c`: the last one, where it
     /// is missing.
-    pub(crate) fn locals(&self, k: usize, level_c: f64) -> Option<[(Local, f64); 2]> {
+    pub(crate) fn locals(&self, k: usize, level_c: f64) -> Option<[(SensorAt, f64); 2]> {
         let locals = self.locals.as_ref()?;
         Some([0, 1].map(|i| (locals[i][k], self.reading_c[i][k] - level_c)))
     }

@@ -8,7 +8,7 @@ use crate::smooth::{self, Form, Gas};
 use crate::system;
 
 /// Largest state.
-pub(crate) const MOST_STATES: usize = 24;
+pub(crate) const MAX_STATES: usize = 24;
 
 /// Reconstructs the gas temperature from `readings` of `rig`, for a gas that fluctuates as `prior`
 /// describes.
@@ -29,8 +29,8 @@ pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) ->
         7..=8 => smooth::run::<8>,
         9..=12 => smooth::run::<12>,
         13..=16 => smooth::run::<16>,
-        17..=MOST_STATES => smooth::run::<MOST_STATES>,
-        _ => return Err(CompensateError::TooLarge { got: states, most: MOST_STATES }),
+        17..=MAX_STATES => smooth::run::<MAX_STATES>,
+        _ => return Err(CompensateError::TooLarge { got: states, most: MAX_STATES }),
     };
     Ok(run(readings, rig, prior, form))
 }

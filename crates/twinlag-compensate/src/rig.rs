@@ -143,7 +143,7 @@ impl Rig {
 
 /// The state of a sensor at one instant, for sensors that change.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Local {
+pub struct SensorAt {
     /// Time constant at this instant over [`Sensor::tau_s`].
     pub tau_factor: f64,
     /// Loss by radiation at the reading, K.

@@ -141,7 +141,7 @@ impl<const D: usize> Forward<D> {
         system: &System<D>,
         lengths: &mut Vec<f64>,
         length_s: f64,
-        locals: Option<[(crate::rig::Local, f64); 2]>,
+        locals: Option<[(crate::rig::SensorAt, f64); 2]>,
     ) -> usize {
         let known = lengths.iter().position(|l| locals.is_none() && (l - length_s).abs() <= SAME_STEP * length_s.abs());
         known.unwrap_or_else(|| {

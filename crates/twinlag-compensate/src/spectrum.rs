@@ -13,14 +13,14 @@ use crate::slopes::{Direction, add_autocovariance_slope, density_slope};
 
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
 /// lasts longer the smoother sees all the same.
-const LONGEST: usize = 16384;
+const MAX_PIECE_SAMPLES: usize = 16384;
 /// Multiples of the sampling frequency from which power folds back; what is farther away is taken
 /// as if the gas were sampled.
 const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 /// Distance from critical damping below which both exponentials of a resonance cancel.
-const NEARLY_CRITICAL: f64 = 1e-3;
+const NEARLY_CRITICAL_ETA: f64 = 1e-3;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
-const OVERLAP: f64 = 0.947;
+const OVERLAPPING_WORTH: f64 = 0.947;
 
 /// A tapered periodogram of the gas, of long records the mean over pieces that overlap by half,
 /// with what noise adds to it.
@@ -70,7 +70,7 @@ impl Periodogram {
         let span_s = readings.time_s()[readings.len() - 1] - first_s;
         let all = (span_s / period_s).round() as usize + 1;
         let even = [0, 1].map(|i| on_grid(readings, i, first_s, period_s, all));
-        let count = if all > LONGEST { 2 * all.div_ceil(LONGEST) - 1 } else { 1 };
+        let count = if all > MAX_PIECE_SAMPLES { 2 * all.div_ceil(MAX_PIECE_SAMPLES) - 1 } else { 1 };
         let samples = 2 * all / (count + 1);
         let tapered = Tapered::new(taper(samples));
         let transform = |values: &[f64]| tapered.transform(values.iter().map(|y| y - level_c));
@@ -118,7 +118,7 @@ impl Periodogram {
         let disagreement = disagreement.collect();
         let taper = autocorrelation(tapered.taper());
         let plan = Forward::of(2 * samples);
-        let pieces = if count > 1 { OVERLAP * count as f64 } else { 1.0 };
+        let pieces = if count > 1 { OVERLAPPING_WORTH * count as f64 } else { 1.0 };
         let flattened = flattened.to_vec();
         Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
     }
@@ -186,7 +186,7 @@ fn add_autocovariances(term: &Term, period_s: f64, out: &mut [f64]) {
             let square = 1.0 - half * half;
             let eta = square.abs().sqrt();
             let variance = std_k * std_k;
-            if eta < NEARLY_CRITICAL {
+            if eta < NEARLY_CRITICAL_ETA {
                 let at = (0..out.len()).map(|m| term.autocovariance_k2(m as f64 * period_s));
                 out.iter_mut().zip(at).for_each(|(sum, r)| *sum += r);
             } else if square > 0.0 {

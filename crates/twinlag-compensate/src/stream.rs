@@ -8,11 +8,11 @@ use crate::rig::Rig;
 use crate::system::{Step, System};
 
 /// Change of the covariance, relative to its largest entry, below which it has settled.
-const SETTLED: f64 = 1e-15;
+const SETTLED_RELATIVE: f64 = 1e-15;
 
 /// The gas temperature at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Now {
+pub struct Filtered {
     /// The gas temperature, °C.
     pub gas_c: f64,
     /// Variance of the gas temperature, K².
@@ -20,10 +20,10 @@ pub struct Now {
     /// Normalised innovation squared: the sum of squared differences between the readings and their
     /// predictions from earlier ones, over their variances. If the rig has not changed, it is
     /// chi-square with one degree of freedom for each reading.
-    pub surprise: f64,
+    pub normalised_innovation_squared: f64,
     /// The product of the innovation variances, K² each: `−2 ln` of the likelihood of the readings
-    /// is `surprise + ln scatter` and a constant.
-    pub scatter: f64,
+    /// is `normalised_innovation_squared + ln innovation_variance` and a constant.
+    pub innovation_variance: f64,
 }
 
 /// A causal filter for two sensors that are read every `period_s`: push readings, read the gas
@@ -62,7 +62,7 @@ struct Settled<const D: usize> {
     /// The gain of each reading, and one over the variance of its innovation.
     gains: [(SVector<f64, D>, f64); 2],
     variance_k2: f64,
-    scatter: f64,
+    innovation_variance: f64,
 }
 
 impl<const D: usize> Stream<D> {
@@ -86,17 +86,17 @@ impl<const D: usize> Stream<D> {
     }
 
     /// The gas temperature once the next readings, °C, are known; `None` for one that is missing.
-    pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> Now {
+    pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> Filtered {
         if let (Some(settled), [Some(y1), Some(y2)]) = (self.settled, reading_c) {
             self.belief.state = self.step.transition * self.belief.state;
-            let mut surprise = 0.0;
+            let mut normalised_innovation_squared = 0.0;
             for ((reads, (gain, weight)), y) in self.system.reads.iter().zip(&settled.gains).zip([y1, y2]) {
                 let innovation = y - self.level_c - reads.dot(&self.belief.state);
                 self.belief.state += gain * innovation;
-                surprise += innovation * innovation * weight;
+                normalised_innovation_squared += innovation * innovation * weight;
             }
-            let Settled { variance_k2, scatter, .. } = settled;
-            return Now { gas_c: self.gas_c(), variance_k2, surprise, scatter };
+            let Settled { variance_k2, innovation_variance, .. } = settled;
+            return Filtered { gas_c: self.gas_c(), variance_k2, normalised_innovation_squared, innovation_variance };
         }
         self.settled = None;
         let before = self.belief.covariance;
@@ -104,20 +104,20 @@ impl<const D: usize> Stream<D> {
             self.belief.predict(&self.step);
         }
         let mut gains = [(SVector::zeros(), 0.0); 2];
-        let (mut surprise, mut scatter) = (0.0, 1.0);
+        let (mut normalised_innovation_squared, mut innovation_variance) = (0.0, 1.0);
         for i in 0..2 {
             if let Some(y) = reading_c[i] {
                 let update = self.belief.update(&self.system.reads[i], y - self.level_c, self.noise_k2[i]);
                 gains[i] = (update.gain, 1.0 / update.variance);
-                surprise += update.innovation * update.innovation / update.variance;
-                scatter *= update.variance;
+                normalised_innovation_squared += update.innovation * update.innovation / update.variance;
+                innovation_variance *= update.variance;
             }
         }
         let variance_k2 = self.system.gas.dot(&(self.belief.covariance * self.system.gas));
         if reading_c.iter().all(Option::is_some) && has_settled(&before, &self.belief.covariance) {
-            self.settled = Some(Settled { gains, variance_k2, scatter });
+            self.settled = Some(Settled { gains, variance_k2, innovation_variance });
         }
-        Now { gas_c: self.gas_c(), variance_k2, surprise, scatter }
+        Filtered { gas_c: self.gas_c(), variance_k2, normalised_innovation_squared, innovation_variance }
     }
 
     /// Whether its gains no longer change.
@@ -132,5 +132,5 @@ impl<const D: usize> Stream<D> {
 
 fn has_settled<const D: usize>(before: &SMatrix<f64, D, D>, now: &SMatrix<f64, D, D>) -> bool {
     let largest = now.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    before.iter().zip(now).all(|(a, b)| (a - b).abs() <= SETTLED * largest)
+    before.iter().zip(now).all(|(a, b)| (a - b).abs() <= SETTLED_RELATIVE * largest)
 }

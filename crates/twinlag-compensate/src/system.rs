@@ -8,11 +8,11 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::prior::Term;
-use crate::rig::{Coloured, Local, Rig};
+use crate::rig::{Coloured, Rig, SensorAt};
 
-/// Terms of the exponential's series: with `‖A h‖ ≤ 1/2` the next is `2⁻¹³/13!`, below 2e-14.
-const SERIES: usize = 12;
-const LONGEST: f64 = 0.5;
+/// Terms of the exponential's series, and the norm of the matrix up to which it is used: with `‖A h‖ ≤ 1/2` the next is `2⁻¹³/13!`, below 2e-14.
+const SERIES_TERMS: usize = 12;
+const MAX_SERIES_NORM: f64 = 0.5;
 
 /// Where each part of the state is.
 #[derive(Clone, Copy, Debug, Default)]
@@ -149,11 +149,11 @@ impl<const D: usize> System<D> {
 
     /// What happens in `step_s`, with each sensor as it is then. `reading_k` is what each reads
     /// about the level, where losses are known.
-    pub(crate) fn step(&self, step_s: f64, locals: Option<[(Local, f64); 2]>) -> Step<D> {
+    pub(crate) fn step(&self, step_s: f64, locals: Option<[(SensorAt, f64); 2]>) -> Step<D> {
         let mut rates = self.rates;
         for i in 0..2 {
             let (local, reading_k) =
-                locals.map_or((Local { tau_factor: 1.0, loss_k: 0.0, loss_slope: 0.0 }, 0.0), |l| l[i]);
+                locals.map_or((SensorAt { tau_factor: 1.0, loss_k: 0.0, loss_slope: 0.0 }, 0.0), |l| l[i]);
             let rate = 1.0 / (self.rig.sensors[i].tau_s * local.tau_factor);
             let body = self.layout.body[i];
             for at in 0..self.layout.gas {
@@ -198,7 +198,7 @@ fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, 
     let mut doublings = 0;
     let mut part_s = step_s;
     let mut left = size;
-    while left > LONGEST {
+    while left > MAX_SERIES_NORM {
         left *= 0.5;
         part_s *= 0.5;
         doublings += 1;
@@ -221,7 +221,7 @@ fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, 
     let mut transition = power;
     let mut driven = drive * part_s;
     let mut added = driven;
-    for k in 1..=SERIES {
+    for k in 1..=SERIES_TERMS {
         power = times_rates(&power) / k as f64;
         transition += power;
         let half = times_rates(&driven);

@@ -5,19 +5,19 @@ use crate::rig::Rig;
 use crate::stream::Stream;
 
 /// Factors of the time constants that are kept in view, evenly spaced in their logarithm between
-/// `1/FARTHEST` and `FARTHEST`.
+/// `1/MAX_FACTOR` and `MAX_FACTOR`.
 const FACTORS: usize = 41;
-const FARTHEST: f64 = 2.5;
+const MAX_FACTOR: f64 = 2.5;
 /// Probability that the factor jumps to any value in a sample. A sudden change is followed once the
 /// likelihood ratio of the readings exceeds one over this.
-const JUMP: f64 = 1e-9;
+const JUMP_CHANCE_PER_SAMPLE: f64 = 1e-9;
 /// Degrees of freedom of Student's distribution in which readings weigh the factors, so that a
 /// single wrong one does not decide.
-const FREEDOM: f64 = 8.0;
+const STUDENT_FREEDOM: f64 = 8.0;
 
 /// The gas temperature and the time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tracked {
+pub struct TrackerState {
     /// The gas temperature, °C.
     pub gas_c: f64,
     /// Variance of the gas temperature, K².
@@ -29,8 +29,8 @@ pub struct Tracked {
     /// Probability that the factor is the smallest or the largest that is tracked. If it is not
     /// small, the factor has left the range.
     pub chance_beyond: f64,
-    /// Normalised innovation squared, as in [`crate::Now`], averaged over the factors.
-    pub surprise: f64,
+    /// Normalised innovation squared, as in [`crate::Filtered`], averaged over the factors.
+    pub normalised_innovation_squared: f64,
 }
 
 /// A filter for sensors whose time constants change by a common factor, as they do in flow that
@@ -57,7 +57,7 @@ impl<const D: usize> Tracker<D> {
     /// `rig` and whose logarithm wanders by `change` a second, standard deviation, growing as the
     /// root of time. `None` as for [`Stream::new`].
     pub fn new(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Self> {
-        let spacing = 2.0 * FARTHEST.ln() / (FACTORS - 1) as f64;
+        let spacing = 2.0 * MAX_FACTOR.ln() / (FACTORS - 1) as f64;
         let log_factor: Vec<f64> = (0..FACTORS).map(|k| (k as f64 - (FACTORS - 1) as f64 / 2.0) * spacing).collect();
         let stream = |log: &f64| {
             let mut rig = *rig;
@@ -73,22 +73,24 @@ impl<const D: usize> Tracker<D> {
     }
 
     /// What is known once the next readings, °C, are; `None` for one that is missing.
-    pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> Tracked {
+    pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> TrackerState {
         let last = FACTORS - 1;
         for k in 0..FACTORS {
             // At the ends of the grid what would step out stays.
             let [below, above] = [k.saturating_sub(1), (k + 1).min(last)].map(|j| self.chance[j]);
             let wandered = self.chance[k] + self.leaves * (below + above - 2.0 * self.chance[k]);
-            self.next[k] = (1.0 - JUMP) * wandered + JUMP / FACTORS as f64;
+            self.next[k] = (1.0 - JUMP_CHANCE_PER_SAMPLE) * wandered + JUMP_CHANCE_PER_SAMPLE / FACTORS as f64;
         }
-        let (mut gas_c, mut square, mut surprise) = ([0.0; FACTORS], [0.0; FACTORS], [0.0; FACTORS]);
+        let (mut gas_c, mut square, mut normalised_innovation_squared) =
+            ([0.0; FACTORS], [0.0; FACTORS], [0.0; FACTORS]);
         let mut most = f64::NEG_INFINITY;
         let count = reading_c.iter().flatten().count() as f64;
         for (k, stream) in self.streams.iter_mut().enumerate() {
             let now = stream.push(reading_c);
-            (gas_c[k], square[k], surprise[k]) = (now.gas_c, now.variance_k2, now.surprise);
-            let tails = (FREEDOM + count) * (now.surprise / FREEDOM).ln_1p();
-            self.log_likelihood[k] = -0.5 * (tails + now.scatter.ln());
+            (gas_c[k], square[k], normalised_innovation_squared[k]) =
+                (now.gas_c, now.variance_k2, now.normalised_innovation_squared);
+            let tails = (STUDENT_FREEDOM + count) * (now.normalised_innovation_squared / STUDENT_FREEDOM).ln_1p();
+            self.log_likelihood[k] = -0.5 * (tails + now.innovation_variance.ln());
             most = most.max(self.log_likelihood[k]);
         }
         let mut sum = 0.0;
@@ -104,24 +106,24 @@ impl<const D: usize> Tracker<D> {
         // between them.
         let spacing = self.log_factor[1] - self.log_factor[0];
         let between = |k: usize| 0.5 * (gas_c[(k + 1).min(last)] - gas_c[k.saturating_sub(1)]);
-        Tracked {
+        TrackerState {
             gas_c: gas,
             variance_k2: mean(&|k| square[k] + (gas_c[k] - gas).powi(2) + between(k).powi(2) / 12.0),
             log_factor,
             log_variance: mean(&|k| (self.log_factor[k] - log_factor).powi(2)) + spacing * spacing / 12.0,
             chance_beyond: self.chance[0] + self.chance[last],
-            surprise: mean(&|k| surprise[k]),
+            normalised_innovation_squared: mean(&|k| normalised_innovation_squared[k]),
         }
     }
 }
 
 /// [`Tracker::push`] with as many states as are needed.
-pub type Push = Box<dyn FnMut([Option<f64>; 2]) -> Tracked + Send>;
+pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send>;
 
 /// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more
 /// than the largest.
-pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
-    fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Push> {
+pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
+    fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
         let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;
         Some(Box::new(move |reading_c| tracker.push(reading_c)))
     }

@@ -2,7 +2,7 @@
 //! covariance matrices in closed form: no state, no recursion, no series.
 
 use nalgebra::{DMatrix, DVector};
-use twinlag_compensate::{Form, Local, Prior, Readings, Rig, Sensor, Term, reconstruct};
+use twinlag_compensate::{Form, Prior, Readings, Rig, Sensor, SensorAt, Term, reconstruct};
 
 const TAU_S: [f64; 2] = [0.03, 0.11];
 const NOISE_K: [f64; 2] = [0.4, 0.2];
@@ -131,8 +131,8 @@ fn what_a_sensor_does_along_the_record_is_what_it_would_do_anyway() {
     let case = case();
     let (factor, slope) = (2.0, 0.25);
     let prior = Prior { level_c: LEVEL_C, terms: vec![Term::Rough { std_k: STD_K, corner_hz: CORNER_HZ }] };
-    let local = |tau_factor: f64, slope: f64, reading_c: &[f64]| -> Vec<Local> {
-        let each = reading_c.iter().map(|c| Local { tau_factor, loss_k: slope * (c - LEVEL_C), loss_slope: slope });
+    let local = |tau_factor: f64, slope: f64, reading_c: &[f64]| -> Vec<SensorAt> {
+        let each = reading_c.iter().map(|c| SensorAt { tau_factor, loss_k: slope * (c - LEVEL_C), loss_slope: slope });
         each.collect()
     };
     let locals = [local(factor, 0.0, &case.reading_c[0]), local(1.0, slope, &case.reading_c[1])];

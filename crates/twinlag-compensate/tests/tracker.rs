@@ -1,6 +1,6 @@
 //! That time constants are followed as readings come in, with a band that holds them, through smooth changes and sudden ones.
 
-use twinlag_compensate::{Prior, Readings, Rig, Sensor, Term, Tracked, learn, tracker};
+use twinlag_compensate::{Prior, Readings, Rig, Sensor, Term, TrackerState, learn, tracker};
 use twinlag_signal::{Flow, FlowSine, FlowStep};
 use twinlag_signal::{
     Gas, Noise, Record, Rig as Simulation, Sensor as Simulated, Signal, Simulated as Answer, Turbulence,
@@ -25,7 +25,7 @@ fn simulated(flow: Flow, seed: u64) -> Answer {
     rig.with_flow(flow).expect("a flow").simulate().expect("a record")
 }
 
-fn tracked(record: &Answer) -> Vec<Tracked> {
+fn tracked(record: &Answer) -> Vec<TrackerState> {
     let rig = Rig::new([Sensor::new(0.024, 0.1), Sensor::new(0.117, 0.1)]);
     let start = |values: &[f64]| values[..START].to_vec();
     let readings =

@@ -12,13 +12,13 @@ use num_dual::{DualNum, DualSVec64};
 use crate::inverse::{Row, row};
 use crate::noise_model::Model;
 use crate::parameters::{Pair, parts};
-use crate::polynomial::LONGEST;
+use crate::polynomial::MAX_COEFFICIENTS;
 use crate::readings::{Segment, Steps};
 
 /// Relative difference that rounding makes.
-const SAME: f64 = 4.0 * f64::EPSILON;
+const SETTLED_RELATIVE: f64 = 4.0 * f64::EPSILON;
 /// Rows that must agree with the one before before the factor counts as settled.
-const AGREEING: usize = LONGEST;
+const SETTLED_ROWS: usize = MAX_COEFFICIENTS;
 
 /// Calls `visit` with each whitened residual of `segment`, in order of time.
 pub(crate) fn sweep<const P: usize>(
@@ -51,12 +51,12 @@ pub(crate) fn sweep<const P: usize>(
         sum
     };
     let is_even = matches!(segment.steps(), Steps::Even(_));
-    let fixed = std::array::from_fn::<_, LONGEST, _>(|lag| covariance(&first, &first, lag));
+    let fixed = std::array::from_fn::<_, MAX_COEFFICIENTS, _>(|lag| covariance(&first, &first, lag));
 
     // The last `band` rows, newest first: filter, factor (lags 0..=band) and residual.
     let mut rows = [first; 2];
-    let mut factors = [[zero; LONGEST]; LONGEST];
-    let mut residuals = [zero; LONGEST];
+    let mut factors = [[zero; MAX_COEFFICIENTS]; MAX_COEFFICIENTS];
+    let mut residuals = [zero; MAX_COEFFICIENTS];
     let mut agreeing = 0;
     for k in 0..(y1.len() + 1).saturating_sub(width) {
         if let Steps::Uneven(steps) = segment.steps() {
@@ -70,7 +70,7 @@ pub(crate) fn sweep<const P: usize>(
             u += d1[j] * y1[k + j] - d2[j] * (-pair.offset + y2[k + j]);
         }
 
-        if agreeing >= AGREEING {
+        if agreeing >= SETTLED_ROWS {
             let mut residual = u;
             for lag in 1..=band {
                 residual -= factors[0][lag] * residuals[lag - 1];
@@ -84,7 +84,7 @@ pub(crate) fn sweep<const P: usize>(
 
         // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the
         // older ones.
-        let mut factor = [zero; LONGEST];
+        let mut factor = [zero; MAX_COEFFICIENTS];
         let reach = band.min(k);
         for lag in (0..=reach).rev() {
             let mut entry = if is_even { fixed[lag] } else { covariance(&rows[0], &rows[lag], lag) };
@@ -110,12 +110,13 @@ pub(crate) fn sweep<const P: usize>(
 }
 
 /// Whether two rows of the factor are the same to rounding, derivatives included.
-fn agree<const P: usize>(now: &[DualSVec64<P>; LONGEST], before: &[DualSVec64<P>; LONGEST]) -> bool {
-    let parts = |row: &[DualSVec64<P>; LONGEST]| row.map(parts);
+fn agree<const P: usize>(now: &[DualSVec64<P>; MAX_COEFFICIENTS], before: &[DualSVec64<P>; MAX_COEFFICIENTS]) -> bool {
+    let parts = |row: &[DualSVec64<P>; MAX_COEFFICIENTS]| row.map(parts);
     let (now, before) = (parts(now), parts(before));
     let size = now[0].0;
     let slope = |p: usize| now.iter().map(|x| x.1[p].abs()).fold(0.0, f64::max);
-    now.iter()
-        .zip(&before)
-        .all(|(a, b)| (a.0 - b.0).abs() <= SAME * size && (0..P).all(|p| (a.1[p] - b.1[p]).abs() <= SAME * slope(p)))
+    now.iter().zip(&before).all(|(a, b)| {
+        (a.0 - b.0).abs() <= SETTLED_RELATIVE * size
+            && (0..P).all(|p| (a.1[p] - b.1[p]).abs() <= SETTLED_RELATIVE * slope(p))
+    })
 }

@@ -2,9 +2,9 @@
 //! interpolated.
 
 /// Points in each band.
-pub(crate) const NODES: usize = 6;
+pub(crate) const NODES_PER_BAND: usize = 6;
 /// Width of a band in `1 − cos w`.
-const RATIO: f64 = 2.0;
+const BAND_RATIO: f64 = 2.0;
 
 /// How the bins of a segment are gathered. Depends on its length alone.
 pub(crate) struct Bands {
@@ -12,7 +12,7 @@ pub(crate) struct Bands {
     /// `cos w` at the points of all bands.
     pub(crate) nodes: Vec<f64>,
     /// Lagrange's polynomials at the bins of the bands that are interpolated, in order.
-    pub(crate) lagrange: Vec<[f64; NODES]>,
+    pub(crate) lagrange: Vec<[f64; NODES_PER_BAND]>,
     /// How many bins each point stands for: Lagrange's polynomials summed.
     counts: Vec<f64>,
 }
@@ -32,10 +32,10 @@ impl Bands {
         let mut out = Self { bands: Vec::new(), nodes: Vec::new(), lagrange: Vec::new(), counts: Vec::new() };
         let mut first_bin = 0;
         while first_bin < cosines.len() {
-            let edge = RATIO * (1.0 - cosines[first_bin]);
+            let edge = BAND_RATIO * (1.0 - cosines[first_bin]);
             let bins = cosines[first_bin..].partition_point(|x| 1.0 - x <= edge).max(1);
             let first_node = out.nodes.len();
-            if bins <= NODES {
+            if bins <= NODES_PER_BAND {
                 out.bands.push(Band { first_bin, bins: 1, first_node, half_width: 0.0 });
                 out.nodes.push(cosines[first_bin]);
                 out.counts.push(1.0);
@@ -44,17 +44,17 @@ impl Bands {
             }
             let (high, low) = (cosines[first_bin], cosines[first_bin + bins - 1]);
             let (middle, half_width) = (0.5 * (high + low), 0.5 * (high - low));
-            let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES as f64;
-            let unit: [f64; NODES] = std::array::from_fn(|q| angle(q).cos());
+            let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES_PER_BAND as f64;
+            let unit: [f64; NODES_PER_BAND] = std::array::from_fn(|q| angle(q).cos());
             out.nodes.extend(unit.iter().map(|c| middle + half_width * c));
             out.bands.push(Band { first_bin, bins, first_node, half_width });
-            let mut counts = [0.0; NODES];
+            let mut counts = [0.0; NODES_PER_BAND];
             for x in &cosines[first_bin..first_bin + bins] {
                 let at = (x - middle) / half_width;
-                let lagrange: [f64; NODES] = std::array::from_fn(|q| {
-                    (0..NODES).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
+                let lagrange: [f64; NODES_PER_BAND] = std::array::from_fn(|q| {
+                    (0..NODES_PER_BAND).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
                 });
-                (0..NODES).for_each(|q| counts[q] += lagrange[q]);
+                (0..NODES_PER_BAND).for_each(|q| counts[q] += lagrange[q]);
                 out.lagrange.push(lagrange);
             }
             out.counts.extend(counts);

@@ -3,7 +3,7 @@
 //!
 //! All that depends on data in the spectral cost is quadratic in a few series per bin,
 //! `D_i,j D_k,j`, and all that depends on the parameters is smooth in `x = cos w`. So in each band
-//! the function `1/λ(x)`, `λ = α + β x`, is interpolated at [`NODES`] Chebyshev points `x_q`: with
+//! the function `1/λ(x)`, `λ = α + β x`, is interpolated at [`NODES_PER_BAND`] Chebyshev points `x_q`: with
 //! `L_q` Lagrange's polynomials, `Σ_j (D_i D_k)_j/λ_j ≈ Σ_q G_ik,q/λ(x_q)`,
 //! `G_ik,q = Σ_j L_q(x_j) (D_i D_k)_j`. The same sum over points, of which there are about a
 //! hundred whatever the length of the record. Bands with no more bins than points keep their bins.
@@ -16,7 +16,7 @@
 
 use num_dual::DualSVec64;
 
-use crate::bands::NODES;
+use crate::bands::NODES_PER_BAND;
 use crate::noise_model::Model;
 use crate::parameters::Pair;
 use crate::spectral::{Sloped, Sums, Weights};
@@ -116,7 +116,7 @@ impl Compressed {
             let mut sums = Sums::<P>::ZERO;
             let mut epsilon = 2.0;
             let mut slope = [0.0; P];
-            for j in band.first_node..band.first_node + NODES {
+            for j in band.first_node..band.first_node + NODES_PER_BAND {
                 let x = bands.nodes[j];
                 let at: [f64; G] = std::array::from_fn(|g| self.gram[g][j]);
                 let terms = forms.at(&at, weights, x);
@@ -163,17 +163,17 @@ fn gather<const T: usize, const G: usize>(segment: &Transformed) -> Vec<Vec<f64>
             }
             continue;
         }
-        let mut sums = [[0.0; NODES]; G];
+        let mut sums = [[0.0; NODES_PER_BAND]; G];
         for (j, weights) in (band.first_bin..band.first_bin + band.bins).zip(&mut lagrange) {
             let products = products(j);
             for g in 0..G {
-                for q in 0..NODES {
+                for q in 0..NODES_PER_BAND {
                     sums[g][q] += products[g] * weights[q];
                 }
             }
         }
         for (row, sums) in gram.iter_mut().zip(&sums) {
-            row[band.first_node..band.first_node + NODES].copy_from_slice(sums);
+            row[band.first_node..band.first_node + NODES_PER_BAND].copy_from_slice(sums);
         }
     }
     gram

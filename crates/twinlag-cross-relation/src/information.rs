@@ -25,7 +25,7 @@ use crate::whitened::Whitened;
 
 /// How the variance of the gradient is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Middle {
+pub enum ScoreVariance {
     /// From white noise of the stated levels, including the noise-noise term.
     WhiteNoise,
     /// The residual's own smoothed spectrum, for records in which model error is not small against
@@ -86,15 +86,15 @@ impl Whitened<'_> {
         theta: &[f64; P],
         free: &[usize],
         prior_std: &[f64; P],
-        middle: Middle,
+        middle: ScoreVariance,
     ) -> Option<[[f64; P]; P]> {
         let full = self.observed_information(theta);
         let score = match middle {
-            Middle::WhiteNoise => {
+            ScoreVariance::WhiteNoise => {
                 let noise = self.noise_noise(theta);
                 std::array::from_fn(|i| std::array::from_fn(|j| full[i][j] + noise[i][j]))
             }
-            Middle::ResidualSpectrum => self.score_variance(theta),
+            ScoreVariance::ResidualSpectrum => self.score_variance(theta),
         };
         // Independent knowledge adds its own information, and as much variance to the gradient.
         let known = |m: &[[f64; P]; P]| -> [[f64; P]; P] {
@@ -339,7 +339,7 @@ mod tests {
             let free = [0, 1, 2, 3];
             cost.covariance(&THETA, &free, &[f64::INFINITY; 4], middle).expect("determined")
         };
-        let (a, b) = (variance(Middle::WhiteNoise), variance(Middle::ResidualSpectrum));
+        let (a, b) = (variance(ScoreVariance::WhiteNoise), variance(ScoreVariance::ResidualSpectrum));
         for i in 0..4 {
             assert!((b[i][i] / a[i][i] - 1.0).abs() < 0.56, "{i}: {} and {}", a[i][i], b[i][i]);
         }
@@ -382,13 +382,19 @@ mod tests {
                 }
                 *mean += cost.score_test(&theta, &[0, 1], &[2, 3]).expect("determined") / 400.0;
             }
-            let all =
-                cost.covariance(&THETA, &[0, 1, 2, 3], &[f64::INFINITY; 4], Middle::WhiteNoise).expect("determined");
+            let all = cost
+                .covariance(&THETA, &[0, 1, 2, 3], &[f64::INFINITY; 4], ScoreVariance::WhiteNoise)
+                .expect("determined");
             wald += off * off / all[2][2] / 400.0;
         }
         assert!((mean[0] - 2.0).abs() < 0.4, "at the truth: mean {}", mean[0]);
-        assert!((mean[1] / (2.0 + wald) - 1.0).abs() < 0.33, "at a gain off: mean {}, Wald \
-            {}", mean[1], 2.0 + wald);
+        assert!(
+            (mean[1] / (2.0 + wald) - 1.0).abs() < 0.33,
+            "at a gain off: mean {}, Wald \
+            {}",
+            mean[1],
+            2.0 + wald
+        );
         assert!(wald > 20.0, "the signal must show the error at all: {wald}");
     }
 
@@ -400,11 +406,11 @@ mod tests {
         let readings = record(30.0, &mut || StandardNormal.sample(&mut rng));
         let cost = cost(&readings);
         let none = [f64::INFINITY; 4];
-        let free = cost.covariance(&THETA, &[0, 1], &none, Middle::WhiteNoise).expect("determined");
+        let free = cost.covariance(&THETA, &[0, 1], &none, ScoreVariance::WhiteNoise).expect("determined");
         assert!(free[2][2] == 0.0 && free[0][2] == 0.0);
         let known = 0.1 * free[0][0].sqrt();
         let after = cost
-            .covariance(&THETA, &[0, 1], &[known, none[1], none[2], none[3]], Middle::WhiteNoise)
+            .covariance(&THETA, &[0, 1], &[known, none[1], none[2], none[3]], ScoreVariance::WhiteNoise)
             .expect("determined");
         assert!((after[0][0].sqrt() / known - 1.0).abs() < 0.01);
     }

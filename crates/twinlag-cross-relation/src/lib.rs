@@ -52,7 +52,7 @@ pub use difference_equation::{DifferenceEquationEstimator, difference_equation_l
 pub use error::CostError;
 pub use free_gains::FreeGains;
 pub use inferred::{InferredInputs, inferred_inputs};
-pub use information::Middle;
+pub use information::ScoreVariance;
 pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};

@@ -4,19 +4,19 @@ use num_dual::DualNum;
 
 /// Coefficients that the longest filter has: two second-order sensors under the first-order hold,
 /// second-order noise on both channels.
-pub(crate) const LONGEST: usize = 9;
+pub(crate) const MAX_COEFFICIENTS: usize = 9;
 
-/// A filter of at most [`LONGEST`] coefficients, oldest sample first.
+/// A filter of at most [`MAX_COEFFICIENTS`] coefficients, oldest sample first.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Polynomial<D> {
-    coefficients: [D; LONGEST],
+    coefficients: [D; MAX_COEFFICIENTS],
     len: usize,
 }
 
 impl<D: DualNum<Primitive = f64> + Copy> Polynomial<D> {
     /// From coefficients of `x[k], x[k−1], …`.
     pub(crate) fn oldest_first(newest_first: impl IntoIterator<Item = D>) -> Self {
-        let mut out = Self { coefficients: [D::from(0.0); LONGEST], len: 0 };
+        let mut out = Self { coefficients: [D::from(0.0); MAX_COEFFICIENTS], len: 0 };
         for c in newest_first {
             out.coefficients[out.len] = c;
             out.len += 1;
@@ -39,7 +39,7 @@ impl<D: DualNum<Primitive = f64> + Copy> Polynomial<D> {
     }
 
     pub(crate) fn times(&self, other: &Self) -> Self {
-        let mut out = Self { coefficients: [D::from(0.0); LONGEST], len: self.len + other.len - 1 };
+        let mut out = Self { coefficients: [D::from(0.0); MAX_COEFFICIENTS], len: self.len + other.len - 1 };
         for (i, &a) in self.as_slice().iter().enumerate() {
             for (j, &b) in other.as_slice().iter().enumerate() {
                 out.coefficients[i + j] += a * b;

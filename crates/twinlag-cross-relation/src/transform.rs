@@ -20,7 +20,7 @@ use crate::bands::Bands;
 use crate::readings::{Segment, Steps};
 
 /// Lengths whose plans are kept by each thread.
-const KEPT: usize = 4;
+const PLANS_KEPT: usize = 4;
 
 /// What the transforms of all segments of one length share.
 pub(crate) struct Plan {
@@ -51,7 +51,7 @@ impl Plan {
             if let Some(place) = kept.iter().position(|p| p.samples == samples) {
                 kept[..=place].rotate_right(1);
             } else {
-                kept.truncate(KEPT - 1);
+                kept.truncate(PLANS_KEPT - 1);
                 kept.insert(0, Arc::new(Self::new(samples)));
             }
             kept[0].clone()

@@ -5,7 +5,7 @@
 //! time constant and of the difference are the unions over all that is allowed. Where the cost owes its shape to noise rather
 //! than to the signal it is not chi-square distributed, and far more is allowed.
 
-use twinlag_cross_relation::{Middle, Whitened};
+use twinlag_cross_relation::{ScoreVariance, Whitened};
 use twinlag_optimise::{Budget, Cost, End, Minimiser, Problem, Variable};
 
 use crate::error::EstimateError;
@@ -65,7 +65,7 @@ pub fn ridge<const P: usize>(
     variables: &[Variable],
     best: &[f64],
     index: usize,
-    middle: Middle,
+    middle: ScoreVariance,
     minimiser: &dyn Minimiser,
 ) -> Result<Option<Ridge>, EstimateError> {
     let other = 1 - index;
@@ -80,7 +80,7 @@ pub fn ridge<const P: usize>(
     let all: Vec<usize> = (0..P).filter(|i| *i == index || rest.contains(i)).collect();
     let noise_share = |x: &[f64]| whitened.noise_share(&theta(x), &all, index);
     // How much wider than white noise alone the residual makes the spread; thresholds grow by its square.
-    let inflation = match (spread(best, middle), spread(best, Middle::WhiteNoise)) {
+    let inflation = match (spread(best, middle), spread(best, ScoreVariance::WhiteNoise)) {
         (Some(actual), Some(assumed)) => (actual / assumed).powi(2).max(1.0),
         _ => 1.0,
     };

@@ -1,7 +1,7 @@
 //! The whitened estimator: levels, fit, levels in the light of the fit, fit again. Where levels were found, their ratio is kept and
 //! their size is that of the residual: an estimator takes its model for right, and then nothing tells the size as well.
 
-use twinlag_cross_relation::{Middle, Readings, Whitened};
+use twinlag_cross_relation::{Readings, ScoreVariance, Whitened};
 use twinlag_optimise::{End, Evaluations, Fit};
 
 use crate::error::EstimateError;
@@ -26,7 +26,7 @@ pub(crate) fn estimate<const P: usize>(task: &Task<'_>) -> Result<Outcome, Estim
     let free = free_parameters::<P>(task);
     let mut intervals = None;
     if task.intervals && found.end.is_usable() {
-        let covariance = found.whitened.covariance(&found.theta, &free, &[f64::INFINITY; P], Middle::WhiteNoise);
+        let covariance = found.whitened.covariance(&found.theta, &free, &[f64::INFINITY; P], ScoreVariance::WhiteNoise);
         intervals = covariance.map(|c| {
             let c = intervals::with_level_uncertainty(&found.whitened, &found.theta, &free, &c, &found.levels, &[]);
             let variables = task.variables::<P>();

@@ -24,10 +24,10 @@ const PER_METHOD: [&str; 9] = [
     "evaluations",
 ];
 /// Quantities of one method.
-const COUNT: usize = 14;
+const QUANTITIES_PER_METHOD: usize = 14;
 
 /// Both time constants this close to the truth, as a share of it, count as reached.
-const REACHED: f64 = 0.2;
+const REACHED_RELATIVE: f64 = 0.2;
 
 /// A plan as a study.
 pub struct Experiment<'a> {
@@ -180,7 +180,7 @@ fn readings(y1: &[f64], y2: &[f64], cell: &Cell) -> Result<Readings, CostError> 
 /// Names of a method's quantities, position by position.
 pub(crate) fn quantities(method: &str) -> Vec<Quantity> {
     let of = |what: &str, sensor: usize| format!("{method}/{what}-{}", sensor + 1);
-    let mut out = Vec::with_capacity(COUNT);
+    let mut out = Vec::with_capacity(QUANTITIES_PER_METHOD);
     for what in &PER_METHOD[..5] {
         for sensor in 0..2 {
             let name = of(what, sensor);
@@ -240,7 +240,7 @@ impl Study for Experiment<'_> {
             task.starts_s = self.start(method, trial);
             task.discard = method.discard;
             task.intervals = method.intervals;
-            let at = m * COUNT;
+            let at = m * QUANTITIES_PER_METHOD;
             let found = match self.estimators[m].estimate(&task) {
                 Err(EstimateError::Cost(CostError::Singular)) => {
                     (10..13).for_each(|event| out.event(at + event, false));
@@ -266,7 +266,7 @@ impl Study for Experiment<'_> {
             }
             out.event(at + 10, found.end.is_usable());
             out.event(at + 11, matches!(found.end, End::OnBound(_)));
-            let is_near = |i: usize| (found.tau_s[i] / cell.tau_s[i] - 1.0).abs() < REACHED;
+            let is_near = |i: usize| (found.tau_s[i] / cell.tau_s[i] - 1.0).abs() < REACHED_RELATIVE;
             out.event(at + 12, found.end.is_usable() && is_near(0) && is_near(1));
             out.value(at + 13, (found.evaluations.values + found.evaluations.derivatives) as f64);
         }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use twinlag_compensate::{Coloured, Local, Readings, Rig, Sensor, SlowPath};
+use twinlag_compensate::{Coloured, SensorAt, Readings, Rig, Sensor, SlowPath};
 
 use crate::error::DiagnoseError;
 use crate::fit::Fitted;
@@ -105,7 +105,7 @@ fn rig(plant: &Plant) -> Rig {
 }
 
 /// What each sensor does at each instant, where that changes.
-fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<Local>; 2]> {
+fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<SensorAt>; 2]> {
     let changes = |s: &crate::plant::Sensor| !s.changes.is_empty() || s.rest.is_some() || s.heat.is_some();
     plant.sensors.iter().any(changes).then(|| {
         [0, 1].map(|i| {
@@ -116,7 +116,7 @@ fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Optio
                 let with_temperature = sensor.heat.as_ref().map_or(1.0, |heat| heat(temperature_c).1.re);
                 let rest = sensor.rest.as_ref().map(|rest| rest(temperature_c));
                 let (loss_k, loss_slope) = rest.map_or((0.0, 0.0), |(with, slope)| (with.re - c, slope.re - 1.0));
-                Local { tau_factor: sensor.tau_factor_at(time_s).re * with_temperature, loss_k, loss_slope }
+                SensorAt { tau_factor: sensor.tau_factor_at(time_s).re * with_temperature, loss_k, loss_slope }
             });
             each.collect()
         })

@@ -10,7 +10,7 @@ use crate::wording::{Counted, brief};
 
 /// Stamps closer to even spacing than this part of the period are called uniform without further
 /// numbers.
-const EXACT: f64 = 1e-6;
+const EXACT_PERIODS: f64 = 1e-6;
 
 /// One remark on how a file was understood. Its `Display` is a sentence for people.
 #[derive(Clone, Debug, PartialEq)]
@@ -188,7 +188,7 @@ impl fmt::Display for Note {
                 };
                 let who = if *chosen { " (as chosen)" } else { "" };
                 write!(f, "sampling {what}{who}: period {} s", brief(*period_s))?;
-                if *largest_departure_s >= EXACT * period_s {
+                if *largest_departure_s >= EXACT_PERIODS * period_s {
                     write!(f, ", stamps depart from even spacing by {jitter_s:.3e} s rms and ")?;
                     write!(f, "{largest_departure_s:.3e} s at most")?;
                     if let Some(resolution_s) = stamp_resolution_s {

@@ -21,12 +21,12 @@ use crate::{Place, RecordError};
 
 /// Fewest samples in segments that make a record. Fewer do not even determine two time constants
 /// and a noise level.
-const LEAST_SAMPLES: usize = 8;
+const MIN_SAMPLES: usize = 8;
 /// Gaps that get a note each.
-const LISTED_GAPS: usize = 5;
+const MAX_LISTED_GAPS: usize = 5;
 pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// No thermocouple reaches this; sentinels such as 9999 and 1e37 lie beyond.
-pub(crate) const HOTTEST_C: f64 = 5000.0;
+pub(crate) const MAX_TEMPERATURE_C: f64 = 5000.0;
 
 /// Vectors to make a record from; `[n]` each, missing temperatures NaN.
 #[derive(Clone, Debug, PartialEq)]
@@ -245,8 +245,8 @@ impl Record {
         if missing > 0 {
             notes.push(Note::Masked { rows: missing, t1: count(&t1_c), t2: count(&t2_c) });
         }
-        let too_short = |usable| RecordError::TooShort { file: file(), usable, rows, missing, least: LEAST_SAMPLES };
-        if rows - missing < LEAST_SAMPLES {
+        let too_short = |usable| RecordError::TooShort { file: file(), usable, rows, missing, least: MIN_SAMPLES };
+        if rows - missing < MIN_SAMPLES {
             return Err(too_short(rows - missing));
         }
         let first = time_s[0];
@@ -265,7 +265,7 @@ impl Record {
         }
         let segments: Vec<_> = segments.into_iter().filter(|segment| segment.len() > 1).collect();
         let usable = segments.iter().map(Range::len).sum();
-        if usable < LEAST_SAMPLES {
+        if usable < MIN_SAMPLES {
             return Err(too_short(usable));
         }
         for (values, column) in [(&t1_c, &origin.columns[0]), (&t2_c, &origin.columns[1])] {
@@ -366,7 +366,7 @@ fn check_time(time_s: &[f64], origin: &Origin<'_>) -> Result<(), RecordError> {
 }
 
 fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(), RecordError> {
-    let is_outside = |value: &f64| *value < ABSOLUTE_ZERO_C || *value > HOTTEST_C;
+    let is_outside = |value: &f64| *value < ABSOLUTE_ZERO_C || *value > MAX_TEMPERATURE_C;
     let Some(row) = values_c.iter().position(is_outside) else { return Ok(()) };
     let cells = origin.table.and_then(|(table, chosen)| {
         let indices = [Some(chosen.channels[0]), Some(chosen.channels[1]), chosen.reference];
@@ -384,12 +384,12 @@ fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(
 
 fn note_gaps(time_s: &[f64], runs: &[Range<usize>], origin: &Origin<'_>, notes: &mut Vec<Note>) {
     let gaps = runs.iter().skip(1).map(|run| (run.start, time_s[run.start] - time_s[run.start - 1]));
-    for (row, length_s) in gaps.clone().take(LISTED_GAPS) {
+    for (row, length_s) in gaps.clone().take(MAX_LISTED_GAPS) {
         notes.push(Note::Gap { at: origin.place(row), from_s: time_s[row - 1], length_s });
     }
-    let count = gaps.len().saturating_sub(LISTED_GAPS);
+    let count = gaps.len().saturating_sub(MAX_LISTED_GAPS);
     if count > 0 {
-        notes.push(Note::FurtherGaps { count, length_s: gaps.skip(LISTED_GAPS).map(|gap| gap.1).sum() });
+        notes.push(Note::FurtherGaps { count, length_s: gaps.skip(MAX_LISTED_GAPS).map(|gap| gap.1).sum() });
     }
 }
 

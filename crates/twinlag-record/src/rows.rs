@@ -5,7 +5,7 @@ use crate::choose::choose;
 use crate::column::Kind;
 use crate::note::Note;
 use crate::number::{self, Value};
-use crate::record::{ABSOLUTE_ZERO_C, HOTTEST_C};
+use crate::record::{ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C};
 use crate::selection::Selection;
 use crate::sign::{Decimal, Delimiter};
 use crate::table::{Table, shortened};
@@ -108,7 +108,7 @@ impl RowReader {
                 }
             };
             match channel.unit.to_celsius(value) {
-                Some(c) if (ABSOLUTE_ZERO_C..=HOTTEST_C).contains(&c) => Ok(Some(c)),
+                Some(c) if (ABSOLUTE_ZERO_C..=MAX_TEMPERATURE_C).contains(&c) => Ok(Some(c)),
                 _ => {
                     let (at, unit) = (Place::Line(number), channel.unit.symbol());
                     Err(RecordError::OutOfRange { file: file(), at, column, value, cell: None, unit })

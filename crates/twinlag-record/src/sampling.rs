@@ -44,9 +44,9 @@ pub struct Sampling {
 }
 
 /// A beat is at least one in so many steps: a logger's period is not off its clock's unit by less.
-const RAREST: usize = 50;
+const MAX_STEPS_PER_BEAT: usize = 50;
 /// Departure, in periods, below which stamps count as even.
-const EXACT: f64 = 0.01;
+const EXACT_PERIODS: f64 = 0.01;
 
 impl Sampling {
     /// The step beyond which two rows do not belong together: 1.5 periods and the rounding of two
@@ -61,7 +61,7 @@ impl Sampling {
     /// How much longer than true a step may seem: less than one unit of the grid, if that is finer
     /// than the period and stamps depart from even ones at all.
     fn rounding_s(&self) -> f64 {
-        let is_exact = self.kind == SamplingKind::Uniform && self.largest_departure_s <= EXACT * self.period_s;
+        let is_exact = self.kind == SamplingKind::Uniform && self.largest_departure_s <= EXACT_PERIODS * self.period_s;
         self.stamp_resolution_s.filter(|&unit_s| unit_s < self.period_s && !is_exact).unwrap_or(0.0)
     }
 }
@@ -108,13 +108,13 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
 /// which do not come in the even beat of a period that is a little longer than the unit it is
 /// rounded to.
 fn are_skips(steps: &[f64], median: f64) -> bool {
-    if steps.iter().any(|step| off_grid(step / median) > EXACT) {
+    if steps.iter().any(|step| off_grid(step / median) > EXACT_PERIODS) {
         return false;
     }
     let long: Vec<usize> = steps.iter().enumerate().filter(|(_, step)| **step > 1.5 * median).map(|(k, _)| k).collect();
     let between = || long.windows(2).map(|pair| pair[1] - pair[0]);
     let is_even = between().max().unwrap_or(0) - between().min().unwrap_or(0) <= 1;
-    let is_beat = long.len() > 2 && is_even && steps.len() < RAREST * long.len();
+    let is_beat = long.len() > 2 && is_even && steps.len() < MAX_STEPS_PER_BEAT * long.len();
     !long.is_empty() && !is_beat
 }
 

@@ -240,11 +240,11 @@ impl Table {
 
 /// Enough of a cell to find it, however long it is.
 pub(crate) fn shortened(text: &str) -> String {
-    const LONGEST: usize = 60;
-    if text.chars().count() <= LONGEST {
+    const MAX_CHARACTERS: usize = 60;
+    if text.chars().count() <= MAX_CHARACTERS {
         return text.to_owned();
     }
-    text.chars().take(LONGEST).chain("...".chars()).collect()
+    text.chars().take(MAX_CHARACTERS).chain("...".chars()).collect()
 }
 
 /// Looks at 500 rows, or at as many more as it takes to see a decimal sign.

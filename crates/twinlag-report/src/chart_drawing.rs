@@ -182,16 +182,16 @@ struct Entry {
 }
 
 impl Legend {
-    /// - `homeless`: labels of reference lines for which there is no place along the line
-    fn new(chart: &Chart, styles: &Styles, homeless: &[&str]) -> Self {
+    /// - `unplaced`: labels of reference lines for which there is no place along the line
+    fn new(chart: &Chart, styles: &Styles, unplaced: &[&str]) -> Self {
         let mut entries: Vec<Entry> = Vec::new();
-        if chart.legend && (chart.series.len() > 1 || !homeless.is_empty()) {
+        if chart.legend && (chart.series.len() > 1 || !unplaced.is_empty()) {
             for series in chart.series.iter().filter(|s| !s.name.is_empty()) {
                 if entries.iter().all(|e| e.name != series.name) {
                     entries.push(Entry::new(series, styles));
                 }
             }
-            entries.extend(homeless.iter().map(|label| Entry::reference(label)));
+            entries.extend(unplaced.iter().map(|label| Entry::reference(label)));
         }
         Self { entries }
     }
@@ -202,7 +202,7 @@ impl Legend {
         let mut obstacles: Vec<Point> =
             (0..chart.series.len()).flat_map(|i| Drawn::new(chart, i, &rulers, frame).obstacles()).collect();
         let labels = place_labels(chart, &rulers, frame, &mut obstacles);
-        let legend = Self::new(chart, styles, &homeless(&labels));
+        let legend = Self::new(chart, styles, &unplaced(&labels));
         let fits = legend.entries.is_empty() || legend.place(frame, &obstacles).is_some_and(|(_, _, hides)| hides == 0);
         (legend, fits)
     }
@@ -337,7 +337,7 @@ struct Placed<'a> {
     place: Option<Frame>,
 }
 
-fn homeless<'a>(placed: &[Placed<'a>]) -> Vec<&'a str> {
+fn unplaced<'a>(placed: &[Placed<'a>]) -> Vec<&'a str> {
     placed.iter().filter(|p| p.place.is_none() && !p.label.is_empty()).map(|p| p.label).collect()
 }
 
@@ -443,7 +443,7 @@ pub(crate) fn draw_chart(
         }
     }
     draw_axes(canvas, axes, limits, frame);
-    let legend = Legend::new(chart, styles, &homeless(&labels));
+    let legend = Legend::new(chart, styles, &unplaced(&labels));
     if legend.entries.is_empty() {
         return;
     }

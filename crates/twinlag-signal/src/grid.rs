@@ -4,15 +4,15 @@ use crate::{Hold, Record, SignalError};
 
 /// Most integration steps in one simulation. The gas is stored at every half step: 3.2 GB at this
 /// limit.
-const MOST_STEPS: f64 = 2e8;
+const MAX_STEPS: f64 = 2e8;
 
-/// Refuses a simulation of more than [`MOST_STEPS`]; `field` is what drives the number besides the
+/// Refuses a simulation of more than [`MAX_STEPS`]; `field` is what drives the number besides the
 /// record's size.
 pub(crate) fn check_size(steps: f64, field: &str) -> Result<(), SignalError> {
-    if steps <= MOST_STEPS {
+    if steps <= MAX_STEPS {
         Ok(())
     } else {
-        Err(SignalError::TooLarge { field: field.to_owned(), steps, limit: MOST_STEPS })
+        Err(SignalError::TooLarge { field: field.to_owned(), steps, limit: MAX_STEPS })
     }
 }
 

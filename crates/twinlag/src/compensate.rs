@@ -1,8 +1,8 @@
 //! The gas temperature of a record: schema `twinlag.compensation/1`.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{
     Form, Gas, Learned, Prior, Readings, Rig, bandwidth_hz, learn, learn_quickly, learn_with_noise, reconstruct,
@@ -18,9 +18,10 @@ use twinlag_estimate::Z_975;
 /// Standard errors by which innovations may be larger than expected before bands are widened.
 const CLEARLY: f64 = 4.0;
 
-/// Factor by which noise is made louder, so many times at most, as long as readings become more probable.
-const LOUDER: f64 = 1.05;
-const TIMES_LOUDER: usize = 6;
+/// Factor by which the standard deviation of the noise is raised at a time, as long as readings become more probable.
+const NOISE_INFLATION_STEP: f64 = 1.05;
+/// Times that it is raised at most: by a third all in all.
+const MAX_NOISE_INFLATIONS: usize = 6;
 
 /// What a compensation may assume.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -240,12 +241,12 @@ impl Found {
         };
         let is_found = is_noise_found(options, &nominal);
         let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
-        let Learned { prior, deviations, others: unlike, mut noise_factor } = learned;
+        let Learned { prior, sigma_priors, alternatives, mut noise_factor } = learned;
         let mut gas = with(theta, &prior, noise_factor)?;
         if is_found && is_excessive(&gas) {
             // Where the prior's spectrum does not end as the gas's does, it has pushed the noise aside: as much as the readings say.
-            for _ in 0..TIMES_LOUDER {
-                let louder = noise_factor.map(|factor| factor * LOUDER);
+            for _ in 0..MAX_NOISE_INFLATIONS {
+                let louder = noise_factor.map(|factor| factor * NOISE_INFLATION_STEP);
                 let other = with(theta, &prior, louder)?;
                 if other.log_likelihood <= gas.log_likelihood {
                     break;
@@ -257,9 +258,9 @@ impl Found {
         let columns = fit.covariance.as_deref().map(columns).unwrap_or_default();
         let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
         let of_model: Vec<(Vec<f64>, &Prior)> = moved.map(|moved| (moved, &prior)).collect();
-        let of_prior: Vec<(Vec<f64>, &Prior)> = deviations.iter().map(|prior| (theta.to_vec(), prior)).collect();
-        let of_unlike: Vec<(Vec<f64>, &Prior)> = unlike.iter().map(|(_, prior)| (theta.to_vec(), prior)).collect();
-        let cases = [of_model, of_prior, of_unlike].concat();
+        let of_prior: Vec<(Vec<f64>, &Prior)> = sigma_priors.iter().map(|prior| (theta.to_vec(), prior)).collect();
+        let of_other: Vec<(Vec<f64>, &Prior)> = alternatives.iter().map(|(_, prior)| (theta.to_vec(), prior)).collect();
+        let cases = [of_model, of_prior, of_other].concat();
         let others = in_parallel(&cases, watch, |(theta, prior)| with(theta, prior, noise_factor).ok());
         let variance = |others: &[Option<Gas>]| {
             let mut variance = vec![0.0; gas.gas_c.len()];
@@ -271,13 +272,13 @@ impl Found {
             variance
         };
         let (of_model, rest) = others.split_at(columns.len());
-        let (of_prior, of_unlike) = rest.split_at(deviations.len());
+        let (of_prior, of_other) = rest.split_at(sigma_priors.len());
         let (of_model, of_prior) = (variance(of_model), variance(of_prior));
         let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
         let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it is, by as much as it moves it.
         let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
-        let gas = averaged(&gas, unlike.iter().map(|(weight, _)| *weight).zip(of_unlike));
+        let gas = averaged(&gas, alternatives.iter().map(|(weight, _)| *weight).zip(of_other));
         let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         Ok(Self { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
     }
@@ -315,27 +316,14 @@ fn in_parallel<Case: Sync>(
     watch: DiagnoseWatch<'_>,
     work: impl Fn(&Case) -> Option<Gas> + Sync,
 ) -> Vec<Option<Gas>> {
-    let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let results = Mutex::new(vec![None; cases.len()]);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..threads.min(cases.len()) {
-            scope.spawn(|| {
-                while let Some((index, case)) =
-                    Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|i| Some((i, cases.get(i)?)))
-                {
-                    let result = work(case);
-                    results.lock().expect("no thread panics")[index] = result;
-                    watch(
-                        "how model and prior move the gas temperature",
-                        done.fetch_add(1, Ordering::Relaxed) + 1,
-                        cases.len(),
-                    );
-                }
-            });
-        }
-    });
-    results.into_inner().expect("no thread panics")
+    let done = AtomicUsize::new(0);
+    let reported = |case: &Case| {
+        let result = work(case);
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        watch("how model and prior move the gas temperature", done, cases.len());
+        result
+    };
+    cases.par_iter().map(reported).collect()
 }
 
 /// The gas temperature by the model of `fit`, without what its parameters add to the bands; `None` where the model gives none.

@@ -1,6 +1,6 @@
 //! Gas temperature and time constants as readings come in.
 
-use twinlag_compensate::{Push, learn, tracker};
+use twinlag_compensate::{TrackerFn, learn, tracker};
 use twinlag_diagnose::Identifier;
 use twinlag_record::{Record, SamplingKind};
 
@@ -58,7 +58,7 @@ pub struct LiveAnswer {
 pub struct Live {
     /// The start's characterisation.
     pub start: Characterisation,
-    push: Push,
+    push: TrackerFn,
     gain: f64,
     offset_k: f64,
     tau_s: [f64; 2],
@@ -137,7 +137,7 @@ impl Live {
         let now = (self.push)([first, second.map(|c| (c - self.offset_k) / self.gain)]);
         let count = reading_c.iter().flatten().filter(|c| c.is_finite()).count();
         if count > 0 {
-            self.energy += (now.surprise / count as f64 - self.energy) / WATCHED;
+            self.energy += (now.normalised_innovation_squared / count as f64 - self.energy) / WATCHED;
         }
         // Of two readings a sample half a chi-square of two degrees, whose variance is 1.
         let excess = self.energy - 1.0 > CLEARLY / (2.0 * WATCHED).sqrt();

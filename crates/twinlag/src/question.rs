@@ -2,8 +2,8 @@
 
 use twinlag_bias::{Compensated, Hybrid, Normalised, plain_covariance};
 use twinlag_cross_relation::{
-    CostError, CrossRelation, Form, Middle, Parameter, Readings, ResidualTest, Segment, Whitened, residual_tests,
-    sandwich,
+    CostError, CrossRelation, Form, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Whitened,
+    residual_tests, sandwich,
 };
 use twinlag_estimate::parts::{
     EstimatorCost, Objective, Prior, SETTLED, hold_known, minimise_whitened, noise, profile_level, second_lags, starts,
@@ -210,7 +210,7 @@ impl<'a, const P: usize> Question<'a, P> {
             );
         }
         let tests = self.tests(&best);
-        let middle = if self.rejected(&tests) { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+        let middle = if self.rejected(&tests) { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
         let free = self.free();
         let covariance = best.whitened.covariance(&theta, &free, &self.prior_std(), middle);
         let covariance =

@@ -3,7 +3,7 @@
 //! A second lag that runs to its lower bound, or that could as well be none, is taken out of the fit. What remains is how large
 //! it may be: the profile of the cost, upwards. The time constants then hold for every second lag that the record allows.
 
-use twinlag_cross_relation::Middle;
+use twinlag_cross_relation::ScoreVariance;
 use twinlag_estimate::parts::{EstimatorCost, FAR_ABOVE, Objective, hold_known};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
 
@@ -47,7 +47,7 @@ impl<'a, const P: usize> Question<'a, P> {
     fn without_least_seen(&mut self, best: &Fitted<'a>) -> Result<Option<Fitted<'a>>, Error> {
         let free = self.free();
         let theta: [f64; P] = best.theta();
-        let covariance = best.whitened.covariance(&theta, &free, &self.prior_std(), Middle::WhiteNoise);
+        let covariance = best.whitened.covariance(&theta, &free, &self.prior_std(), ScoreVariance::WhiteNoise);
         let doubt = |i: usize| match (&best.fit.end, covariance) {
             (End::OnBound(which), _) if which.contains(&i) => f64::INFINITY,
             (_, Some(c)) => c[i][i].sqrt() / theta[i],
@@ -86,7 +86,8 @@ impl<'a, const P: usize> Question<'a, P> {
         let value = Objective::<P> { cost: &cost, priors: &self.priors }.at(&next_to_none).value;
         let gained = (value - best.fit.value) / self.energy(best).max(1.0);
         let theta: [f64; P] = without.theta();
-        let covariance = without.whitened.covariance(&theta, &self.free(), &self.prior_std(), Middle::WhiteNoise);
+        let covariance =
+            without.whitened.covariance(&theta, &self.free(), &self.prior_std(), ScoreVariance::WhiteNoise);
         let is_determined = without.fit.end.is_usable() && self.vague(&theta, covariance.as_ref()).is_empty();
         if gained > if is_determined { limit } else { FAR_ABOVE } {
             self.variables = kept;
@@ -99,10 +100,10 @@ impl<'a, const P: usize> Question<'a, P> {
     }
 
     /// How large the second lags may be that are not seen, beside the fit `best` without them.
-    pub(crate) fn bound_unseen(&mut self, best: &Fitted<'a>, middle: Middle) -> Result<(), Error> {
+    pub(crate) fn bound_unseen(&mut self, best: &Fitted<'a>, middle: ScoreVariance) -> Result<(), Error> {
         let limit = match middle {
-            Middle::WhiteNoise => ONE_SIDED_95,
-            Middle::ResidualSpectrum => ONE_SIDED_95 * self.energy(best).max(1.0),
+            ScoreVariance::WhiteNoise => ONE_SIDED_95,
+            ScoreVariance::ResidualSpectrum => ONE_SIDED_95 * self.energy(best).max(1.0),
         };
         let cost = EstimatorCost::Whitened(best.whitened.clone());
         let objective = Objective::<P> { cost: &cost, priors: &self.priors };

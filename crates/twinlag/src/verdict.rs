@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use twinlag_cross_relation::{Middle, Parameter, ResidualTest};
+use twinlag_cross_relation::{Parameter, ResidualTest, ScoreVariance};
 use twinlag_estimate::parts::{EstimatorCost, Intervals, Minimum, Objective, Ridge, ridge};
 use twinlag_estimate::{
     Bootstrap, Estimate, EstimateError, Estimator, Hold, IntervalBasis, Intervals as Wanted, Known, NoiseColour,
@@ -82,7 +82,7 @@ impl<'a, const P: usize> Question<'a, P> {
                 self.hold_against_knowledge(&theta);
             }
             _ => {
-                let middle = if is_rejected { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+                let middle = if is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
                 // Walk along the time constant that is on a bound, or the vaguer one.
                 let index = on_bound.iter().chain(&vague).copied().find(|&i| i < 2 && is_free(i));
                 let found = match index {
@@ -252,7 +252,7 @@ impl<'a, const P: usize> Question<'a, P> {
 
     /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
     /// more than noise, neither hold can be preferred.
-    fn ridge(&self, best: &Fitted<'a>, index: usize, middle: Middle) -> Result<Option<Ridge>, Error> {
+    fn ridge(&self, best: &Fitted<'a>, index: usize, middle: ScoreVariance) -> Result<Option<Ridge>, Error> {
         let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, EstimateError> {
             let cost = EstimatorCost::Whitened(fitted.whitened.clone());
             let objective = Objective::<P> { cost: &cost, priors: &self.priors };

@@ -16,13 +16,14 @@ use crate::smooth::Form;
 
 /// Samples that the likelihood is taken of, at most: of uneven ones, each of which has a matrix
 /// exponential of its own, fewer.
-const MOST: usize = 4096;
-const MOST_UNEVEN: usize = 1024;
+const MAX_EVEN_SAMPLES: usize = 4096;
+const MAX_UNEVEN_SAMPLES: usize = 1024;
 /// Evaluations of it for each candidate.
-const EVALUATIONS: u64 = 120;
-/// Edge of the first simplex: a quarter, in a logarithm.
-const EDGE: f64 = 0.25;
-const SPREAD: f64 = 0.05;
+const EVALUATIONS_PER_CANDIDATE: u64 = 120;
+/// Edge of the first simplex in the logarithm of each number, and the spread of scores below which a
+/// fit has ended: a tenth of the least gain that counts.
+const SIMPLEX_EDGE_LN: f64 = 0.25;
+const SPREAD_TOLERANCE_LN: f64 = 0.05;
 
 /// The likeliest of `found` and each kind of single part, with fitted numbers, allowing for their
 /// count.
@@ -34,7 +35,7 @@ pub(super) fn choose(
     found: Vec<Part>,
     is_uneven: bool,
 ) -> Vec<Part> {
-    let readings = readings.first(if is_uneven { MOST_UNEVEN } else { MOST });
+    let readings = readings.first(if is_uneven { MAX_UNEVEN_SAMPLES } else { MAX_EVEN_SAMPLES });
     let singles = search.best_of_each_kind().into_iter().map(|part| vec![part]);
     let candidates = singles.chain([found.clone()]).map(|parts| {
         let cost = Exact { readings: &readings, rig, level_c, parts: &parts };
@@ -57,8 +58,8 @@ impl Exact<'_> {
         let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
         let variables = self.parts.iter().flat_map(|p| p.variables(&search.limits)).collect();
         let fit = Problem::new(self, variables).ok().and_then(|problem| {
-            let optimiser = Optimiser::NelderMead { spread_tolerance: SPREAD, edge: EDGE };
-            let budget = Budget { evaluations: EVALUATIONS, ..Budget::default() };
+            let optimiser = Optimiser::NelderMead { spread_tolerance: SPREAD_TOLERANCE_LN, edge: SIMPLEX_EDGE_LN };
+            let budget = Budget { evaluations: EVALUATIONS_PER_CANDIDATE, ..Budget::default() };
             optimiser.minimise(&problem, &values, &budget).ok()
         });
         match fit {

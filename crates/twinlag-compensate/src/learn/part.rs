@@ -5,22 +5,25 @@ use twinlag_optimise::Variable;
 use crate::prior::Term;
 use crate::slopes::Direction;
 
-/// Bounds of a quality, and of frequencies in units of `1/T` and of `1/Ts`.
-const QUALITY: [f64; 2] = [0.02, 1e4];
-const SLOWEST: f64 = 0.02;
-const FASTEST: f64 = 0.5;
-/// Narrowest and widest first line of a comb, in units of `1/T` and of its frequency.
-const NARROWEST: f64 = 0.01;
-const WIDEST: f64 = 0.2;
+/// Bounds of a quality.
+const QUALITY_BOUNDS: [f64; 2] = [0.02, 1e4];
+/// Lowest frequency, in units of `1/T`: a fiftieth of a cycle in the record is a drift.
+const MIN_CYCLES_PER_SPAN: f64 = 0.02;
+/// Highest frequency, in units of `1/Ts`: what is sampled.
+const MAX_CYCLES_PER_STEP: f64 = 0.5;
+/// Least width of the first line of a comb, in units of `1/T`: a hundredth of a bin is no width.
+const MIN_WIDTH_CYCLES_PER_SPAN: f64 = 0.01;
+/// Largest width of the first line of a comb, as a share of its frequency.
+const MAX_WIDTH_SHARE: f64 = 0.2;
 
 /// Rough terms of a turbulent part.
-const CASCADE: usize = 4;
+const CASCADE_TERMS: usize = 4;
 
 /// Noise has at least this share of the variance that it was thought to have.
-const LEAST_NOISE: f64 = 1e-3;
+const MIN_NOISE_VARIANCE_SHARE: f64 = 1e-3;
 
 /// A part of the swing this small counts as zero.
-const NOTHING: f64 = 1e-5;
+const MIN_SWING_SHARE: f64 = 1e-5;
 
 /// What bounds are made from.
 #[derive(Clone, Copy, Debug)]
@@ -63,10 +66,10 @@ impl Part {
             Self::Noise(_) => Vec::new(),
             Self::Single(term) => vec![*term],
             Self::Turbulent { std_k, corner_hz, fastest_hz } => {
-                let step = (fastest_hz / corner_hz).powf(1.0 / (CASCADE - 1) as f64);
-                let shares: [f64; CASCADE] = std::array::from_fn(|k| step.powf(-2.0 / 3.0 * k as f64));
+                let step = (fastest_hz / corner_hz).powf(1.0 / (CASCADE_TERMS - 1) as f64);
+                let shares: [f64; CASCADE_TERMS] = std::array::from_fn(|k| step.powf(-2.0 / 3.0 * k as f64));
                 let all: f64 = shares.iter().sum();
-                let terms = (0..CASCADE as i32).zip(shares);
+                let terms = (0..CASCADE_TERMS as i32).zip(shares);
                 terms
                     .map(|(k, share)| Term::Rough {
                         std_k: std_k * (share / all).sqrt(),
@@ -92,13 +95,13 @@ impl Part {
             Self::Single(term) => vec![(*term, std::array::from_fn(|i| if i == a { 1.0 } else { 0.0 }))],
             Self::Turbulent { std_k, corner_hz, fastest_hz } => {
                 // The step between corners is `(F/c)^(1/(n−1))`, and shares of the variance go with `step^(−2k/3)`.
-                let by_corner = -1.0 / ((CASCADE - 1) as f64 * corner_hz);
+                let by_corner = -1.0 / ((CASCADE_TERMS - 1) as f64 * corner_hz);
                 let terms = self.terms();
                 let share_by = |k: usize| -2.0 / 3.0 * k as f64 * by_corner;
                 let share = |term: &Term| (term.std_k() / std_k).powi(2);
                 let mean: f64 = terms.iter().enumerate().map(|(k, term)| share(term) * share_by(k)).sum();
                 let of = |(k, term): (usize, &Term)| {
-                    let corner_k_hz = corner_hz * (fastest_hz / corner_hz).powf(k as f64 / (CASCADE - 1) as f64);
+                    let corner_k_hz = corner_hz * (fastest_hz / corner_hz).powf(k as f64 / (CASCADE_TERMS - 1) as f64);
                     let by = match a {
                         0 => [term.std_k() / std_k, 0.0, 0.0],
                         _ => [
@@ -134,7 +137,7 @@ impl Part {
     /// Whether it has shrunk to less than anything that matters.
     pub(super) fn is_nothing(&self, limits: &Limits) -> bool {
         self.noise().is_none()
-            && self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < NOTHING * limits.swing_k
+            && self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < MIN_SWING_SHARE * limits.swing_k
     }
 
     /// What the variances of both channels' noise are multiplied by.
@@ -199,16 +202,19 @@ impl Part {
     pub(super) fn variables(&self, limits: &Limits) -> Vec<Variable> {
         let Limits { swing_k, span_s, period_s } = *limits;
         let std = || Variable::logarithmic("std", 1e-7 * swing_k, 1e3 * swing_k);
-        let frequency = || Variable::logarithmic("frequency", SLOWEST / span_s, FASTEST / period_s);
+        let frequency =
+            || Variable::logarithmic("frequency", MIN_CYCLES_PER_SPAN / span_s, MAX_CYCLES_PER_STEP / period_s);
         match self {
-            Self::Noise(_) => vec![Variable::logarithmic("noise", LEAST_NOISE, 1.0 / LEAST_NOISE); 2],
+            Self::Noise(_) => {
+                vec![Variable::logarithmic("noise", MIN_NOISE_VARIANCE_SHARE, 1.0 / MIN_NOISE_VARIANCE_SHARE); 2]
+            }
             Self::Single(Term::Rough { .. }) | Self::Turbulent { .. } => vec![std(), frequency()],
             Self::Single(Term::Resonance { .. }) => {
-                vec![std(), frequency(), Variable::logarithmic("quality", QUALITY[0], QUALITY[1])]
+                vec![std(), frequency(), Variable::logarithmic("quality", QUALITY_BOUNDS[0], QUALITY_BOUNDS[1])]
             }
             Self::Comb { frequency_hz, std_k, .. } => {
-                let widest = (WIDEST * frequency_hz).max(2.0 * NARROWEST / span_s);
-                let width = Variable::logarithmic("width", NARROWEST / span_s, widest);
+                let widest = (MAX_WIDTH_SHARE * frequency_hz).max(2.0 * MIN_WIDTH_CYCLES_PER_SPAN / span_s);
+                let width = Variable::logarithmic("width", MIN_WIDTH_CYCLES_PER_SPAN / span_s, widest);
                 // Another frequency than one nearby would be another comb.
                 let near = Variable::logarithmic("frequency", frequency_hz / 1.1, frequency_hz * 1.1);
                 std_k.iter().map(|_| std()).chain([near, width]).collect()

@@ -103,7 +103,7 @@ impl Kind {
 
     /// The kinds that no library of effects knows: here a diagnosis ought to say that it does not
     /// know.
-    pub const ALIENS: [Self; 4] = [Self::Hysteresis, Self::IntermittentContact, Self::ClockSlip, Self::Replaced];
+    pub const UNMODELLED: [Self; 4] = [Self::Hysteresis, Self::IntermittentContact, Self::ClockSlip, Self::Replaced];
 
     /// The name in files, in kebab case.
     pub fn name(self) -> &'static str {
@@ -135,7 +135,7 @@ impl Kind {
 
     /// The name of this effect in a library of effects. Gain, offset and curvature share the name
     /// `"calibration"`, because they are hard to distinguish from the readings alone.
-    /// [`Kind::None`] and the [aliens](Kind::ALIENS) have no name.
+    /// [`Kind::None`] and the [aliens](Kind::UNMODELLED) have no name.
     pub fn effect(self) -> Option<&'static str> {
         match self {
             Self::None | Self::Hysteresis | Self::IntermittentContact | Self::ClockSlip | Self::Replaced => None,
