@@ -72,7 +72,7 @@ pub struct Progress {
 /// number of threads; what was done is in the checkpoint. [`StudyError::Exists`],
 /// [`StudyError::OtherStudy`], [`StudyError::Damaged`] before anything is run.
 /// [`StudyError::Write`]. [`StudyError::Empty`], [`StudyError::TooLarge`], [`StudyError::SameName`]
-/// for a study that is none.
+/// for an invalid study.
 pub fn run<S: Study>(
     study: &S,
     options: &Options,
