@@ -1,4 +1,5 @@
-//! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by what has seen none of it.
+//! The closed loop: fit, examine the residual, add the effect that explains it, repeat, and judge
+//! the result on data that were not used.
 
 use twinlag_model::{
     DiagnoseError, Effort, Fitted, Identifier, LEFT_OVER, ModelFit, Observations, Prepared, Settings, Watch, Weighting,
@@ -12,13 +13,14 @@ use crate::search::{FALSE_ALARM, FAR_OFF, Search, TIE, Tried, threshold};
 
 /// Most effects that are added.
 const MOST_EFFECTS: usize = 4;
-/// Tones of a gas of which nothing but two time constants can be told.
+/// Number of tones that determine two time constants and nothing else.
 const SINGLE: usize = 1;
 
 /// What is said where noise levels are lowered.
-const LOWERED: &str = "the noise levels are those of what is left over: the fastest changes of the readings are larger, and so are the gas's";
+const LOWERED: &str = "the noise levels come from the residual, because the fastest changes of the readings \
+    are larger and belong to the gas";
 
-/// Finds what two first-order lags leave over in `observations`, and which effects account for it.
+/// Finds which physical effects two first-order lags fail to describe in `observations`.
 ///
 /// # Errors
 /// [`DiagnoseError`] for a record that is too short, or in which a channel never changes.
@@ -93,8 +95,7 @@ impl State {
         for index in 0..self.steps.len() {
             let alike = search.look_alikes(&self.current, index, &self.steps[index].0);
             let is_static = |t: &Tried| t.effect.about().is_static;
-            let is_imitator =
-                self.steps[index].0.effect.about().imitates_static;
+            let is_imitator = self.steps[index].0.effect.about().imitates_static;
             // A static disagreement before its subtler imitators.
             let better =
                 alike.iter().find(|t| t.advantage > TIE || (is_imitator && is_static(t) && t.advantage > -TIE));
@@ -102,7 +103,7 @@ impl State {
                 self.current = better.fitted.clone().in_order();
                 let before = std::mem::replace(&mut self.steps[index].0, better);
                 self.remarks.push(format!(
-                    "{} was taken up first and replaced once more was known: {} explains more",
+                    "{} was added first and later replaced, because {} explains more",
                     before.effect.identifier(),
                     self.steps[index].0.effect.identifier()
                 ));
@@ -136,7 +137,10 @@ impl State {
     /// Goes on with `without`, the fit without effect `index`.
     fn take_out(&mut self, index: usize, without: Fitted) {
         let effect = self.current.model.effects[index].identifier();
-        self.remarks.push(format!("{effect} was taken up first and found needless once more was known"));
+        self.remarks.push(format!(
+            "{effect} was added first and later removed, because other effects explain \
+            the record without it"
+        ));
         self.current = without;
         self.steps.remove(index);
     }
@@ -204,9 +208,8 @@ impl State {
     fn conclude(mut self, prepared: &Prepared, tones: Option<usize>, limits: Vec<Limit>) -> Diagnosis {
         let is_refused = tones == Some(SINGLE);
         let (observations, everything) = (&prepared.observations, &prepared.everything);
-        let to_the_end = |fitted: &Fitted| {
-            fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
-        };
+        let to_the_end =
+            |fitted: &Fitted| fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
         let last = to_the_end(&self.current);
         let summary = |fitted: &Fitted| summarise(fitted, observations, everything, &prepared.levels);
         // Before is before everything: with the defects of the data in it.
@@ -234,15 +237,16 @@ impl State {
         let is_blind = last_fit.time_constants.iter().all(|t| t.value_s.is_none());
         if is_blind && has(|effect| effect == Identifier::DELAY) {
             self.remarks.push(
-                "time constants and delay are not told apart: the difference is how much later channel 2 is as a whole, \
-                 τ2 − τ1 + delay"
+                "this record does not distinguish time constants from a delay: the difference is the total \
+                 delay of channel 2, τ2 − τ1 + delay"
                     .into(),
             );
         }
         if is_refused {
             self.remarks.push(
-                "the gas is a single tone: its amplitude and phase are two equations for two time constants, and whatever \
-                 else is missing hides in them without a trace. Take a record in which the gas changes at more than one rate"
+                "the gas is a single tone. Its amplitude and phase are two equations for two time constants, \
+                 which absorb any missing effect without a trace. Take a record in which the gas changes at \
+                 more than one rate"
                     .into(),
             );
         }
@@ -251,8 +255,8 @@ impl State {
             // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the same.
             found.retain(|f| !f.effect.is_noise());
             self.remarks.push(
-                "what is left over goes with the gas temperature: it is an error of the model, not noise. The fit is weighted \
-                 by its spectrum, and the intervals rest on it"
+                "the residual is coherent with the gas temperature, so it is model error and not noise. Its \
+                 spectrum weights the fit and sets the intervals"
                     .into(),
             );
         }
@@ -266,10 +270,8 @@ impl State {
             (false, _) => Verdict::PartlyExplained,
         };
         if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
-            self.remarks.push(
-                "the intervals are those of noise and of what is left over: how far the missing effect moves the numbers they do not know"
-                    .into(),
-            );
+            self.remarks
+                .push("the intervals cover noise and the residual, but not the bias from the missing effect".into());
         }
         Diagnosis {
             verdict,

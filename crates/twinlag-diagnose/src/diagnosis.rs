@@ -1,16 +1,16 @@
-//! What a diagnosis says.
+//! The result of a diagnosis.
 
 use serde::{Deserialize, Serialize};
 use twinlag_model::{Identifier, ModelFit, Value};
 
-/// Whether the model is found to be complete.
+/// Whether the model is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Verdict {
     /// Two first-order lags leave nothing but noise.
     Adequate,
-    /// With the effects that are named, nothing but noise is left.
+    /// With the effects that are named, only noise is left.
     Explained,
     /// The effects that are named explain a part; something else is left.
     PartlyExplained,
@@ -23,11 +23,11 @@ pub enum Verdict {
 /// Why an effect was added.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
-    /// Likelihood-ratio statistic, the level of the noise free.
+    /// Likelihood-ratio statistic, with the noise level free.
     pub statistic: f64,
-    /// Parameters that it took.
+    /// Number of parameters of the effect.
     pub dof: usize,
-    /// Probability of such a statistic if the effect is not there.
+    /// Probability of such a statistic if the effect is absent.
     pub p_value: f64,
     /// Nats of likelihood gained on blocks that were left out of the fit.
     pub held_out_gain_nats: f64,
@@ -38,32 +38,35 @@ pub struct Evidence {
 /// An effect that was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Found {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Channel that it sits in, 0 or 1; `None` where it is of both, or where the record does not tell.
+    /// Channel that has the effect, 0 or 1; `None` if both have it, or if the record does not
+    /// determine which.
     pub channel: Option<usize>,
-    /// Channel that the parameters are meant in, 0 or 1; `None` where it is of both.
+    /// Channel to which the parameters refer, 0 or 1; `None` if they refer to both.
     pub fitted_in: Option<usize>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<Value>,
-    /// Why it was added; `None` for defects of the data, which are seen, not inferred.
+    /// Why the effect was added; `None` for defects of the data, which are seen directly and not
+    /// inferred.
     pub evidence: Option<Evidence>,
-    /// Effects that explain this record as well.
+    /// Other effects that explain this record equally well.
     pub alternatives: Vec<Identifier>,
-    /// What was seen, where it is no parameter: a count, a step.
+    /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
 }
 
 /// One number before and after the effects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BeforeAfter<T> {
-    /// Of two first-order lags.
+    /// With two first-order lags.
     pub before: T,
-    /// With the effects.
+    /// The value with the effects in the model.
     pub after: T,
 }
 
-/// How large the error is before and after. On blocks that neither chose the effects nor were fitted, but for the first.
+/// Errors before and after adding the effects. All but `chi2_per_dof` are computed on blocks used
+/// neither to choose effects nor to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorBudget {
     /// Energy of the whitened residual per degree of freedom, on the whole record.
@@ -76,36 +79,36 @@ pub struct ErrorBudget {
     pub held_out_input_difference_k: BeforeAfter<f64>,
 }
 
-/// Something that is left over.
+/// The part of the residual that no effect explains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unexplained {
-    /// In words.
+    /// Description of the residual in words.
     pub description: String,
-    /// Where in frequency, Hz: the band with most of it.
+    /// The frequency band with most of the excess, Hz.
     #[serde(rename = "band_Hz")]
     pub band_hz: Option<[f64; 2]>,
-    /// How many times the energy of the noise there.
+    /// Energy in that band over that of the noise.
     pub energy_ratio: f64,
-    /// Where in time, s: the tenth of the record with most of it.
+    /// The tenth of the record with most of the excess, s.
     pub worst_s: Option<[f64; 2]>,
 }
 
-/// What the search would have seen of an effect that it did not find.
+/// The detection limit of an effect that was not found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limit {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Channel, 0 or 1; `None` where it is of both, or relative.
+    /// Channel, 0 or 1; `None` if the effect is of both, or relative.
     pub channel: Option<usize>,
-    /// Its main parameter.
+    /// Main parameter of the effect.
     pub parameter: String,
-    /// The smallest size that would have been taken for more than chance.
+    /// The smallest size that would have been distinguished from chance.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
 }
 
-/// The whole answer.
+/// The result of a diagnosis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
     /// The verdict.
@@ -114,15 +117,15 @@ pub struct Diagnosis {
     pub effects: Vec<Found>,
     /// Two first-order lags.
     pub base: ModelFit,
-    /// With the effects.
+    /// The value with the effects in the model.
     pub last: ModelFit,
     /// Errors before and after.
     pub error: ErrorBudget,
-    /// What is left.
+    /// The unexplained part of the residual, if there is one.
     pub unexplained: Option<Unexplained>,
-    /// What this record cannot tell.
+    /// What this record does not determine.
     pub not_testable: Vec<String>,
-    /// What would have been seen of the effects that were not found.
+    /// Detection limits of the effects that were not found.
     pub limits: Vec<Limit>,
     /// Why the record was refused, or what to know before using the numbers.
     pub remarks: Vec<String>,

@@ -5,7 +5,7 @@ use twinlag_transform::Tapered;
 
 /// A bin counts if it has this many times the power of the noise.
 const CLEAR: f64 = 30.0;
-/// Samples below which tones are not told apart.
+/// Number of samples below which tones are not distinguished.
 const SHORTEST: usize = 200;
 /// Periods in the record that a tone must have at least.
 const FEWEST_PERIODS: usize = 5;

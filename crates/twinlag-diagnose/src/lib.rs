@@ -1,10 +1,10 @@
-//! The closed loop: what a two-sensor model leaves over, which physical effect it lacks, and how much better it is with it.
-//!
-//! Two first-order lags seldom are the whole truth of a measured record. [`diagnose()`] looks at the disagreement of the two gas
-//! temperatures that the sensors imply, finds the effect that accounts for it among [`Identifier::ALL`], adds it, looks again,
-//! and reports errors before and after on blocks of the record that neither chose nor were fitted; or it says that nothing
-//! is missing, or that something is and no known effect accounts for it. [`fit_with`] puts effects that are known already
-//! into the model.
+//! The closed loop: finds the physical effects that a two-sensor model lacks, and measures how much
+//! better the model is with them. Two first-order lags are seldom the whole truth of a measured
+//! record. [`diagnose()`] examines the disagreement of the two gas temperatures that the sensors
+//! imply, finds the effect in [`Identifier::ALL`] that explains it, adds it, repeats, and reports
+//! errors before and after on blocks of the record that neither chose nor were fitted; or it says
+//! that nothing is missing, or that something is and no known effect accounts for it. [`fit_with`]
+//! puts effects that are known already into the model.
 //!
 //! The crate takes readings, not files, and knows no file format: for logger files, characterisations and reports take
 //! `twinlag`; for the two-lag model alone, and other costs, `twinlag-cross-relation`; for sensor models `twinlag-sensor`.
@@ -38,6 +38,6 @@ mod search;
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, Unexplained, Verdict};
 pub use twinlag_model::{
-    About, Change, ChangePoint, DiagnoseError, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, ModelFit,
-    Observations, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
+    About, Change, ChangePoint, DiagnoseError, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant,
+    ModelFit, Observations, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
 };

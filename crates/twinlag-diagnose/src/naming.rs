@@ -1,4 +1,4 @@
-//! What is said of effects, of what is left over, and of what cannot be known.
+//! The wording of effects, of what is left over, and of what cannot be known.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use twinlag_cross_relation::ResidualTest;
@@ -107,31 +107,32 @@ pub(crate) fn widen<'a>(
     widened.dedup();
     if !widened.is_empty() {
         remarks.push(format!(
-            "the intervals of the time constants hold for the alternatives as well ({}), which put them elsewhere",
+            "the intervals of the time constants also cover the alternatives ({}), which give different values",
             widened.join(", ")
         ));
     }
 }
 
-/// What no record of two sensors tells, and what this one does not.
+/// What no record of two sensors reveals, and what this one does not.
 ///
 /// - `tones`: separate tones of the gas, where it has few
 pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>) -> Vec<String> {
     let mut out = vec![
-        "anything that both sensors share: gain, offset, drift, delay, a second lag, a slow mode, radiation".to_owned(),
-        "crosstalk that takes the place of a part of the reading: it is a wrong time constant and nothing else"
+        "anything that both sensors share (gain, offset, drift, delay, a second lag, a slow mode, \
+         radiation)"
             .to_owned(),
-        "which channel picks up a line, where the gas has one of that frequency".to_owned(),
+        "crosstalk that replaces part of a reading (it only makes one time constant wrong)".to_owned(),
+        "which channel picked up a sinusoid that is also in the gas".to_owned(),
     ];
     if let Some(tones) = tones.filter(|t| (2..=FEW_TONES).contains(t)) {
         let (equations, left) = (2 * tones, 2 * tones - 2);
         out.push(format!(
-            "more than {left} numbers beside the time constants: the gas has {tones} tones, an amplitude and a phase each, which \
-             are {equations} equations, and two of them go to the time constants"
+            "more than {left} numbers beside the time constants (the gas has {tones} tones with an amplitude \
+             and a phase each, which are {equations} equations, and the time constants take two of them)"
         ));
     }
     if observations.period_s.is_none() {
-        out.push("coloured noise, input mismatch and lines: these take evenly spaced samples".to_owned());
+        out.push("coloured noise, input mismatch and lines (these need evenly spaced samples)".to_owned());
     }
     out
 }
@@ -168,7 +169,7 @@ pub(crate) fn what_is_left(fit: &ModelFit) -> Option<Unexplained> {
         hz => format!("around {hz:.4} Hz"),
     };
     let where_most = if ratio > 1.0 {
-        format!(": most of what is too much lies {place}, {ratio:.2} times the noise there")
+        format!("; most of the excess lies {place}, {ratio:.2} times the noise there")
     } else {
         String::new()
     };

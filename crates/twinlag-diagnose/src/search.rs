@@ -1,4 +1,4 @@
-//! The search: fit, look at what is left over, add what explains it best, and look again.
+//! The search: fit, examine the residual, add the effect that explains it best, and repeat.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -17,8 +17,8 @@ pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Difference of `−2 ln L` (penalties included) up to which two effects explain a record equally well.
 pub(crate) const TIE: f64 = 10.0;
 
-/// Share of what noise of another colour explains that an effect must explain whatever the noise, to come before it, unless it
-/// takes off half as much energy.
+/// An effect comes before noise of another colour only if it explains at least this share of what
+/// that noise explains, whatever the noise, or removes half as much energy.
 const BESIDE_NOISE: f64 = 0.03;
 /// Energy of the residual per degree of freedom beyond which a model is far off.
 pub(crate) const FAR_OFF: f64 = 3.0;
@@ -30,7 +30,7 @@ const INCOMPLETE: f64 = 1.5;
 const MOST_FITTED: usize = 10;
 /// Share of the residuals that must be left with an effect in the model.
 const KEPT: f64 = 0.8;
-/// The same up to which they are the same model in two guises.
+/// Difference of gains up to which two effects are one model in two guises.
 const EQUAL: f64 = 2.0;
 
 /// A candidate with its fit.
@@ -42,7 +42,8 @@ pub(crate) struct Tried {
     pub(crate) added: usize,
     /// `−2 ln L` saved, noise white with the levels that there are.
     pub(crate) gain: f64,
-    /// The same with a free noise level in every band: what noise of any colour does not explain.
+    /// `−2 ln L` saved with a free noise level in every band, which noise of any colour does not
+    /// explain.
     pub(crate) robust_gain: f64,
     /// Nats that it saves on blocks that were left out.
     pub(crate) held_out_nats: f64,
@@ -135,10 +136,8 @@ impl<'a> Search<'a> {
     /// - `thorough`: where the model is far off, the score at it says little, and every candidate is fitted, from a grid of time
     ///   constants as well
     pub(crate) fn try_all(&self, current: &Fitted, thorough: bool) -> Vec<Tried> {
-        let all: Vec<Shared> = candidates(self.allowed, &self.context)
-            .into_iter()
-            .filter(|c| Self::is_new(current, c))
-            .collect();
+        let all: Vec<Shared> =
+            candidates(self.allowed, &self.context).into_iter().filter(|c| Self::is_new(current, c)).collect();
         let robust_before = self.robust(current);
         let now = (!thorough).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
         let promises = self.in_parallel(&all, |effect| {
@@ -209,9 +208,10 @@ impl<'a> Search<'a> {
 
     fn fits(model: &Model, candidate: &Shared) -> bool {
         let id = candidate.identifier();
-        let repeats = model.effects.iter().any(|e| {
-            e.identifier() == id && (e.channel() == candidate.channel() || !candidate.about().is_narrow)
-        });
+        let repeats = model
+            .effects
+            .iter()
+            .any(|e| e.identifier() == id && (e.channel() == candidate.channel() || !candidate.about().is_narrow));
         let excluded = model.effects.iter().any(|e| e.identifier().excludes(id));
         let determined: Vec<_> = model.parameters().filter_map(|p| p.determines).collect();
         let twice = candidate.parameters().iter().filter_map(|p| p.determines).any(|f| determined.contains(&f));

@@ -65,7 +65,7 @@ fn noise_below_the_changes_of_the_gas_is_found() {
         }
     });
     let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
-    assert!(d.remarks.iter().any(|r| r.contains("noise levels are those of what is left over")), "{}", told(&d));
+    assert!(d.remarks.iter().any(|r| r.contains("noise levels come from the residual")), "{}", told(&d));
     for (time_constant, want) in d.last.time_constants.iter().zip([0.003, 0.015]) {
         let (got, error) = estimate(time_constant);
         assert!((got - want).abs() <= 4.0 * error, "got {got}, want {want} ± 4 × {error}: {}", told(&d));

@@ -1,9 +1,12 @@
-//! Intervals by parametric bootstrap: the same estimator on records simulated from what it found.
+//! Intervals by parametric bootstrap: the estimate is repeated on records simulated with the
+//! estimated parameters.
 //!
-//! A gas with the power that the record shows, noise taken off, is passed through both fitted sensors; noise of the found
-//! levels is added, anew for each replicate; and the estimator answers each. The spread of `ln(τ*/τ)` turned round gives the
-//! interval. It takes a hundred times as long as a standard error, and makes no use of one: for estimators that have none, and
-//! to check those that do. The estimator's own model makes the records, so it cannot tell that the model is wrong.
+//! A gas with the power that the record shows, noise taken off, is passed through both fitted
+//! sensors; noise of the found levels is added, anew for each replicate; and the estimator answers
+//! each. The spread of `ln(τ*/τ)` turned round gives the interval. It takes a hundred times as long
+//! as a standard error and does not use one. Use it for estimators without standard errors, and to
+//! check those that have them. The estimator's own model makes the records, so it cannot show that
+//! the model is wrong.
 //!
 //! # Source
 //! Efron and Tibshirani 1993, the basic bootstrap interval.

@@ -114,7 +114,7 @@ impl<const P: usize> Minimum<'_, '_, P> {
         out
     }
 
-    /// The same of the time constant `i` alone, which is free.
+    /// The interval of the time constant `i` alone, which is free.
     pub fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
         let Self { theta, free, variables, .. } = self;
         let ends = quadratic(theta[i], self.covariance[i][i]);

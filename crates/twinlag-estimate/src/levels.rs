@@ -25,7 +25,7 @@ const MOST_COLOURED: f64 = 0.97;
 pub const MIN_DEGREES_OF_FREEDOM_AT_REST: usize = 8;
 /// Step of a coefficient in differences.
 const AR1_STEP: f64 = 0.01;
-/// Change of a level, relative, or of a coefficient, that is none.
+/// Change of a level, relative, or of a coefficient, below which it has settled.
 const SETTLED: f64 = 0.01;
 /// Rounds of weights and coefficients.
 const ROUNDS: usize = 3;
@@ -34,7 +34,7 @@ const ROUNDS: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Levels {
     pub std_k: [f64; 2],
-    /// Where each comes from.
+    /// Where each level comes from.
     pub source: [NoiseSource; 2],
     /// Whether they stand, whatever a fit says.
     pub given: bool,
@@ -67,7 +67,7 @@ impl Levels {
         }
     }
 
-    /// Of which only the ratio is known: the residual sets the size after the fit.
+    /// Levels of which only the ratio is known: the residual sets the size after the fit.
     pub fn of_ratio(readings: &Readings, ratio: f64) -> Result<Self, EstimateError> {
         let found = Self::from_differences(readings)?;
         Ok(Self {
@@ -104,7 +104,8 @@ impl Levels {
         })
     }
 
-    /// The same levels, all of them `factor` times as large, since that is what the residual has in `terms` degrees of freedom.
+    /// These levels, all of them `factor` times as large, since that is what the residual has in
+    /// `terms` degrees of freedom.
     pub fn scaled_to_residual(mut self, factor: f64, terms: f64) -> Self {
         self.std_k = self.std_k.map(|s| s * factor);
         self.source = [NoiseSource::Residual; 2];

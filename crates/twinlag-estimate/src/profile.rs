@@ -1,4 +1,4 @@
-//! What a record tells when it does not tell both time constants: the range of their difference.
+//! The range of the difference of the time constants, for a record that does not determine both.
 //!
 //! One time constant is held at one value after another, away from where the fit ended, and the rest is fitted. Every value
 //! for which the cost stays within the 95 % point of chi-square above its minimum is allowed; the intervals of the other
@@ -27,7 +27,7 @@ const MOSTLY_NOISE: f64 = 0.25;
 pub const FAR_ABOVE: f64 = 50.0;
 /// Halvings, in logarithms, that place the edge of what is allowed.
 const HALVINGS: usize = 5;
-/// A time constant this small beside its lower bound is none.
+/// A time constant below this multiple of its lower bound counts as zero.
 const VANISHING: f64 = 1e-3;
 
 /// Intervals over all values of the undetermined time constant that the record allows.

@@ -1,8 +1,9 @@
 //! One trait for every estimator: from two channels to two time constants with their intervals.
 //!
-//! For studies and comparisons: [`Estimator`] holds the family by name, and an estimator of your own takes part by implementing
-//! [`Estimate`]. It answers the bare question, without looking at whether the model is right; for a record that you want to
-//! *know* about take [`crate::characterise()`], which tests the residual, says what is not determined, and finds the hold.
+//! For studies and comparisons: [`Estimator`] holds the family by name, and an estimator of your
+//! own takes part by implementing [`Estimate`]. It only estimates, without checking whether the
+//! model is right. To analyse a record use [`crate::characterise()`], which tests the residual,
+//! says what is not determined, and finds the hold.
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{Parameter, Readings};
@@ -13,13 +14,13 @@ use crate::error::EstimateError;
 use crate::vocabulary::{Estimator, IntervalBasis, NoiseKnowledge};
 use crate::{assumptions, difference, published, whitened};
 
-/// What an estimator is given.
+/// The input of an estimator.
 pub struct Task<'a> {
     /// The two channels.
     pub readings: &'a Readings,
     /// What the gas does between samples.
     pub hold: Discretisation,
-    /// What is known of the noise.
+    /// What is known about the noise.
     pub noise: NoiseKnowledge,
     /// How costs are minimised.
     pub minimiser: &'a dyn Minimiser,
@@ -28,7 +29,7 @@ pub struct Task<'a> {
     /// Samples left out at the start of each unbroken stretch by the published family; by default ten times the longest time
     /// constant of the whitened estimate, or of the start.
     pub discard: Option<usize>,
-    /// Which sensors have a second lag that is fitted too.
+    /// The sensors whose second lag is fitted too.
     pub second_order: [bool; 2],
     /// Whether standard errors and intervals are wanted.
     pub intervals: bool,
@@ -88,7 +89,7 @@ pub struct Outcome {
     pub standard_error_s: Option<[f64; 2]>,
     /// 95 % intervals, s.
     pub interval_95_s: Option<[[f64; 2]; 2]>,
-    /// What the intervals rest on.
+    /// How the intervals were found.
     pub interval_basis: [IntervalBasis; 2],
     /// Noise levels that were given or found, K; `None` where nothing needed them.
     pub noise_std_k: Option<[f64; 2]>,

@@ -1,4 +1,5 @@
-//! The words in which a question is put: which estimator, what is known of noise and parameters, what intervals are made of.
+//! The types that state a question: which estimator, what is known about noise and parameters, how
+//! to find intervals.
 
 use std::fmt;
 use std::str::FromStr;
@@ -85,7 +86,7 @@ impl FromStr for Estimator {
     }
 }
 
-/// What the gas is taken to do between samples.
+/// How the gas is assumed to move between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
@@ -129,7 +130,7 @@ impl FromStr for Hold {
     }
 }
 
-/// What 95 % intervals are made of.
+/// How to find 95 % intervals.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Intervals {
@@ -139,14 +140,14 @@ pub enum Intervals {
     Auto,
     /// The profile of the whitened cost.
     Profile,
-    /// The same estimator on simulated records.
+    /// From repeating the estimate on simulated records.
     Bootstrap(Bootstrap),
 }
 
-/// Something known of a parameter beforehand: `T1.time_constant_s=0.5`, or `T1.time_constant_s=0.5+-0.05`.
+/// Prior knowledge of a parameter: `T1.time_constant_s=0.5`, or `T1.time_constant_s=0.5+-0.05`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// Which one.
+    /// The parameter.
     pub parameter: Parameter,
     /// Its value: s for time constants, 1 for the gain, K at 0 °C for the offset.
     pub value: f64,
@@ -191,7 +192,7 @@ impl FromStr for Known {
     }
 }
 
-/// What noise is taken to be like.
+/// The assumed colour of the noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseColour {
@@ -223,7 +224,7 @@ impl FromStr for NoiseColour {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum NoiseSource {
-    /// It was given.
+    /// The level was given.
     Given,
     /// Scatter about a straight line in stretches in which the gas is at rest.
     QuietSegment,
@@ -231,7 +232,7 @@ pub enum NoiseSource {
     ThirdDifferences,
     /// How the two inferred gas temperatures disagree.
     InferredInputs,
-    /// The residual's own energy: only the ratio of the levels was given, or could be told.
+    /// The residual's own energy: only the ratio of the levels was given, or could be determined.
     Residual,
 }
 
@@ -247,7 +248,7 @@ impl NoiseColour {
     }
 }
 
-/// What is known of the noise.
+/// What is known about the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum NoiseKnowledge {
@@ -271,7 +272,7 @@ impl Default for NoiseKnowledge {
     }
 }
 
-/// What 95 % intervals rest on.
+/// How 95 % intervals were found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalBasis {
@@ -279,7 +280,7 @@ pub enum IntervalBasis {
     StandardError,
     /// The profile of the cost, where standard errors do not describe it.
     Profile,
-    /// The same estimator on simulated records: see [`Bootstrap`].
+    /// From repeating the estimate on simulated records: see [`Bootstrap`].
     Bootstrap,
 }
 

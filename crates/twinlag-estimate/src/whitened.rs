@@ -1,5 +1,6 @@
-//! The whitened estimator: levels, fit, levels in the light of the fit, fit again. Where levels were found, their ratio is kept and
-//! their size is that of the residual: an estimator takes its model for right, and then nothing tells the size as well.
+//! The whitened estimator: levels, fit, levels in the light of the fit, fit again. Where levels
+//! were found, their ratio is kept and their size is that of the residual: an estimator assumes
+//! that its model is right, and then nothing else determines the size.
 
 use twinlag_cross_relation::{Readings, ScoreVariance, Whitened};
 use twinlag_optimise::{End, Evaluations, Fit};

@@ -6,8 +6,8 @@ use twinlag_bias::estimate_noise;
 use twinlag_cross_relation::{Readings, Segment, Steps};
 use twinlag_transform::Forward;
 
-use crate::observations::Observations;
 use crate::implied::{Evaluation, Part, median};
+use crate::observations::Observations;
 
 /// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
 const COARSE: f64 = 0.5;

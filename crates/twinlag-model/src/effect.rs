@@ -141,9 +141,8 @@ pub fn candidates(effects: &[Identifier], context: &Context) -> Vec<Shared> {
 /// Of `candidates`, in all their sizes, the one that `known` describes: in its channel, with all parameters given, and
 /// with the most of them.
 pub fn described_by(known: &KnownEffect, candidates: Vec<Shared>) -> Option<Shared> {
-    let is_described = |e: &Shared| {
-        e.channel() == known.channel && e.parameters().iter().all(|p| known.parameter(p.name).is_some())
-    };
+    let is_described =
+        |e: &Shared| e.channel() == known.channel && e.parameters().iter().all(|p| known.parameter(p.name).is_some());
     let sizes: Vec<Shared> = candidates.iter().flat_map(|e| e.sizes()).collect();
     candidates.into_iter().chain(sizes).filter(is_described).max_by_key(|e| e.parameters().len())
 }

@@ -9,26 +9,32 @@ use twinlag_compensate::CompensateError;
 #[non_exhaustive]
 pub enum DiagnoseError {
     #[error(
-        "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record for longer, or ask for the time constants alone (`characterise`)"
+        "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record \
+         for longer, or ask for the time constants alone (`characterise`)"
     )]
     TooShort { samples: usize, needed: usize },
     #[error(
-        "a diagnosis needs stretches of at least {needed} rows without a missing reading, and of the {samples} rows of this record too few lie in any: see to what drops readings, or ask for the time constants alone (`characterise`)"
+        "a diagnosis needs stretches of at least {needed} rows without a missing reading, and of the \
+         {samples} rows of this record too few lie in any: find out why readings are missing, or ask for the \
+         time constants alone (`characterise`)"
     )]
     InShreds { samples: usize, needed: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,
     #[error("expected a positive flow at every sample, as many as there are readings")]
     Flow,
-    #[error("channel {channel} never changes: there is no dynamics to see in it")]
+    #[error("channel {channel} never changes, so it shows no dynamics")]
     Constant { channel: usize },
-    #[error("the model has time constants that go with a measured flow: name its column (--flow COL)")]
+    #[error("the model has time constants that depend on a measured flow: name its column (--flow COL)")]
     NeedsFlow,
-    #[error("the model has \"{effect}\" with parameters that it does not have here: was it made by another version?")]
+    #[error(
+        "the model has \"{effect}\" with parameters that it does not have here: was it made by another \
+        version?"
+    )]
     Model { effect: &'static str },
     #[error("the model has {effect} with {name} = {got}: expected {expected}")]
     Parameter { effect: &'static str, name: &'static str, got: f64, expected: &'static str },
-    #[error("with the numbers of the model nothing finite comes out of this record: was it changed by hand?")]
+    #[error("the numbers of the model give no finite result for this record: was the model changed by hand?")]
     Absurd,
     #[error(transparent)]
     Compensate(#[from] CompensateError),

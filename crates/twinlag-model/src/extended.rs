@@ -1,4 +1,5 @@
-//! A fitted model as a compensation takes it: the sensors' own temperatures, and what each sensor does.
+//! A fitted model in the form that a compensation needs: the sensors' own temperatures, and the
+//! state of each sensor.
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,8 +9,8 @@ use twinlag_compensate::{Coloured, SensorAt, Readings, Rig, Sensor, SlowPath};
 use crate::error::DiagnoseError;
 use crate::fit::Fitted;
 use crate::model::Model;
-use crate::observations::Observations;
 use crate::number::Number;
+use crate::observations::Observations;
 use crate::plant::{Place, Plant};
 
 /// Two lags and the effects that were found, with the record that they were fitted to.
@@ -47,7 +48,8 @@ impl Extended {
     /// Both time constants at `time_s` with other `parameters`, s: where they change along the record, as they do then.
     pub fn time_constants_s(&self, parameters: &[f64], time_s: &[f64]) -> [Vec<f64>; 2] {
         let plant = self.model.plant(parameters, &self.observations);
-        [0, 1].map(|i| time_s.iter().map(|t| (plant.sensors[i].tau_s * plant.sensors[i].tau_factor_at(*t)).re).collect())
+        [0, 1]
+            .map(|i| time_s.iter().map(|t| (plant.sensors[i].tau_s * plant.sensors[i].tau_factor_at(*t)).re).collect())
     }
 
     /// Gain and offset of the second channel against the first, 1 and K.
@@ -58,10 +60,10 @@ impl Extended {
         [gain, second.offset_k.re - first.offset_k.re * gain]
     }
 
-    /// The sensors' temperatures at every sample of the record, and the sensors, with other `parameters`.
-    ///
-    /// Readings are taken back through their calibration; what masks a reading, and missing samples of a grid, is missing. Of noise
-    /// that is not white, and of crosstalk, the first order is there: that of a channel is its own.
+    /// The sensors' temperatures at every sample of the record, and the sensors, with other
+    /// `parameters`. Readings are returned with the calibration removed; masked readings and grid
+    /// gaps are `None`. Coloured noise and crosstalk are kept to first order: each channel has its
+    /// own coloured noise.
     ///
     /// # Errors
     /// [`DiagnoseError::Compensate`] for parameters with which there is no rig.

@@ -25,7 +25,7 @@ const FINISH: (u64, f64) = (40, 1e-4);
 /// Evaluations for each iteration.
 const EVALUATIONS_PER_ITERATION: u64 = 4;
 
-/// How hard a fit tries.
+/// How much effort a fit makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
     /// Enough to rank it.
@@ -39,7 +39,7 @@ pub enum Effort {
 pub struct Fitted {
     /// The model.
     pub model: Model,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub theta: Vec<f64>,
     /// Energy of the residuals that count, as the fit weighs frequencies.
     pub chi2: f64,

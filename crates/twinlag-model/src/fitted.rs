@@ -11,7 +11,7 @@ use crate::summary::LEFT_OVER;
 /// A fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Value {
-    /// Its name.
+    /// Name of the number.
     pub name: String,
     /// The number.
     pub value: f64,
@@ -19,7 +19,7 @@ pub struct Value {
     pub standard_error: Option<f64>,
     /// Its 95 % interval.
     pub interval_95: Option<[f64; 2]>,
-    /// Its unit.
+    /// Unit of the number.
     pub unit: String,
 }
 
@@ -64,11 +64,11 @@ pub struct ModelFit {
     pub fit: Fit,
     /// Noise of the channels, K.
     pub noise_std_k: [f64; 2],
-    /// Tests of what it leaves over.
+    /// Tests of the residual.
     pub tests: Vec<ResidualTest>,
     /// Energy of the residual per degree of freedom.
     pub chi2_per_dof: f64,
-    /// Whether intervals rest on the residual's own spectrum.
+    /// Whether the intervals follow from the spectrum of the residual itself.
     pub is_weighted_by_residual: bool,
     /// For pictures.
     pub trace: Trace,
@@ -79,7 +79,7 @@ pub struct ModelFit {
 }
 
 impl ModelFit {
-    /// Whether a test of what it leaves over says that this is not noise of the levels found.
+    /// Whether a test of the residual finds that it is not noise of the estimated levels.
     pub fn is_contradicted(&self) -> bool {
         self.tests.iter().any(|t| t.p_value < LEFT_OVER)
     }
@@ -94,12 +94,12 @@ pub struct KnownFit {
     pub fitted_again: Vec<Identifier>,
 }
 
-/// A defect of the data: seen, not inferred.
+/// A defect of the data, which is seen directly and not inferred.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Defect {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Its channel, 0 or 1.
+    /// Channel of the effect, 0 or 1.
     pub channel: usize,
     /// What was seen: a count, a step.
     pub seen: String,

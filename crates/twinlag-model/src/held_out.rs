@@ -1,4 +1,4 @@
-//! Judgement on blocks that a fit has not seen.
+//! Evaluation on blocks that a fit has not used.
 //!
 //! A fit without one block is, to first order, `θ + (JᵀJ − J_bᵀJ_b)⁻¹ J_bᵀ r_b`, seen from the fit of all: one linearisation
 //! gives the residual of every block as a fit without it would leave it. Residuals next to a block, which share readings with it,
@@ -66,12 +66,7 @@ pub fn held_out_energy(observations: &Observations, selection: &Selection, fitte
 }
 
 /// Nats that `after` saves against `before` on the blocks left out, the level of the noise free.
-pub fn held_out_gain(
-    observations: &Observations,
-    selection: &Selection,
-    before: &Fitted,
-    after: &Fitted,
-) -> f64 {
+pub fn held_out_gain(observations: &Observations, selection: &Selection, before: &Fitted, after: &Fitted) -> f64 {
     let energy = |fitted| held_out_energy(observations, selection, fitted);
     match (energy(before), energy(after)) {
         (Some(b), Some(a)) => 0.5 * after.count * (b / a).ln(),

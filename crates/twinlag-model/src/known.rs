@@ -1,20 +1,22 @@
 //! Effects that are known already, put into the model.
 
-use crate::fitted::KnownFit;
 use crate::effect::{Identifier, Parameter};
 use crate::error::DiagnoseError;
 use crate::fit::Fitted;
+use crate::fitted::KnownFit;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::prepare::{GRID_STARTS, Prepared};
 use crate::settings::{KnownEffect, Settings};
 use crate::summary::summarise;
 
-/// Both time constants of `observations` with `effects` as they are in the model, but for what belongs to a record, which is
-/// fitted again; defects of the data are dealt with as in [`crate::diagnose()`].
+/// Both time constants of `observations` with `effects` held as they are in the model, except
+/// parameters that belong to a record, which are fitted again; defects of the data are dealt with
+/// as in [`crate::diagnose()`].
 ///
 /// # Errors
-/// As [`crate::diagnose()`]; [`DiagnoseError::Model`] for an effect that is none of this library, or whose parameters are others.
+/// As [`crate::diagnose()`]; [`DiagnoseError::Model`] for an effect that is not in this library, or
+/// has other parameters.
 pub fn fit_with(
     observations: &Observations,
     settings: &Settings,

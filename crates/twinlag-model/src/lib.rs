@@ -1,4 +1,5 @@
-//! Two first-order sensors with any physical effects beside: the inverse of the whole rig with its noise, and its fit.
+//! Two first-order sensors with any further physical effects: the inverse of the whole rig with its
+//! noise, and its fit.
 
 mod chain;
 mod cost;
@@ -31,20 +32,20 @@ mod track;
 mod weighting;
 mod whitening;
 
-pub use defects::{Levels, levels, line_channel, lines};
 pub use cost::Linearised;
+pub use defects::{Levels, levels, line_channel, lines};
 pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, OfParameters, Parameter, Seat, Shared, candidates,
     described_by,
 };
 pub use error::DiagnoseError;
 pub use extended::Extended;
-pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Trace, Value};
-pub use held_out::{held_out_energy, held_out_gain};
-pub use known::fit_with;
 pub use fit::{Effort, Fitted};
+pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Trace, Value};
 pub use flow::Flow;
+pub use held_out::{held_out_energy, held_out_gain};
 pub use implied::Evaluation;
+pub use known::fit_with;
 pub use model::{KnownTimeConstant, Model};
 pub use number::{Curve, Number, TimeFunction};
 pub use observations::{Observations, Stretch};

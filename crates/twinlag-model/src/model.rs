@@ -13,7 +13,7 @@ pub(crate) const MAX_TAU_SPANS: f64 = 4.0;
 /// Shortest time constant beside a sample period: what happens within a tenth of it leaves no trace.
 const MIN_TAU_STEPS: f64 = 0.1;
 
-/// Something known of a time constant beforehand.
+/// Prior knowledge of a time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KnownTimeConstant {
     /// Sensor 0 or 1.

@@ -38,7 +38,7 @@ pub(crate) trait Real: DualNum<Primitive = f64> + Copy + Send + Sync {
 
 /// Relative difference that rounding makes.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Relative difference of derivatives that is none: they enter a step of a solver, not an estimate.
+/// Relative difference of derivatives that does not count: they enter a step of a solver, not an estimate.
 const DERIVATIVE_ROUNDING: f64 = 1e-13;
 
 impl Real for f64 {

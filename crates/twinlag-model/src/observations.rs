@@ -30,14 +30,15 @@ impl Stretch {
         Self { time_s, reading_c, masked, flow: None }
     }
 
-    /// The same with readings of either channel that say nothing: missing ones, in whose place is some value between their
-    /// neighbours.
+    /// This stretch, with the marked readings of either channel ignored. They are missing readings,
+    /// in whose place stands some value between their neighbours.
     #[must_use]
     pub fn with_missing(self, masked: [Vec<bool>; 2]) -> Self {
         Self { masked, ..self }
     }
 
-    /// The same with a measured flow velocity or density at each sample, in any unit, positive.
+    /// These observations with a measured flow velocity or density at each sample, positive, in any
+    /// unit.
     #[must_use]
     pub fn with_flow(self, flow: Vec<f64>) -> Self {
         Self { flow: Some(flow), ..self }

@@ -1,10 +1,10 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
 use crate::defects::{self, Levels};
-use crate::fitted::Defect;
 use crate::effect::{Context, Identifier};
 use crate::error::DiagnoseError;
 use crate::fit::{Effort, Fitted};
+use crate::fitted::Defect;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::reach;
@@ -42,7 +42,7 @@ pub struct Prepared {
     pub raw: (Observations, Levels),
     /// Residuals of the whole record.
     pub everything: Selection,
-    /// Those without the blocks that judge.
+    /// The samples without the blocks that judge.
     pub searched: Selection,
 }
 
@@ -162,7 +162,7 @@ impl Prepared {
         self.everything.weighting = self.searched.weighting.clone();
     }
 
-    /// The same model with the levels that there are now.
+    /// This model with the current noise levels.
     pub fn refit(&self, fitted: &Fitted) -> Fitted {
         let model = fitted.model.clone().with_noise(self.levels.std_k);
         model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Finish)

@@ -35,7 +35,8 @@ impl Pairs {
         let evaluation = plant.evaluate(observations);
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
-        let channel = usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
+        let channel =
+            usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
         let mut cleaned = vec![f64::NAN; observations.samples()];
         for part in &evaluation.parts {
             let stretch = &observations.stretches[part.stretch];

@@ -3,12 +3,12 @@
 use crate::disagreement::Piece;
 use crate::weighting::Weighting;
 
-/// Which residuals count, by the sample in the middle of their reach.
+/// The residuals that count, by the sample in the middle of their reach.
 #[derive(Clone, Debug)]
 pub struct Selection {
     /// Whether a sample counts.
     pub counts: Vec<bool>,
-    /// Which frequencies count.
+    /// The weights of the frequencies.
     pub weighting: Weighting,
 }
 

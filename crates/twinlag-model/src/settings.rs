@@ -23,9 +23,9 @@ impl Default for Settings {
 /// An effect as it was found in another record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownEffect {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Channel, 0 or 1; `None` where it is of both, or relative.
+    /// Channel, 0 or 1; `None` if the effect is of both, or relative.
     pub channel: Option<usize>,
     /// Its parameters by name.
     pub parameters: Vec<(String, f64)>,
@@ -38,5 +38,5 @@ impl KnownEffect {
     }
 }
 
-/// Told how far a diagnosis has come: what it is doing, how much of that is done, of how much.
+/// Progress callback: `(task, done, total)`.
 pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);

@@ -8,8 +8,8 @@ use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 use twinlag_transform::Forward;
 
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
-use crate::observations::Observations;
 use crate::implied::Evaluation;
+use crate::observations::Observations;
 use crate::plant::{Extra, Place, Plant};
 
 /// Longest block, samples.
@@ -42,7 +42,7 @@ impl Band {
 #[derive(Clone, Debug)]
 pub struct Bands(pub Vec<Band>);
 
-/// Which blocks.
+/// The blocks that are used.
 #[derive(Clone, Copy)]
 pub enum Half {
     Both,
@@ -182,7 +182,7 @@ pub struct NoiseFit {
     pub extra: Option<Extra>,
     /// `−2 ln L`.
     pub likelihood: f64,
-    /// The same in each half with what the other half said, summed.
+    /// Likelihood of each half with the parameters of the other half, summed.
     pub held_out: f64,
 }
 
@@ -231,7 +231,7 @@ impl Cost for NoiseCost<'_> {
 
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
-/// - `is_coarse`: channels whose levels third differences do not tell
+/// - `is_coarse`: channels whose levels third differences do not determine
 pub fn fit_noise(
     plant: &Plant,
     observations: &Observations,

@@ -4,9 +4,9 @@ use twinlag_cross_relation::residual_tests;
 
 use crate::defects::Levels;
 use crate::dense;
-use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
+use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::prepare::is_judge;
@@ -15,9 +15,10 @@ use crate::spectrum::{Bands, runs};
 
 /// 97.5 % point of the normal distribution.
 pub const Z_975: f64 = 1.959_963_984_540_054;
-/// A time constant shorter than this share of a sample period is none.
+/// A time constant shorter than this share of a sample period is not resolved.
 const UNRESOLVED: f64 = 0.2;
-/// A time constant whose logarithm is less certain than this is none either: its interval spans a factor of seven.
+/// A time constant whose logarithm is less certain than this is not determined: its interval spans
+/// a factor of seven.
 const VAGUE: f64 = 0.5;
 /// Relative standard error up to which a time constant is not doubted.
 const CERTAIN: f64 = 0.03;
@@ -26,7 +27,7 @@ const CHI2_95: f64 = 3.841_458_820_694_124;
 /// Below this p-value of any test something is left over.
 pub const LEFT_OVER: f64 = 1e-4;
 
-/// Whether a time constant is shorter than the samples tell, or as long as the record.
+/// Whether a time constant is shorter than the samples resolve, or as long as the record.
 pub fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
     let seen = UNRESOLVED * observations.step_s()..0.9 * MAX_TAU_SPANS * observations.span_s();
     (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
@@ -109,12 +110,7 @@ pub fn covariance(
     Some(dense::product(&dense::product(&inverse, &middle), &inverse))
 }
 
-pub fn summarise(
-    fitted: &Fitted,
-    observations: &Observations,
-    selection: &Selection,
-    levels: &Levels,
-) -> ModelFit {
+pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection, levels: &Levels) -> ModelFit {
     let evaluation = fitted.model.evaluate(&fitted.theta, observations);
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);

@@ -3,11 +3,11 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::dense;
-use crate::fitted::ModelFit;
 use crate::effect::{Context, Shared, varying};
 use crate::error::DiagnoseError;
-use crate::known::Known;
 use crate::fit::{Effort, Fitted};
+use crate::fitted::ModelFit;
+use crate::known::Known;
 use crate::observations::Observations;
 use crate::prepare::Prepared;
 use crate::selection::Selection;
@@ -26,7 +26,8 @@ const INSTANTS: usize = 40;
 const ROUNDS: usize = 4;
 /// Halvings by which the ends of its interval are found.
 const HALVINGS: usize = 5;
-/// Share of the record at either end in which a step is not told from a slope of the start.
+/// Share of the record at either end in which a step is not distinguished from a slope of the
+/// start.
 const MARGIN: f64 = 0.05;
 /// Part of a standard error by which a parameter is moved for derivatives.
 const SMALL: f64 = 0.01;
@@ -38,7 +39,7 @@ const INSTANT_95: f64 = 7.352_277;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Change {
-    /// They do not, as far as the record tells.
+    /// No change of the time constants is detected.
     Constant,
     /// Smoothly, with this many coefficients: the effective number of a smoothing spline.
     Smooth(usize),
@@ -62,11 +63,11 @@ pub struct ChangePoint {
 /// Whether the ratio of the time constants stays while they change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioTest {
-    /// What a changing ratio takes off `−2 ln L`.
+    /// Reduction of `−2 ln L` by a changing ratio.
     pub statistic: f64,
-    /// Coefficients that it takes.
+    /// Number of coefficients of the changing ratio.
     pub degrees_of_freedom: usize,
-    /// Chance of that where the ratio stays.
+    /// Probability of such a reduction if the ratio is constant.
     pub p_value: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Which frequencies a fit listens to.
+//! The weights that a fit gives to frequencies.
 //!
 //! Where the gas has no power the whitened residual is noise whatever the parameters are, and still its energy depends on them:
 //! noise of one channel multiplied by noise of the other. Its expectation does not, so a fixed weight over frequency leaves the
@@ -82,8 +82,9 @@ impl Weighting {
         Self { taps, prediction: Vec::new() }
     }
 
-    /// The same, and frequencies weighted by the spectrum of the residual itself, whose unbroken stretches are `runs`: what is left
-    /// over is larger than the noise, and says as little about the parameters as it is large.
+    /// These weights, with frequencies also weighted by the spectrum of the residual itself, whose
+    /// unbroken stretches are `runs`. The residual is larger than the noise, and the larger it is,
+    /// the less it says about the parameters.
     ///
     /// The filter is the prediction error of the autoregressive model that the autocorrelation gives (Yule and Walker), scaled to
     /// unit variance.

@@ -76,9 +76,8 @@ impl<T: Real> Factor<T> {
                 };
             }
             let scale = row[0];
-            let agrees = settles
-                && k > band
-                && row.iter().zip(&before[from - stride..]).all(|(a, b)| a.agrees(*b, scale));
+            let agrees =
+                settles && k > band && row.iter().zip(&before[from - stride..]).all(|(a, b)| a.agrees(*b, scale));
             agreeing = if agrees { agreeing + 1 } else { 0 };
             self.count += 1;
         }
@@ -156,8 +155,7 @@ mod tests {
 
     fn through_lag<T: Real>(tau_s: T) -> Chain<T> {
         let time_s: Vec<f64> = (0..SAMPLES).map(|k| k as f64).collect();
-        let reading: Vec<f64> =
-            (0..SAMPLES).map(|k| (0.7 * k as f64).sin() + 0.01 * (k * k % 7) as f64).collect();
+        let reading: Vec<f64> = (0..SAMPLES).map(|k| (0.7 * k as f64).sin() + 0.01 * (k * k % 7) as f64).collect();
         let stretch = Stretch::new(time_s, [reading.clone(), reading]);
         let mut chain = Chain::of(&stretch, 0, Some(1.0));
         chain.factor(Along::Same(tau_s), Curves::default());
@@ -175,10 +173,8 @@ mod tests {
         let [one, two] = tau_s.map(through_lag);
         let variance = masked_variance();
         let second = if is_masked { Variance::Each(&variance) } else { Variance::Same(0.04) };
-        let sources = [
-            Source { rows: &one.rows, variance: Variance::Same(0.01) },
-            Source { rows: &two.rows, variance: second },
-        ];
+        let sources =
+            [Source { rows: &one.rows, variance: Variance::Same(0.01) }, Source { rows: &two.rows, variance: second }];
         let mut factor = Factor::empty();
         factor.compute(&sources, one.len());
         let u = one.value.iter().zip(&two.value).map(|(a, b)| *a - *b).collect();

@@ -119,24 +119,24 @@ impl Page<'_> {
         let effects = listed(&diagnosis.effects.iter().map(|f| self.named(f)).collect::<Vec<_>>());
         let many = diagnosis.effects.len() > 1;
         let lead = match diagnosis.verdict {
-            Verdict::Adequate => "Two first-order lags explain this record: what they leave over cannot be told from \
-                                  noise."
+            Verdict::Adequate => "Two first-order lags explain this record: their residual cannot be \
+                distinguished from noise."
                 .into(),
             Verdict::Explained => format!(
-                "Two first-order lags alone do not explain this record; with {} more, {effects}, what is left cannot be \
-                 told from noise.",
+                "Two first-order lags alone do not explain this record; with {} more, {effects}, the residual \
+                 cannot be distinguished from noise.",
                 if many { "these effects" } else { "one effect" },
             ),
             Verdict::PartlyExplained if diagnosis.unexplained.is_some() => format!(
-                "Of what two first-order lags leave over, {effects} {} a part, but not all: something else is left.",
+                "{effects} {} part of the residual of two first-order lags, but more than noise is left.",
                 if many { "explain" } else { "explains" },
             ),
             Verdict::PartlyExplained => format!(
-                "With {effects} what is left looks like noise, but so many effects cannot be told apart from one record: \
-                 together they may imitate another cause."
+                "With {effects} the residual looks like noise, but one record cannot distinguish so many \
+                 effects: together they may imitate another cause."
             ),
-            Verdict::Unexplained => "Two first-order lags do not explain this record, and none of the known effects \
-                                     accounts for what is left over."
+            Verdict::Unexplained => "Two first-order lags do not explain this record, and no known effect \
+                explains the residual."
                 .into(),
             Verdict::Refused => "This record cannot be diagnosed.".into(),
             _ => "The verdict is one that this report does not know.".into(),
@@ -161,9 +161,9 @@ impl Page<'_> {
         }
         if diagnosis.verdict == Verdict::Unexplained {
             document = document.paragraph(
-                "What to do: see below where in frequency and in time most of it lies, and look for what happens at the \
-                 rig there. Time constants and gas temperature are biased by it to an extent that the record does not \
-                 tell.",
+                "What to do: see below at which frequencies and times most of it lies, and look for what \
+                 happens at the rig there. It biases time constants and gas temperature by an amount that the \
+                 record does not determine.",
             );
         }
         for found in &diagnosis.effects {
@@ -173,10 +173,10 @@ impl Page<'_> {
             let seen = found.seen.iter().cloned().chain((!sizes.is_empty()).then(|| sizes.join("; ")));
             facts.push(("What was found", sentence(&seen.collect::<Vec<_>>().join("; "))));
             facts.push(("What to do", sentence(about.advice)));
-            facts.push(("Explains this record as well", identifiers(&found.alternatives)));
+            facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
             let confusable: Vec<Identifier> =
                 found.effect.imitates().filter(|other| !found.alternatives.contains(other)).collect();
-            facts.push(("Resembles, where it is small", identifiers(&confusable)));
+            facts.push(("Resembles, if it is small", identifiers(&confusable)));
             facts.retain(|(_, text)| !text.is_empty());
             document = document.subheading(capital(&words(found.effect))).facts(facts);
         }
@@ -207,7 +207,7 @@ impl Page<'_> {
             && let Some(chart) = self.trace_chart("Where the readings move most", zoom)
         {
             figure = figure.panel(chart.without_legend());
-            caption.push_str(" Below, the part of the record where the readings move most, larger.");
+            caption.push_str(" Below, enlarged, the part of the record where the readings move most.");
         }
         Ok(document.figure(figure.to_svg()?, caption))
     }
@@ -233,8 +233,9 @@ impl Page<'_> {
 
     fn residual(&self, document: Document) -> Result<Document, ReportError> {
         let document = document.heading("What is left over, before and after").paragraph(
-            "The residual is how far the two inferred gas temperatures disagree, in units of what the noise of both \
-             sensors makes of it, and with the memory that the filters give it taken off. If the model is right, it is \
+            "The residual is the difference of the two inferred gas temperatures, in units of the difference \
+             that the noise of both sensors makes, and without the memory that the filters give it. If the \
+             model is right, it is \
              white noise of unit variance.",
         );
         let models = models(self.diagnosis);
@@ -243,13 +244,15 @@ impl Page<'_> {
         };
         let mut document = document.figure(
             figure.to_svg()?,
-            "The residual along the record, and its root mean square in hundredths of it, with the range that holds 95 % of \
+            "The residual along the record, and its root mean square in hundredths of it, with the range that \
+             holds 95 % of \
              such parts if it is white noise of unit variance.",
         );
         if let Some(figure) = frequency_figure(&models) {
             document = document.figure(
                 figure.to_svg()?,
-                "Power of the residual against frequency, in units of that of the noise. The pale range holds 95 % of the \
+                "Power of the residual against frequency, in units of that of the noise. The pale range holds \
+                 95 % of the \
                  bands if the residual is white noise of unit variance: one in twenty lies outside by chance.",
             );
         }
@@ -269,7 +272,7 @@ impl Page<'_> {
             "p-value",
             "gain on held-out blocks (nats)",
             "statistic, noise free in each band",
-            "explains it as well",
+            "explains it equally well",
         ]);
         let mut sizes = Table::new(["effect", "parameter", "value", "95 % interval", "unit"]);
         for found in &self.diagnosis.effects {
@@ -312,10 +315,11 @@ impl Page<'_> {
         if self.changed {
             document = document
                 .paragraph(
-                    "The statistic is twice the gain in log-likelihood, with the level of the noise free: it is \
-                     chi-square distributed if the effect is not there, and the p-value is the probability of a statistic \
-                     so large. The gain on held-out blocks is that on parts of the record that the fit had not seen: what \
-                     is there by chance does not gain.",
+                    "The statistic is twice the gain in log-likelihood, with the level of the noise free: it \
+                     is chi-square distributed if the effect is absent, and the p-value is the probability of \
+                     a statistic \
+                     so large. The gain on held-out blocks is that on parts of the record that the fit had \
+                     not seen. An effect that is due to chance does not gain there.",
                 )
                 .table(evidence);
         }
@@ -346,8 +350,8 @@ impl Page<'_> {
         for model in models.iter().filter(|m| m.fit.is_weighted_by_residual) {
             let when = if self.changed { format!(" {}", model.column) } else { String::new() };
             document = document.note(format!(
-                "The residual{when} is not white: the errors{when} rest on its own spectrum. They do not cover the bias \
-                 that what is left may cause."
+                "The residual{when} is not white, so the errors{when} follow from its own spectrum. They do \
+                 not cover the bias that its cause may have."
             ));
         }
         if let Some(figure) = self.time_constant_figure() {
@@ -415,7 +419,8 @@ impl Page<'_> {
         let document = document
             .heading("Error before and after")
             .paragraph(
-                "Held-out blocks are parts of the record that took no part in choosing effects or in fitting them. In the \
+                "Held-out blocks are parts of the record that took no part in choosing effects or in fitting \
+                 them. In the \
                  first two rows, 1 is what noise alone makes.",
             )
             .table(table);
@@ -423,8 +428,9 @@ impl Page<'_> {
             return document;
         }
         document.paragraph(
-            "The diagnosis has not seen the reference. Against it counts as well what both sensors share, and which of \
-             them is right where they disagree about gain and offset: this no record of two sensors tells.",
+            "The diagnosis has not used the reference. The error against it also includes errors that both \
+             sensors share, and depends on which sensor is right where they disagree about gain and offset. \
+             Two sensors alone cannot reveal either.",
         )
     }
 
@@ -454,10 +460,11 @@ impl Page<'_> {
         }
         document
             .paragraph(
-                "Each asks whether the residual is white noise of unit variance. The p-value is the probability of a \
-                 statistic at least as extreme if it is: a small one speaks against the model.",
+                "Each test asks whether the residual is white noise of unit variance. The p-value is the \
+                 probability of a statistic at least as extreme if it is, so a small one is evidence against \
+                 the model.",
             )
-            .table(table.caption("Statistics, in brackets their degrees of freedom where they have any."))
+            .table(table.caption("Statistics, with their degrees of freedom, if any, in brackets."))
     }
 
     fn unexplained(&self, document: Document) -> Document {
@@ -465,7 +472,7 @@ impl Page<'_> {
         let Some(left) = &self.diagnosis.unexplained else {
             return document.paragraph(match self.diagnosis.verdict {
                 Verdict::Refused => "The record was not diagnosed: nothing can be said.",
-                _ => "Nothing that these tests show: what is left cannot be told from noise.",
+                _ => "Nothing that these tests show: the residual cannot be distinguished from noise.",
             });
         };
         let span = |ends: Option<[f64; 2]>, unit: &str| {
@@ -487,13 +494,19 @@ impl Page<'_> {
             if !told.contains(&found.effect) {
                 told.push(found.effect);
                 items.push(format!(
-                    "{}: what stays unseen is {}.",
+                    "{}: not detectable is {}.",
                     capital(&words(found.effect)),
                     found.effect.about().unseen
                 ));
             }
         }
-        let mut limits = Table::new(["effect", "where", "parameter", "smallest size that would have been seen"]);
+        let mut limits = Table::new([
+            "effect",
+            "where",
+            "parameter",
+            "smallest size that would have been \
+            detected",
+        ]);
         for limit in &self.diagnosis.limits {
             limits = limits.row([
                 words(limit.effect),
@@ -503,10 +516,10 @@ impl Page<'_> {
             ]);
         }
         let document = document
-            .heading("What this record cannot tell")
+            .heading("What this record cannot reveal")
             .paragraph(
-                "The diagnosis sees the gas only through two sensors. What does the same to both leaves no trace in how \
-                 they disagree, and is not among the effects even where it is large.",
+                "The diagnosis sees the gas only through two sensors. Anything that affects both alike leaves \
+                 no trace in their disagreement, and is not among the effects even if it is large.",
             )
             .list(items);
         if limits.is_empty() {
@@ -514,8 +527,8 @@ impl Page<'_> {
         }
         document
             .paragraph(
-                "Of the effects that were not found, no more is known than that they are small: below these sizes they \
-                 would not have been told from chance.",
+                "The effects that were not found may still be present, but small: below these sizes they \
+                 would not have been distinguished from chance.",
             )
             .table(limits)
     }
@@ -604,7 +617,7 @@ mod tests {
         "Error before and after",
         "Tests of what is left over",
         "What is unexplained",
-        "What this record cannot tell",
+        "What this record cannot reveal",
         "How to reproduce this",
     ];
 

@@ -48,21 +48,21 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
                 format!("{} rms", with_unit(&rounded(reference.rmse_k, 3), "K")),
             ));
             facts.push((
-                "The same of the faster sensor",
+                "Error of the uncorrected faster sensor",
                 format!("{} rms", with_unit(&rounded(reference.raw_rmse_k, 3), "K")),
             ));
             facts.push(("Reference inside the 95 % band", with_unit(&rounded(100.0 * reference.inside_95, 3), "%")));
         }
         document = document.facts(facts).figure(
             temperature_figure(record, answer).to_svg()?,
-            "Readings, and the gas temperature with its 95 % band. Below, the part where it moves most, larger.",
+            "Readings, and the gas temperature with its 95 % band. Below, enlarged, the part where it moves most.",
         );
         let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 260.0).panel(spectra(record, answer));
         document = document.heading("Before and after").figure(
             spectra.to_svg()?,
-            "Spectra of the faster sensor as it reads, of the gas temperature, and of the noise that the inferred gas temperature would \
-             have without what is known of the gas. The lag is compensated up to the line; beyond it the answer is what the gas is like, \
-             not what it did.",
+            "Spectra of the faster sensor's reading, of the gas temperature, and of the noise that the \
+             inferred gas temperature would have without the prior. The lag is compensated up to the line; \
+             beyond it the answer follows from the prior of the gas, not from the readings.",
         );
     }
     Ok(end(numbers(document, &answer.last), &answer.last, command))
@@ -84,8 +84,8 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
             with_unit(&rounded(step.at_s, 5), "s"),
             with_unit(&between(step.interval_95_s), "s")
         ),
-        ("windows", _, _) => format!("Each of {} windows is characterised by itself.", answer.time_s.len()),
-        _ => "Time constants do not change, as far as the record tells.".into(),
+        ("windows", _, _) => format!("Each of {} windows is characterised separately.", answer.time_s.len()),
+        _ => "No change of the time constants is detected.".into(),
     };
     let mut document = Document::new(format!("Time constants along {}", record.source))
         .heading("Time constants along the record")
@@ -94,9 +94,13 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
         document = document.warning(sentence(warning));
     }
     if let Some(ratio) = &answer.ratio {
-        let stays = if ratio.stays { "stays, as far as the record tells" } else { "changes" };
-        let text =
-            format!("{stays} (p = {}, {} degrees of freedom)", probability(ratio.p_value), ratio.degrees_of_freedom);
+        let stays = if ratio.stays { "shows no change" } else { "changes" };
+        let text = format!(
+            "{stays} (p = {}, {} degrees of \
+                freedom)",
+            probability(ratio.p_value),
+            ratio.degrees_of_freedom
+        );
         document = document.facts([("The ratio of both", text)]);
     }
     if !answer.time_s.is_empty() {

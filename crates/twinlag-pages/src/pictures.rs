@@ -12,7 +12,7 @@ const Z_975: f64 = 1.959_963_984_540_054;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
-/// A step so many times the period is a gap.
+/// A step longer than this multiple of the period is a gap.
 const GAP: f64 = 2.5;
 
 /// Readings and gas temperature with its band, over the record and where it moves most, and the spectra before and after with the
@@ -75,13 +75,13 @@ pub(crate) fn spectra(record: &Record, answer: &Compensation) -> Chart {
     let (hz, density) = power_spectrum(&known, period_s);
     let (gas_hz, gas) = power_spectrum(&answer.gas_c, period_s);
     let mut chart = Chart::new("Spectra", Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("density (K²/Hz)"))
-        .series(Series::line(format!("{name} as it reads"), hz, density).colour(Colour::Blue))
+        .series(Series::line(format!("{name}, uncorrected"), hz, density).colour(Colour::Blue))
         .series(Series::line("gas", gas_hz.clone(), gas).colour(Colour::Green));
     if let (Some(quality), Some(rig)) = (&answer.gas, &answer.rig) {
         let noise: Vec<f64> = gas_hz.iter().map(|hz| rig.noise_density_k2_per_hz(*hz, period_s)).collect();
         chart = chart.series(Series::trace("noise of the inferred gas", gas_hz, noise).colour(Colour::Orange).dashed());
         if let Some(hz) = quality.bandwidth_hz {
-            chart = chart.reference(Reference::vertical(hz).label("the readings decide up to here"));
+            chart = chart.reference(Reference::vertical(hz).label("determined by the readings up to here"));
         }
     }
     chart

@@ -70,7 +70,7 @@ pub(crate) fn interval(of: &TimeConstant) -> String {
 pub(crate) fn question(test: &str) -> &'static str {
     match test {
         "total-energy" => "Is its energy that of the noise?",
-        "band-energy" => "Has every band of frequencies its share of the energy?",
+        "band-energy" => "Does every frequency band have its share of the energy?",
         "whiteness" => "Are values a few samples apart unrelated?",
         "coherence" => "Is it unrelated to the inferred gas temperature, at every frequency?",
         "level" => "Is it unrelated to how high the gas temperature is?",
@@ -78,7 +78,7 @@ pub(crate) fn question(test: &str) -> &'static str {
         "time" => "Is its energy the same all along the record?",
         "tails" => "Are its largest values those of Gaussian noise?",
         "lines" => "Is no single frequency far above its neighbours?",
-        "repeated-values" => "Do readings equal the one before no more often than noise makes them?",
+        "repeated-values" => "Do readings equal the one before no more often than noise explains?",
         _ => "",
     }
 }

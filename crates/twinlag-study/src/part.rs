@@ -308,8 +308,10 @@ impl Part {
 
     pub(crate) fn insert(&mut self, job: u64, tally: Tally) {
         let blocks = self.header.blocks();
-        self.cells[(job / blocks) as usize].insert(job % blocks, tally).expect("each job is taken once, and \
-            exists");
+        self.cells[(job / blocks) as usize].insert(job % blocks, tally).expect(
+            "each job is taken once, and \
+            exists",
+        );
     }
 
     /// Jobs in `range` that are not there.

@@ -1,4 +1,4 @@
-//! The answer, as scripts read it: schema `twinlag.characterisation/1`.
+//! The answer in the form that scripts read: schema `twinlag.characterisation/1`.
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
@@ -13,11 +13,12 @@ use crate::options::Options;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Status {
-    /// Both time constants are determined, and the residual is what noise leaves.
+    /// Both time constants are determined, and the residual is consistent with noise.
     Ok,
-    /// The best fit lies on a bound: no estimate.
+    /// The best fit lies on a bound, so it is not an estimate.
     AtBound,
-    /// The record does not determine the time constants apart; [`Characterisation::not_identifiable`] names what it does not.
+    /// The record does not determine both time constants; [`Characterisation::not_identifiable`]
+    /// lists what it does not determine.
     NotIdentifiable,
     /// The time constants are the best of a model that the record contradicts: the residual is not noise.
     ModelRejected,
@@ -28,13 +29,13 @@ pub enum Status {
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// Its standard error; `None` where the interval has no one width to state.
+    /// Standard error of the estimate; `None` if the interval has no single width.
     pub standard_error: Option<f64>,
     /// 95 % interval.
     pub interval_95: [f64; 2],
 }
 
-/// What the record is.
+/// Summary of the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordSummary {
     /// File or name.
@@ -49,11 +50,11 @@ pub struct RecordSummary {
     pub channels: [String; 2],
     /// Unbroken stretches.
     pub segments: usize,
-    /// How the stamps lie.
+    /// How the time stamps are spaced.
     pub sampling: Sampling,
 }
 
-/// What is found of one sensor; `None` where the record does not tell.
+/// Estimates for one sensor; `None` for numbers that the record does not determine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorEstimate {
     /// Name of the channel.
@@ -64,10 +65,11 @@ pub struct SensorEstimate {
     pub standard_error_s: Option<f64>,
     /// Its 95 % interval, s.
     pub interval_95_s: Option<[f64; 2]>,
-    /// What that interval rests on.
+    /// How the interval was found.
     pub interval_basis: Option<IntervalBasis>,
-    /// Time constant of its second lag, s, the smaller of the two; `None` where it was not asked. Without a value where none is
-    /// seen or it is not determined: the interval then says how large it may be.
+    /// Time constant of the sensor's second lag, s, the smaller of the two; `None` if it was not
+    /// asked for. It has no value if no second lag is detected or if it is not determined; the
+    /// interval then says how large it may be.
     pub second_time_constant_s: Option<SecondLag>,
     /// Noise standard deviation that was given or found, K.
     #[serde(rename = "noise_std_K")]
@@ -79,20 +81,20 @@ pub struct SensorEstimate {
     pub noise_ar1: Option<f64>,
     /// Where the noise level comes from.
     pub noise_from: NoiseSource,
-    /// Whether the time constant was given, not found.
+    /// Whether the time constant was given, not estimated.
     pub known: bool,
 }
 
-/// What is found of a sensor's second lag.
+/// Estimate of a sensor's second lag.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SecondLag {
-    /// The estimate, s; `None` where none is seen, or it is not determined.
+    /// The estimate, s; `None` if no second lag is detected, or if it is not determined.
     pub value: Option<f64>,
     /// Its standard error, s.
     pub standard_error: Option<f64>,
-    /// 95 % interval, s; from 0 where none is seen.
+    /// 95 % interval, s; from 0 if no second lag is detected.
     pub interval_95: Option<[f64; 2]>,
-    /// Whether it was given, not found.
+    /// Whether the value was given, not estimated.
     pub known: bool,
 }
 
@@ -115,29 +117,31 @@ pub struct Difference {
     pub interval_95_s: Option<[f64; 2]>,
 }
 
-/// What the fit leaves over.
+/// The residual of the fit, and its tests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Residual {
-    /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated level is left. `None` if
-    /// there are no degrees of freedom, or if the levels were made to fit since only their ratio was given.
+    /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated
+    /// level is left. `None` if there are no degrees of freedom, or if the levels were scaled to
+    /// the residual because only their ratio was given.
     pub chi2_per_dof: Option<f64>,
-    /// Whether its autocorrelations are those of white noise.
+    /// Whether the autocorrelations of the residual are those of white noise.
     pub white: bool,
     /// The tests.
     pub tests: Vec<ResidualTest>,
 }
 
-/// What the intervals rest on.
+/// How the intervals were found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalMethod {
-    /// Noise of the stated levels, the noise-noise term and what found levels are uncertain by included.
+    /// From the stated noise levels, including the noise-noise term and the uncertainty of
+    /// estimated levels.
     Information,
-    /// The residual's own spectrum: model error is part of it.
+    /// From the spectrum of the residual itself, which includes model error.
     ResidualSpectrum,
-    /// The range over every value of the undetermined time constant that the record allows.
+    /// From every value of the undetermined time constant that the record allows.
     Profile,
-    /// The same estimator on simulated records.
+    /// From repeating the estimate on simulated records.
     Bootstrap,
     /// There are no intervals.
     None,
@@ -150,7 +154,7 @@ pub struct MadeBy {
     pub program: String,
     /// Its version.
     pub version: String,
-    /// What was asked.
+    /// The options that were given.
     pub options: Options,
 }
 
@@ -159,38 +163,38 @@ pub struct MadeBy {
 pub struct Characterisation {
     /// `twinlag.characterisation/1`.
     pub schema: String,
-    /// What the record is.
+    /// Summary of the record.
     pub record: RecordSummary,
     /// Name of the estimator.
     pub estimator: String,
     /// Name of the optimiser.
     pub optimiser: String,
-    /// What the gas was taken to do between samples.
+    /// How the gas was assumed to move between samples.
     pub hold: String,
-    /// How much each time constant moves, relative, if the gas is taken to do the other thing between samples; `None` where
-    /// this was not tried.
+    /// Relative change of each time constant with the other assumption about the gas between
+    /// samples; `None` if this was not tried.
     pub hold_sensitivity: Option<[f64; 2]>,
     /// Sensors 1 and 2.
     pub sensors: [SensorEstimate; 2],
-    /// What the record tells best: the difference.
+    /// Difference of the time constants, which the record often determines best.
     pub time_constant_difference_s: Difference,
     /// Relative calibration, where fitted.
     pub free: FreeParameters,
-    /// What is left over.
+    /// The unexplained part of the residual, if there is one.
     pub residual: Residual,
-    /// What the intervals rest on; the shape of each is in [`SensorEstimate::interval_basis`].
+    /// How the intervals were found; [`SensorEstimate::interval_basis`] has the shape of each.
     pub interval_method: IntervalMethod,
     /// Whether there is an answer.
     pub status: Status,
-    /// What this record cannot tell.
+    /// What this record does not determine.
     pub not_identifiable: Vec<String>,
     /// What to know before using the numbers.
     pub warnings: Vec<String>,
-    /// How the best fit ended. Its point is where it ended, not an estimate, unless the status says so.
+    /// How the best fit ended. Its end point is an estimate only if the status says so.
     pub fit: Fit,
     /// Number of starts.
     pub starts: usize,
-    /// How the file was understood.
+    /// How the file was read.
     pub notes: Vec<String>,
     /// What made this answer.
     pub made_by: MadeBy,

@@ -1,4 +1,4 @@
-//! The question that a record is asked first: both time constants.
+//! Estimates both time constants of a record.
 
 use twinlag_cross_relation::{Parameter, Readings, Segment, Steps};
 use twinlag_estimate::{Bootstrap, Estimator, Intervals, Known, Levels, NoiseColour};
@@ -10,17 +10,18 @@ use crate::options::Options;
 use crate::question::{Question, Watch};
 use crate::quiet;
 
-/// Both time constants of `record`, with intervals, noise levels and residual tests.
+/// Estimates both time constants of `record`, with intervals, noise levels and residual tests.
 ///
 /// # Errors
-/// [`Error`] if the question cannot be put: options that contradict each other, an estimator that cannot take the record's
-/// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its [`Status`](crate::Status) says what it is
-/// worth.
+/// [`Error`] if the question cannot be put: options that contradict each other, an estimator that
+/// cannot take the record's sampling, too few samples to distinguish noise from signal. A fit that
+/// ran is never an error; its [`Status`](crate::Status) says how good it is.
 pub fn characterise(record: &Record, options: &Options) -> Result<Characterisation, Error> {
     characterise_watched(record, options, &|_, _| ())
 }
 
-/// The same, with `watch` told of every replicate of a bootstrap: how many are done, of how many.
+/// Characterises `record` as [`characterise`] does, and calls `watch` with `(done, total)` after
+/// every replicate of a bootstrap.
 ///
 /// # Errors
 /// As [`characterise`].
@@ -38,9 +39,9 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     }
 }
 
-/// The channels of a record as the costs take them, cut where samples are missing.
-///
-/// The level taken off is the mean, or 0 °C where an offset is known or excluded: it is stated there.
+/// The channels of a record in the form that the costs need, cut where samples are missing. The
+/// level that is subtracted is the mean, or 0 °C if an offset, which is stated there, is known or
+/// excluded.
 ///
 /// # Errors
 /// [`Error::Cost`] for a record without usable samples, which its constructors do not let through.
@@ -86,7 +87,9 @@ fn check_sampling(readings: &Readings, options: &Options) -> Result<(), Error> {
     match wants.into_iter().find(|(is_asked, _)| *is_asked) {
         Some((_, option)) if readings.even_period_s().is_none() => Err(Error::Option {
             option,
-            expected: "a record with evenly spaced samples; if the stamps are only ragged, --sampling uniform".into(),
+            expected: "a record with evenly spaced samples; if the stamps are only ragged, --sampling \
+                uniform"
+                .into(),
             got: "uneven time stamps".into(),
         }),
         _ => Ok(()),
@@ -208,7 +211,9 @@ fn check_estimator(options: &Options) -> Result<(), Error> {
             if options.calibrates() || !options.known.is_empty() {
                 return Err(Error::Option {
                     option: "--intervals",
-                    expected: "auto or profile with --free or --known, which the bootstrap does not simulate".into(),
+                    expected: "auto or profile with --free or --known, which the bootstrap does not \
+                        simulate"
+                        .into(),
                     got: "bootstrap".into(),
                 });
             }

@@ -28,47 +28,50 @@ const MAX_NOISE_INFLATIONS: usize = 6;
 pub struct CompensateOptions {
     /// How the model is found, where none is given.
     pub diagnose: DiagnoseOptions,
-    /// A model that was found in another record: its effects stay as they are.
+    /// A model that was found in another record; its effects stay fixed.
     pub model: Option<Model>,
-    /// Which readings the gas temperature at an instant may rest on.
+    /// Which readings the gas temperature at an instant may use.
     pub form: Form,
-    /// The channel, 0 or 1, that gain, offset and delay are held to be right of: no record of two sensors tells.
+    /// The channel, 0 or 1, that is trusted where gain, offset and delay differ, since two sensors
+    /// alone cannot reveal which one is right.
     pub trusted: usize,
 }
 
-/// How good the gas temperature is, held against a trusted one.
+/// Error of the gas temperature, compared with a trusted one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AgainstReference {
     /// Root mean square error, K.
     #[serde(rename = "rmse_K")]
     pub rmse_k: f64,
-    /// The same of the faster sensor as it reads, K.
+    /// Root mean square error of the faster sensor's uncorrected reading, K.
     #[serde(rename = "raw_rmse_K")]
     pub raw_rmse_k: f64,
-    /// Share of the instants at which the reference lies within the 95 % band.
+    /// Share of the instants at which the reference lies inside the 95 % band.
     pub inside_95: f64,
 }
 
-/// How good a gas temperature is.
+/// Quality of a gas temperature.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Median of its standard deviation, K.
     #[serde(rename = "median_std_K")]
     pub median_std_k: f64,
-    /// Root mean square of the part of it that is due to the model's parameters, K.
+    /// Root mean square of the part of the standard deviation that is due to the model's
+    /// parameters, K.
     #[serde(rename = "parameter_std_K")]
     pub parameter_std_k: f64,
-    /// Highest frequency of which the readings say more than the prior, Hz: above it the answer is what the gas is like, not what it
-    /// did. `None` where there is none.
+    /// Highest frequency at which the readings determine the gas better than the prior, Hz; above
+    /// it the answer follows from the prior. `None` if there is no such frequency.
     #[serde(rename = "bandwidth_Hz")]
     pub bandwidth_hz: Option<f64>,
-    /// Mean square of readings less what earlier ones led to expect, over its variance: 1 where model and prior are right.
+    /// Mean square of the innovations (readings less their predictions from earlier ones) over
+    /// their variance: 1 if model and prior are right.
     pub innovation_energy: f64,
-    /// What the bands were multiplied by, since that is too large.
+    /// Factor by which the bands were widened because the innovations are too large.
     pub widened_by: f64,
-    /// What the gas is like, as the readings say.
+    /// The prior of the gas, learned from the readings.
     pub prior: Prior,
-    /// Held against the reference, where there is one.
+    /// Comparison with the reference, if there is one.
     pub reference: Option<AgainstReference>,
 }
 
@@ -79,11 +82,12 @@ pub struct Compensation {
     pub schema: String,
     /// `ok`, or `not-identifiable` where the record does not determine the time constants: there is no gas temperature then.
     pub status: Status,
-    /// Which readings the answer for an instant rests on.
+    /// Which readings the answer for an instant uses.
     pub form: Form,
-    /// How good it is; `None` where there is none.
+    /// Quality of the gas temperature; `None` if there is no gas temperature.
     pub gas: Option<Quality>,
-    /// Instants, s: those of the record, and those that are missing in an even grid. The series are not part of the JSON.
+    /// Instants, s: those of the record, and the missing ones of an even grid. The series are not
+    /// part of the JSON.
     #[serde(skip)]
     pub time_s: Vec<f64>,
     /// The gas temperature, °C.
@@ -92,7 +96,7 @@ pub struct Compensation {
     /// Its standard deviation, K: noise, prior and the uncertainty of the model's parameters.
     #[serde(skip)]
     pub gas_std_k: Vec<f64>,
-    /// What the diagnosis said, where there was one.
+    /// Verdict of the diagnosis, if there was one.
     pub verdict: Option<Verdict>,
     /// The effects in the model.
     pub effects: Vec<NamedEffect>,
@@ -111,7 +115,8 @@ impl Compensation {
     pub const SCHEMA: &'static str = "twinlag.compensation/1";
 }
 
-/// The gas temperature of `record` with its standard deviation: by the model that a diagnosis finds, or by the one given.
+/// Reconstructs the gas temperature of `record` with its standard deviation, using the model given
+/// or the one that a diagnosis finds.
 ///
 /// # Errors
 /// As [`crate::diagnose()`] and [`crate::characterise_with`].
@@ -139,27 +144,31 @@ pub fn compensate(
         fit.time_constants.iter().any(|t| t.value_s.is_none()) || out.last.status == Status::NotIdentifiable;
     if is_unknown || verdict == Some(Verdict::Refused) {
         out.warnings.push(
-            "the record does not determine both time constants, so it has no gas temperature: say what is known of one (--known \
-             T1.time_constant_s=VALUE), or take a model from another record (--model)"
+            "the record does not determine both time constants, so the gas temperature cannot be \
+             reconstructed: give a known time constant (--known \
+             T1.time_constant_s=VALUE), or use a model from another record (--model)"
                 .into(),
         );
         return Ok(out);
     }
     if matches!(verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained)) {
         out.warnings.push(
-            "the model does not explain the record: the bands are those of noise and parameters, and of no error of the model"
+            "the model does not explain the record: the bands cover noise and parameters, but not the error \
+             of the model"
                 .into(),
         );
     }
     let found = Found::of(&fit, options, watch)?;
     if found.widened_by > 1.0 {
         out.warnings.push(format!(
-            "readings differ from what the others led to expect by {:.2} times what noise explains: the bands are as much wider",
+            "readings deviate from their predictions {:.2} times as far as noise explains; the bands are \
+             widened by this factor",
             found.widened_by
         ));
     }
     out.warnings.push(
-        "what both sensors share (a gain, an offset, a delay, a second lag) is in the gas temperature, and no band knows of it"
+        "errors that both sensors share (a gain, an offset, a delay, a second lag) remain in the gas \
+         temperature, and no band covers them"
             .into(),
     );
     let mut sorted = found.std_k.clone();

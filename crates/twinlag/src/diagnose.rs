@@ -33,19 +33,21 @@ pub struct DiagnoseOptions {
 /// An effect that was found, as scripts read it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedEffect {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Name of the channel that it sits in; `None` where it is of both, or where the record does not tell.
+    /// Name of the channel that has the effect; `None` if both have it, or if the record does not
+    /// determine which.
     pub channel: Option<String>,
-    /// Name of the channel that the parameters are meant in; `None` where it is of both.
+    /// Name of the channel to which the parameters refer; `None` if they refer to both.
     pub fitted_in: Option<String>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<Value>,
-    /// Why it was added; `None` for defects of the data, which are seen, not inferred.
+    /// Why the effect was added; `None` for defects of the data, which are seen directly and not
+    /// inferred.
     pub evidence: Option<Evidence>,
-    /// Effects that explain this record as well.
+    /// Other effects that explain this record equally well.
     pub alternatives: Vec<Identifier>,
-    /// What was seen, where it is no parameter.
+    /// What was seen in the data, for an effect without parameters.
     pub seen: Option<String>,
     /// What it is.
     pub explanation: String,
@@ -53,22 +55,23 @@ pub struct NamedEffect {
     pub advice: String,
 }
 
-/// What the search would have seen of an effect that it did not find.
+/// The detection limit of an effect that was not found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedLimit {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Name of the channel; `None` where it is of both, or relative.
+    /// Name of the channel; `None` if the effect is of both, or relative.
     pub channel: Option<String>,
-    /// Its main parameter.
+    /// Main parameter of the effect.
     pub parameter: String,
-    /// The smallest size that would have been taken for more than chance.
+    /// The smallest size that would have been distinguished from chance.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
 }
 
-/// Errors before and after, none of them on data that chose the effects, but for the first.
+/// Errors before and after adding the effects. All but `chi2_per_dof` are computed on blocks used
+/// neither to choose effects nor to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorBeforeAfter {
     /// Energy of the whitened residual per degree of freedom, on the whole record.
@@ -99,19 +102,20 @@ pub struct Diagnosis {
     /// The model with the effects.
     #[serde(rename = "final")]
     pub last: Characterisation,
-    /// What is left over.
+    /// The unexplained part of the residual, if there is one.
     pub unexplained: Option<Unexplained>,
-    /// What no record of two sensors, or not this one, can tell.
+    /// What these readings cannot reveal: some of it no record of two sensors can, some of it not
+    /// this one.
     pub not_testable: Vec<String>,
-    /// What would have been seen of the effects that were not found.
+    /// Detection limits of the effects that were not found.
     pub limits: Vec<NamedLimit>,
     /// What to know before using the numbers.
     pub remarks: Vec<String>,
     /// Effects that were not considered, as asked.
     pub without: Vec<Identifier>,
-    /// Whether a measured flow was there, with which time constants may go.
+    /// Whether the record has a measured flow, on which time constants may depend.
     pub has_flow: bool,
-    /// Pictures' numbers; not part of the JSON.
+    /// Numbers for the pictures; not part of the JSON.
     #[serde(skip)]
     pub core: Option<Box<Core>>,
 }
@@ -135,18 +139,18 @@ pub struct Model {
     pub noise_std_k: [f64; 2],
     /// The effects.
     pub effects: Vec<ModelEffect>,
-    /// What made it.
+    /// The program that made this answer, and its options.
     pub made_by: MadeBy,
 }
 
 /// An effect of a [`Model`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelEffect {
-    /// Which.
+    /// The effect.
     pub effect: Identifier,
-    /// Name of its channel; `None` where it is of both.
+    /// Name of the channel that has the effect; `None` if both have it.
     pub channel: Option<String>,
-    /// Its parameters.
+    /// Parameters of the effect.
     pub parameters: Vec<Value>,
 }
 
@@ -154,7 +158,7 @@ impl Model {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.model/1";
 
-    /// The model of two first-order lags: nothing in it.
+    /// The model of two first-order lags, without any effect.
     pub fn of_two_lags(channels: [String; 2]) -> Self {
         Self {
             schema: Self::SCHEMA.into(),
@@ -193,16 +197,16 @@ impl Diagnosis {
     }
 }
 
-/// Both time constants of `record` with the effects of `model` as they are.
+/// Estimates both time constants of `record`, with the effects of `model` held fixed.
 ///
 /// # Errors
-/// As [`diagnose`]; an effect whose parameters are none of this version's.
+/// As [`diagnose`]; also if an effect has parameters that this version does not know.
 pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
     if model.effects.is_empty() {
         check_channels(record, model)?;
         check_numbers(model)?;
         let mut out = characterise(record, options)?;
-        out.warnings.push("the model has no effects: two first-order lags".into());
+        out.warnings.push("the model has no effects: it is two first-order lags".into());
         return Ok(out);
     }
     Ok(with_model(record, model, options)?.0)
@@ -241,7 +245,8 @@ pub(crate) fn check_numbers(model: &Model) -> Result<(), Error> {
     }
 }
 
-/// The same, and the fit itself.
+/// Estimates both time constants with the effects of a model held fixed, and returns the fit as
+/// well.
 pub(crate) fn with_model(
     record: &Record,
     model: &Model,
@@ -268,24 +273,30 @@ pub(crate) fn with_model(
     let names: Vec<&str> = model.effects.iter().map(|e| e.effect.name()).collect();
     let mut out = of_fit(&base, &fit, status, FreeParameters { gain: None, offset_k: None }, options);
     if !names.is_empty() {
-        out.warnings.push(format!("with the effects of the model as they are there: {}", names.join(", ")));
+        out.warnings.push(format!("effects held at the values of the model: {}", names.join(", ")));
     }
     if !known.fitted_again.is_empty() {
         let again: Vec<&str> = known.fitted_again.iter().map(|e| e.name()).collect();
-        out.warnings
-            .push(format!("fitted again, since they belong to a record and not to the rig: {}", again.join(", ")));
+        out.warnings.push(format!(
+            "effects fitted again, because they belong to a record and not to the rig: \
+                {}",
+            again.join(", ")
+        ));
     }
     if options.free_gain || options.free_offset || options.second_order != [false; 2] {
-        out.warnings
-            .push("gain, offset and second lags that were to be fitted are not: the model says what is fitted".into());
+        out.warnings.push(
+            "the request to fit gain, offset or second lags is ignored, because the model determines \
+                what is fitted"
+                .into(),
+        );
     }
     Ok((out, fit))
 }
 
-/// Told what a diagnosis is doing, how much of that is done, and of how much.
+/// Progress callback: `(task, done, total)`.
 pub type DiagnoseWatch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 
-/// Finds what two first-order lags leave over in `record`, and which effects account for it.
+/// Finds which physical effects two first-order lags fail to describe in `record`.
 ///
 /// # Errors
 /// As [`characterise`]; [`Error::Diagnose`] for a record that is too short or in which a channel never changes.
@@ -324,14 +335,15 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         && rmse.after > rmse.before
     {
         remarks.push(
-            "with the effects the gas temperature is farther from the reference: what both sensors share, and which of the two has \
-             a gain, an offset or a delay, no record of two sensors tells"
+            "with the effects the gas temperature is farther from the reference. Two sensors alone cannot \
+             reveal errors that both share, nor which of them has a gain, an offset or a delay"
                 .into(),
         );
     }
     if options.characterise.known.iter().any(|k| !matches!(k.parameter, Parameter::Tau1 | Parameter::Tau2)) {
         remarks.push(
-            "of what is known beforehand the loop uses the time constants alone; the rest is in the two lags of `base`"
+            "the loop uses only prior knowledge of time constants; other prior knowledge is used in the two \
+             lags of `base`"
                 .into(),
         );
     }

@@ -33,21 +33,26 @@ pub enum Error {
     Option { option: &'static str, expected: String, got: String },
     #[error("{what} needs the whitened estimator, not {estimator}: leave out --estimator")]
     WhitenedOnly { what: &'static str, estimator: String },
-    #[error("{what} has no part in {estimator}, which is in closed form: leave it out, or take another estimator")]
+    #[error(
+        "{what} cannot be used with {estimator}, which is in closed form: leave it out, or use another \
+        estimator"
+    )]
     NotInClosedForm { what: &'static str, estimator: String },
     #[error(
-        "the model is of the channels {} and {}, in this order, and the record has {} and {}: gain, offset and delay are those of \
-         the second against the first. Choose the same with --t1 and --t2", model[0], model[1], record[0], record[1]
+        "the model has the channels {} and {}, in this order, but the record has {} and {}; gain, offset and \
+         delay are those of the second relative to the first. Choose the same channels with --t1 and \
+         --t2", model[0], model[1], record[0], record[1]
     )]
     ModelChannels { model: [String; 2], record: [String; 2] },
     #[error(
-        "--quiet-segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
+        "--quiet-segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at \
+         {last_s} s, with \
          {needed} samples or more in unbroken stretches there"
     )]
     QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
     #[error(
-        "--live: the model has {effect}, which readings alone as they come do not allow to undo: leave out --live, or take a model \
-         of calibration, second lags, slow paths and noise"
+        "--live: the model has {effect}, which cannot be undone reading by reading: leave out --live, or use \
+         a model with calibration, second lags, slow paths and noise only"
     )]
     LiveEffect { effect: &'static str },
     #[error("the start of --live needs {why}")]

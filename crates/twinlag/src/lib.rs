@@ -1,9 +1,10 @@
-//! Two temperature sensors' time constants from their readings alone.
+//! Identifies the time constants of two temperature sensors from their readings alone.
 //!
-//! Two sensors of different thickness in one gas lag differently. From how they disagree [`characterise()`] finds the time
-//! constant of each *blind*, without knowing the gas temperature, with 95 % intervals that account for the noise it finds, and
-//! says so where the record does not tell. This crate is the one to take for whole records; each layer is re-exported as a
-//! module and can be taken alone: [`sensor`] (models), [`signal`] (simulated records), [`cross_relation`] (the costs),
+//! Two sensors of different thickness in one gas lag differently. From how their readings differ,
+//! [`characterise()`] estimates the time constant of each without knowing the gas temperature. Its
+//! 95 % intervals account for the noise, and it says so if the record does not determine the
+//! answer. Use this crate for whole records; each layer is re-exported as a module and can be used
+//! alone: [`sensor`] (models), [`signal`] (simulated records), [`cross_relation`] (the costs),
 //! [`bias`] (noise in the published cost), [`optimise`] (solvers), [`record`] (logger files).
 //!
 //! ```

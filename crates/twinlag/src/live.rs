@@ -1,4 +1,4 @@
-//! Gas temperature and time constants as readings come in.
+//! Gas temperature and time constants, reading by reading.
 
 use twinlag_compensate::{TrackerFn, learn, tracker};
 use twinlag_diagnose::Identifier;
@@ -13,7 +13,7 @@ use twinlag_estimate::Z_975;
 /// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower sensor, where nothing is said.
 const CHANGE: f64 = 0.1;
 const CHANGE_OVER: f64 = 10.0;
-/// Missing samples of a gap that are gone through one by one; a time that is farther off is none.
+/// Missing samples of a gap that are passed through one by one; a time farther off is refused.
 const LONGEST_GAP: f64 = 100_000.0;
 /// Chance that the time constants are beyond the range in view, above which that is said.
 const LIKELY: f64 = 0.05;
@@ -27,14 +27,15 @@ const CLEARLY: f64 = 4.0;
 pub struct LiveOptions {
     /// Noise, known time constants, and how the start is characterised.
     pub characterise: Options,
-    /// A model that was found in another record: its effects stay as they are.
+    /// A model that was found in another record; its effects stay fixed.
     pub model: Option<Model>,
-    /// By how much the time constants may change in a second, as a share: the standard deviation, which grows as the root of time.
-    /// Where nothing is said, a tenth in ten time constants of the slower sensor.
+    /// How far the time constants may change within one second, as a fraction (standard deviation;
+    /// it grows with the square root of time). The default is 0.1 within ten time constants of the
+    /// slower sensor.
     pub change_per_root_s: Option<f64>,
 }
 
-/// What is known at an instant from the readings up to it.
+/// Gas temperature and time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LiveAnswer {
     /// The instant, s.
@@ -47,16 +48,16 @@ pub struct LiveAnswer {
     pub tau_s: [f64; 2],
     /// Ends of their 95 % bands, s.
     pub tau_95_s: [[f64; 2]; 2],
-    /// Whether the time constants may have left the range that is in view.
+    /// Whether the time constants may have left the range that is tracked.
     pub is_beyond: bool,
-    /// What the bands were multiplied by, since readings of late are farther from what was expected of them than noise takes them: the gas is
-    /// not what it was in the start.
+    /// Factor by which the bands were widened: recent readings deviate from the predictions by more
+    /// than noise, so the gas or a sensor has changed since the start.
     pub widened_by: f64,
 }
 
-/// Tracks both sensors from a start on.
+/// Tracks both sensors, reading by reading, after a start.
 pub struct Live {
-    /// The start's characterisation.
+    /// Characterisation of the start.
     pub start: Characterisation,
     push: TrackerFn,
     gain: f64,
@@ -70,7 +71,8 @@ pub struct Live {
 }
 
 impl Live {
-    /// Characterises `record`, the start, and learns from it what the gas is like: what comes after is taken to go on so.
+    /// Characterises `record`, the start, and learns the spectrum of the gas from it. The gas is
+    /// assumed to keep fluctuating in the same way.
     ///
     /// # Errors
     /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a stream cannot undo,
@@ -94,7 +96,8 @@ impl Live {
         let tau_s = [0, 1].map(|i| fit.time_constants[i].value_s);
         let (Some(extended), [Some(tau1_s), Some(tau2_s)]) = (&fit.extended, tau_s) else {
             return Err(Error::LiveStart {
-                why: "both time constants to be determined by it: wait for more rows, or say what is known of one (--known \
+                why: "rows that determine both time constants: wait for more rows, or give a known time \
+                    constant (--known \
                       T1.time_constant_s=VALUE)"
                     .into(),
             });
@@ -106,7 +109,9 @@ impl Live {
         let change = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
         if start.status == Status::ModelRejected {
             start.warnings.push(
-                "the start contradicts the model: gas temperature and time constants are off by more than their bands say. `twinlag                  diagnose START.csv --save model.json` looks for what is missing, --model model.json takes it"
+                "the start contradicts the model, so the errors of gas temperature and time constants may \
+                 exceed their bands. `twinlag diagnose START.csv --save model.json` looks for \
+                 what is missing, --model model.json takes it"
                     .into(),
             );
         }
@@ -119,9 +124,10 @@ impl Live {
         Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None, energy: 1.0 })
     }
 
-    /// What is known once a row is read: both readings, °C, `None` for one that is missing, at `time_s`; a sample after the last one where
-    /// that is not said. `None` for a row that is not later than the last one, or 100 000 samples after it, which is left out. Samples that are missing in a gap are
-    /// gone through as such.
+    /// Adds a row and returns the answer at its instant. `reading_c` has both readings, °C, `None`
+    /// for a missing one. Without `time_s` the row is one sample after the last. Returns `None` and
+    /// leaves the row out if it is not later than the last one, or more than 100 000 samples after
+    /// it. The missing samples of a gap are passed through one by one.
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
         let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);

@@ -59,7 +59,7 @@ impl Fitted<'_> {
     }
 }
 
-/// Told of every replicate of a bootstrap: how many are done, of how many.
+/// Progress callback of a bootstrap: `(done, total)` replicates.
 pub type Watch<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// One record with one set of options, `P` parameters.
@@ -178,7 +178,8 @@ impl<'a, const P: usize> Question<'a, P> {
             let louder = self.levels.std_k.map(|s| s * energy.sqrt());
             best = self.fit_whitened_with(self.options.hold.first(), louder, None)?;
             self.warnings.push(format!(
-                "the residual has {energy:.3} times the energy that sensor noise explains; the known values were weighed \
+                "the residual has {energy:.3} times the energy that sensor noise explains; the known values \
+                 were weighed \
                  against the residual"
             ));
         }
@@ -204,8 +205,8 @@ impl<'a, const P: usize> Question<'a, P> {
             self.levels.source = [NoiseSource::Residual; 2];
             self.levels.energy_as_found = Some(energy);
             self.warnings.push(
-                "the signal moves between samples as noise would: the noise levels are scaled to the residual, and their \
-                 ratio is a guess; give --noise S1,S2 if you know them"
+                "the signal changes between samples as noise does, so the noise levels are scaled to the \
+                 residual and their ratio is a guess; give --noise S1,S2 if you know them"
                     .into(),
             );
         }
@@ -277,13 +278,14 @@ impl<'a, const P: usize> Question<'a, P> {
         };
         let bias = match self.options.estimator {
             Estimator::DifferenceEquationLs => {
-                "noise biases least squares on the difference equation, and which way depends on which sensor is called T1"
+                "noise biases least squares on the difference equation, in a direction that depends on which \
+                 sensor is called T1"
             }
             Estimator::DifferenceEquationTls => "noise biases total least squares on the difference equation",
             _ => "",
         };
         if !bias.is_empty() {
-            self.warnings.push(format!("{bias}; its intervals say how the estimate scatters, not how far it is off"));
+            self.warnings.push(format!("{bias}; its intervals cover the scatter of the estimate, not its bias"));
         }
         let theta: [f64; P] = std::array::from_fn(|i| outcome.tau_s[i]);
         whitened.fit = Fit {
@@ -333,8 +335,8 @@ impl<'a, const P: usize> Question<'a, P> {
             Estimator::Hybrid => EstimatorCost::Hybrid(Hybrid::new(published, noise)?),
             _ => {
                 self.warnings.push(
-                    "the plain cross-relation cost is biased to long time constants by noise; its intervals say how the \
-                     estimate scatters, not how far it is off"
+                    "the plain cross-relation cost is biased towards long time constants by noise; its \
+                     intervals cover the scatter of the estimate, not its bias"
                         .into(),
                 );
                 EstimatorCost::CrossRelation(published)
@@ -446,7 +448,8 @@ impl<'a, const P: usize> Question<'a, P> {
         }
     }
 
-    /// Two lags in series have no order: the larger one comes first. `None` where it does, or where knowledge tells them apart.
+    /// Two lags in series have no order: the larger one comes first. `None` where it does, or where
+    /// prior knowledge distinguishes them.
     fn larger_first(&self, x: &[f64]) -> Option<Vec<f64>> {
         let is_free = |i: usize| !self.is_held(i) && self.priors.iter().all(|p| p.index != i);
         let mut out = x.to_vec();

@@ -14,9 +14,9 @@ use crate::question::{Fitted, Question};
 const ONE_SIDED_95: f64 = 2.705_543_454_095_404;
 /// A second lag that lowers the cost by less than the 95 % point of chi-square may be none.
 const CHI2_95: f64 = 3.841_458_820_694_124;
-/// The same for two of them.
+/// The threshold of the cost for two second lags together.
 const CHI2_95_OF_TWO: f64 = 5.991_464_547_107_98;
-/// A second lag this small beside its lower bound is none.
+/// A second lag below this multiple of its lower bound counts as zero.
 const NEXT_TO_NONE: f64 = 1e-3;
 /// Halvings, in logarithms, that place the largest that is allowed.
 const HALVINGS: usize = 6;

@@ -27,20 +27,21 @@ const SHORTEST_WINDOW: usize = 200;
 pub struct TrackOptions {
     /// Noise, known time constants, and how windows are characterised.
     pub characterise: Options,
-    /// A model that was found in another record: its effects stay as they are.
+    /// A model that was found in another record; its effects stay fixed.
     pub model: Option<Model>,
-    /// Length of a sliding window, s: the published way, each window characterised by itself; `None` for the whole record at once.
+    /// Length of a sliding window, s, if each window is to be characterised separately, as in
+    /// published work; `None` for the whole record at once.
     pub window_s: Option<f64>,
 }
 
 /// One sensor's time constant along the record.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Along {
-    /// Time constant, s; NaN where a window does not tell.
+    /// Time constant, s; NaN if a window does not determine it.
     pub tau_s: Vec<f64>,
-    /// Ends of the pointwise 95 % band, s; NaN likewise.
+    /// End of the pointwise 95 % band, s; NaN if a window does not determine it.
     pub low_s: Vec<f64>,
-    /// Ends of the pointwise 95 % band, s; NaN likewise.
+    /// End of the pointwise 95 % band, s; NaN if a window does not determine it.
     pub high_s: Vec<f64>,
 }
 
@@ -53,20 +54,20 @@ pub struct StepFound {
     pub interval_95_s: [f64; 2],
     /// Time constants after over those before.
     pub factor: f64,
-    /// What it takes off `−2 ln L` against constant time constants.
+    /// Reduction of `−2 ln L` compared with constant time constants.
     pub evidence: f64,
 }
 
-/// Whether the ratio of the time constants stays.
+/// Test of whether the ratio of the time constants stays constant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ratio {
-    /// Whether it does, as far as the record tells.
+    /// Whether no change of the ratio is detected.
     pub stays: bool,
-    /// What a changing ratio takes off `−2 ln L`.
+    /// Reduction of `−2 ln L` by a changing ratio.
     pub statistic: f64,
-    /// Coefficients that it takes.
+    /// Number of coefficients of the changing ratio.
     pub degrees_of_freedom: usize,
-    /// Chance of that where the ratio stays.
+    /// Probability of such a reduction if the ratio is constant.
     pub p_value: f64,
 }
 
@@ -89,11 +90,12 @@ pub struct Track {
     pub sensors: [Along; 2],
     /// Smallest and largest time constant of each sensor, s.
     pub range_s: Option<[[f64; 2]; 2]>,
-    /// The step that explains most, if a step was taken.
+    /// The step, if the change is a step.
     pub step: Option<StepFound>,
-    /// Whether the ratio stays; not of windows.
+    /// Test of a constant ratio; `None` for windows.
     pub ratio: Option<Ratio>,
-    /// The fit that it is of, its time constants means over the record; of windows that of the whole record.
+    /// The fit, with time constants that are means over the record; for windows, the fit to the
+    /// whole record.
     #[serde(rename = "final")]
     pub last: Characterisation,
     /// What to know before using the numbers.
@@ -105,7 +107,7 @@ impl Track {
     pub const SCHEMA: &'static str = "twinlag.track/1";
 }
 
-/// Both time constants along `record`.
+/// Follows both time constants along `record`.
 ///
 /// # Errors
 /// As [`crate::diagnose()`] and [`crate::characterise_with`]; [`Error::Option`] for a window that is too short or longer than the record.
@@ -145,14 +147,18 @@ fn whole(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) -> R
     let mut warnings = Vec::new();
     if is_left {
         warnings.push(
-            "something is left over: the bands are those of the residual's own spectrum, and know of no other effect. `twinlag \
-             diagnose` looks for it"
+            "the residual is more than noise: the bands follow from its spectrum and cover no missing effect. \
+             `twinlag diagnose` looks for one"
                 .into(),
         );
     }
     let stays = found.ratio.p_value >= RATIO_CHANGES;
     if !stays {
-        warnings.push("the ratio of the time constants changes: both do not follow the same flow".into());
+        warnings.push(
+            "the ratio of the time constants changes: the two sensors do not follow the same \
+            flow"
+                .into(),
+        );
     }
     let sensors = found.log_error.as_ref().map(|errors| {
         [0, 1].map(|i| {
@@ -253,7 +259,7 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Diagno
         warnings.push(format!("{empty} of {} windows do not determine both time constants", time_s.len()));
     }
     if rejected > 0 {
-        warnings.push(format!("in {rejected} of {} windows something is left over", time_s.len()));
+        warnings.push(format!("in {rejected} of {} windows the residual is more than noise", time_s.len()));
     }
     let is_any = sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()));
     Ok(Track {

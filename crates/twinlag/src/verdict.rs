@@ -1,4 +1,5 @@
-//! What is reported of a fit: status, intervals, and in place of a number that the record does not tell, the reason.
+//! What is reported of a fit: status, intervals, and in place of a number that the record does not
+//! determine, the reason.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -144,7 +145,8 @@ impl<'a, const P: usize> Question<'a, P> {
         for (channel, outliers) in self.record.channels.iter().zip(self.levels.outliers) {
             if outliers > 0 {
                 out.warnings.push(format!(
-                    "{channel}: {outliers} third differences are too large for noise and were left out of its level: spikes, \
+                    "{channel}: {outliers} third differences are too large for noise and were left out of its \
+                     level: spikes, \
                      dropouts or sharp steps of the gas"
                 ));
             }
@@ -212,7 +214,8 @@ impl<'a, const P: usize> Question<'a, P> {
         let Wanted::Bootstrap(bootstrap) = self.options.intervals else { return Ok(None) };
         if is_rejected {
             self.warnings.push(
-                "the bootstrap makes its records by the model, which this record contradicts: the intervals are not by it"
+                "the bootstrap simulates records with the model, which this record contradicts, so it was not \
+                 used for the intervals"
                     .into(),
             );
             return Ok(None);
@@ -222,8 +225,8 @@ impl<'a, const P: usize> Question<'a, P> {
             Watched { estimator: self.options.estimator, done: AtomicUsize::new(0), bootstrap, watch: self.watch };
         let Some(interval_95_s) = bootstrap.intervals(&watched, &task, outcome)? else {
             self.warnings.push(
-                "more than a tenth of the bootstrap's records have no answer, so it has no intervals; these are from \
-                 standard errors"
+                "more than a tenth of the simulated records have no answer, so the bootstrap gives no \
+                 intervals; these are from standard errors"
                     .into(),
             );
             return Ok(None);
@@ -250,8 +253,8 @@ impl<'a, const P: usize> Question<'a, P> {
         })
     }
 
-    /// What the record tells along time constant `index`, whatever the gas does between samples: where the model leaves
-    /// more than noise, neither hold can be preferred.
+    /// What the record determines along time constant `index`, whatever the gas does between
+    /// samples: where the model leaves more than noise, neither hold can be preferred.
     fn ridge(&self, best: &Fitted<'a>, index: usize, middle: ScoreVariance) -> Result<Option<Ridge>, Error> {
         let along = |fitted: &Fitted<'a>| -> Result<Option<Ridge>, EstimateError> {
             let cost = EstimatorCost::Whitened(fitted.whitened.clone());
@@ -376,8 +379,8 @@ impl<'a, const P: usize> Question<'a, P> {
             sensor.interval_basis = Some(intervals.basis[i]);
             if from_hold[i].abs() > NOTICEABLE * noise {
                 self.warnings.push(format!(
-                    "{}: what the gas does between samples moves the time constant by {:.2} %, which is part of the \
-                     interval: sample faster",
+                    "{}: the assumption about the gas between samples changes the time constant by {:.2} %, \
+                     which is part of the interval; sample faster",
                     sensor.channel,
                     100.0 * hold_sensitivity.map_or(0.0, |m| m[i]).abs()
                 ));
@@ -426,13 +429,15 @@ impl<'a, const P: usize> Question<'a, P> {
                 let allowed = match unseen.at_most_s {
                     Some(limit_s) => {
                         lag.interval_95 = Some([0.0, limit_s]);
-                        format!("the record allows one of {limit_s:.3e} s at most")
+                        format!("the record allows at most {limit_s:.3e} s")
                     }
-                    None => "it may be as large as the first one for all the record says".into(),
+                    None => "as far as the record shows, it may be as large as the first one".into(),
                 };
                 self.warnings.push(format!(
-                    "{channel}: no second lag is seen; {allowed}. The time constants are those without it, their intervals \
-                     hold with whatever of it is allowed; leave {} out of --second-order, or give --known {name}=...",
+                    "{channel}: no second lag is detected; {allowed}. The time constants are those without \
+                     it, and their intervals cover any second lag that is allowed; leave {} out of \
+                     --second-order, or give --known \
+                     {name}=...",
                     ["T1", "T2"][sensor]
                 ));
             } else if self.is_vague(i, &theta, Some(covariance)) {
@@ -442,7 +447,8 @@ impl<'a, const P: usize> Question<'a, P> {
                     lag.interval_95 = Some(self.minimum(best, theta, covariance, &free).interval(i, true).0);
                 }
                 self.warnings.push(format!(
-                    "{channel}: the record needs a second lag but does not tell how large: a data-sheet value may, as \
+                    "{channel}: the record needs a second lag but does not determine its size; a data-sheet \
+                     value may help, as \
                      --known {name}=..."
                 ));
             } else {
@@ -471,7 +477,8 @@ impl<'a, const P: usize> Question<'a, P> {
             let away = (theta[prior.index] - prior.mean) / prior.std;
             if away.abs() > FAR {
                 self.warnings.push(format!(
-                    "the record contradicts what was known of {}: it lies {:.1} standard deviations of that knowledge away",
+                    "the record contradicts the known value of {}: the estimate lies {:.1} of its standard \
+                     deviations away",
                     Known::NAMES[prior.index],
                     away.abs()
                 ));
@@ -479,7 +486,7 @@ impl<'a, const P: usize> Question<'a, P> {
         }
     }
 
-    /// What a record tells that does not tell both time constants.
+    /// Explains what a record determines if it does not determine both time constants.
     fn explain(
         &mut self,
         out: &mut Characterisation,
@@ -500,7 +507,8 @@ impl<'a, const P: usize> Question<'a, P> {
             (0..Known::NAMES.len()).filter(|&i| unknown(i)).map(|i| Known::NAMES[i].to_owned()).collect();
         if !self.is_determined {
             self.warnings.push(
-                "the whitened estimate finds nothing determined here; a number from this estimator would be chance"
+                "the whitened estimate finds that this record determines nothing; a number from this \
+                 estimator would be due to chance"
                     .into(),
             );
             out.not_identifiable.push("time_constant_difference_s".into());
@@ -517,20 +525,28 @@ impl<'a, const P: usize> Question<'a, P> {
                         (false, _) => "the two channels do not belong together",
                     };
                     self.warnings.push(format!(
-                        "the best fit lies on a bound of {}, {x:.3e}, and is no estimate: {meaning}",
+                        "the best fit lies on a bound of {}, {x:.3e}, so it is not an estimate: {meaning}",
                         variable.name
                     ));
                 }
-                out.not_identifiable.extend([2, 3].iter().filter(|i| which.contains(i)).map(|&i| Known::NAMES[i].into()));
+                out.not_identifiable
+                    .extend([2, 3].iter().filter(|i| which.contains(i)).map(|&i| Known::NAMES[i].into()));
             }
             End::Stalled(why) if self.options.estimator.is_closed_form() => {
-                self.warnings.push(format!("{why}: the noise may be too much for this estimator"));
+                self.warnings.push(format!("{why}: there may be too much noise for this estimator"));
             }
-            End::Stalled(why) => self.warnings.push(format!("the optimiser stopped at no minimum: {why}")),
-            End::LimitReached => self.warnings.push("the optimiser ran out of evaluations before it converged".into()),
+            End::Stalled(why) => self.warnings.push(format!(
+                "the optimiser stopped at a point that is not a \
+                minimum: {why}"
+            )),
+            End::LimitReached => self.warnings.push(
+                "the optimiser ran out of evaluations before it \
+                converged"
+                    .into(),
+            ),
             _ => self.warnings.push(
-                "the record fits time constants that differ by large factors about equally well, or best such as are long \
-                 beside the record itself: none is reported"
+                "time constants that differ by large factors fit the record about equally well, or the best \
+                 ones are long compared with the record, so none is reported"
                     .into(),
             ),
         }
@@ -538,7 +554,8 @@ impl<'a, const P: usize> Question<'a, P> {
             out.not_identifiable.push("time_constant_difference_s".into());
             if !self.options.estimator.is_closed_form() {
                 self.warnings.push(
-                    "nothing about the time constants is determined, not even their difference: the sensors may be alike, \
+                    "nothing about the time constants is determined, not even their difference: the sensors \
+                     may be alike, \
                      or the gas may hardly have moved"
                         .into(),
                 );
@@ -550,8 +567,11 @@ impl<'a, const P: usize> Question<'a, P> {
         out.time_constant_difference_s = Difference { value: Some(value), interval_95_s: Some([low, high]) };
         if low <= 0.0 && high >= 0.0 {
             out.not_identifiable.push("time_constant_difference_s".into());
-            self.warnings
-                .push("nothing about the time constants is determined, not even which sensor is the slower one".into());
+            self.warnings.push(
+                "nothing about the time constants is determined, not even which sensor is the slower \
+                    one"
+                .into(),
+            );
             return;
         }
         let other = 1 - index;
@@ -564,8 +584,8 @@ impl<'a, const P: usize> Question<'a, P> {
             out.not_identifiable.retain(|name| name != Known::NAMES[other]);
         } else {
             self.warnings.push(
-                "the absolute time constants are not identifiable from this record; their difference is, over every \
-                 time constant that the record allows"
+                "this record does not determine the time constants themselves; it determines their \
+                 difference, over every time constant that it allows"
                     .into(),
             );
         }
@@ -580,10 +600,11 @@ impl<'a, const P: usize> Question<'a, P> {
             let (noise, levels) = if self.options.noise_std_k.is_some() {
                 ("the given noise", "the noise levels given")
             } else {
-                ("the noise of the quiet segment", "the gas seems not to be at rest there: the levels")
+                ("the noise of the quiet segment", "the gas temperature seems not to be steady there: the levels")
             };
             out.warnings.push(format!(
-                "the residual is white, but its energy is {energy:.3} of what {noise} explains: {levels} are about {:.2} \
+                "the residual is white, but its energy is {energy:.3} of what {noise} explains: {levels} are \
+                 about {:.2} \
                  times what the record shows",
                 energy.sqrt().recip()
             ));
@@ -591,8 +612,8 @@ impl<'a, const P: usize> Question<'a, P> {
         }
         if self.whitened_is_accepted {
             out.warnings.push(format!(
-                "at this estimate the residual is not noise (tests that fail: {}), but at the whitened one it is: the \
-                 estimator is at fault, not the model",
+                "with this estimate the residual is not noise (tests that fail: {}), but with the whitened \
+                 one it is, so the estimator is at fault and not the model",
                 failed.join(", ")
             ));
             return;
@@ -615,25 +636,31 @@ impl<'a, const P: usize> Question<'a, P> {
             "two first-order lags"
         };
         let hint = if !coarse.is_empty() {
-            format!("{}, coarser than its noise: that alone may be what is left", coarse.join(", "))
+            format!("{}, coarser than its noise, which alone may explain the residual", coarse.join(", "))
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
         } else if self.levels.outliers != [0, 0] && failed.contains(&"total-energy") {
-            "samples that no noise explains are among them (see below): mend or empty these cells first".into()
+            "some samples are too far off for noise (see below): correct or empty these cells first".into()
         } else if failed.contains(&"calibration") {
-            let colour = if may_be_coloured { ", and if it does not help --noise-colour autoregressive" } else { "" };
+            let colour = if may_be_coloured {
+                ", and if it does not help --noise-colour \
+                autoregressive"
+            } else {
+                ""
+            };
             format!("gain and offset of the second channel would explain it better: try --free gain,offset{colour}")
         } else if self.options.calibrates() {
             format!("an effect that {model} lack is at work, or {colour}")
         } else {
             format!(
-                "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that {model} lack is at \
+                "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that \
+                 {model} lack is at \
                  work, or {colour}"
             )
         };
         out.warnings.push(format!(
-            "{model} do not explain this record (tests that fail: {}), and a time constant found with them \
-             need not be that of a sensor; {hint}",
+            "{model} do not explain this record (tests that fail: {}), so the fitted time constants need not \
+             be those of the sensors; {hint}",
             failed.join(", ")
         ));
     }

@@ -55,7 +55,7 @@ fn a_second_lag_that_is_not_there_is_denied_with_a_limit() {
     let denied = answer.sensors[1].second_time_constant_s.expect("asked for");
     let [low, high] = denied.interval_95.expect("bounded");
     assert!(denied.value.is_none() && low == 0.0 && high > 0.0 && high < 0.02, "{denied:?}");
-    assert!(answer.warnings.iter().any(|w| w.contains("no second lag is seen")), "{:?}", answer.warnings);
+    assert!(answer.warnings.iter().any(|w| w.contains("no second lag is detected")), "{:?}", answer.warnings);
     // None at all: the answer is that at first order, with intervals that are no narrower.
     for second_order in [[true, false], [false, true], [true, true]] {
         let record = rig(5, "", "");

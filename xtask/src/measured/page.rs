@@ -75,7 +75,7 @@ impl Page {
         let error = &answer.error;
         lines.push(format!(
             "- residual, rms on held-out blocks: {} before, {} after; energy per degree of freedom {} before, {} after; \
-             inferred gas temperatures apart by {} K before, {} K after",
+             rms difference of the inferred gas temperatures {} K before, {} K after",
             number(error.held_out_normalised_rms.before),
             number(error.held_out_normalised_rms.after),
             number(error.chi2_per_dof.before),
@@ -85,7 +85,7 @@ impl Page {
         ));
         lines.push(match &answer.unexplained {
             Some(left) => format!("- unexplained: {}", left.description),
-            None => "- nothing that a test sees is left over".into(),
+            None => "- no test finds more than noise in the residual".into(),
         });
         lines.push(String::new());
         if let Some(svg) = answer.core.as_deref().map(residual_picture).transpose()?.flatten() {
@@ -123,7 +123,7 @@ fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
     inside.extend(effect.seen.clone().filter(|_| whole));
     if whole && !effect.alternatives.is_empty() {
         let others: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
-        inside.push(format!("explained as well by {}", others.join(", ")));
+        inside.push(format!("equally well explained by {}", others.join(", ")));
     }
     let channel = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
     let inside = if inside.is_empty() { String::new() } else { format!(" ({})", inside.join(", ")) };

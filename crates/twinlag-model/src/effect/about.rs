@@ -12,7 +12,7 @@ use crate::settings::KnownEffect;
 pub struct About {
     /// The name that scripts use.
     pub name: &'static str,
-    /// What it is, in one sentence.
+    /// What the effect is, in one sentence.
     pub explanation: &'static str,
     /// What can be done about it at the rig.
     pub advice: &'static str,

@@ -16,8 +16,10 @@ use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     .in_words(
-        "the two channels do not agree when everything is at rest: gain, offset or curvature of one against the other",
-        "calibrate both sensors against each other at two or three steady temperatures; check reference junctions and \
+        "the two channels disagree when everything is at rest: gain, offset or curvature of one relative to \
+         the other",
+        "calibrate both sensors against each other at two or three steady temperatures; check reference \
+         junctions and \
              types of thermocouple wire",
         "gain and offset that both channels share",
     )
@@ -26,7 +28,7 @@ pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     .streamable()
     .restored_by(restore);
 
-/// Which of them are fitted.
+/// Which of gain, offset and curvature are fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Offset,

@@ -10,9 +10,10 @@ use crate::plant::{Extra, Place, Plant};
 
 pub(crate) static ABOUT: About = About::new("coloured-noise", 13, candidates)
     .in_words(
-        "one channel has noise that lasts from sample to sample: an amplifier, a filter, electromagnetic interference",
-        "nothing is wrong with the sensors; the weights and intervals take it into account. A better amplifier lowers it",
-        "which channel slow noise belongs to, where both sensors follow it",
+        "the noise of one channel is correlated from sample to sample: an amplifier, a filter, \
+         electromagnetic interference",
+        "the sensors are fine; weights and intervals take the noise into account. A better amplifier reduces it",
+        "which channel has slow noise that both sensors could follow",
     )
     .imitating(&["input-mismatch", "drift"])
     .of_noise()
@@ -37,7 +38,11 @@ pub(super) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
         Parameter::new(
             "correlation_time",
             "s",
-            Variable::logarithmic("correlation time", MIN_CORRELATION_STEPS * context.step_s, MAX_CORRELATION_SPANS * context.span_s()),
+            Variable::logarithmic(
+                "correlation time",
+                MIN_CORRELATION_STEPS * context.step_s,
+                MAX_CORRELATION_SPANS * context.span_s(),
+            ),
         ),
     ]
 }

@@ -38,7 +38,7 @@ pub struct Context {
 
 /// Share of the swing that a step of a solver may change a temperature by.
 const TYPICAL_SWING_SHARE: f64 = 0.1;
-/// The same where nothing moves, K.
+/// The smallest change of temperature to consider where nothing moves, K.
 const LEAST_TYPICAL_K: f64 = 1e-9;
 
 impl Context {

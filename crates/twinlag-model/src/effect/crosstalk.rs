@@ -1,9 +1,10 @@
 //! A share `ε` of one channel in the other, on top of its own reading: `y₁ + ε (y₂ − about)`; between the wires, or in a
 //! multiplexer that has not settled.
 //!
-//! With two first-order sensors `y₁ = H₁ x + ε H₂ x` has `y₁/y₂ = (1 + ε) (1 + τ' s)/(1 + τ₁ s)`, `τ' = (τ₂ + ε τ₁)/(1 + ε)`: no record
-//! tells it from a gain of `1 + ε` and another `τ₂`. If the share takes the place of a part of the reading, so that the static gain
-//! stays 1, it is a wrong `τ₂` and nothing else, and cannot be seen at all.
+//! With two first-order sensors `y₁ = H₁ x + ε H₂ x` has `y₁/y₂ = (1 + ε) (1 + τ' s)/(1 + τ₁ s)`,
+//! `τ' = (τ₂ + ε τ₁)/(1 + ε)`: no record distinguishes it from a gain of `1 + ε` and another `τ₂`.
+//! If the share takes the place of a part of the reading, so that the static gain stays 1, it is a
+//! wrong `τ₂` and nothing else, and cannot be seen at all.
 
 use std::sync::Arc;
 
@@ -17,9 +18,9 @@ use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("crosstalk", 8, candidates)
     .in_words(
-        "a share of one channel's reading is the other's: wires that touch, a multiplexer that has not settled",
+        "one channel picks up a share of the other: wires that touch, a multiplexer that has not settled",
         "separate the wires, lower the source impedance, let the multiplexer settle longer",
-        "crosstalk that takes the place of a part of the reading: with it one time constant is a mixture of both",
+        "crosstalk that replaces part of the reading, which turns one time constant into a mixture of both",
     )
     .imitating(&["calibration", "slow-mode"])
     .excluding(&["calibration"])

@@ -13,7 +13,8 @@ use crate::plant::Plant;
 
 pub(crate) static ABOUT: About = About::new("delay", 5, candidates)
     .in_words(
-        "one channel is later than the other: scanned after it, filtered with a pure delay, or further downstream",
+        "one channel is later than the other: it is scanned later, filtered with a pure delay, or further \
+         downstream",
         "sample both channels at the same instant, mount the junctions side by side across the flow, and check the \
              logger's scan order",
         "a delay that both channels share",

@@ -11,9 +11,9 @@ use crate::plant::{Extra, Place, Plant};
 pub(crate) static ABOUT: About = About::new("input-mismatch", 14, candidates)
     .in_words(
         "the two sensors do not see the same gas: eddies smaller than their distance, a wake, a gradient",
-        "mount the junctions closer together, across the flow, away from walls; the weights and intervals take it into \
-             account",
-        "what both sensors see and the gas elsewhere does not",
+        "mount the junctions closer together, across the flow, away from walls; weights and intervals take \
+         the mismatch into account",
+        "a disturbance that both sensors see but the gas elsewhere does not",
     )
     .imitating(&["coloured-noise"])
     .of_noise()

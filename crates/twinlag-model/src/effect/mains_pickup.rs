@@ -16,7 +16,7 @@ pub(crate) static ABOUT: About = About::new("mains-pickup", 3, candidates)
     .in_words(
         "a steady sinusoid in one channel that the other does not have: mains or another machine, possibly aliased",
         "shield and twist the leads, ground at one end, average over whole mains periods",
-        "pick-up of both channels that their lags happen to make equal",
+        "pick-up in both channels that their lags happen to make equal",
     )
     .at_one_frequency()
     .restored_by(restore);

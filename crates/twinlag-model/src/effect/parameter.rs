@@ -8,7 +8,7 @@ use twinlag_optimise::Variable;
 pub struct Parameter {
     /// The name that scripts use.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the number.
     pub unit: &'static str,
     /// Scale and bounds of its fit.
     pub variable: Variable,
@@ -86,7 +86,7 @@ impl Domain {
             }
     }
 
-    /// In words.
+    /// Description of the residual in words.
     pub fn expected(self) -> &'static str {
         match self {
             Self::Finite => "a finite number",
@@ -105,7 +105,7 @@ pub type OfParameters = Box<dyn Fn(&[f64]) -> f64>;
 pub struct Derived {
     /// The name that scripts use.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit of the number.
     pub unit: &'static str,
     /// The number from the parameters.
     pub of: OfParameters,

@@ -14,7 +14,7 @@ pub(crate) static ABOUT: About = About::new("radiation", 11, candidates)
     .in_words(
         "one sensor exchanges radiation with walls of another temperature, the other much less",
         "shield or aspirate the thicker sensor, use thinner wires or lower emissivity",
-        "radiation error that both sensors share, which biases the gas temperature itself",
+        "a radiation error that both sensors share, which biases the gas temperature itself",
     )
     .imitating(&["calibration", "temperature-dependent-time-constant"])
     .imitating_rest()

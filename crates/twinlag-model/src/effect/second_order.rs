@@ -11,7 +11,8 @@ use crate::plant::Plant;
 pub(crate) static ABOUT: About = About::new("second-order", 6, candidates)
     .in_words(
         "one sensor has a second lag in series: a sheath around the junction, a filter in the logger",
-        "use bare junctions, or know the filter; with the second lag in the model the larger one is the sensor's own",
+        "use bare junctions, or find out the time constant of the filter; with the second lag in the model, \
+         the larger lag is the sensor's own",
         "a second lag that both sensors share",
     )
     .imitating(&["delay", "slow-mode"])

@@ -1,4 +1,5 @@
-//! A slow parallel path: `H = [(1 − φ) + φ/(1 + τ_s s)]/(1 + τ s)`: conduction to a support, the mass of a housing.
+//! A slow parallel path, `H = [(1 − φ) + φ/(1 + τ_s s)]/(1 + τ s)`, such as conduction to a support
+//! or the mass of a housing.
 
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use crate::plant::{Plant, SlowPath};
 
 pub(crate) static ABOUT: About = About::new("slow-mode", 7, candidates)
     .in_words(
-        "a part of one sensor's reading follows through a slow body: conduction along the wires to the support, \
+        "part of one sensor's reading arrives through a slow body: conduction along the wires to the support, \
                   the mass of the housing",
         "use longer or thinner leads between junction and support, or a support that follows faster",
         "the same share through the same support in both sensors",
@@ -51,7 +52,10 @@ impl Effect for SlowMode {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        [3.0, 15.0].into_iter().map(|times| vec![0.05, (times * self.tau_s).min(0.5 * MAX_SLOW_SPANS * self.span_s)]).collect()
+        [3.0, 15.0]
+            .into_iter()
+            .map(|times| vec![0.05, (times * self.tau_s).min(0.5 * MAX_SLOW_SPANS * self.span_s)])
+            .collect()
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

@@ -16,7 +16,7 @@ pub(crate) static ABOUT: About = About::new("temperature-dependent-time-constant
     .in_words(
         "time constants change with temperature: heat capacity, the gas's conductivity, radiative transfer",
         "take records over a smaller range of temperature, or use the exponent that was found",
-        "a dependence of both on the gas temperature that leaves their disagreement alone",
+        "a dependence of both on the gas temperature that does not affect their disagreement",
     )
     .imitating(&["varying-time-constant", "radiation"])
     .restored_by(restore);

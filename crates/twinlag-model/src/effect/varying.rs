@@ -17,9 +17,9 @@ use crate::spline::{Spline, on_knots};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
     .in_words(
-        "both time constants change along the record by the same share, as they do when the flow changes",
+        "both time constants change along the record by the same factor, as they do when the flow changes",
         "log the flow velocity, or take records at steady flow",
-        "which of the two a change of their ratio belongs to",
+        "which sensor causes a change of their ratio",
     )
     .imitating(&["temperature-dependent-time-constant"])
     .changing_time_constants()
@@ -36,8 +36,8 @@ pub(crate) const SAMPLES_PER_COEFFICIENT: usize = 60;
 /// Most coefficients of a spline.
 pub(crate) const MAX_COEFFICIENTS: usize = NAMES.len();
 const NAMES: [&str; 32] = [
-    "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17", "m18",
-    "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
+    "m1", "m2", "m3", "m4", "m5", "m6", "m7", "m8", "m9", "m10", "m11", "m12", "m13", "m14", "m15", "m16", "m17",
+    "m18", "m19", "m20", "m21", "m22", "m23", "m24", "m25", "m26", "m27", "m28", "m29", "m30", "m31", "m32",
 ];
 const RATIO_NAMES: [&str; RATIO_SIZE] = ["ratio1", "ratio2", "ratio3", "ratio4"];
 
