@@ -12,7 +12,7 @@ use crate::search::Tried;
 /// Tones of the gas up to which equations are counted.
 const FEW_TONES: usize = 4;
 
-/// Effect `index` of the model `last` with its numbers, of which `fit` tells how certain they are.
+/// Effect `index` of the model `last` with its numbers, whose certainty follows from `fit`.
 pub(crate) fn name(index: usize, tried: &Tried, ties: &[Tried], last: &Fitted, fit: &ModelFit) -> Found {
     let effect: &dyn Effect = tried.effect.as_ref();
     let covariance = fit.covariance.as_ref().filter(|_| !effect.is_noise());

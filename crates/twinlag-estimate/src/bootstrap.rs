@@ -172,8 +172,8 @@ fn gas(f: [&[f64]; 2], inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2
 ///
 /// From the median over bins within an eighth of the frequency, which lines do not touch; where that is no clear sign of gas, two
 /// standard errors above noise alone, there is none. A bin that stands out five times above its surroundings, its neighbours with
-/// it, is a line and counts by itself. Anything less strict leaves noise in the gas, which would tell the replicates more
-/// about the sensors than the record does.
+/// it, is a line and counts by itself. Anything less strict leaves noise in the gas, which would make the replicates more
+/// informative about the sensors than the record is.
 fn gas_share(ratios: &[f64], bin: usize, bins: usize) -> f64 {
     let (low, high) = (bin - (bin / 8 + 4).min(bin), (bin + bin / 8 + 5).min(bins));
     let mut around = ratios[low..high].to_vec();

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use twinlag_compensate::{Coloured, SensorAt, Readings, Rig, Sensor, SlowPath};
+use twinlag_compensate::{Coloured, Readings, Rig, Sensor, SensorAt, SlowPath};
 
 use crate::error::DiagnoseError;
 use crate::fit::Fitted;

@@ -22,8 +22,8 @@ use crate::question::{Fitted, Question, REJECT, Watch};
 /// A time constant whose logarithm has a larger standard error than this is not determined: its interval spans a factor of
 /// seven.
 const UNDETERMINED: f64 = 0.5;
-/// A time constant longer than this share of the record, and only known to [`LOOSE`], is where fits run to when the record does
-/// not tell two lags from none.
+/// Fits end at a time constant longer than this share of the record, and only known to [`LOOSE`], if
+/// the record does not distinguish two lags from none.
 const LONGEST_SHARE: f64 = 1.0 / 3.0;
 /// Standard error of the logarithm of a time constant that is long beside the record, above which it is not believed.
 const LOOSE: f64 = 0.1;
