@@ -122,6 +122,16 @@ impl Optimiser {
 
     /// The solver called `name`, with its default options.
     ///
+    /// ```
+    /// use twinlag_optimise::Optimiser;
+    ///
+    /// assert_eq!(Optimiser::by_name("levenberg-marquardt")?, Optimiser::default());
+    /// assert!(Optimiser::names().all(|name| Optimiser::by_name(name).is_ok()));
+    /// let error = Optimiser::by_name("newton").expect_err("there is none of that name");
+    /// assert!(error.to_string().contains("nelder-mead")); // it lists those that there are
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ProblemError::UnknownOptimiser`], which lists the names there are.
     pub fn by_name(name: &str) -> Result<Self, ProblemError> {

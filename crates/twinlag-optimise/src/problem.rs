@@ -66,6 +66,23 @@ impl Variable {
     }
 
     /// This variable, held at `value`.
+    ///
+    /// ```
+    /// use twinlag_optimise::{Cost, Problem, Variable};
+    ///
+    /// struct Bowl;
+    ///
+    /// impl Cost for Bowl {
+    ///     fn value(&self, x: &[f64]) -> f64 {
+    ///         x[0] * x[0] + x[1] * x[1]
+    ///     }
+    /// }
+    ///
+    /// let gain = Variable::linear("gain", 0.1, 0.5, 2.0).held_at(1.0);
+    /// let problem = Problem::new(&Bowl, vec![gain, Variable::linear("offset", 1.0, -5.0, 5.0)])?;
+    /// assert_eq!(problem.free(), [1]); // a solver sees the offset alone
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
     #[must_use]
     pub fn held_at(mut self, value: f64) -> Self {
         (self.lower, self.upper) = (value, value);

@@ -24,6 +24,16 @@ pub struct Adc {
 
 impl Adc {
     /// What the converter makes of a temperature, °C.
+    ///
+    /// ```
+    /// use twinlag_signal::Adc;
+    ///
+    /// let adc = Adc { step_k: Some(0.25), low_c: None, high_c: Some(100.0) };
+    /// // Quarters are exact in binary.
+    /// assert_eq!(adc.convert(20.1), 20.0);
+    /// assert_eq!(adc.convert(20.2), 20.25);
+    /// assert_eq!(adc.convert(130.0), 100.0);
+    /// ```
     pub fn convert(&self, temperature_c: f64) -> f64 {
         let rounded_c = self.step_k.map_or(temperature_c, |step_k| (temperature_c / step_k).round() * step_k);
         rounded_c.max(self.low_c.unwrap_or(f64::NEG_INFINITY)).min(self.high_c.unwrap_or(f64::INFINITY))

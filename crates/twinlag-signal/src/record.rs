@@ -42,6 +42,14 @@ impl Record {
     }
 
     /// Length of an integration step, s.
+    ///
+    /// ```
+    /// use twinlag_signal::Record;
+    ///
+    /// // 24 steps between two readings; one division rounds by half of `ε` at most.
+    /// let record = Record::new(2500, 0.002);
+    /// assert!((24.0 * record.step_s() - 0.002).abs() <= 0.002 * f64::EPSILON);
+    /// ```
     pub fn step_s(&self) -> f64 {
         self.sample_period_s / self.oversampling as f64
     }

@@ -95,12 +95,37 @@ impl Moments {
     }
 
     /// Standard deviation of one value, `√(M₂/(n − 1))`; `None` below two values.
+    ///
+    /// ```
+    /// use twinlag_study::Moments;
+    ///
+    /// let mut errors = Moments::default();
+    /// for x in [1.0, 2.0, 3.0, 4.0] {
+    ///     assert!(errors.push(x));
+    /// }
+    /// // Departures ±1.5 and ±0.5: M₂ = 5, to rounding of a few operations on numbers of that size.
+    /// let got = errors.standard_deviation().expect("four values");
+    /// assert!((got - (5.0_f64 / 3.0).sqrt()).abs() < 10.0 * f64::EPSILON);
+    /// assert_eq!(errors.mean(), Some(2.5));
+    /// ```
     pub fn standard_deviation(&self) -> Option<f64> {
         (self.n > 1).then(|| (self.m2 / (self.n - 1) as f64).sqrt())
     }
 
     /// Root mean square about zero, `√(μ² + M₂/n)`; `None` without values. If the values are
     /// errors, this is the RMSE.
+    ///
+    /// ```
+    /// use twinlag_study::Moments;
+    ///
+    /// let mut errors = Moments::default();
+    /// for x in [3.0, -4.0] {
+    ///     errors.push(x);
+    /// }
+    /// // √((9 + 16)/2), to rounding of a few operations on numbers of size 25.
+    /// let got = errors.root_mean_square().expect("two values");
+    /// assert!((got - 12.5_f64.sqrt()).abs() < 25.0 * f64::EPSILON);
+    /// ```
     pub fn root_mean_square(&self) -> Option<f64> {
         Some((self.mean()?.powi(2) + self.central(2)?).sqrt())
     }

@@ -40,6 +40,17 @@ impl Rate {
     /// coverage is near 95 % on average over the probability; for single probabilities, above all
     /// near 0 and 1, it can be less.
     ///
+    /// ```
+    /// use twinlag_study::Rate;
+    ///
+    /// let mut covered = Rate::default();
+    /// (0..20).for_each(|trial| covered.push(trial != 7));
+    /// assert_eq!(covered.rate(), Some(0.95));
+    /// // (0.95 + 0.0960 ± 0.1355)/1.1921, to the four digits shown.
+    /// let [low, high] = covered.wilson_interval().expect("20 trials");
+    /// assert!((low - 0.7639).abs() < 5e-5 && (high - 0.9911).abs() < 5e-5);
+    /// ```
+    ///
     /// # Source
     /// Wilson 1927, from memory; the ends are checked against the equation that defines them.
     pub fn wilson_interval(&self) -> Option<[f64; 2]> {
