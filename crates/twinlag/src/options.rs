@@ -51,7 +51,7 @@ impl Options {
             return Ok(());
         };
         let expected = format!(
-            "nothing: {what} takes what is to be undone from a model (`twinlag diagnose --save`, then --model)"
+            "no such request, because {what} takes its effects from a model (`twinlag diagnose --save`, then --model)"
         );
         Err(Error::Option { option, expected, got: got.into() })
     }
