@@ -124,7 +124,7 @@ fn literals(source: &str, file: &str, out: &mut Vec<Text>) {
             ('\'', '\\') => k += 3,
             ('\'', _) if at(k + 2) == '\'' => k += 2,
             ('r', '"' | '#') if !at(k.wrapping_sub(1)).is_alphanumeric() && at(k.wrapping_sub(1)) != '_' => {
-                let hashes = (k + 1..).take_while(|&i| at(i) == '#').count();
+                let hashes = (k + 1..characters.len()).take_while(|&i| at(i) == '#').count();
                 if at(k + 1 + hashes) == '"' {
                     let from = k + 2 + hashes;
                     let closes = |i: &usize| at(*i) == '"' && (1..=hashes).all(|h| at(i + h) == '#');
