@@ -243,16 +243,25 @@ impl<T: Real> Chain<T> {
     /// between the samples, so that they change smoothly with the delay.
     fn advance_uneven(&mut self, delay_s: T) {
         let reach = UNEVEN_REACH;
-        let length = 2 * reach + DELAY_TAPS;
-        let count = self.len() - length + 1;
+        let span = 2 * reach + DELAY_TAPS;
+        let count = self.len() - span + 1;
+        let middle_s = |times_s: &[f64], k: usize| 0.5 * (times_s[k + reach + 1] + times_s[k + reach + 2]);
+        // The interval that an instant lies in, counted from sample k.
+        let interval = |times_s: &[f64], k: usize| {
+            let at_s = middle_s(times_s, k) + delay_s.value();
+            times_s[k..k + span].partition_point(|t| *t <= at_s).clamp(2, span - 2) - 1
+        };
+        let intervals = (0..count).map(|k| interval(&self.time_s, k));
+        let [low, high] = intervals.fold([span, 0], |[low, high], j| [low.min(j), high.max(j)]);
+        // Samples that any of them reaches: four, and as many more as the intervals differ.
+        let (first, length) = (low - 1, high - low + DELAY_TAPS);
         let taps = &mut self.memory.taps;
         taps.clear();
         taps.resize(count * length, T::from(0.0));
         for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
-            let window = &self.time_s[k..k + length];
-            let middle_s = 0.5 * (window[reach + 1] + window[reach + 2]);
-            let at = delay_s + middle_s;
-            let j = window.partition_point(|t| *t <= at.value()).clamp(2, length - 2) - 1;
+            let j = interval(&self.time_s, k) - first;
+            let window = &self.time_s[k + first..k + first + length];
+            let at = delay_s + middle_s(&self.time_s, k);
             let step_s = window[j + 1] - window[j];
             let mut u = (at - window[j]) / step_s;
             if u.value() < 0.0 || u.value() > 1.0 {
@@ -270,14 +279,17 @@ impl<T: Real> Chain<T> {
         }
         for (k, taps) in taps.chunks_exact(length).enumerate() {
             let mut sum = T::from(0.0);
-            for (tap, v) in taps.iter().zip(&self.value[k..]) {
+            for (tap, v) in taps.iter().zip(&self.value[k + first..]) {
                 sum += *tap * *v;
             }
             self.value[k] = sum;
+        }
+        for k in 0..count {
             // Instants before this one are needed no more.
-            self.time_s[k] = 0.5 * (self.time_s[k + reach + 1] + self.time_s[k + reach + 2]);
+            self.time_s[k] = middle_s(&self.time_s, k);
         }
         self.value.truncate(count);
+        self.rows.skip(first);
         self.rows.combine_each(count, length, taps);
     }
 

@@ -102,7 +102,8 @@ impl<'a> ResidualCost<'a> {
             }
             let mut numbers = constants(theta);
             numbers[i] = numbers[i].derivative();
-            evaluator.derivative(&self.model.plant_of(&numbers, self.observations), values);
+            let functions = self.model.sensors_of_functions(i);
+            evaluator.derivative(&self.model.plant_of(&numbers, self.observations), functions, values);
             self.selection.pick(values, &evaluator.pieces, filtered, column);
             column.extend(self.known(&numbers).map(|k| k.eps));
         }

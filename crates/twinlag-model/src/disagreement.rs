@@ -9,7 +9,7 @@ use crate::number::{Number, Real};
 use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
 use crate::rows::Rows;
-use crate::whitening::{Factor, Source, Variance};
+use crate::whitening::{Factor, FactorDerivative, Source, Variance};
 
 /// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
 /// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
@@ -86,6 +86,7 @@ impl<T: Real> Disagreement<T> {
             let rho = extra.rho(step_s);
             let (before, rest) = self.extra_rows.split_at_mut(index);
             match extra.place {
+                Place::Reading(i) if !self.inverse.has[i] => rest[0].begin(),
                 Place::Reading(i) => self.inverse.disagreement_rows(plant, i, &mut rest[0]),
                 Place::Gas => rest[0].copy(&self.inverse.gas.rows),
             }
@@ -96,14 +97,22 @@ impl<T: Real> Disagreement<T> {
             self.inverse.difference(rho, has_gas);
         }
         for (i, rows) in self.reading_rows.iter_mut().enumerate() {
-            self.inverse.disagreement_rows(plant, i, rows);
+            if self.inverse.has[i] {
+                self.inverse.disagreement_rows(plant, i, rows);
+            } else {
+                rows.begin();
+            }
         }
         let [one, two] = &self.inverse.chains;
         self.values.clear();
-        self.values.extend(one.value.iter().zip(&two.value).map(|(a, b)| *a - *b));
+        match self.inverse.has {
+            [true, true] => self.values.extend(one.value.iter().zip(&two.value).map(|(a, b)| *a - *b)),
+            [true, false] => self.values.extend_from_slice(&one.value),
+            [false, _] => self.values.extend(two.value.iter().map(|b| -*b)),
+        }
     }
 
-    /// What brings noise in, of readings with `variances`.
+    /// What brings noise in, of readings with `variances`; of derivatives, where there are some.
     pub(crate) fn sources<'a>(
         &'a self,
         plant: &Plant,
@@ -141,8 +150,8 @@ pub(crate) struct Evaluator<'a> {
     variances: Vec<[ReadingVariance; 2]>,
     plain: Disagreement<f64>,
     moved: Disagreement<Number>,
-    factors: Vec<Factor<f64>>,
-    moved_factor: Factor<Number>,
+    factors: Vec<Factor>,
+    moved_factor: FactorDerivative,
     /// Pieces of the last evaluation.
     pub(crate) pieces: Vec<Piece>,
     /// Its whitened residual.
@@ -160,7 +169,7 @@ impl<'a> Evaluator<'a> {
             plain: Disagreement::empty(),
             moved: Disagreement::empty(),
             factors: Vec::new(),
-            moved_factor: Factor::empty(),
+            moved_factor: FactorDerivative::default(),
             pieces: Vec::new(),
             residual: Vec::new(),
         }
@@ -194,22 +203,29 @@ impl<'a> Evaluator<'a> {
 
     /// The derivative of the residual, into `out`, at the values of the plant that was evaluated last: `plant` has
     /// them, with the derivatives of what the parameter moves.
-    pub(crate) fn derivative(&mut self, plant: &Plant, out: &mut Vec<f64>) {
+    ///
+    /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
+    pub(crate) fn derivative(&mut self, plant: &Plant, functions: [bool; 2], out: &mut Vec<f64>) {
+        let moved = plant.moved(functions);
         let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
         out.clear();
         for (piece, factor) in self.pieces.iter().zip(&self.factors) {
+            if moved == [false; 2] {
+                out.resize(out.len() + piece.count, 0.0);
+                continue;
+            }
             let stretch = &self.observations.stretches[piece.stretch];
-            self.moved.inverse.invert(plant, stretch, period_s);
+            self.moved.inverse.invert_moved(plant, stretch, period_s, moved);
             self.moved.compare(plant, step_s);
             let from = out.len();
+            out.extend(self.moved.values.iter().map(|v| v.eps));
+            let values = &mut out[from..];
             if self.moved.is_equally_noisy() {
-                out.extend(self.moved.values.iter().map(|v| v.eps));
-                factor.whiten(&mut out[from..]);
+                factor.whiten(values);
             } else {
                 let sources = self.moved.sources(plant, step_s, &self.variances[piece.stretch]);
-                self.moved_factor.compute(&sources, self.moved.values.len());
-                self.moved_factor.whiten(&mut self.moved.values);
-                out.extend(self.moved.values.iter().map(|v| v.eps));
+                let residual = &self.residual[from..from + piece.count];
+                self.moved_factor.whiten(factor, &sources, residual, values);
             }
         }
     }

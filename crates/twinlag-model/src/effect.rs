@@ -42,7 +42,8 @@ use crate::settings::KnownEffect;
 pub struct Seat {
     /// Which effect.
     pub identifier: Identifier,
-    /// Channel 0 or 1; `None` where it is of both.
+    /// Channel 0 or 1; `None` where it is of both. Functions of time or temperature that an effect of one channel
+    /// installs are that sensor's.
     pub channel: Option<usize>,
     /// Parameters that are fitted, in the order in which [`Effect::install`] takes them.
     pub parameters: Vec<Parameter>,

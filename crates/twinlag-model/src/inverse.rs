@@ -1,7 +1,7 @@
 //! The inverse of a plant: from both channels' readings to the gas temperatures that they imply.
 
 use crate::chain::{Along, Chain, Curves};
-use crate::number::{Real, is_exactly};
+use crate::number::{Number, Real, is_exactly};
 use crate::observations::Stretch;
 use crate::plant::{Place, Plant, Sensor};
 use crate::rows::Rows;
@@ -14,11 +14,13 @@ pub(crate) struct Inverse<T> {
     pub(crate) gas: Chain<T>,
     /// Time constants along the record.
     tau_s: Vec<T>,
+    /// Which of the chains are computed: of one that a parameter does not move the derivative is zero.
+    pub(crate) has: [bool; 2],
 }
 
 impl<T: Real> Inverse<T> {
     pub(crate) fn empty() -> Self {
-        Self { chains: [Chain::empty(), Chain::empty()], gas: Chain::empty(), tau_s: Vec::new() }
+        Self { chains: [Chain::empty(), Chain::empty()], gas: Chain::empty(), tau_s: Vec::new(), has: [true; 2] }
     }
 
     /// Takes the readings of a stretch through the inverse of `plant`.
@@ -27,24 +29,32 @@ impl<T: Real> Inverse<T> {
         self.run(plant, stretch, period_s, has_gas);
     }
 
+    /// Takes the readings of a stretch through the inverse of `plant`, in those of the chains that a parameter moves.
+    pub(crate) fn invert_moved(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>, moved: [bool; 2]) {
+        self.has = moved;
+        self.invert(plant, stretch, period_s);
+    }
+
     /// Takes the readings of a stretch through the inverse of `plant`, and finds the path of noise of the gas as well.
     pub(crate) fn invert_with_gas(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>) {
         self.run(plant, stretch, period_s, true);
     }
 
     fn run(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>, has_gas: bool) {
-        let Self { chains, gas, tau_s } = self;
-        for (i, chain) in chains.iter_mut().enumerate() {
+        let Self { chains, gas, tau_s, has } = self;
+        for (i, chain) in chains.iter_mut().enumerate().filter(|(i, _)| has[*i]) {
             chain.begin(stretch, i, period_s);
         }
-        plant.correct(chains);
+        plant.correct(chains, *has);
         // Of the gas's path nothing but the rows is of interest.
         if has_gas {
             gas.begin(stretch, 0, period_s);
         }
         if let Some(delay_s) = plant.delay_s {
-            chains[0].advance(T::from(0.0), plant.reach);
-            chains[1].advance(T::of(delay_s), plant.reach);
+            let delays_s = [T::from(0.0), T::of(delay_s)];
+            for i in (0..2).filter(|i| has[*i]) {
+                chains[i].advance(delays_s[i], plant.reach);
+            }
             if has_gas {
                 gas.advance(T::from(0.0), plant.reach);
             }
@@ -56,20 +66,24 @@ impl<T: Real> Inverse<T> {
         };
         for i in 0..2 {
             if let Some(second_tau_s) = plant.sensors[i].second_tau_s {
-                chains[i].factor(Along::Same(T::of(second_tau_s)), Curves::default());
-                chains[1 - i].factor(Along::Same(T::from(0.0)), Curves::default());
+                let taus_s = [(i, T::of(second_tau_s)), (1 - i, T::from(0.0))];
+                for (j, tau_s) in taus_s.into_iter().filter(|(j, _)| has[*j]) {
+                    chains[j].factor(Along::Same(tau_s), Curves::default());
+                }
                 pass(T::from(0.0));
             }
         }
-        for (chain, sensor) in chains.iter_mut().zip(&plant.sensors) {
-            lag(chain, sensor, tau_s);
+        for i in (0..2).filter(|i| has[*i]) {
+            lag(&mut chains[i], &plant.sensors[i], tau_s);
         }
         pass(T::from(0.0));
         for i in 0..2 {
             if let Some(slow) = plant.sensors[i].slow {
                 let direct_tau_s = T::of((-slow.share + 1.0) * slow.tau_s);
-                chains[i].factor(Along::Same(T::of(slow.tau_s)), Curves::default());
-                chains[1 - i].factor(Along::Same(direct_tau_s), Curves::default());
+                let taus_s = [(i, T::of(slow.tau_s)), (1 - i, direct_tau_s)];
+                for (j, tau_s) in taus_s.into_iter().filter(|(j, _)| has[*j]) {
+                    chains[j].factor(Along::Same(tau_s), Curves::default());
+                }
                 pass(direct_tau_s);
             }
         }
@@ -77,12 +91,15 @@ impl<T: Real> Inverse<T> {
 
     /// Values of the disagreement.
     pub(crate) fn count(&self) -> usize {
-        self.chains[0].len().min(self.chains[1].len())
+        // Both have as many.
+        self.chains[usize::from(!self.has[0])].len()
     }
 
     /// `v[k+1] − ρ v[k]` of all that there is.
     pub(crate) fn difference(&mut self, rho: f64, has_gas: bool) {
-        self.chains.iter_mut().for_each(|c| c.difference(rho));
+        for i in (0..2).filter(|i| self.has[*i]) {
+            self.chains[i].difference(rho);
+        }
         if has_gas {
             self.gas.difference(rho);
         }
@@ -107,10 +124,12 @@ impl<T: Real> Inverse<T> {
 
 impl Plant {
     /// Takes off what is added to, and done to, the sensors' temperatures.
-    pub(crate) fn correct<T: Real>(&self, chains: &mut [Chain<T>; 2]) {
+    ///
+    /// - `has`: which of the chains there are; both with crosstalk
+    pub(crate) fn correct<T: Real>(&self, chains: &mut [Chain<T>; 2], has: [bool; 2]) {
         self.take_off_crosstalk(chains);
-        for (chain, sensor) in chains.iter_mut().zip(&self.sensors) {
-            let reading = &sensor.reading;
+        for i in (0..2).filter(|i| has[*i]) {
+            let (chain, reading) = (&mut chains[i], &self.sensors[i].reading);
             let offset_k = T::of(reading.offset_k);
             if !is_exactly(reading.offset_k, 0.0) || !reading.disturbances.is_empty() {
                 chain.add(|t| -(offset_k + T::of(reading.disturbance_at(t))));
@@ -122,6 +141,24 @@ impl Plant {
                 chain.map(curve);
             }
         }
+    }
+
+    /// Which of the chains have a derivative.
+    ///
+    /// - `functions`: in which of the sensors functions may have one
+    pub(crate) fn moved(&self, functions: [bool; 2]) -> [bool; 2] {
+        let moves = |number: Number| number.eps != 0.0;
+        let has_crosstalk = self.sensors.iter().any(|s| !is_exactly(s.reading.crosstalk, 0.0));
+        let slow_moves = |s: &Sensor| s.slow.is_some_and(|slow| moves(slow.share) || moves(slow.tau_s));
+        let own = [0, 1].map(|i| {
+            let sensor = &self.sensors[i];
+            let numbers = [sensor.reading.gain, sensor.reading.offset_k, sensor.tau_s];
+            let later = if i == 1 { self.delay_s } else { None };
+            functions[i] || numbers.into_iter().chain(sensor.second_tau_s).chain(later).any(moves)
+        });
+        // A slow path of one sensor is a factor of the other's chain as well.
+        let is_shared = has_crosstalk || self.sensors.iter().any(slow_moves);
+        own.map(|moves| moves || is_shared)
     }
 
     /// `y₁ − ε₁ (y₂ − m₁)` and `y₂ − ε₂ (y₁ − m₂)`, with the channels as they were read.

@@ -145,6 +145,16 @@ impl Model {
         plant
     }
 
+    /// In which of the sensors a parameter may change functions of time or temperature: those of the effect's seat.
+    pub(crate) fn sensors_of_functions(&self, parameter: usize) -> [bool; 2] {
+        if parameter < 2 {
+            return [false; 2];
+        }
+        let effect = (0..self.effects.len()).find(|index| self.range(*index).contains(&parameter));
+        let channel = effect.and_then(|index| self.effects[index].channel());
+        [0, 1].map(|i| channel.is_none_or(|channel| channel == i))
+    }
+
     /// The readings without the disturbances of the model.
     pub(crate) fn without_disturbances(&self, theta: &[f64], observations: &Observations) -> Observations {
         let plant = self.plant(theta, observations);

@@ -31,15 +31,7 @@ pub(crate) trait Real: DualNum<Primitive = f64> + Copy + Send + Sync {
     fn value(self) -> f64 {
         self.number().re
     }
-
-    /// Whether value and derivative are those of `other`, but for rounding beside numbers of the size `scale`.
-    fn agrees(self, other: Self, scale: Self) -> bool;
 }
-
-/// Relative difference that rounding makes.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
-/// Relative difference of derivatives that does not count: they enter a step of a solver, not an estimate.
-const DERIVATIVE_ROUNDING: f64 = 1e-13;
 
 impl Real for f64 {
     fn of(number: Number) -> Self {
@@ -48,10 +40,6 @@ impl Real for f64 {
 
     fn number(self) -> Number {
         Number::from(self)
-    }
-
-    fn agrees(self, other: Self, scale: Self) -> bool {
-        (self - other).abs() <= ROUNDING * scale
     }
 }
 
@@ -62,10 +50,5 @@ impl Real for Number {
 
     fn number(self) -> Number {
         self
-    }
-
-    fn agrees(self, other: Self, scale: Self) -> bool {
-        let derivative = scale.eps.abs().max(self.eps.abs());
-        self.re.agrees(other.re, scale.re) && (self.eps - other.eps).abs() <= DERIVATIVE_ROUNDING * derivative
     }
 }
