@@ -53,7 +53,7 @@ pub(crate) fn add_autocovariance_slope(&(term, by): &Direction, period_s: f64, o
             } else {
                 [-1.0 / (eta + half), -(eta + half)].map(|rate| Complex64::new(rate * step, 0.0))
             };
-            let factor = turn.map(|rate| rate.exp());
+            let factor = turn.map(Complex64::exp);
             let mut now = [Complex64::new(std_k * std_k, 0.0); 2];
             for (m, sum) in out.iter_mut().enumerate() {
                 let angle = m as f64 * step;
