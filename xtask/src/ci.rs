@@ -9,18 +9,22 @@ use pulldown_cmark::{Event, Parser, Tag};
 
 use crate::root;
 
-pub(crate) fn run() -> Result<()> {
-    step("tests", "cargo", &["test", "--workspace"])?;
+/// The oldest compiler that is promised: `rust-version` of the workspace.
+const OLDEST: &str = "1.89";
+const WASM: &str = "wasm32-unknown-unknown";
+
+/// Runs all checks, the tests among them unless they are known to be `tested`.
+pub(crate) fn run(tested: bool) -> Result<()> {
+    if !tested {
+        step("tests", "cargo", &["test", "--workspace"])?;
+    }
     step("format", "cargo", &["fmt", "--all", "--check"])?;
-    step(
-        "without the standard library",
-        "cargo",
-        &["check", "--package", "twinlag-compensate", "--package", "twinlag-sensor", "--no-default-features"],
-    )?;
+    features()?;
+    toolchains()?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
     // In one build, most of which the tests have made: asked for one by one, packages take features one by one, and are compiled anew.
-    step("programs and examples", "cargo", &["build", "--workspace", "--bins", "--examples"])?;
+    step("programs and examples", "cargo", &["build", "--workspace", "--all-targets"])?;
     step("the README's main job", "target/debug/twinlag", &["demo"])?;
     step("example: all estimators", "target/debug/examples/characterise", &[])?;
     step("example: a solver of one's own", "target/debug/own-solver", &[])?;
@@ -35,6 +39,47 @@ pub(crate) fn run() -> Result<()> {
     crate::experiment::quick(&quick)?;
     println!("== experiments, two trials a cell: {:.0} s", start.elapsed().as_secs_f64());
     links()
+}
+
+/// Each optional feature left out, one by one: there are so few that they are listed here.
+fn features() -> Result<()> {
+    step(
+        "without the standard library",
+        "cargo",
+        &["check", "--package", "twinlag-compensate", "--package", "twinlag-sensor", "--no-default-features"],
+    )?;
+    step(
+        "without the random solvers",
+        "cargo",
+        &["test", "--package", "twinlag-optimise", "--no-default-features", "--lib", "--quiet"],
+    )
+}
+
+/// The oldest compiler, and a machine without an operating system, where they are installed.
+fn toolchains() -> Result<()> {
+    // Apart, or the next build would begin anew.
+    let check = ["check", "--target-dir", "target/oldest", "--workspace"];
+    if let Some(oldest) = installed(&["toolchain", "list"], OLDEST) {
+        let arguments: Vec<&str> = ["run", &oldest, "cargo"].into_iter().chain(check).collect();
+        step("the oldest compiler", "rustup", &arguments)?;
+    } else {
+        println!("== SKIPPED: the oldest compiler; `rustup toolchain install {OLDEST} --profile minimal` installs it");
+    }
+    if installed(&["target", "list", "--installed"], WASM).is_some() {
+        let arguments = ["check", "--target", WASM, "--package", "twinlag", "--no-default-features"];
+        step("in a browser", "cargo", &arguments)
+    } else {
+        println!("== SKIPPED: in a browser; `rustup target add {WASM}` installs what it takes");
+        let arguments = ["check", "--package", "twinlag", "--no-default-features"];
+        step("the facade without the random solvers", "cargo", &arguments)
+    }
+}
+
+/// The first word that `rustup` answers that begins with `name`.
+fn installed(question: &[&str], name: &str) -> Option<String> {
+    let answer = Command::new("rustup").args(question).output().ok()?;
+    let answer = String::from_utf8_lossy(&answer.stdout);
+    answer.split_whitespace().find(|word| word.starts_with(name)).map(str::to_owned)
 }
 
 fn step(name: &str, program: &str, arguments: &[&str]) -> Result<()> {

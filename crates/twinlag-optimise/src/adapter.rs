@@ -66,6 +66,7 @@ impl<'l, 'p, 'c, 'o> Objective<'l, 'p, 'c, 'o> {
         objective
     }
 
+    #[cfg(feature = "global")]
     pub(crate) fn ledger(&self) -> &'l Ledger<'p, 'c, 'o> {
         self.ledger
     }

@@ -6,10 +6,9 @@ use crate::ledger::{Ledger, Observer, Refusal, Stop};
 use crate::minimiser::Minimiser;
 use crate::problem::{NoDerivatives, Problem, ProblemError};
 use crate::report::{Budget, End, Fit, Progress};
-use crate::solvers::simulated_annealing::Schedule;
-use crate::solvers::{
-    brent, levenberg_marquardt, nelder_mead, particle_swarm, quasi_newton, simulated_annealing, trust_region,
-};
+use crate::solvers::{brent, levenberg_marquardt, nelder_mead, quasi_newton, trust_region};
+#[cfg(feature = "global")]
+use crate::solvers::{particle_swarm, simulated_annealing, simulated_annealing::Schedule};
 
 /// The solvers that come with this crate, with their options.
 ///
@@ -108,7 +107,8 @@ impl Optimiser {
     ];
 
     /// Names of the global solvers, which search the whole of the bounds. If a cost has a lower
-    /// minimum than the one next to the start they go there, whether or not it makes sense.
+    /// minimum than the one next to the start they go there, whether or not it makes sense. They
+    /// are built with the feature `global` of this crate, which is on by default.
     pub const GLOBAL_NAMES: [&'static str; 2] = ["particle-swarm", "simulated-annealing"];
 
     /// Names of the solvers for one free variable. With more they refuse:
@@ -133,25 +133,39 @@ impl Optimiser {
     /// ```
     ///
     /// # Errors
-    /// [`ProblemError::UnknownOptimiser`], which lists the names there are.
+    /// [`ProblemError::UnknownOptimiser`], which lists the names there are;
+    /// [`ProblemError::NotBuilt`] if the solver was left out of this build.
     pub fn by_name(name: &str) -> Result<Self, ProblemError> {
-        match name {
-            "levenberg-marquardt" => Ok(Self::default()),
-            "nelder-mead" => Ok(Self::NelderMead { spread_tolerance: 1e-14, edge: 0.3 }),
-            "l-bfgs" => Ok(Self::LBfgs { memory: 7, gradient_tolerance: 1e-9 }),
-            "bfgs" => Ok(Self::Bfgs { gradient_tolerance: 1e-9 }),
-            "newton-trust-region-steihaug" => Ok(Self::NewtonTrustRegionSteihaug { step_tolerance: 1e-9 }),
-            "newton-trust-region-dogleg" => Ok(Self::NewtonTrustRegionDogleg { step_tolerance: 1e-9 }),
-            "particle-swarm" => Ok(Self::ParticleSwarm { particles: 30, generations: 60, seed: 0 }),
+        let found = match name {
+            "levenberg-marquardt" => Self::default(),
+            "nelder-mead" => Self::NelderMead { spread_tolerance: 1e-14, edge: 0.3 },
+            "l-bfgs" => Self::LBfgs { memory: 7, gradient_tolerance: 1e-9 },
+            "bfgs" => Self::Bfgs { gradient_tolerance: 1e-9 },
+            "newton-trust-region-steihaug" => Self::NewtonTrustRegionSteihaug { step_tolerance: 1e-9 },
+            "newton-trust-region-dogleg" => Self::NewtonTrustRegionDogleg { step_tolerance: 1e-9 },
+            "particle-swarm" => Self::ParticleSwarm { particles: 30, generations: 60, seed: 0 },
             "simulated-annealing" => {
-                Ok(Self::SimulatedAnnealing { sweeps: 100, moves: 10, temperature: 0.3, cooling: 1e-4, seed: 0 })
+                Self::SimulatedAnnealing { sweeps: 100, moves: 10, temperature: 0.3, cooling: 1e-4, seed: 0 }
             }
-            "brent" => Ok(Self::Brent { step_tolerance: 1e-9 }),
-            _ => Err(ProblemError::UnknownOptimiser {
-                name: name.into(),
-                known: Self::names().collect::<Vec<_>>().join(", "),
-            }),
+            "brent" => Self::Brent { step_tolerance: 1e-9 },
+            _ => {
+                return Err(ProblemError::UnknownOptimiser {
+                    name: name.into(),
+                    known: Self::names().collect::<Vec<_>>().join(", "),
+                });
+            }
+        };
+        found.check_built()?;
+        Ok(found)
+    }
+
+    /// That this build has the solver.
+    fn check_built(&self) -> Result<(), ProblemError> {
+        let is_global = matches!(self, Self::ParticleSwarm { .. } | Self::SimulatedAnnealing { .. });
+        if is_global && !cfg!(feature = "global") {
+            return Err(ProblemError::NotBuilt { optimiser: self.name() });
         }
+        Ok(())
     }
 
     fn follows_gradients(&self) -> bool {
@@ -194,11 +208,17 @@ impl Optimiser {
             Self::Bfgs { gradient_tolerance } => quasi_newton::bfgs(ledger, gradient_tolerance),
             Self::NewtonTrustRegionSteihaug { step_tolerance } => trust_region::steihaug(ledger, step_tolerance),
             Self::NewtonTrustRegionDogleg { step_tolerance } => trust_region::dogleg(ledger, step_tolerance),
+            #[cfg(feature = "global")]
             Self::ParticleSwarm { particles, generations, seed } => {
                 particle_swarm::run(ledger, particles, generations, seed)
             }
+            #[cfg(feature = "global")]
             Self::SimulatedAnnealing { sweeps, moves, temperature, cooling, seed } => {
                 simulated_annealing::run(ledger, Schedule { sweeps, moves, temperature, cooling }, seed)
+            }
+            #[cfg(not(feature = "global"))]
+            Self::ParticleSwarm { .. } | Self::SimulatedAnnealing { .. } => {
+                unreachable!("a fit begins with a check that its solver is built")
             }
             Self::Brent { step_tolerance } => brent::run(ledger, step_tolerance),
         }
@@ -211,6 +231,7 @@ impl Optimiser {
         budget: &Budget,
         observer: Option<Observer<'_>>,
     ) -> Result<Fit, ProblemError> {
+        self.check_built()?;
         let from = problem.coordinates(start)?;
         if matches!(self, Self::Brent { .. }) && problem.free().len() > 1 {
             let free = problem.free().iter().map(|&i| problem.variables()[i].name.clone()).collect();
@@ -281,5 +302,31 @@ impl Minimiser for Optimiser {
         observer: &mut dyn FnMut(&Progress),
     ) -> Result<Fit, ProblemError> {
         self.fit(problem, start, budget, Some(observer))
+    }
+}
+
+#[cfg(all(test, not(feature = "global")))]
+mod tests {
+    use super::*;
+
+    struct Square;
+
+    impl crate::Cost for Square {
+        fn value(&self, x: &[f64]) -> f64 {
+            x[0] * x[0]
+        }
+    }
+
+    /// By its name as by its options, and the message says what to build with.
+    #[test]
+    fn a_solver_that_was_left_out_of_the_build_is_refused() {
+        let problem = Problem::new(&Square, vec![crate::Variable::linear("x", 1.0, -1.0, 1.0)]).expect("valid bounds");
+        let swarm = Optimiser::ParticleSwarm { particles: 3, generations: 3, seed: 0 };
+        let by_options = swarm.minimise(&problem, &[0.5], &Budget::default()).expect_err("not built");
+        let by_name = Optimiser::by_name("particle-swarm").expect_err("not built");
+        assert_eq!(by_options, by_name);
+        assert!(by_name.to_string().contains("feature `global`"), "{by_name}");
+        assert!(Optimiser::by_name("simulated-annealing").is_err());
+        assert!(Optimiser::NAMES.into_iter().all(|name| Optimiser::by_name(name).is_ok()));
     }
 }
