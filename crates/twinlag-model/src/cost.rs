@@ -173,3 +173,144 @@ impl Linearised {
 fn constants(theta: &[f64]) -> Vec<Number> {
     theta.iter().copied().map(Number::from).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use finitediff::vec::central_jacobian;
+    use twinlag_optimise::Scale;
+
+    use super::*;
+    use crate::effect::{Context, Identifier, Parameter, Shared, candidates, varying};
+    use crate::observations::Stretch;
+    use crate::prepare::Prepared;
+    use crate::settings::Settings;
+
+    const SAMPLES: usize = 240;
+    const TAU_S: [f64; 2] = [3.0, 9.0];
+
+    /// How the readings of a record were taken.
+    #[derive(Clone, Copy, Debug, PartialEq)]
+    enum Kind {
+        Even,
+        Uneven,
+        /// Even, with readings that say nothing.
+        Masked,
+    }
+
+    /// Two lags in a gas of three tones, with some hundredths of a kelvin of noise, and a flow beside them.
+    fn record(kind: Kind) -> Observations {
+        let time_s: Vec<f64> = (0..SAMPLES)
+            .map(|k| k as f64 + if kind == Kind::Uneven { 0.15 * (1.7 * k as f64).sin() } else { 0.0 })
+            .collect();
+        // Each tone through a lag, as it is long after its start.
+        let reading = |t: f64, tau_s: f64| {
+            let tones = [(0.031, 30.0), (0.11, 20.0), (0.35, 8.0)];
+            let through = |(omega, amplitude_k): (f64, f64)| {
+                let x = omega * tau_s;
+                amplitude_k * ((omega * t).sin() - x * (omega * t).cos()) / (1.0 + x * x)
+            };
+            400.0 + tones.into_iter().map(through).sum::<f64>()
+        };
+        // A sequence without order: what it is does not matter, only that it is no function of the gas.
+        let noise = |k: usize, i: usize| 0.05 * ((k * k * 7 + 13 * i + k) as f64 * 2.399).sin();
+        let channel = |i: usize| (0..SAMPLES).map(|k| reading(time_s[k], TAU_S[i]) + noise(k, i)).collect();
+        let flow = time_s.iter().map(|t| 5.0 + (0.05 * t).sin()).collect();
+        let masked = [0, 1].map(|i| (0..SAMPLES).map(|k| kind == Kind::Masked && (k + 31 * i) % 97 == 5).collect());
+        let channels = [channel(0), channel(1)];
+        let stretch = Stretch::new(time_s, channels).with_missing(masked).with_flow(flow);
+        let period_s = (kind != Kind::Uneven).then_some(1.0);
+        Observations::new(vec![stretch], period_s).expect("a record of 240 samples")
+    }
+
+    /// Every candidate of every effect, in all sizes, and what is made for other questions.
+    fn effects(context: &Context) -> Vec<Shared> {
+        let all = candidates(&Identifier::ALL, context);
+        let sizes: Vec<Shared> = all.iter().flat_map(|e| e.sizes()).collect();
+        let smooth = varying::smooth(4, context.ends_s, context.samples, 2.0);
+        let others = [varying::step(100.5), varying::ratio(context.ends_s)].into_iter().chain(smooth);
+        all.into_iter().chain(sizes).chain(others).collect()
+    }
+
+    fn context(observations: &Observations) -> Context {
+        let mut context = Prepared::new(observations, &Settings::default()).expect("a sound record").context;
+        context.tau_s = TAU_S;
+        context.lines = vec![(0.2, 0), (0.2, 1)];
+        context
+    }
+
+    fn selection(observations: &Observations) -> Selection {
+        Prepared::new(observations, &Settings::default()).expect("a sound record").everything
+    }
+
+    /// The derivatives of the residual with respect to every parameter of every effect are those of a derivative
+    /// checker, on even, uneven and masked readings. Its central differences reach 6e-6 of a hundred times a
+    /// parameter's size, 6e-4 of it: they are wrong by a third derivative times 6e-8, so the bound is 1e-5 of the
+    /// largest derivative. Where readings are masked the noise is taken for 5 K, so that a masked one has 1e4 times the
+    /// variance of the others and not 1e8: it multiplies the rounding that the differences see.
+    #[test]
+    fn derivatives_of_every_effect_are_exact() {
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
+            let observations = record(kind);
+            let (context, selection) = (context(&observations), selection(&observations));
+            for effect in effects(&context) {
+                let name = effect.identifier().name();
+                let noise_std_k = if kind == Kind::Masked { [5.0, 7.0] } else { [0.05, 0.07] };
+                let model = Model::new(&[], noise_std_k).with(effect.clone());
+                // Off the start, where some derivatives vanish.
+                let off = |(p, x): (&Parameter, f64)| match p.variable.scale {
+                    Scale::Logarithmic => 1.1 * x,
+                    Scale::Linear { typical } => x + 0.7 * typical,
+                };
+                let start = effect.starts().remove(0);
+                let values = effect.parameters().iter().zip(start).map(off);
+                let theta: Vec<f64> = TAU_S.into_iter().chain(values).collect();
+                let cost = ResidualCost::new(&model, &theta, &observations, &selection);
+                let size = |i: usize| match cost.variables[i].scale {
+                    Scale::Logarithmic => 100.0 * theta[i],
+                    Scale::Linear { typical } => 100.0 * typical,
+                };
+                let residual = |z: &Vec<f64>| {
+                    let theta: Vec<f64> = z.iter().enumerate().map(|(i, z)| z * size(i)).collect();
+                    Ok(cost.linearised(&theta, theta.len()).residual)
+                };
+                let z: Vec<f64> = theta.iter().enumerate().map(|(i, x)| x / size(i)).collect();
+                let want = central_jacobian(&residual)(&z).expect("residuals are finite");
+                let got = cost.linearised(&theta, 0).columns;
+                for i in (0..theta.len()).filter(|i| !cost.is_held(*i)) {
+                    let largest = want.iter().map(|row| row[i].abs()).fold(0.0, f64::max);
+                    for (k, row) in want.iter().enumerate() {
+                        let got = got[i][k] * size(i);
+                        assert!(
+                            (got - row[i]).abs() < 1e-5 * largest,
+                            "{kind:?}, {name}, parameter {i}, residual {k}: got {got}, want {}",
+                            row[i]
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    /// An effect whose parameters are those of its absence leaves the residual as it is, to rounding of readings of
+    /// 400 K over noise of 0.05 K: 1e-12. Effects that add factors to both inverses are smoothed once more, and left out.
+    #[test]
+    fn an_effect_of_no_size_changes_nothing() {
+        let adds_factors = ["delay", "second-order", "slow-mode", "coloured-noise", "input-mismatch"];
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
+            let observations = record(kind);
+            let (context, selection) = (context(&observations), selection(&observations));
+            let two_lags = Model::new(&[], [0.05, 0.07]);
+            let want = two_lags.linearised(&TAU_S, &observations, &selection).residual;
+            for effect in effects(&context).into_iter().filter(|e| !adds_factors.contains(&e.identifier().name())) {
+                let neutral = |p: &Parameter| f64::from(u8::from(p.name == "gain"));
+                let theta: Vec<f64> = TAU_S.into_iter().chain(effect.parameters().iter().map(neutral)).collect();
+                let model = two_lags.with(effect.clone());
+                let got = model.linearised(&theta, &observations, &selection).residual;
+                for (k, (got, want)) in got.iter().zip(&want).enumerate() {
+                    let name = effect.identifier().name();
+                    assert!((got - want).abs() < 1e-9, "{kind:?}, {name}, residual {k}: got {got}, want {want}");
+                }
+            }
+        }
+    }
+}
