@@ -1,15 +1,21 @@
 //! The energy of the whitened residual as a cost, with exact derivatives.
 
 use std::cell::RefCell;
+use std::sync::Mutex;
 
+use rayon::prelude::*;
 use twinlag_optimise::{Cost, Derivatives, Variable};
 
 use crate::dense;
-use crate::disagreement::Evaluator;
+use crate::disagreement::{Evaluator, MovedMemory};
 use crate::model::Model;
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::selection::Selection;
+
+/// Residuals, over all columns, from which on columns are computed side by side: below, threads cost more than they save
+/// (some tens of microseconds against as many nanoseconds for each residual).
+const MIN_PARALLEL_VALUES: usize = 10_000;
 
 /// The sum of squares of the whitened residuals that count, filtered, and of what is known beforehand over its
 /// uncertainty.
@@ -30,6 +36,15 @@ struct Memory<'a> {
     residual: Vec<f64>,
     /// Derivatives of them, one column for each parameter; empty for one that is held.
     columns: Vec<Vec<f64>>,
+    filtered: Vec<f64>,
+    /// Memory for columns, as many as are computed at a time.
+    of_columns: Mutex<Vec<ColumnMemory>>,
+}
+
+/// Memory for one column.
+#[derive(Default)]
+struct ColumnMemory {
+    moved: MovedMemory,
     values: Vec<f64>,
     filtered: Vec<f64>,
 }
@@ -47,8 +62,8 @@ impl<'a> ResidualCost<'a> {
             at: Vec::new(),
             residual: Vec::new(),
             columns: vec![Vec::new(); theta.len()],
-            values: Vec::new(),
             filtered: Vec::new(),
+            of_columns: Mutex::default(),
         };
         let variables = model.variables(theta, observations);
         Self { model, observations, selection, variables, memory: RefCell::new(memory) }
@@ -63,17 +78,10 @@ impl<'a> ResidualCost<'a> {
     pub(crate) fn energy(&self, theta: &[f64]) -> f64 {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        let known = self.known(&constants(theta)).count();
+        let known = self.model.knowledge(&constants(theta)).count();
         let residuals = &memory.residual[..memory.residual.len() - known];
         let sum = dense::dot(residuals, residuals);
         if sum.is_finite() { sum } else { f64::INFINITY }
-    }
-
-    /// What is known beforehand, over its uncertainty.
-    fn known<'b>(&'b self, theta: &'b [Number]) -> impl Iterator<Item = Number> + 'b {
-        let of_tau = self.model.known.iter().filter_map(|known| Some((known, known.std_s?)));
-        let of_tau = of_tau.map(|(known, std_s)| (theta[known.sensor] - known.value_s) / std_s);
-        of_tau.chain(self.model.prior(theta))
     }
 
     fn evaluate(&self, theta: &[f64], memory: &mut Memory<'_>) {
@@ -85,7 +93,7 @@ impl<'a> ResidualCost<'a> {
         let Memory { evaluator, residual, filtered, .. } = memory;
         residual.clear();
         self.selection.pick(&evaluator.residual, &evaluator.pieces, filtered, residual);
-        residual.extend(self.known(&numbers).map(|k| k.re));
+        residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
         memory.at.clear();
         memory.at.extend_from_slice(theta);
     }
@@ -93,19 +101,27 @@ impl<'a> ResidualCost<'a> {
     /// Computes the columns of the parameters from `first` on.
     fn differentiate(&self, theta: &[f64], first: usize, memory: &mut Memory<'_>) {
         self.evaluate(theta, memory);
-        let Memory { evaluator, columns, values, filtered, .. } = memory;
-        for i in first..theta.len() {
-            let column = &mut columns[i];
-            column.clear();
-            if self.is_held(i) {
-                continue;
-            }
+        let Memory { evaluator, columns, of_columns, .. } = memory;
+        let (evaluator, of_columns) = (&*evaluator, &*of_columns);
+        let (model, observations, selection) = (self.model, self.observations, self.selection);
+        let compute = |(i, column): (usize, &mut Vec<f64>)| {
+            let memory = of_columns.lock().expect("no thread panics").pop();
+            let ColumnMemory { mut moved, mut values, mut filtered } = memory.unwrap_or_default();
             let mut numbers = constants(theta);
             numbers[i] = numbers[i].derivative();
-            let functions = self.model.sensors_of_functions(i);
-            evaluator.derivative(&self.model.plant_of(&numbers, self.observations), functions, values);
-            self.selection.pick(values, &evaluator.pieces, filtered, column);
-            column.extend(self.known(&numbers).map(|k| k.eps));
+            let plant = model.plant_of(&numbers, observations);
+            evaluator.derivative(&plant, model.sensors_of_functions(i), &mut moved, &mut values);
+            column.clear();
+            selection.pick(&values, &evaluator.pieces, &mut filtered, column);
+            column.extend(model.knowledge(&numbers).map(|k| k.eps));
+            of_columns.lock().expect("no thread panics").push(ColumnMemory { moved, values, filtered });
+        };
+        let is_free: Vec<bool> = (0..theta.len()).map(|i| i >= first && !self.is_held(i)).collect();
+        let count = is_free.iter().filter(|is| **is).count();
+        if count > 1 && count * evaluator.residual.len() >= MIN_PARALLEL_VALUES {
+            columns.par_iter_mut().enumerate().filter(|(i, _)| is_free[*i]).for_each(compute);
+        } else {
+            columns.iter_mut().enumerate().filter(|(i, _)| is_free[*i]).for_each(compute);
         }
     }
 

@@ -30,30 +30,9 @@ pub(crate) struct Piece {
     pub(crate) first_sample: usize,
 }
 
-/// Variance of each reading of a stretch, K².
-#[derive(Clone, Debug)]
-pub(crate) enum ReadingVariance {
-    Same(f64),
-    /// Boundless, to all purposes, where a reading is masked.
-    Masked(Vec<f64>),
-}
-
-impl ReadingVariance {
-    pub(crate) fn of(noise_std_k: f64, masked: &[bool], swing_k: f64) -> Self {
-        let variance = noise_std_k * noise_std_k;
-        if !masked.contains(&true) {
-            return Self::Same(variance);
-        }
-        let boundless = (MASKED_NOISE_SWINGS * swing_k).powi(2);
-        Self::Masked(masked.iter().map(|m| if *m { boundless } else { variance }).collect())
-    }
-
-    pub(crate) fn as_variance(&self) -> Variance<'_> {
-        match self {
-            Self::Same(v) => Variance::Same(*v),
-            Self::Masked(all) => Variance::Each(all),
-        }
-    }
+/// Variance of each reading of a channel, K²: boundless, to all purposes, where it is masked.
+pub(crate) fn reading_variance(noise_std_k: f64, masked: &[bool], swing_k: f64) -> Variance {
+    Variance::masked(noise_std_k * noise_std_k, (MASKED_NOISE_SWINGS * swing_k).powi(2), masked)
 }
 
 /// The disagreement of one stretch, ready to be whitened, in memory that is used again.
@@ -66,6 +45,14 @@ pub(crate) struct Disagreement<T> {
     pub(crate) extra_rows: Vec<Rows<T>>,
     /// The disagreement, and then the residual.
     pub(crate) values: Vec<T>,
+    /// Variance of the innovations of each extra noise, K².
+    extra_variances: Vec<Variance>,
+}
+
+impl<T: Real> Default for Disagreement<T> {
+    fn default() -> Self {
+        Self::empty()
+    }
 }
 
 impl<T: Real> Disagreement<T> {
@@ -75,6 +62,7 @@ impl<T: Real> Disagreement<T> {
             reading_rows: [Rows::identity(), Rows::identity()],
             extra_rows: Vec::new(),
             values: Vec::new(),
+            extra_variances: Vec::new(),
         }
     }
 
@@ -82,8 +70,10 @@ impl<T: Real> Disagreement<T> {
     pub(crate) fn compare(&mut self, plant: &Plant, step_s: f64) {
         let has_gas = plant.extra.iter().any(|e| e.place == Place::Gas);
         self.extra_rows.resize_with(plant.extra.len(), Rows::identity);
+        self.extra_variances.clear();
         for (index, extra) in plant.extra.iter().enumerate() {
             let rho = extra.rho(step_s);
+            self.extra_variances.push(Variance::same(extra.std_k * extra.std_k * (1.0 - rho * rho)));
             let (before, rest) = self.extra_rows.split_at_mut(index);
             match extra.place {
                 Place::Reading(i) if !self.inverse.has[i] => rest[0].begin(),
@@ -113,19 +103,10 @@ impl<T: Real> Disagreement<T> {
     }
 
     /// What brings noise in, of readings with `variances`; of derivatives, where there are some.
-    pub(crate) fn sources<'a>(
-        &'a self,
-        plant: &Plant,
-        step_s: f64,
-        variances: &'a [ReadingVariance; 2],
-    ) -> Vec<Source<'a, T>> {
+    pub(crate) fn sources<'a>(&'a self, variances: &'a [Variance; 2]) -> Vec<Source<'a, T>> {
         let readings = self.reading_rows.iter().zip(variances);
-        let readings = readings.map(|(rows, variance)| Source { rows, variance: variance.as_variance() });
-        let extra = self.extra_rows.iter().zip(&plant.extra).map(|(rows, extra)| {
-            let rho = extra.rho(step_s);
-            Source { rows, variance: Variance::Same(extra.std_k * extra.std_k * (1.0 - rho * rho)) }
-        });
-        readings.chain(extra).collect()
+        let extra = self.extra_rows.iter().zip(&self.extra_variances);
+        readings.chain(extra).map(|(rows, variance)| Source { rows, variance }).collect()
     }
 
     /// Whether no row has a derivative.
@@ -144,14 +125,19 @@ pub(crate) fn first_sample(stretch: &Stretch, first_s: f64, step_s: f64) -> usiz
     stretch.time_s.partition_point(|t| *t < first_s - SAME_INSTANT_STEPS * step_s)
 }
 
+/// Memory for a derivative.
+#[derive(Default)]
+pub(crate) struct MovedMemory {
+    disagreement: Disagreement<Number>,
+    factor: FactorDerivative,
+}
+
 /// Evaluates plants of one record, one after the other.
 pub(crate) struct Evaluator<'a> {
     observations: &'a Observations,
-    variances: Vec<[ReadingVariance; 2]>,
+    variances: Vec<[Variance; 2]>,
     plain: Disagreement<f64>,
-    moved: Disagreement<Number>,
     factors: Vec<Factor>,
-    moved_factor: FactorDerivative,
     /// Pieces of the last evaluation.
     pub(crate) pieces: Vec<Piece>,
     /// Its whitened residual.
@@ -162,14 +148,12 @@ impl<'a> Evaluator<'a> {
     /// - `noise_std_k`: white noise of the channels, which all plants have
     pub(crate) fn new(observations: &'a Observations, noise_std_k: [f64; 2]) -> Self {
         let of_stretch =
-            |s: &Stretch| [0, 1].map(|i| ReadingVariance::of(noise_std_k[i], &s.masked[i], observations.swing_k()));
+            |s: &Stretch| [0, 1].map(|i| reading_variance(noise_std_k[i], &s.masked[i], observations.swing_k()));
         Self {
             observations,
             variances: observations.stretches.iter().map(of_stretch).collect(),
             plain: Disagreement::empty(),
-            moved: Disagreement::empty(),
             factors: Vec::new(),
-            moved_factor: FactorDerivative::default(),
             pieces: Vec::new(),
             residual: Vec::new(),
         }
@@ -192,7 +176,7 @@ impl<'a> Evaluator<'a> {
                     self.factors.push(Factor::empty());
                 }
                 let factor = &mut self.factors[self.pieces.len()];
-                factor.compute(&self.plain.sources(plant, step_s, &self.variances[index]), count);
+                factor.compute(&self.plain.sources(&self.variances[index]), count);
                 factor.whiten(&mut self.plain.values);
                 self.pieces.push(Piece { stretch: index, count, first_sample });
                 self.residual.extend_from_slice(&self.plain.values);
@@ -205,7 +189,14 @@ impl<'a> Evaluator<'a> {
     /// them, with the derivatives of what the parameter moves.
     ///
     /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
-    pub(crate) fn derivative(&mut self, plant: &Plant, functions: [bool; 2], out: &mut Vec<f64>) {
+    pub(crate) fn derivative(
+        &self,
+        plant: &Plant,
+        functions: [bool; 2],
+        memory: &mut MovedMemory,
+        out: &mut Vec<f64>,
+    ) {
+        let MovedMemory { disagreement, factor: of_factor } = memory;
         let moved = plant.moved(functions);
         let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
         out.clear();
@@ -215,17 +206,17 @@ impl<'a> Evaluator<'a> {
                 continue;
             }
             let stretch = &self.observations.stretches[piece.stretch];
-            self.moved.inverse.invert_moved(plant, stretch, period_s, moved);
-            self.moved.compare(plant, step_s);
+            disagreement.inverse.invert_moved(plant, stretch, period_s, moved);
+            disagreement.compare(plant, step_s);
             let from = out.len();
-            out.extend(self.moved.values.iter().map(|v| v.eps));
+            out.extend(disagreement.values.iter().map(|v| v.eps));
             let values = &mut out[from..];
-            if self.moved.is_equally_noisy() {
+            if disagreement.is_equally_noisy() {
                 factor.whiten(values);
             } else {
-                let sources = self.moved.sources(plant, step_s, &self.variances[piece.stretch]);
+                let sources = disagreement.sources(&self.variances[piece.stretch]);
                 let residual = &self.residual[from..from + piece.count];
-                self.moved_factor.whiten(factor, &sources, residual, values);
+                of_factor.whiten(factor, &sources, residual, values);
             }
         }
     }

@@ -2,12 +2,12 @@
 //! Computed once, where a fit has ended.
 
 use crate::chain::Chain;
-use crate::disagreement::{Disagreement, ReadingVariance, first_sample, is_long_enough};
+use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variance};
 use crate::inverse::Inverse;
 use crate::observations::{Observations, Stretch};
 use crate::plant::Plant;
 use crate::rows::Rows;
-use crate::whitening::Factor;
+use crate::whitening::{Factor, Variance};
 
 /// A disagreement that is this many times less certain than most says nothing: it rests on a masked reading, whose
 /// noise is some hundred times that of the others.
@@ -43,7 +43,7 @@ pub(crate) struct Part {
     pub(crate) stretch: usize,
     /// How noise of either reading enters the disagreement.
     rows: [Rows<f64>; 2],
-    variances: [ReadingVariance; 2],
+    variances: [Variance; 2],
     /// `V⁻¹ u`.
     weighted: Vec<f64>,
     /// Both inferred inputs.
@@ -73,7 +73,7 @@ impl Part {
 
     /// The noise of each reading of a channel that makes both inputs agree with the least of it, K: `s² Bᵀ V⁻¹ u`.
     pub(crate) fn noise_of(&self, channel: usize, samples: usize) -> Vec<f64> {
-        let variance = self.variances[channel].as_variance();
+        let variance = &self.variances[channel];
         let scores = self.scores(channel, samples).into_iter().enumerate();
         scores.map(|(k, score)| score * variance.at(k)).collect()
     }
@@ -102,10 +102,10 @@ impl Plant {
         let inferred = disagreement.inverse.chains.clone();
         disagreement.compare(self, step_s);
         let variances =
-            [0, 1].map(|i| ReadingVariance::of(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
+            [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
         let mut residual = std::mem::take(&mut disagreement.values);
         let mut factor = Factor::empty();
-        factor.compute(&disagreement.sources(self, step_s, &variances), residual.len());
+        factor.compute(&disagreement.sources(&variances), residual.len());
         factor.whiten(&mut residual);
         let count = residual.len();
         let times_s = &disagreement.inverse.chains[0].times_s()[..count];

@@ -114,6 +114,13 @@ impl Model {
         self.effects.iter().enumerate().flat_map(|(index, e)| e.prior(&theta[self.range(index)])).collect()
     }
 
+    /// What is known beforehand of time constants and effects, over its uncertainty.
+    pub(crate) fn knowledge<'a>(&'a self, theta: &'a [Number]) -> impl Iterator<Item = Number> + 'a {
+        let of_tau = self.known.iter().filter_map(|known| Some((known, known.std_s?)));
+        let of_tau = of_tau.map(|(known, std_s)| (theta[known.sensor] - known.value_s) / std_s);
+        of_tau.chain(self.prior(theta))
+    }
+
     /// The energy of prior knowledge of the effects' parameters.
     pub(crate) fn prior_energy(&self, theta: &[f64]) -> f64 {
         let theta: Vec<Number> = theta.iter().copied().map(Number::from).collect();

@@ -1,8 +1,8 @@
 //! Exact whitening of a disagreement whose noise is a sum of moving averages: `V = L Lᵀ`, banded, `r = L⁻¹ u`, and the
 //! derivatives of `r` with respect to what moves `V` and `u`.
 //!
-//! Where every row of the covariance is the same and no reading is masked, the rows of `L` settle after a few times
-//! the band, and the last one stands for all that follow; so do their derivatives.
+//! Where the weights of all rows are the same, the rows of `L` settle after a few times the band, from the start and
+//! from each masked reading on, and the last one stands for all up to the next masked reading; so do their derivatives.
 
 use crate::number::{Number, Real};
 use crate::rows::Rows;
@@ -18,71 +18,94 @@ const DERIVATIVE_ROUNDING: f64 = 1e-13;
 /// Noise that enters the disagreement through rows of weights.
 pub(crate) struct Source<'a, T> {
     pub(crate) rows: &'a Rows<T>,
-    pub(crate) variance: Variance<'a>,
+    pub(crate) variance: &'a Variance,
 }
 
-/// Variance of white noise, K².
-#[derive(Clone, Copy)]
-pub(crate) enum Variance<'a> {
-    Same(f64),
-    /// One for each sample.
-    Each(&'a [f64]),
+/// Variance of the white noise of readings, K².
+#[derive(Clone, Debug)]
+pub(crate) struct Variance {
+    plain: f64,
+    boundless: f64,
+    /// Readings that say nothing, in rising order.
+    masked: Vec<usize>,
 }
 
-impl Variance<'_> {
+impl Variance {
+    /// The same for all readings.
+    pub(crate) fn same(plain: f64) -> Self {
+        Self { plain, boundless: plain, masked: Vec::new() }
+    }
+
+    /// Another for those that are masked.
+    pub(crate) fn masked(plain: f64, boundless: f64, is_masked: &[bool]) -> Self {
+        let masked = is_masked.iter().enumerate().filter(|(_, is)| **is).map(|(k, _)| k).collect();
+        Self { plain, boundless, masked }
+    }
+
     pub(crate) fn at(&self, sample: usize) -> f64 {
-        match self {
-            Self::Same(v) => *v,
-            Self::Each(all) => all[sample.min(all.len() - 1)],
-        }
+        if self.masked.binary_search(&sample).is_ok() { self.boundless } else { self.plain }
+    }
+
+    fn has_masked_in(&self, samples: std::ops::Range<usize>) -> bool {
+        let first = self.masked.partition_point(|m| *m < samples.start);
+        self.masked.get(first).is_some_and(|m| *m < samples.end)
     }
 }
 
-/// Whether every row of the covariance of these sources is the same.
-fn is_same<T: Real>(sources: &[Source<'_, T>]) -> bool {
-    sources.iter().all(|s| s.rows.is_same() && matches!(s.variance, Variance::Same(_)))
+/// Whether a masked reading enters value `k`, or one within `band` before it.
+fn is_masked_around<T: Real>(sources: &[Source<'_, T>], k: usize, band: usize) -> bool {
+    sources.iter().any(|Source { rows, variance }| {
+        let end = rows.start + k + rows.width;
+        variance.has_masked_in((rows.start + k).saturating_sub(band)..end)
+    })
 }
 
-/// The factor `L` of a covariance: lags `0..=band` of each row, up to the one from which on all are the same.
+/// The factor `L` of a covariance: lags `0..=band` of each row; rows that are the same are kept once.
 #[derive(Clone, Debug)]
 pub(crate) struct Factor {
     band: usize,
     rows: Vec<f64>,
-    count: usize,
-    /// Entries of a row of the covariance, where all are the same.
+    /// Which of the rows that are kept stands for each row of `L`.
+    kept: Vec<u32>,
+    /// Entries of a row of the covariance without masked readings, where all are the same.
     same: Vec<f64>,
 }
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), count: 0, same: Vec::new() }
+        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new() }
     }
 
     /// Becomes the factor of the covariance of `count` values, in its own memory.
     pub(crate) fn compute(&mut self, sources: &[Source<'_, f64>], count: usize) {
         self.band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
         let (band, stride) = (self.band, self.band + 1);
-        let settles = is_same(sources) && count > band;
+        let settles = sources.iter().all(|s| s.rows.is_same()) && count > band;
         self.same.clear();
         if settles {
-            self.same.extend((0..stride).map(|lag| covariance(sources, band, lag)));
+            self.same.extend((0..stride).map(|lag| covariance_of_same(sources, lag)));
         }
         let mut agreeing = 0;
         self.rows.clear();
-        self.count = 0;
-        while self.count < count && agreeing < SETTLED_ROWS {
-            let k = self.count;
-            let from = k * stride;
+        self.kept.clear();
+        for k in 0..count {
+            let is_plain = settles && !is_masked_around(sources, k, band);
+            if is_plain && agreeing >= SETTLED_ROWS {
+                self.kept.push(self.kept[k - 1]);
+                continue;
+            }
+            let from = self.rows.len();
             self.rows.resize(from + stride, 0.0);
             let (before, row) = self.rows.split_at_mut(from);
+            let older_row = |k: usize| &before[self.kept[k] as usize * stride..][..stride];
             let reach = band.min(k);
             for lag in (0..=reach).rev() {
-                let mut entry = if settles { self.same[lag] } else { covariance(sources, k, lag) };
-                let other = if lag == 0 { &[][..] } else { &before[(k - lag) * stride..][..stride] };
+                let mut entry = if is_plain { self.same[lag] } else { covariance(sources, k, lag) };
                 if lag == 0 {
                     entry -= row[1..=reach].iter().map(|l| l * l).sum::<f64>();
                     row[0] = entry.max(f64::MIN_POSITIVE).sqrt();
                 } else {
+                    let other = older_row(k - lag);
                     let products = row[lag + 1..=reach].iter().zip(&other[1..]).map(|(a, b)| a * b);
                     entry -= products.sum::<f64>();
                     row[lag] = entry / other[0];
@@ -90,17 +113,21 @@ impl Factor {
             }
             let scale = row[0];
             let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= ROUNDING * scale;
-            let has_settled = settles && k > band && row.iter().zip(&before[from - stride..]).all(agrees);
+            let has_settled = is_plain && k > band && row.iter().zip(older_row(k - 1)).all(agrees);
             agreeing = if has_settled { agreeing + 1 } else { 0 };
-            self.count += 1;
+            self.kept.push((from / stride) as u32);
         }
     }
 
     /// Row `k` of `L`: the standard deviation of value `k` given those before it, then the lags.
     pub(crate) fn row(&self, k: usize) -> &[f64] {
         let stride = self.band + 1;
-        let from = k.min(self.count - 1) * stride;
-        &self.rows[from..from + stride]
+        &self.rows[self.kept[k] as usize * stride..][..stride]
+    }
+
+    /// Whether row `k` is the one before it.
+    fn is_settled(&self, k: usize) -> bool {
+        k > 0 && self.kept[k] == self.kept[k - 1]
     }
 
     /// `L⁻¹ u` in place.
@@ -152,28 +179,36 @@ impl FactorDerivative {
     ) {
         let (band, stride) = (factor.band, factor.band + 1);
         let settles = !factor.same.is_empty();
+        let mut is_kept = false;
         self.recent.clear();
         self.recent.resize(stride * stride, 0.0);
         self.row.clear();
         self.row.resize(stride, 0.0);
         self.same.clear();
         if settles {
-            self.same.extend((0..stride).map(|lag| derivative_of_covariance(sources, band, lag)));
+            self.same.extend((0..stride).map(|lag| derivative_of_same(sources, lag)));
         }
         let mut agreeing = 0;
         for k in 0..values.len() {
             let reach = band.min(k);
             let of_factor = factor.row(k);
             // Where the factor has settled, its derivative does soon after.
-            if agreeing < SETTLED_ROWS {
-                self.next_row(factor, sources, k, settles);
+            let is_settled = factor.is_settled(k);
+            if !(is_settled && agreeing >= SETTLED_ROWS) {
+                if is_kept {
+                    // All rows in reach were the one that was kept.
+                    self.recent.chunks_exact_mut(stride).for_each(|row| row.copy_from_slice(&self.row));
+                }
+                let is_plain = settles && (is_settled || !is_masked_around(sources, k, band));
+                self.next_row(factor, sources, k, is_plain);
                 let largest = self.row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
                 let before = &self.recent[(k + stride - 1) % stride * stride..][..stride];
                 let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest;
-                let has_settled = settles && k >= factor.count && self.row.iter().zip(before).all(agrees);
+                let has_settled = is_settled && self.row.iter().zip(before).all(agrees);
                 agreeing = if has_settled { agreeing + 1 } else { 0 };
                 self.recent[k % stride * stride..][..stride].copy_from_slice(&self.row);
             }
+            is_kept = is_settled && agreeing >= SETTLED_ROWS;
             let mut d = values[k] - self.row[0] * residual[k];
             let before = residual[..k].iter().rev().zip(values[..k].iter().rev());
             for ((l, dl), (r, dr)) in of_factor[1..=reach].iter().zip(&self.row[1..=reach]).zip(before) {
@@ -184,12 +219,12 @@ impl FactorDerivative {
     }
 
     /// Row `k` of `dL`.
-    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, settles: bool) {
+    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, is_plain: bool) {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
         let l = factor.row(k);
         for lag in (0..=reach).rev() {
-            let mut entry = if settles { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
+            let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
             if lag == 0 {
                 let products = l[1..=reach].iter().zip(&self.row[1..=reach]).map(|(l, dl)| l * dl);
                 entry -= 2.0 * products.sum::<f64>();
@@ -216,8 +251,32 @@ fn derivative_of_covariance(sources: &[Source<'_, Number>], k: usize, lag: usize
     sum_over_readings(sources, k, lag, |a, b| a.eps * b.re + a.re * b.eps)
 }
 
+/// Covariance with the value `lag` before, of rows that are all the same and no masked reading.
+fn covariance_of_same(sources: &[Source<'_, f64>], lag: usize) -> f64 {
+    sum_over_same(sources, lag, |a, b| a * b)
+}
+
+/// Derivative of the covariance with the value `lag` before, of rows that are all the same and no masked reading.
+fn derivative_of_same(sources: &[Source<'_, Number>], lag: usize) -> f64 {
+    sum_over_same(sources, lag, |a, b| a.eps * b.re + a.re * b.eps)
+}
+
+fn sum_over_same<T: Real>(sources: &[Source<'_, T>], lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
+    let of_source = |Source { rows, variance }: &Source<'_, T>| -> f64 {
+        let row = rows.at(0);
+        let products = row.iter().zip(row.get(lag..).unwrap_or(&[])).map(|(a, b)| product(*a, *b));
+        variance.plain * products.sum::<f64>()
+    };
+    sources.iter().map(of_source).sum()
+}
+
 /// `Σ σ² product(weight in value k, weight in value k − lag)` over the readings that both have in common.
-fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
+fn sum_over_readings<T: Real>(
+    sources: &[Source<'_, T>],
+    k: usize,
+    lag: usize,
+    product: impl Fn(T, T) -> f64,
+) -> f64 {
     let mut sum = 0.0;
     for Source { rows, variance } in sources {
         let (now, then) = (rows.at(k), rows.at(k - lag));
@@ -225,12 +284,11 @@ fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, p
             continue;
         }
         let products = now.iter().zip(&then[lag..]).map(|(a, b)| product(*a, *b));
-        sum += match variance {
-            Variance::Same(variance) => variance * products.sum::<f64>(),
-            Variance::Each(_) => {
-                let first = rows.start + k;
-                products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
-            }
+        let first = rows.start + k;
+        sum += if variance.has_masked_in(first..first + now.len()) {
+            products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
+        } else {
+            variance.plain * products.sum::<f64>()
         };
     }
     sum
@@ -255,25 +313,22 @@ mod tests {
         chain
     }
 
-    fn masked_variance() -> Vec<f64> {
-        let mut variance = vec![0.04; SAMPLES];
-        variance[17] = 1e3;
-        variance
+    /// Variances of both channels, of which the second has two masked readings or none.
+    fn variances(is_masked: bool) -> [Variance; 2] {
+        let masked: Vec<bool> = (0..SAMPLES).map(|k| is_masked && [17, 70].contains(&k)).collect();
+        [Variance::same(0.01), Variance::masked(0.04, 1e3, &masked)]
     }
 
-    /// What brings noise into two chains, one reading masked or none.
-    fn sources<'a, T: Real>(chains: &'a [Chain<T>; 2], masked: Option<&'a [f64]>) -> [Source<'a, T>; 2] {
-        let second = masked.map_or(Variance::Same(0.04), Variance::Each);
-        let [one, two] = chains;
-        [Source { rows: &one.rows, variance: Variance::Same(0.01) }, Source { rows: &two.rows, variance: second }]
+    /// What brings noise into two chains.
+    fn sources<'a, T: Real>(chains: &'a [Chain<T>; 2], variances: &'a [Variance; 2]) -> [Source<'a, T>; 2] {
+        [0, 1].map(|i| Source { rows: &chains[i].rows, variance: &variances[i] })
     }
 
     /// Factor and disagreement of two lags, one reading masked or none.
     fn two_lags(tau_s: [f64; 2], is_masked: bool) -> (Vec<f64>, Factor) {
         let chains = tau_s.map(through_lag);
-        let variance = masked_variance();
         let mut factor = Factor::empty();
-        factor.compute(&sources(&chains, is_masked.then_some(&variance[..])), chains[0].len());
+        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len());
         let u = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| *a - *b).collect();
         (u, factor)
     }
@@ -285,7 +340,7 @@ mod tests {
         let (u, factor) = two_lags([3.0, 9.0], true);
         let mut whitened = u.clone();
         factor.whiten(&mut whitened);
-        let (m, variance) = (u.len(), masked_variance());
+        let (m, [_, variance]) = (u.len(), variances(true));
         let dense_rows = |rows: &Rows<f64>| -> Vec<Vec<f64>> {
             (0..m)
                 .map(|k| {
@@ -297,7 +352,7 @@ mod tests {
         };
         let (a, b) = (dense_rows(&through_lag(3.0).rows), dense_rows(&through_lag(9.0).rows));
         let entry = |i: usize, j: usize| -> f64 {
-            (0..SAMPLES).map(|k| 0.01 * a[i][k] * a[j][k] + variance[k] * b[i][k] * b[j][k]).sum()
+            (0..SAMPLES).map(|k| 0.01 * a[i][k] * a[j][k] + variance.at(k) * b[i][k] * b[j][k]).sum()
         };
         let matrix: Vec<Vec<f64>> = (0..m).map(|i| (0..m).map(|j| entry(i, j)).collect()).collect();
         let inverse = dense::inverse(&matrix).expect("positive definite");
@@ -324,8 +379,8 @@ mod tests {
             let (mut whitened, factor) = two_lags([3.0, 9.0], is_masked);
             factor.whiten(&mut whitened);
             let chains = [Number::from(3.0).derivative(), Number::from(9.0)].map(through_lag);
-            let variance = masked_variance();
-            let sources = sources(&chains, is_masked.then_some(&variance[..]));
+            let variances = variances(is_masked);
+            let sources = sources(&chains, &variances);
             let mut got: Vec<f64> = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| (a - b).eps).collect();
             FactorDerivative::default().whiten(&factor, &sources, &whitened, &mut got);
             let step_s = 3e-4;
