@@ -3,6 +3,7 @@
 mod coverage;
 mod loops;
 mod pair;
+mod policy;
 mod reconstruction;
 mod stored;
 mod surface;

@@ -1,7 +1,12 @@
 //! The result of a diagnosis.
 
 use serde::{Deserialize, Serialize};
-use twinlag_model::{Identifier, ModelFit, Value};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use twinlag_model::{Identifier, ModelFit, Policy, Value};
+
+use crate::candidates::Candidate;
+use crate::moves::Move;
+use crate::remark::Remark;
 
 /// Whether the model is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,8 +36,23 @@ pub struct Evidence {
     pub p_value: f64,
     /// Nats of likelihood gained on blocks that were left out of the fit.
     pub held_out_gain_nats: f64,
-    /// The statistic with a free noise level in every frequency band; `None` for effects of the noise.
+    /// The statistic with a free noise level in every frequency band; `None` for effects of the
+    /// noise.
     pub robust_statistic: Option<f64>,
+}
+
+impl Evidence {
+    pub(crate) fn of(candidate: &Candidate) -> Self {
+        let (statistic, dof) = (candidate.white_gain, candidate.added);
+        let chi2 = ChiSquared::new(dof.max(1) as f64).expect("a positive number");
+        Self {
+            statistic,
+            dof,
+            p_value: chi2.sf(statistic.max(0.0)),
+            held_out_gain_nats: candidate.held_out_nats,
+            robust_statistic: (!candidate.effect.is_noise()).then_some(candidate.robust_gain),
+        }
+    }
 }
 
 /// An effect that was found.
@@ -73,8 +93,8 @@ pub struct ErrorBudget {
     pub chi2_per_dof: BeforeAfter<f64>,
     /// Root mean square of the whitened residual.
     pub held_out_normalised_rms: BeforeAfter<f64>,
-    /// Root mean square of the difference between the two inferred gas temperatures, without the frequencies in which there is
-    /// only noise, K.
+    /// Root mean square of the difference between the two inferred gas temperatures, without the
+    /// frequencies in which there is only noise, K.
     #[serde(rename = "held_out_input_difference_K")]
     pub held_out_input_difference_k: BeforeAfter<f64>,
 }
@@ -128,5 +148,9 @@ pub struct Diagnosis {
     /// Detection limits of the effects that were not found.
     pub limits: Vec<Limit>,
     /// Why the record was refused, or what to know before using the numbers.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
+    /// What the loop did, in order.
+    pub moves: Vec<Move>,
+    /// The numbers that decided.
+    pub policy: Policy,
 }

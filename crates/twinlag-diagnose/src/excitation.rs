@@ -1,26 +1,25 @@
 //! What the gas does: how many tones there are to learn from.
 
-use twinlag_model::{Observations, levels};
+use twinlag_model::{Observations, Policy, levels};
 use twinlag_transform::Tapered;
 
-/// A bin counts if it has this many times the power of the noise.
-const CLEAR: f64 = 30.0;
-/// Number of samples below which tones are not distinguished.
-const SHORTEST: usize = 200;
-/// Periods in the record that a tone must have at least.
-const FEWEST_PERIODS: usize = 5;
-/// Bins of one tone under the window.
-const WIDTH: usize = 12;
+/// Tones of a gas from which nothing but two time constants can be learned.
+pub(crate) const SINGLE: usize = 1;
+/// Bins of one tone under the window: its main lobe and rounding.
+const TONE_BINS: usize = 12;
+/// Power of a tone's side lobes beside its own: what is less is none.
+const LEAST_SHARE: f64 = 1e-9;
 
-/// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples are uneven or the power is
-/// spread. Each tone gives two equations, and two time constants take two.
-pub(crate) fn tones(observations: &Observations) -> Option<usize> {
+/// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples
+/// are uneven or the power is spread. Each tone gives two equations, and two time constants take
+/// two.
+pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usize> {
     observations.period_s?;
     let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
     let stretch = observations.stretches.iter().max_by_key(|s| s.len())?;
     let y = &stretch.reading_c[channel];
     let n = y.len() & !1;
-    if n < SHORTEST {
+    if n < policy.tone_fewest_samples {
         return None;
     }
     let noise_k = levels(observations)?.std_k[channel];
@@ -35,10 +34,10 @@ pub(crate) fn tones(observations: &Observations) -> Option<usize> {
     let spectrum = tapered.transform(y[..n].iter().map(|y| y - mean));
     let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
-    let least = (CLEAR * noise_k * noise_k).max(1e-9 * largest);
+    let least = (policy.tone_power_ratio * noise_k * noise_k).max(LEAST_SHARE * largest);
     // What moves less than a few times in the whole record is no tone: it is not seen to come back.
     let strongest = power.iter().position(|p| *p == largest)?;
-    if strongest < FEWEST_PERIODS {
+    if strongest < policy.tone_fewest_periods {
         return None;
     }
     let (mut tones, mut bin) = (0, 0);
@@ -51,7 +50,7 @@ pub(crate) fn tones(observations: &Observations) -> Option<usize> {
         while bin < power.len() && power[bin] > least {
             bin += 1;
         }
-        tones += 1 + (bin - from) / WIDTH;
+        tones += 1 + (bin - from) / TONE_BINS;
     }
     Some(tones)
 }

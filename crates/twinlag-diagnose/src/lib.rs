@@ -6,10 +6,13 @@
 //! that nothing is missing, or that something is and no known effect accounts for it. [`fit_with`]
 //! puts effects that are known already into the model.
 //!
-//! The crate takes readings, not files, and knows no file format: for logger files, characterisations and reports take
-//! `twinlag`; for the two-lag model alone, and other costs, `twinlag-cross-relation`; for sensor models `twinlag-sensor`.
+//! The crate takes readings, not files, and knows no file format: for logger files,
+//! characterisations and reports take `twinlag`; for the two-lag model alone, and other costs,
+//! `twinlag-cross-relation`; for sensor models `twinlag-sensor`.
 //!
 //! ```
+//! use std::ops::ControlFlow;
+//!
 //! use twinlag_diagnose::{Identifier, Observations, Settings, Stretch, Verdict, diagnose};
 //! use twinlag_signal::undeclared::{GasKind, Kind, undeclared};
 //!
@@ -20,7 +23,8 @@
 //! let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
 //! let observations = Observations::new(vec![stretch], Some(period_s))?;
 //!
-//! let answer = diagnose(&observations, &Settings::default(), &|_, _, _| ())?;
+//! let watch = |_: &str, _, _| ControlFlow::Continue(());
+//! let answer = diagnose(&observations, &Settings::default(), &watch)?;
 //! assert_eq!(answer.verdict, Verdict::Explained);
 //! assert_eq!(answer.effects[0].effect, Identifier::CALIBRATION);
 //! let error = answer.error.held_out_normalised_rms;
@@ -28,16 +32,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod confirm;
+mod accept;
+mod alternatives;
+mod candidates;
+mod conclude;
 mod diagnose;
 mod diagnosis;
 mod excitation;
+mod left_over;
+mod limits;
+mod moves;
 mod naming;
-mod search;
+mod rank;
+mod remark;
 
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, Unexplained, Verdict};
+pub use moves::Move;
+pub use remark::Remark;
 pub use twinlag_model::{
     About, Change, ChangePoint, DiagnoseError, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant,
-    ModelFit, Observations, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
+    ModelFit, Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with,
+    track,
 };

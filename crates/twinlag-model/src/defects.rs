@@ -8,17 +8,12 @@ use twinlag_transform::Forward;
 
 use crate::implied::{Evaluation, Part, median};
 use crate::observations::Observations;
+use crate::policy::Policy;
 
 /// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
 const COARSE: f64 = 0.5;
-/// Readings at an extreme value that two in a row of which no noise explains.
-const FEWEST_AT_END: usize = 8;
-/// How much farther than others a reading must stick out of its neighbours that the residual hardly shows.
-const PLAIN: f64 = 1.7;
 /// Bins beside a line that it is held against: beyond the window's main lobe.
 const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
-/// More of the readings than this are no single ones.
-const MOST_SPIKES: f64 = 0.05;
 
 /// Noise of the channels as third differences show it.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +81,7 @@ pub fn levels(observations: &Observations) -> Option<Levels> {
 /// channel.
 ///
 /// - `steps_k`: of a coarse converter, whose every value comes again and again
-pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2]) -> [usize; 2] {
+pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2], policy: &Policy) -> [usize; 2] {
     let mut out = [0; 2];
     for i in 0..2 {
         let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
@@ -98,7 +93,7 @@ pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2
             let at = |y: &f64| *y == end;
             let count = observations.channel(i).filter(|y| at(y)).count();
             // On a coarse grid every value comes again and again.
-            let crowded = steps_k[i].is_none() && count >= FEWEST_AT_END;
+            let crowded = steps_k[i].is_none() && count >= policy.fewest_readings_at_end;
             let pairs: usize = observations
                 .stretches
                 .iter()
@@ -128,7 +123,7 @@ fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
 /// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
 /// particular.
-pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) -> [Vec<usize>; 2] {
+pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64, policy: &Policy) -> [Vec<usize>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
@@ -159,7 +154,7 @@ pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) ->
                 let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
                 // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
                 let is_far = (scores[k].abs() > far && sticks_out > far)
-                    || (scores[k].abs() > 0.5 * far && sticks_out > PLAIN * far);
+                    || (scores[k].abs() > 0.5 * far && sticks_out > policy.spike_neighbour_factor * far);
                 if is_peak && is_far && !stretch.masked[channel][k] {
                     found.push(part.before + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
@@ -168,7 +163,7 @@ pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64) ->
         }
         let m = found.len() as f64;
         let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
-        if found.len() >= 2 && m < MOST_SPIKES * observations.samples() as f64 && related < 3.5 {
+        if found.len() >= 2 && m < policy.most_spikes_share * observations.samples() as f64 && related < 3.5 {
             out[channel] = found;
         }
     }

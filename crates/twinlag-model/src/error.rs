@@ -36,6 +36,10 @@ pub enum DiagnoseError {
     Parameter { effect: &'static str, name: &'static str, got: f64, expected: &'static str },
     #[error("the numbers of the model give no finite result for this record: was the model changed by hand?")]
     Absurd,
+    #[error("the policy has {name} = {got}: expected a positive number, of a share or a probability at most 1")]
+    Policy { name: &'static str, got: f64 },
+    #[error("the run was cancelled")]
+    Cancelled,
     #[error(transparent)]
     Compensate(#[from] CompensateError),
     #[error("there is no effect called \"{name}\"; there are {known}")]

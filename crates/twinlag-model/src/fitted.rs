@@ -6,7 +6,6 @@ use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
 use crate::extended::Extended;
-use crate::summary::LEFT_OVER;
 
 /// A fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,7 +80,7 @@ pub struct ModelFit {
 impl ModelFit {
     /// Whether a test of the residual finds that it is not noise of the estimated levels.
     pub fn is_contradicted(&self) -> bool {
-        self.tests.iter().any(|t| t.p_value < LEFT_OVER)
+        self.is_weighted_by_residual
     }
 }
 

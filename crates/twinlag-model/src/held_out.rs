@@ -1,28 +1,29 @@
 //! Evaluation on blocks that a fit has not used.
 //!
-//! A fit without one block is, to first order, `θ + (JᵀJ − J_bᵀJ_b)⁻¹ J_bᵀ r_b`, seen from the fit of all: one linearisation
-//! gives the residual of every block as a fit without it would leave it. Residuals next to a block, which share readings with it,
-//! are in neither.
+//! A fit without one block is, to first order, `θ + (JᵀJ − J_bᵀJ_b)⁻¹ J_bᵀ r_b`, seen from the fit
+//! of all: one linearisation gives the residual of every block as a fit without it would leave it.
+//! Residuals next to a block, which share readings with it, are in neither.
 
+use crate::blocks;
 use crate::dense;
 use crate::fit::Fitted;
 use crate::observations::Observations;
+use crate::policy::Policy;
 use crate::selection::Selection;
 
-/// Blocks along the record.
-const BLOCKS: usize = 40;
-/// Folds: block `b` is left out together with `b + FOLDS`, `b + 2 FOLDS`, …
-const FOLDS: usize = 5;
-
 /// Energy, per residual, of every fold as a fit without it leaves it.
-pub fn held_out_energy(observations: &Observations, selection: &Selection, fitted: &Fitted) -> Option<f64> {
+pub fn held_out_energy(
+    observations: &Observations,
+    selection: &Selection,
+    fitted: &Fitted,
+    policy: &Policy,
+) -> Option<f64> {
     let lin = fitted.model.linearised(&fitted.theta, observations, selection);
     let n = lin.samples.len();
     let p = lin.columns.len();
     let total = observations.samples().max(1);
-    let block = |sample: usize| sample * BLOCKS / total;
-    let gap = (total / BLOCKS / 10).min(20);
-    let fold_of = |sample: usize| block(sample) % FOLDS;
+    let gap = policy.block_gap_samples(total, policy.held_out_blocks);
+    let fold_of = |sample: usize| blocks::fold(sample, total, policy);
     let matrix = |rows: &[usize]| -> Vec<Vec<f64>> {
         (0..p)
             .map(|a| (0..p).map(|b| rows.iter().map(|&k| lin.columns[a][k] * lin.columns[b][k]).sum()).collect())
@@ -32,7 +33,7 @@ pub fn held_out_energy(observations: &Observations, selection: &Selection, fitte
     let whole = matrix(&all);
     let gradient: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
     let (mut sum, mut count) = (0.0, 0usize);
-    for fold in 0..FOLDS {
+    for fold in 0..policy.held_out_folds {
         let inside: Vec<usize> = (0..n).filter(|&k| fold_of(lin.samples[k]) == fold).collect();
         let near: Vec<usize> = (0..n)
             .filter(|&k| {
@@ -66,8 +67,14 @@ pub fn held_out_energy(observations: &Observations, selection: &Selection, fitte
 }
 
 /// Nats that `after` saves against `before` on the blocks left out, the level of the noise free.
-pub fn held_out_gain(observations: &Observations, selection: &Selection, before: &Fitted, after: &Fitted) -> f64 {
-    let energy = |fitted| held_out_energy(observations, selection, fitted);
+pub fn held_out_gain(
+    observations: &Observations,
+    selection: &Selection,
+    before: &Fitted,
+    after: &Fitted,
+    policy: &Policy,
+) -> f64 {
+    let energy = |fitted| held_out_energy(observations, selection, fitted, policy);
     match (energy(before), energy(after)) {
         (Some(b), Some(a)) => 0.5 * after.count * (b / a).ln(),
         (None, Some(a)) => 0.5 * after.count * (before.mean_energy() * selection.weighting.mean() / a).ln(),

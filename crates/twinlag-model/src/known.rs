@@ -23,7 +23,7 @@ pub fn fit_with(
     effects: &[KnownEffect],
 ) -> Result<KnownFit, DiagnoseError> {
     let Known { prepared, fitted, fitted_again } = Known::of(observations, settings, effects)?;
-    let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels);
+    let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels, &prepared.policy);
     Ok(KnownFit { fit, fitted_again })
 }
 
@@ -68,7 +68,8 @@ impl Known {
             prepared.find_levels(&fitted, settings);
             fitted = fit(&prepared, &model.clone().with_noise(prepared.levels.std_k));
         }
-        if prepared.lower_levels(&fitted, settings) {
+        if prepared.has_high_levels(&fitted, settings) {
+            prepared.lower_levels(&fitted, settings);
             fitted = prepared.refit(&fitted);
         }
         if !fitted.chi2.is_finite() {

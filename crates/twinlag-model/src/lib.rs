@@ -1,6 +1,7 @@
 //! Two first-order sensors with any further physical effects: the inverse of the whole rig with its
 //! noise, and its fit.
 
+mod blocks;
 mod chain;
 mod cost;
 mod defects;
@@ -20,6 +21,7 @@ mod model;
 mod number;
 mod observations;
 mod plant;
+mod policy;
 mod prepare;
 mod residual;
 mod rows;
@@ -51,12 +53,13 @@ pub use num_dual::DualNum;
 pub use number::{Curve, Number, TimeFunction};
 pub use observations::{Observations, Stretch};
 pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
+pub use policy::Policy;
 pub use prepare::Prepared;
 pub use selection::Selection;
-pub use settings::{KnownEffect, Settings, Watch};
+pub use settings::{KnownEffect, Settings, Watch, report};
 pub use spectrum::{Bands, fit_noise, runs};
 pub use spline::Spline;
-pub use summary::{LEFT_OVER, Z_975, covariance, is_unresolved, summarise};
+pub use summary::{Z_975, covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};
 pub use twinlag_optimise::Variable;
 pub use weighting::Weighting;

@@ -1,5 +1,6 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
+use crate::blocks;
 use crate::defects::{self, Levels};
 use crate::effect::{Context, Identifier};
 use crate::error::DiagnoseError;
@@ -8,31 +9,25 @@ use crate::fitted::Defect;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::reach;
+use crate::policy::Policy;
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::spectrum::runs;
 use crate::weighting::Weighting;
 
-/// Blocks along the record, of which every eighth is kept for the judgement at the end.
-const BLOCKS: usize = 80;
 /// Samples of a record that is looked at through excerpts first, and of each of these.
 const LONG: usize = 7000;
 const EXCERPT: usize = 500;
-/// Robust standard deviations beyond which a single reading is wrong, and where others are.
-const SPIKE: f64 = 6.0;
-const SPIKE_AMONG_OTHERS: f64 = 4.5;
-
 /// Starts of the two-lag fit that the best points of a grid of time constants give.
 pub const GRID_STARTS: usize = 3;
 /// Times that spikes are looked for.
 const SPIKE_ROUNDS: usize = 3;
-/// Standard errors by which less is clearly less.
-const CLEARLY: f64 = 4.0;
 
 /// A record with its defects masked, and the two-lag model of it.
 pub struct Prepared {
     pub observations: Observations,
     pub levels: Levels,
+    pub policy: Policy,
     pub context: Context,
     /// Defects of the data.
     pub found: Vec<Defect>,
@@ -49,6 +44,8 @@ pub struct Prepared {
 impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
+        let policy = settings.policy.clone();
+        policy.check()?;
         for i in 0..2 {
             let first = observations.channel(i).next();
             if observations.channel(i).all(|y| Some(y) == first) {
@@ -64,14 +61,15 @@ impl Prepared {
             levels.log_error = [0.0; 2];
         }
         let raw = (observations.clone(), levels);
-        let found = data_defects(&mut observations, &levels, &settings.effects);
+        let found = data_defects(&mut observations, &levels, settings);
         let weighting = Weighting::of(&observations, levels.std_k);
         Ok(Self {
-            everything: selection(&observations, false, &weighting),
-            searched: selection(&observations, true, &weighting),
+            everything: selection(&observations, None, &weighting),
+            searched: selection(&observations, Some(&policy), &weighting),
             context: context(&observations, &levels),
             observations,
             levels,
+            policy,
             found,
             spikes: [0; 2],
             raw,
@@ -109,11 +107,14 @@ impl Prepared {
     pub fn mask_spikes(&mut self, base: &Fitted) -> bool {
         let evaluation = base.model.evaluate(&base.theta, &self.observations);
         let mut counts = [0; 2];
-        for far in [SPIKE, SPIKE_AMONG_OTHERS] {
-            let spikes = defects::spikes(&self.observations, &evaluation, far);
+        let policy = &self.policy;
+        for (round, far) in
+            [policy.spike_standard_deviations, policy.further_spike_standard_deviations].into_iter().enumerate()
+        {
+            let spikes = defects::spikes(&self.observations, &evaluation, far, policy);
             for i in 0..2 {
                 // Where there are some there are smaller ones.
-                if far == SPIKE || counts[i] > 0 {
+                if round == 0 || counts[i] > 0 {
                     defects::mask(&mut self.observations, i, &spikes[i]);
                     counts[i] += spikes[i].len();
                 }
@@ -135,23 +136,24 @@ impl Prepared {
         }
     }
 
-    /// Lowers levels that were found rather than given to what `fitted` leaves over, where that is less than levels as uncertain as
-    /// these allow: the disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. May
-    /// show that a converter is coarse. Whether they were lowered.
-    pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) -> bool {
-        let energy = fitted.mean_energy();
+    /// Whether what `fitted` leaves over is clearly less than noise of the levels that there are, as uncertain as these are: the
+    /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Levels that were given
+    /// are believed.
+    pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
         let level_std = 2.0 * self.levels.log_error[0].max(self.levels.log_error[1]);
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
-        let is_clearly_less = energy.ln() < -CLEARLY * (2.0 / fitted.count + level_std * level_std).sqrt();
-        if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse || !is_clearly_less {
-            return false;
-        }
-        self.levels.scale(energy.sqrt());
+        let log_std = (2.0 / fitted.count + level_std * level_std).sqrt();
+        let is_clearly_less = fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std;
+        settings.noise_std_k.is_none() && fitted.model.noise().is_none() && !is_coarse && is_clearly_less
+    }
+
+    /// Lowers the levels to what `fitted` leaves over, which may show that a converter is coarse.
+    pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
+        self.levels.scale(fitted.mean_energy().sqrt());
         self.context = context(&self.observations, &self.levels);
         if settings.effects.contains(&Identifier::QUANTISATION) {
             self.found.extend(coarse_steps(&self.levels));
         }
-        true
     }
 
     /// From here on frequencies count by the spectrum of what `fitted` leaves over.
@@ -175,9 +177,9 @@ impl Prepared {
             return (self.observations.clone(), self.searched.clone());
         }
         // After each block that judges.
-        let starts = (0..BLOCKS).step_by(8).map(|block| (block + 5) * samples / BLOCKS + 20);
+        let starts = blocks::after_judges(samples, &self.policy);
         let excerpt = self.observations.excerpt(starts, EXCERPT);
-        let whole = selection(&excerpt, false, &self.searched.weighting);
+        let whole = selection(&excerpt, None, &self.searched.weighting);
         (excerpt, whole)
     }
 
@@ -188,15 +190,16 @@ impl Prepared {
 
     /// Whether a sample is of the blocks that judge.
     pub fn judges(&self, sample: usize) -> bool {
-        self.everything.holds(sample) && is_judge(sample, self.observations.samples())
+        self.everything.holds(sample) && blocks::is_judge(sample, self.observations.samples(), &self.policy)
     }
 }
 
 /// Saturation and coarse converters, masked and named.
-fn data_defects(observations: &mut Observations, levels: &Levels, allowed: &[Identifier]) -> Vec<Defect> {
+fn data_defects(observations: &mut Observations, levels: &Levels, settings: &Settings) -> Vec<Defect> {
+    let allowed = &settings.effects;
     let mut out = Vec::new();
     if allowed.contains(&Identifier::SATURATION) {
-        let counts = defects::mask_saturation(observations, levels.coarse_step_k());
+        let counts = defects::mask_saturation(observations, levels.coarse_step_k(), &settings.policy);
         for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
             out.push(defect(Identifier::SATURATION, i, format!("{count} readings at an end of the range")));
         }
@@ -216,19 +219,17 @@ fn defect(effect: Identifier, channel: usize, seen: String) -> Defect {
     Defect { effect, channel, seen }
 }
 
-pub fn is_judge(sample: usize, samples: usize) -> bool {
-    (sample * BLOCKS / samples.max(1)) % 8 == 4
-}
-
-/// All residuals away from the ends; without the blocks that judge, and their surroundings, if these are to be kept.
-fn selection(observations: &Observations, keeps_judges: bool, weighting: &Weighting) -> Selection {
+/// All residuals away from the ends.
+///
+/// - `judging`: the policy whose judging blocks, and their surroundings, are left out
+fn selection(observations: &Observations, judging: Option<&Policy>, weighting: &Weighting) -> Selection {
     let samples = observations.samples();
-    let gap = (samples / BLOCKS / 10).min(20);
     let mut out = away_from_ends(observations, reach(observations), weighting);
-    if keeps_judges {
+    if let Some(policy) = judging {
+        let gap = policy.block_gap_samples(samples, policy.judging_blocks);
         for (k, counts) in out.counts.iter_mut().enumerate() {
             let near = [k.saturating_sub(gap), k, (k + gap).min(samples - 1)];
-            *counts &= !near.iter().any(|s| is_judge(*s, samples));
+            *counts &= !near.iter().any(|s| blocks::is_judge(*s, samples, policy));
         }
     }
     out

@@ -1,7 +1,11 @@
 //! What a diagnosis may assume.
 
+use std::ops::ControlFlow;
+
 use crate::effect::Identifier;
+use crate::error::DiagnoseError;
 use crate::model::KnownTimeConstant;
+use crate::policy::Policy;
 
 /// What a diagnosis may assume.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,11 +16,13 @@ pub struct Settings {
     pub known: Vec<KnownTimeConstant>,
     /// Effects that may be named.
     pub effects: Vec<Identifier>,
+    /// The numbers that decide what a user reads.
+    pub policy: Policy,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { noise_std_k: None, known: Vec::new(), effects: Identifier::ALL.to_vec() }
+        Self { noise_std_k: None, known: Vec::new(), effects: Identifier::ALL.to_vec(), policy: Policy::default() }
     }
 }
 
@@ -38,5 +44,17 @@ impl KnownEffect {
     }
 }
 
-/// Progress callback: `(task, done, total)`.
-pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+/// Progress of a run: called with the task, how much of it is done, and of how much.
+/// [`ControlFlow::Break`] cancels the run, which then returns [`DiagnoseError::Cancelled`].
+pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
+
+/// Reports progress to `watch`.
+///
+/// # Errors
+/// [`DiagnoseError::Cancelled`] if that is its answer.
+pub fn report(watch: Watch<'_>, task: &str, done: usize, of: usize) -> Result<(), DiagnoseError> {
+    match watch(task, done, of) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(DiagnoseError::Cancelled),
+    }
+}

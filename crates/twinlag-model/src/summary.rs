@@ -2,6 +2,7 @@
 
 use twinlag_cross_relation::residual_tests;
 
+use crate::blocks;
 use crate::defects::Levels;
 use crate::dense;
 use crate::extended::Extended;
@@ -9,42 +10,40 @@ use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
-use crate::prepare::is_judge;
+use crate::policy::Policy;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
 
 /// 97.5 % point of the normal distribution.
 pub const Z_975: f64 = 1.959_963_984_540_054;
-/// A time constant shorter than this share of a sample period is not resolved.
-const UNRESOLVED: f64 = 0.2;
-/// A time constant whose logarithm is less certain than this is not determined: its interval spans
-/// a factor of seven.
-const VAGUE: f64 = 0.5;
-/// Relative standard error up to which a time constant is not doubted.
-const CERTAIN: f64 = 0.03;
 /// 95 % point of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
-/// Below this p-value of any test something is left over.
-pub const LEFT_OVER: f64 = 1e-4;
 
 /// Whether a time constant is shorter than the samples resolve, or as long as the record.
-pub fn is_unresolved(fitted: &Fitted, observations: &Observations) -> bool {
-    let seen = UNRESOLVED * observations.step_s()..0.9 * MAX_TAU_SPANS * observations.span_s();
+pub fn is_unresolved(fitted: &Fitted, observations: &Observations, policy: &Policy) -> bool {
+    let longest_s = policy.longest_resolved_share * MAX_TAU_SPANS * observations.span_s();
+    let seen = policy.shortest_resolved_periods * observations.step_s()..longest_s;
     (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
 }
 
 /// Whether half or twice a time constant fits as well, the other parameters free: then it is not determined, whatever the curvature
 /// at the minimum says, as with two equal sensors. A curvature that is certain to a few per cent is believed.
-fn is_flat(fitted: &Fitted, observations: &Observations, selection: &Selection, variance: Option<f64>) -> bool {
+fn is_flat(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    variance: Option<f64>,
+    policy: &Policy,
+) -> bool {
     // One that is known ties the other down.
     if (0..2).any(|i| fitted.model.knows(i)) {
         return false;
     }
     let tau_s = fitted.theta[0];
-    if variance.is_some_and(|v| v.sqrt() < CERTAIN * tau_s) {
+    if variance.is_some_and(|v| v.sqrt() < policy.certain_log_std * tau_s) {
         return false;
     }
-    [0.5, 2.0].into_iter().any(|factor| {
+    [1.0 / policy.ridge_factor, policy.ridge_factor].into_iter().any(|factor| {
         let model = fitted.model.clone().holding(0, factor * tau_s);
         let mut theta = fitted.theta.clone();
         // Along the ridge of equal sensors.
@@ -110,7 +109,14 @@ pub fn covariance(
     Some(dense::product(&dense::product(&inverse, &middle), &inverse))
 }
 
-pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selection, levels: &Levels) -> ModelFit {
+/// The fit in numbers: what it leaves over, how certain it is, and what pictures need.
+pub fn summarise(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    levels: &Levels,
+    policy: &Policy,
+) -> ModelFit {
     let evaluation = fitted.model.evaluate(&fitted.theta, observations);
     let residual_runs = runs(&evaluation, |s| selection.holds(s));
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
@@ -120,7 +126,7 @@ pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selec
     let count: usize = residual_runs.iter().map(Vec::len).sum();
     let dof = count.saturating_sub(fitted.model.free_count()).max(1);
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
-    let rejects = tests.iter().any(|t| t.p_value < LEFT_OVER);
+    let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
     let time_constant = |value: f64, variance: Option<f64>, is_log: bool| {
         let se = variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt);
@@ -133,7 +139,7 @@ pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selec
             }
         });
         // A factor of seven either way is no estimate.
-        let known = !is_log || se.is_some_and(|se| se / value < VAGUE);
+        let known = !is_log || se.is_some_and(|se| se / value < policy.vague_log_std);
         let held = variance == Some(0.0);
         TimeConstant {
             value_s: (known || held).then_some(value),
@@ -145,7 +151,8 @@ pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selec
     // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
     let c = covariance.as_ref();
     let variance = |i: usize| c.map(|c| c[i][i]);
-    let unresolved = is_unresolved(fitted, observations) || is_flat(fitted, observations, selection, variance(0));
+    let unresolved =
+        is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
     // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
     let delay = fitted.model.parameters().position(|p| p.is_lateness);
     let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
@@ -181,7 +188,7 @@ pub fn summarise(fitted: &Fitted, observations: &Observations, selection: &Selec
             is_judge: evaluation
                 .sample
                 .iter()
-                .map(|s| selection.holds(*s) && is_judge(*s, observations.samples()))
+                .map(|s| selection.holds(*s) && blocks::is_judge(*s, observations.samples(), policy))
                 .collect(),
             sample: evaluation.sample,
             disagreement_k: evaluation.disagreement_k,

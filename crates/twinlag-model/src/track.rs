@@ -11,7 +11,7 @@ use crate::known::Known;
 use crate::observations::Observations;
 use crate::prepare::Prepared;
 use crate::selection::Selection;
-use crate::settings::{KnownEffect, Settings, Watch};
+use crate::settings::{KnownEffect, Settings, Watch, report};
 use crate::summary::summarise;
 
 /// Fewest coefficients of the shared change.
@@ -121,17 +121,17 @@ pub fn track(
             best = (change, fitted, score);
         }
     };
-    if let Some((coefficients, fitted)) = search.smooth(&constant, watch) {
+    if let Some((coefficients, fitted)) = search.smooth(&constant, watch)? {
         consider(Change::Smooth(coefficients.round() as usize), fitted, coefficients);
     }
-    let step = search.step(&constant, watch);
+    let step = search.step(&constant, watch)?;
     if let Some((_, fitted)) = &step {
         // Its size, its instant, and the choice of that.
         consider(Change::Step, fitted.clone(), 3.0);
     }
     let (change, fitted, _) = best;
     let ratio = search.ratio(&fitted);
-    let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels);
+    let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels, &prepared.policy);
     let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
     let [tau_s, log_error] = along(&fit, &time_s);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
@@ -186,18 +186,19 @@ impl Tracker<'_> {
     }
 
     /// The smooth change under which the record is most likely, and its effective number of coefficients.
-    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(f64, Fitted)> {
+    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(f64, Fitted)>, DiagnoseError> {
         let Context { ends_s, samples, .. } = self.prepared.context;
         let size = varying::MAX_COEFFICIENTS.min(samples / varying::SAMPLES_PER_COEFFICIENT);
         if size < LEAST_COEFFICIENTS {
-            return None;
+            return Ok(None);
         }
         let mut start = vec![0.0; size];
         let mut best: Option<(f64, f64, Fitted)> = None;
         for done in 0..STRENGTHS {
-            watch("smooth changes", done as usize, STRENGTHS as usize);
+            report(watch, "smooth changes", done as usize, STRENGTHS as usize)?;
             let curvature = CURVATURE * 2.0_f64.powi(done);
-            let fitted = self.fit(constant, varying::smooth(size, ends_s, samples, curvature)?, &start, Effort::Finish);
+            let Some(effect) = varying::smooth(size, ends_s, samples, curvature) else { return Ok(None) };
+            let fitted = self.fit(constant, effect, &start, Effort::Finish);
             start = fitted.theta[constant.theta.len()..].to_vec();
             let Some((evidence, coefficients)) = self.evidence(&fitted, size, curvature) else { break };
             let so_far = best.as_ref().map_or(f64::INFINITY, |b| b.0);
@@ -208,7 +209,7 @@ impl Tracker<'_> {
                 best = Some((evidence, coefficients, fitted));
             }
         }
-        best.map(|(_, coefficients, fitted)| (coefficients, fitted))
+        Ok(best.map(|(_, coefficients, fitted)| (coefficients, fitted)))
     }
 
     /// `−2 ln` of the likelihood with the coefficients integrated out (Laplace's approximation), but for a constant, and how many of
@@ -233,26 +234,28 @@ impl Tracker<'_> {
     }
 
     /// The step that takes most off, and the fit with it.
-    fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Option<(ChangePoint, Fitted)> {
+    fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, DiagnoseError> {
         let [first_s, last_s] = self.prepared.observations.ends_s();
         let span_s = last_s - first_s;
         let mut from_s = first_s + MARGIN * span_s;
         let mut apart_s = (1.0 - 2.0 * MARGIN) * span_s / (INSTANTS - 1) as f64;
         let mut tried: Vec<(f64, Fitted)> = Vec::new();
         for round in 0..ROUNDS {
-            watch("steps", round, ROUNDS);
+            report(watch, "steps", round, ROUNDS)?;
             let instants: Vec<f64> = (0..INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
             for at_s in instants.into_iter().filter(|t| *t > first_s && *t < last_s) {
                 tried.push((at_s, self.fit(constant, varying::step(at_s), &[0.0], Effort::Look)));
             }
-            let best_s = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.0;
+            let Some(best) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2)) else { return Ok(None) };
+            let best_s = best.0;
             from_s = best_s - apart_s;
             apart_s *= 2.0 / (INSTANTS - 1) as f64;
             if apart_s < 0.25 * self.prepared.context.step_s {
                 break;
             }
         }
-        let (at_s, looked) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2))?.clone();
+        let best = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
+        let Some((at_s, looked)) = best.cloned() else { return Ok(None) };
         let fitted = self.fit(constant, varying::step(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
         let limit = INSTANT_95 * fitted.mean_energy().max(1.0);
         let half_s = 0.5 * self.prepared.context.step_s;
@@ -266,7 +269,7 @@ impl Tracker<'_> {
             factor: 1.0 + fitted.theta[constant.theta.len()],
             evidence: score(constant, 0.0) - score(&fitted, 0.0),
         };
-        Some((point, fitted))
+        Ok(Some((point, fitted)))
     }
 
     /// The last instant before or after `at_s` up to which a step takes as much off as the `best` one, but for `limit`.

@@ -157,7 +157,7 @@ impl Page<'_> {
         }
         // Why it was refused, or what to know before the numbers are used.
         for remark in &diagnosis.remarks {
-            document = document.warning(sentence(remark));
+            document = document.warning(sentence(&remark.to_string()));
         }
         if diagnosis.verdict == Verdict::Unexplained {
             document = document.paragraph(
@@ -602,8 +602,8 @@ fn against_reference(trace: &Trace, time_s: &[f64], reference_c: &[f64]) -> f64 
 mod tests {
     use super::{ReportContext, diagnosis_report};
     use twinlag::diagnosis::{
-        BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Identifier, ModelFit, TimeConstant, Trace, Unexplained,
-        Value, Verdict,
+        BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Identifier, ModelFit, Policy, Remark, TimeConstant,
+        Trace, Unexplained, Value, Verdict,
     };
     use twinlag::optimise::{End, Evaluations, Fit};
     use twinlag_report::ReportError;
@@ -654,7 +654,9 @@ mod tests {
             unexplained: None,
             not_testable: vec!["the record is too short".into()],
             limits: Vec::new(),
-            remarks: vec!["the gas is a single tone".into()],
+            remarks: vec![Remark::SingleTone],
+            moves: Vec::new(),
+            policy: Policy::default(),
         }
     }
 

@@ -1,10 +1,12 @@
 //! The closed loop on a record: schema `twinlag.diagnosis/1`.
 
+use std::ops::ControlFlow;
+
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::Parameter;
 use twinlag_diagnose::{
     BeforeAfter, Diagnosis as Core, Evidence, Identifier, KnownEffect, KnownTimeConstant, ModelFit, Observations,
-    Settings, Stretch, TimeConstant, Unexplained, Value, Verdict,
+    Policy, Settings, Stretch, TimeConstant, Unexplained, Value, Verdict,
 };
 use twinlag_record::{Record, SamplingKind};
 
@@ -259,7 +261,7 @@ pub(crate) fn with_model(
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let has_noise = model.effects.iter().any(|e| e.effect.is_noise());
     let noise_std_k = options.noise_std_k.or(has_noise.then_some(model.noise_std_k));
-    let settings = Settings { noise_std_k, known: known(options), effects: Identifier::ALL.to_vec() };
+    let settings = Settings { noise_std_k, known: known(options), ..Settings::default() };
     let effects = known_effects(model);
     let known = twinlag_diagnose::fit_with(&observations, &settings, &effects)?;
     let fit = known.fit;
@@ -307,8 +309,12 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
         noise_std_k: options.characterise.noise_std_k,
         known: known(&options.characterise),
         effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
+        ..Settings::default()
     };
-    let core = twinlag_diagnose::diagnose(&observations, &settings, watch)?;
+    let core = twinlag_diagnose::diagnose(&observations, &settings, &|task, done, of| {
+        watch(task, done, of);
+        ControlFlow::Continue(())
+    })?;
     let error = ErrorBeforeAfter {
         chi2_per_dof: core.error.chi2_per_dof,
         held_out_normalised_rms: core.error.held_out_normalised_rms,
@@ -330,7 +336,7 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions, watch: DiagnoseWatch
             advice: f.effect.about().advice.into(),
         })
         .collect();
-    let mut remarks = core.remarks.clone();
+    let mut remarks: Vec<String> = core.remarks.iter().map(ToString::to_string).collect();
     if let Some(rmse) = error.reference_rmse_k
         && rmse.after > rmse.before
     {
@@ -515,7 +521,7 @@ fn with_effects(base: &Characterisation, core: &Core, options: &DiagnoseOptions)
     };
     let free = FreeParameters { gain: free("gain"), offset_k: free("offset") };
     let mut out = of_fit(base, fit, status, free, &options.characterise);
-    out.warnings.clone_from(&core.remarks);
+    out.warnings = core.remarks.iter().map(ToString::to_string).collect();
     out
 }
 
@@ -556,7 +562,11 @@ pub(crate) fn of_fit(
         free,
         residual: Residual {
             chi2_per_dof: Some(fit.chi2_per_dof),
-            white: fit.tests.iter().find(|t| t.test == "whiteness").is_none_or(|t| t.p_value > 1e-3),
+            white: fit
+                .tests
+                .iter()
+                .find(|t| t.test == "whiteness")
+                .is_none_or(|t| t.p_value >= Policy::default().rejection_p_value()),
             tests: fit.tests.clone(),
         },
         interval_method: if fit.is_weighted_by_residual {

@@ -1,9 +1,9 @@
 //! Time constants along a record: schema `twinlag.track/1`.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{Change, Identifier, Settings, track as core};
+use twinlag_diagnose::{Change, Settings, track as core};
 use twinlag_record::{Channels, Record, SamplingChoice};
 
 use crate::characterisation::{Characterisation, FreeParameters, Status};
@@ -133,9 +133,12 @@ fn whole(record: &Record, options: &TrackOptions, watch: DiagnoseWatch<'_>) -> R
     let settings = Settings {
         noise_std_k: options.characterise.noise_std_k,
         known: known(&options.characterise),
-        effects: Identifier::ALL.to_vec(),
+        ..Settings::default()
     };
-    let found = core(&observations, &settings, &effects, watch)?;
+    let found = core(&observations, &settings, &effects, &|task, done, of| {
+        watch(task, done, of);
+        ControlFlow::Continue(())
+    })?;
     let is_left = found.fit.is_contradicted();
     let status = match (&found.log_error, is_left) {
         (None, _) => Status::NotIdentifiable,

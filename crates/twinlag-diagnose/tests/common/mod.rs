@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test program uses its own part")]
 
+use std::ops::ControlFlow;
+
 use twinlag_diagnose::{
     DiagnoseError, Diagnosis, Identifier, ModelFit, Observations, Settings, Stretch, TimeConstant, diagnose,
 };
@@ -54,14 +56,15 @@ pub(crate) fn record(seed: u64, change: impl FnOnce(&mut [Sensor; 2])) -> Observ
 
 /// The diagnosis with nothing known.
 pub(crate) fn found(observations: &Observations) -> Diagnosis {
-    diagnose(observations, &Settings::default(), &|_, _, _| ()).expect("a record that can be diagnosed")
+    diagnose(observations, &Settings::default(), &|_, _, _| ControlFlow::Continue(()))
+        .expect("a record that can be diagnosed")
 }
 
 /// The diagnosis by someone who has never heard of `effect`.
 pub(crate) fn found_without(observations: &Observations, effect: Identifier) -> Diagnosis {
     let effects = Identifier::ALL.into_iter().filter(|e| *e != effect).collect();
     let settings = Settings { effects, ..Settings::default() };
-    diagnose(observations, &settings, &|_, _, _| ()).expect("a record that can be diagnosed")
+    diagnose(observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("a record that can be diagnosed")
 }
 
 /// What a failure prints: a diagnosis has thousands of numbers.

@@ -1,0 +1,115 @@
+//! Other forms of an effect that has been chosen: another size, one parameter more, a look-alike in
+//! its place.
+
+use twinlag_model::{DiagnoseError, Effort, Fitted, Shared, held_out_gain};
+
+use crate::candidates::{Candidate, Search, accepts, white_gain};
+use crate::rank::worth;
+
+/// A look-alike in the place of an effect.
+pub(crate) struct Replacement {
+    pub(crate) candidate: Candidate,
+    /// Deviance by which it is better, its parameters counted.
+    pub(crate) advantage: f64,
+}
+
+impl Search<'_> {
+    /// The chosen candidate in the size that the data support.
+    pub(crate) fn resized(&self, current: &Fitted, mut chosen: Candidate) -> Candidate {
+        let sizes = chosen.effect.sizes();
+        if sizes.is_empty() {
+            return chosen;
+        }
+        let robust_before = self.robust(current);
+        for effect in sizes {
+            // More of it where something is left.
+            let left = 1.0 + self.policy.resize_standard_errors * (2.0 / chosen.fitted.count).sqrt();
+            if effect.parameters().len() > chosen.added && chosen.fitted.mean_energy() < left {
+                continue;
+            }
+            let other = self.with(current, &effect, robust_before);
+            let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
+            if white(&other) > white(&chosen) {
+                chosen = other;
+            }
+        }
+        chosen
+    }
+
+    /// Effect `index` of `current` with one parameter more, where the data support that.
+    pub(crate) fn extended(&self, current: &Fitted, index: usize, taken: &Candidate) -> Option<Candidate> {
+        let range = current.model.range(index);
+        let (effect, start) = taken.effect.extended(&current.theta[range.clone()])?;
+        if !accepts(&current.model.without(index), &effect) {
+            return None;
+        }
+        let added = start.len() - range.len();
+        let mut theta = current.theta.clone();
+        theta.splice(range, start);
+        let model = current.model.replaced(index, effect.clone());
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        let white_gain = white_gain(current, &fitted);
+        let robust_gain = self.robust(current) - self.robust(&fitted);
+        let held_out_nats = held_out_gain(self.observations, self.selection, current, &fitted, self.policy);
+        let is_supported = white_gain.min(robust_gain) > worth(added, fitted.count, self.policy);
+        (is_supported && held_out_nats > 0.0 && fitted.end.is_usable()).then(|| Candidate {
+            white_gain: taken.white_gain + white_gain,
+            robust_gain: taken.robust_gain + robust_gain,
+            held_out_nats: taken.held_out_nats + held_out_nats,
+            added: taken.added + added,
+            effect,
+            fitted,
+            ..taken.clone()
+        })
+    }
+
+    /// Effects that look like effect `index` of `current`, in its place, best first.
+    pub(crate) fn look_alikes(
+        &self,
+        current: &Fitted,
+        index: usize,
+        taken: &Candidate,
+    ) -> Result<Vec<Replacement>, DiagnoseError> {
+        let effect = &taken.effect;
+        let (id, rest) = (effect.identifier(), current.model.without(index));
+        if effect.is_noise() {
+            return Ok(Vec::new());
+        }
+        let is_alike = |c: &Shared| {
+            let other = c.identifier();
+            !c.is_noise() && (id.resembles(other) || (other == id && c.channel() != effect.channel()))
+        };
+        let all: Vec<Shared> = self.candidates(&rest).into_iter().filter(is_alike).collect();
+        let replaced = self.each(&all, |other| self.replaced(current, index, taken, other))?;
+        let mut alike: Vec<Replacement> =
+            replaced.into_iter().flatten().filter(|r| r.candidate.is_clear_of_bounds()).collect();
+        alike.sort_by(|a, b| b.advantage.total_cmp(&a.advantage));
+        Ok(alike)
+    }
+
+    /// `other` in the place of effect `index`, everything fitted again.
+    fn replaced(&self, current: &Fitted, index: usize, taken: &Candidate, other: &Shared) -> Option<Replacement> {
+        let range = current.model.range(index);
+        let model = current.model.replaced(index, other.clone());
+        let look = |start: Vec<f64>| {
+            let mut theta = current.theta.clone();
+            theta.splice(range.clone(), start);
+            model.fit(&theta, self.observations, self.selection, Effort::Look)
+        };
+        let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+        let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);
+        let more = other.parameters().len() as f64 - range.len() as f64;
+        let white_gain = white_gain(current, &fitted);
+        let robust_gain = self.robust(current) - self.robust(&fitted);
+        let candidate = Candidate {
+            effect: other.clone(),
+            white_gain: taken.white_gain + white_gain,
+            robust_gain: taken.robust_gain + robust_gain,
+            added: other.parameters().len(),
+            fitted,
+            ..taken.clone()
+        };
+        let advantage = white_gain.min(robust_gain) - more * candidate.fitted.count.max(2.0).ln();
+        Some(Replacement { candidate, advantage })
+    }
+}

@@ -1,0 +1,384 @@
+//! What may be added to a model: made from what the record shows, screened by a linearisation,
+//! fitted.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use twinlag_model::{
+    Bands, Context, DiagnoseError, Effort, Fitted, Identifier, Linearised, Model, Observations, Parameter, Place,
+    Policy, Prepared, Selection, Settings, Shared, Stretch, Watch, candidates, dense, fit_noise, line_channel, lines,
+    report, runs,
+};
+use twinlag_optimise::{End, Scale, Variable};
+
+use crate::rank::{Kind, Score, threshold};
+
+/// Margin of a logarithm from its bound, and of a number as a share of its range, within which a
+/// parameter is on its bound.
+const LOG_MARGIN: f64 = 1e-3;
+const LINEAR_MARGIN: f64 = 1e-9;
+/// Points of the grid of each time constant, and its ends: sample periods, and a share of the
+/// record.
+const GRID_POINTS: usize = 5;
+const GRID_FROM_PERIODS: f64 = 2.0;
+const GRID_TO_SHARE: f64 = 0.03;
+/// Parameters of an effect up to which it is fitted from that grid.
+const MOST_GRID_PARAMETERS: usize = 3;
+/// Samples beyond the reach of the model without which no noise is fitted.
+const FEWEST_NOISE_SAMPLES: usize = 20;
+
+/// A candidate with its fit.
+#[derive(Clone)]
+pub(crate) struct Candidate {
+    pub(crate) effect: Shared,
+    pub(crate) fitted: Fitted,
+    /// Parameters it added.
+    pub(crate) added: usize,
+    /// `−2 ln L` saved, noise white with the levels that there are.
+    pub(crate) white_gain: f64,
+    /// `−2 ln L` saved with a free noise level in every band: what noise of any colour does not
+    /// explain.
+    pub(crate) robust_gain: f64,
+    /// Nats that it saves on blocks that were left out.
+    pub(crate) held_out_nats: f64,
+    /// What its gains count beside those of the others.
+    pub(crate) share: f64,
+}
+
+/// What an effect is to the order of candidates.
+pub(crate) fn kind(effect: &Shared) -> Kind {
+    let about = effect.about();
+    if about.is_noise {
+        Kind::Noise
+    } else if about.is_static {
+        Kind::Static
+    } else if about.imitates_static {
+        Kind::Imitator
+    } else {
+        Kind::Sensor
+    }
+}
+
+impl Candidate {
+    /// What it is worth, added to `current`.
+    pub(crate) fn score(&self, current: &Fitted, policy: &Policy) -> Score {
+        Score {
+            seat: (self.effect.identifier(), self.effect.channel()),
+            kind: kind(&self.effect),
+            prevalence: self.effect.about().rank,
+            is_sound: self.is_sound(current, policy),
+            added: self.added,
+            count: self.fitted.count,
+            white_gain: self.white_gain,
+            robust_gain: self.robust_gain,
+            share: self.share,
+            saved_energy: current.chi2 - self.fitted.chi2,
+            energy: self.fitted.mean_energy(),
+        }
+    }
+
+    /// Whether its fit says anything: it has ended well, and keeps most residuals. A time constant
+    /// that is too short to be seen may lie on its bound: the effect is none the worse for it.
+    fn is_sound(&self, current: &Fitted, policy: &Policy) -> bool {
+        let has_ended = match &self.fitted.end {
+            End::OnBound(which) => which.iter().all(|i| *i < 2),
+            end => end.is_usable() || *end == End::LimitReached,
+        };
+        has_ended && self.fitted.count > policy.kept_share * current.count && self.is_clear_of_bounds()
+    }
+
+    /// Whether the effect's parameters are clear of nothing, or of a bound that means nothing, and
+    /// leave those of the others there.
+    pub(crate) fn is_clear_of_bounds(&self) -> bool {
+        let model = &self.fitted.model;
+        let is_clear = |(p, x): (&Parameter, &f64)| {
+            let Variable { lower, upper, scale, .. } = p.variable;
+            let [margin, low, high] = match scale {
+                Scale::Logarithmic => [LOG_MARGIN, (x / lower).ln(), (upper / x).ln()],
+                Scale::Linear { .. } => [LINEAR_MARGIN * (upper - lower), x - lower, upper - x],
+            };
+            x.is_finite() && low > margin && high > margin
+        };
+        let effects = model.effects.iter().enumerate().filter(|(_, e)| !e.is_noise());
+        effects.flat_map(|(i, e)| e.parameters().iter().zip(&self.fitted.theta[model.range(i)])).all(is_clear)
+    }
+}
+
+/// Deviance saved by going from `before` to `after`, the level of the noise free.
+pub(crate) fn white_gain(before: &Fitted, after: &Fitted) -> f64 {
+    after.count * (before.mean_energy() / after.mean_energy().max(1e-300)).ln()
+}
+
+/// Whether the model lacks the effect, and can take it: it repeats none, excludes none, and determines
+/// nothing that another one determines.
+pub(crate) fn accepts(model: &Model, effect: &Shared) -> bool {
+    let id = effect.identifier();
+    let is_form_of =
+        |e: &Shared| e.identifier() == id && (e.channel() == effect.channel() || !effect.about().is_narrow);
+    let is_excluded = model.effects.iter().any(|e| is_form_of(e) || e.identifier().excludes(id));
+    let determined: Vec<_> = model.parameters().filter_map(|p| p.determines).collect();
+    let mut determines = effect.parameters().iter().filter_map(|p| p.determines);
+    !is_excluded && !determines.any(|freedom| determined.contains(&freedom))
+}
+
+/// What a search works on.
+pub(crate) struct Search<'a> {
+    prepared: &'a Prepared,
+    pub(crate) observations: &'a Observations,
+    pub(crate) selection: &'a Selection,
+    context: Context,
+    /// Effects that may be named.
+    allowed: &'a [Identifier],
+    pub(crate) policy: &'a Policy,
+    watch: Watch<'a>,
+}
+
+impl<'a> Search<'a> {
+    /// A search of `prepared`.
+    pub(crate) fn of(prepared: &'a Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
+        Self {
+            prepared,
+            observations: &prepared.observations,
+            selection: &prepared.searched,
+            context: prepared.context.clone(),
+            allowed: &settings.effects,
+            policy: &settings.policy,
+            watch,
+        }
+    }
+
+    /// The search with candidates made from what `current` shows: its time constants, lines that it
+    /// leaves over.
+    pub(crate) fn beside(mut self, current: &Fitted) -> Self {
+        self.context.tau_s = [current.theta[0], current.theta[1]];
+        let evaluation = current.model.evaluate(&current.theta, self.observations);
+        let found = lines(self.observations, &evaluation, |s| self.selection.holds(s));
+        self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
+        self
+    }
+
+    /// The candidates that `model` lacks and can take.
+    pub(crate) fn candidates(&self, model: &Model) -> Vec<Shared> {
+        candidates(self.allowed, &self.context).into_iter().filter(|c| accepts(model, c)).collect()
+    }
+
+    /// What `work` makes of each of the items, in their order.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Cancelled`] if the watch says so.
+    pub(crate) fn each<T: Sync, R: Send>(
+        &self,
+        items: &[T],
+        work: impl Fn(&T) -> R + Sync,
+    ) -> Result<Vec<R>, DiagnoseError> {
+        let done = AtomicUsize::new(0);
+        let one = |item| {
+            let out = work(item);
+            report(self.watch, "candidates", done.fetch_add(1, Ordering::Relaxed) + 1, items.len())?;
+            Ok(out)
+        };
+        items.par_iter().map(one).collect()
+    }
+
+    fn bands(&self, fitted: &Fitted) -> Bands {
+        let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
+        Bands::of(&runs(&evaluation, |s| self.selection.holds(s)))
+    }
+
+    /// `−2 ln L` with a free noise level in every band.
+    pub(crate) fn robust(&self, fitted: &Fitted) -> f64 {
+        self.bands(fitted).robust(|omega| self.selection.weighting.at(omega))
+    }
+
+    /// Both gains of a candidate, white and robust. A line has its own frequency, and is judged
+    /// there: with no weight over frequency, and no free level in a band that is wider than it.
+    fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> [f64; 2] {
+        if !effect.about().is_narrow {
+            return [white_gain(before, after), robust];
+        }
+        let energy = |fitted: &Fitted| {
+            let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
+            let pairs = evaluation.residual.iter().zip(&evaluation.sample);
+            let held = pairs.filter(|(_, s)| self.selection.holds(**s));
+            held.fold((0.0, 0.0), |(sum, n), (r, _)| (sum + r * r, n + 1.0))
+        };
+        let ((b, n), (a, _)) = (energy(before), energy(after));
+        [n * (b / a.max(1e-300)).ln(); 2]
+    }
+
+    /// Every candidate that may be added to `current`: those that may explain something are fitted,
+    /// the best few to the end.
+    pub(crate) fn fitted(&self, current: &Fitted) -> Result<Vec<Candidate>, DiagnoseError> {
+        let promising = self.screened(current)?;
+        let robust_before = self.robust(current);
+        // Where the model is far off, every candidate is fitted, from a grid of time constants as
+        // well.
+        let excerpt = self.is_far_off(current).then(|| self.prepared.excerpt());
+        let looked = self.each(&promising, |effect| {
+            if effect.is_noise() {
+                return self.with_noise(current, effect);
+            }
+            Some(match &excerpt {
+                Some(excerpt) => self.looked_at(current, effect, excerpt),
+                None => self.with(current, effect, robust_before),
+            })
+        })?;
+        let (noise, mut mean): (Vec<Candidate>, Vec<Candidate>) =
+            looked.into_iter().flatten().partition(|c| c.effect.is_noise());
+        let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
+        mean.sort_by(|a, b| unshared(b).total_cmp(&unshared(a)));
+        mean.truncate(self.policy.most_fitted_candidates);
+        let finished = self.each(&mean, |looked| {
+            let model = &looked.fitted.model;
+            let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);
+            let robust = robust_before - self.robust(&fitted);
+            let [white_gain, robust_gain] = self.gains(current, &fitted, &looked.effect, robust);
+            Candidate { fitted, white_gain, robust_gain, ..looked.clone() }
+        })?;
+        Ok(finished.into_iter().chain(noise).collect())
+    }
+
+    fn is_far_off(&self, current: &Fitted) -> bool {
+        current.mean_energy() > self.policy.far_off_energy
+    }
+
+    /// The candidates that are worth a fit, the most promising first: all of them where the model
+    /// is far off, and its score there says little; else noise, lines, and those that would gain
+    /// more than chance if the residual were linear.
+    fn screened(&self, current: &Fitted) -> Result<Vec<Shared>, DiagnoseError> {
+        let all = self.candidates(&current.model);
+        let is_far_off = self.is_far_off(current);
+        let now = (!is_far_off).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
+        let gains = self.each(&all, |effect| {
+            if effect.is_noise() || effect.about().is_narrow || is_far_off {
+                return f64::INFINITY;
+            }
+            self.score_gain(current, effect, now.as_ref())
+        })?;
+        let least = |effect: &Shared| {
+            threshold(effect.parameters().len(), self.policy.screening_probability) * current.mean_energy().max(1.0)
+        };
+        let mut promising: Vec<(f64, Shared)> =
+            gains.into_iter().zip(all).filter(|(gain, effect)| *gain > least(effect)).collect();
+        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let certain = promising.iter().take_while(|p| p.0.is_infinite()).count();
+        promising.truncate(certain + self.policy.most_fitted_candidates);
+        Ok(promising.into_iter().map(|p| p.1).collect())
+    }
+
+    /// Energy that a candidate would take off if the residual were linear in everything, from the
+    /// best of its starts.
+    ///
+    /// The residual is that of the candidate's own model: another number of factors is another
+    /// whitening of the same disagreement.
+    ///
+    /// - `now`: the current model, linearised
+    fn score_gain(&self, current: &Fitted, effect: &Shared, now: Option<&Linearised>) -> f64 {
+        let model = current.model.with(effect.clone());
+        let from = |start: &Vec<f64>| -> f64 {
+            let mut theta = current.theta.clone();
+            theta.extend_from_slice(start);
+            let lin = model.linearised_beside(&theta, self.observations, self.selection, now);
+            let slope: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
+            // Where it is singular, along the diagonal: less than it could take off, but no more
+            // than it can.
+            let taken = dense::inverse(&products(&lin))
+                .map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
+            current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
+        };
+        effect.starts().iter().map(from).fold(0.0, f64::max)
+    }
+
+    /// The candidate with the best fit of all its starts.
+    pub(crate) fn with(&self, current: &Fitted, effect: &Shared, robust_before: f64) -> Candidate {
+        let fitted = self.best_of_starts(current, effect, |model, theta| {
+            vec![model.fit(theta, self.observations, self.selection, Effort::Look)]
+        });
+        let [white_gain, robust_gain] = self.gains(current, &fitted, effect, robust_before - self.robust(&fitted));
+        self.candidate(effect, fitted, white_gain, robust_gain)
+    }
+
+    /// The candidate with the best fit to an excerpt of the record, from a grid of time constants
+    /// as well. Its gains say how it compares with the others; what it is worth is found when it is
+    /// fitted to the end.
+    fn looked_at(&self, current: &Fitted, effect: &Shared, excerpt: &(Observations, Selection)) -> Candidate {
+        let (observations, selection) = excerpt;
+        let fitted = self.best_of_starts(current, effect, |model, theta| {
+            let mut fits = vec![model.fit(theta, observations, selection, Effort::Look)];
+            if effect.parameters().len() <= MOST_GRID_PARAMETERS {
+                fits.push(self.over_grid(model, &theta[2..], excerpt));
+            }
+            fits
+        });
+        let before = current.model.energy(&current.theta, observations, selection);
+        let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
+        self.candidate(effect, fitted, gain, gain)
+    }
+
+    fn best_of_starts(
+        &self,
+        current: &Fitted,
+        effect: &Shared,
+        fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>,
+    ) -> Fitted {
+        let model = current.model.with(effect.clone());
+        let from = |start: Vec<f64>| {
+            let mut theta = current.theta.clone();
+            theta.extend(start);
+            fits(&model, &theta)
+        };
+        let all = effect.starts().into_iter().flat_map(from);
+        all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start")
+    }
+
+    fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
+        let share = if effect.about().is_narrow { self.selection.weighting.mean() } else { 1.0 };
+        let added = effect.parameters().len();
+        Candidate { effect: effect.clone(), fitted, added, white_gain, robust_gain, held_out_nats: 0.0, share }
+    }
+
+    /// The best fit to an excerpt from a grid of time constants.
+    fn over_grid(&self, model: &Model, rest: &[f64], excerpt: &(Observations, Selection)) -> Fitted {
+        let (observations, selection) = excerpt;
+        let (low, high) = (GRID_FROM_PERIODS * self.context.step_s, GRID_TO_SHARE * self.context.span_s());
+        let at = |i: usize| low * (high / low).powf(i as f64 / (GRID_POINTS - 1) as f64);
+        let pairs = (0..GRID_POINTS).flat_map(|i| (0..GRID_POINTS).map(move |j| (i, j)));
+        let points = pairs.map(|(i, j)| {
+            let theta: Vec<f64> = [at(i), at(j)].into_iter().chain(rest.iter().copied()).collect();
+            (model.energy(&theta, observations, selection), theta)
+        });
+        let best = points.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a grid has points");
+        model.fit(&best.1, observations, selection, Effort::Look)
+    }
+
+    /// The candidate of a noise, fitted to the spectrum of the residual; `None` for a record that
+    /// is too short.
+    pub(crate) fn with_noise(&self, current: &Fitted, effect: &Shared) -> Option<Candidate> {
+        let plant = current.model.plant(&current.theta, self.observations);
+        let longest = self.observations.stretches.iter().map(Stretch::len).max()?;
+        if longest < plant.consumed(true) + FEWEST_NOISE_SAMPLES {
+            return None;
+        }
+        let bands = self.bands(current);
+        let place = match effect.channel() {
+            Some(i) => Place::Reading(i),
+            None => Place::Gas,
+        };
+        let starts: Vec<[f64; 2]> = effect.starts().iter().map(|s| [s[0], s[1]]).collect();
+        let white = fit_noise(&plant, self.observations, &bands, None, &[], self.context.is_coarse);
+        let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts, self.context.is_coarse);
+        let extra = with.extra?;
+        let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
+        let mut theta = current.theta.clone();
+        theta.extend([extra.std_k, extra.correlation_s]);
+        // The weights move the time constants, and these the noise: once more is enough.
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        let held_out_nats = 0.5 * (white.held_out - with.held_out);
+        Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
+    }
+}
+
+/// Products of the columns of a linearisation.
+pub(crate) fn products(lin: &Linearised) -> Vec<Vec<f64>> {
+    lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect()
+}

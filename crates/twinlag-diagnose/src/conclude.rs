@@ -1,0 +1,164 @@
+//! From the last state of the loop to the answer.
+
+use twinlag_model::{
+    DiagnoseError, Effort, Fitted, Identifier, ModelFit, Observations, Policy, Settings, Weighting, summarise,
+};
+
+use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
+use crate::excitation::SINGLE;
+use crate::left_over::what_is_left;
+use crate::limits::not_testable;
+use crate::moves::State;
+use crate::naming::{name, of_defect, widen};
+use crate::remark::Remark;
+
+/// Most samples of a changing mean that stands for a filter where no spectrum says which
+/// frequencies are noise.
+const MOST_SMOOTHED_SAMPLES: f64 = 50.0;
+
+/// The answer, its numbers fitted once more to the whole record.
+///
+/// - `tones`: of the gas, where its power is in tones
+///
+/// # Errors
+/// [`DiagnoseError::Cancelled`] if the watch says so.
+pub(crate) fn conclude(
+    state: State<'_>,
+    settings: &Settings,
+    tones: Option<usize>,
+) -> Result<Diagnosis, DiagnoseError> {
+    let policy = &settings.policy;
+    let limits = state.search().limits(&state.current)?;
+    // Before is before everything: with the defects of the data in it.
+    let unmasked = state.prepared.unmasked(&state.base);
+    let base = base_fit(&state, unmasked.as_ref(), policy);
+    let with_effects = to_the_end(&state.current, &state);
+    let mut last = summary(&with_effects, &state, policy);
+    let mut remarks: Vec<Remark> = Vec::new();
+    for remark in state.moves.iter().filter_map(|m| m.remark()) {
+        if remark != Remark::NoiseLowered || !remarks.contains(&remark) {
+            remarks.push(remark);
+        }
+    }
+    remarks.extend(widen(&mut last, &whole_ties(&state), &state.prepared, policy));
+    let mut found: Vec<Found> = state.prepared.found.iter().map(of_defect).collect();
+    let named = state.taken.iter().enumerate();
+    found.extend(named.map(|(index, taken)| name(index, taken, &with_effects, &last)));
+    let left = what_is_left(&last, policy);
+    if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
+    {
+        remarks.push(Remark::LagAlone);
+    }
+    let is_refused = tones == Some(SINGLE);
+    if is_refused {
+        remarks.push(Remark::SingleTone);
+    }
+    let is_coherent = last.tests.iter().any(|t| t.test == "coherence" && t.p_value < policy.rejection_p_value());
+    if is_coherent && found.iter().any(|f| f.effect.is_noise()) {
+        // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the
+        // same.
+        found.retain(|f| !f.effect.is_noise());
+        remarks.push(Remark::ModelErrorAsNoise);
+    }
+    let verdict = if is_refused { Verdict::Refused } else { verdict(&state, &found, left.as_ref(), policy) };
+    if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
+        remarks.push(Remark::BiasUnknown);
+    }
+    Ok(Diagnosis {
+        verdict,
+        effects: found,
+        error: errors(&state, unmasked.as_ref(), [&base, &last]),
+        base,
+        last,
+        unexplained: left.filter(|_| !is_refused),
+        not_testable: not_testable(&state.prepared.observations, tones, policy),
+        limits,
+        remarks,
+        moves: state.moves,
+        policy: policy.clone(),
+    })
+}
+
+/// A fit of the search, of the whole record.
+fn to_the_end(fitted: &Fitted, state: &State<'_>) -> Fitted {
+    let (observations, everything) = (&state.prepared.observations, &state.prepared.everything);
+    fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
+}
+
+fn summary(fitted: &Fitted, state: &State<'_>, policy: &Policy) -> ModelFit {
+    let prepared = &state.prepared;
+    summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy)
+}
+
+/// Two lags and the whole record.
+///
+/// - `unmasked`: two lags and the record as it came, where some of that is masked
+fn base_fit(state: &State<'_>, unmasked: Option<&Fitted>, policy: &Policy) -> ModelFit {
+    let Some(unmasked) = unmasked else { return summary(&to_the_end(&state.base, state), state, policy) };
+    let (raw, levels) = &state.prepared.raw;
+    let everything = &state.prepared.everything;
+    let fitted = unmasked.model.fit(&unmasked.theta, raw, everything, Effort::Finish);
+    summarise(&fitted, raw, everything, levels, policy)
+}
+
+/// Ties of the whole model: those of a time when less was known have been looked at again. None of
+/// them is noise.
+fn whole_ties<'a>(state: &'a State<'_>) -> Vec<(Identifier, &'a Fitted)> {
+    let effects = state.current.model.effects.len();
+    let all = state.taken.iter().flat_map(|t| &t.ties);
+    let whole = all.filter(|t| !t.effect.is_noise() && t.fitted.model.effects.len() == effects);
+    whole.map(|t| (t.effect.identifier(), &t.fitted)).collect()
+}
+
+/// Whether the effects that were found explain the record. Of more of them than can be
+/// distinguished together they imitate some other cause.
+fn verdict(state: &State<'_>, found: &[Found], left: Option<&Unexplained>, policy: &Policy) -> Verdict {
+    let effects = state.taken.iter().filter(|t| !t.candidate.effect.is_noise()).count();
+    match (found.is_empty(), left) {
+        (true, None) => Verdict::Adequate,
+        (true, Some(_)) => Verdict::Unexplained,
+        (false, None) if effects <= policy.most_distinguished_effects => Verdict::Explained,
+        (false, _) => Verdict::PartlyExplained,
+    }
+}
+
+/// Errors on the blocks that judge, of the fits that chose, which have not seen them.
+///
+/// - `unmasked`: two lags and the record as it came, where some of that is masked
+/// - `fits`: before and after, of the whole record
+fn errors(state: &State<'_>, unmasked: Option<&Fitted>, fits: [&ModelFit; 2]) -> ErrorBudget {
+    let [base, last] = fits;
+    let prepared = &state.prepared;
+    let rms = |fitted: &Fitted, observations: &Observations| {
+        let evaluation = fitted.model.evaluate(&fitted.theta, observations);
+        // Without the frequencies in which there is only noise, which each factor of the inverse
+        // makes larger.
+        let filter = Weighting::of_disagreement(observations, fitted.model.noise_std_k());
+        // Where no spectrum says which these are, changes within the faster time constant are left
+        // out.
+        let faster_s = fitted.theta[0].min(fitted.theta[1]);
+        let half = (faster_s / observations.step_s()).clamp(1.0, MOST_SMOOTHED_SAMPLES) as usize;
+        let ends = evaluation.begins.iter().skip(1).copied().chain([evaluation.disagreement_k.len()]);
+        let apart: Vec<f64> = evaluation
+            .begins
+            .iter()
+            .zip(ends)
+            .flat_map(|(from, to)| filter.smooth_or_mean(&evaluation.disagreement_k[*from..to], half))
+            .collect();
+        [&evaluation.residual, &apart].map(|values| {
+            let pairs = values.iter().zip(&evaluation.sample).filter(|(_, s)| prepared.judges(**s));
+            let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), (v, _)| (sum + v * v, n + 1.0));
+            (sum / count.max(1.0)).sqrt()
+        })
+    };
+    let [r0, k0] = match unmasked {
+        Some(unmasked) => rms(unmasked, &prepared.raw.0),
+        None => rms(&state.base, &prepared.observations),
+    };
+    let [r1, k1] = rms(&state.current, &prepared.observations);
+    ErrorBudget {
+        chi2_per_dof: BeforeAfter { before: base.chi2_per_dof, after: last.chi2_per_dof },
+        held_out_normalised_rms: BeforeAfter { before: r0, after: r1 },
+        held_out_input_difference_k: BeforeAfter { before: k0, after: k1 },
+    }
+}

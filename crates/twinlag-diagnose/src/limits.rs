@@ -1,0 +1,74 @@
+//! What a search would have seen, and what no search can.
+
+use twinlag_model::{DiagnoseError, Fitted, Linearised, Observations, Policy, Shared, dense};
+
+use crate::candidates::{Search, products};
+use crate::diagnosis::Limit;
+use crate::rank::threshold;
+
+impl Search<'_> {
+    /// For each candidate that the model lacks, the smallest size that the search would have seen:
+    /// the square root of the threshold times the standard error that its main parameter would
+    /// have.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Cancelled`] if the watch says so.
+    pub(crate) fn limits(&self, current: &Fitted) -> Result<Vec<Limit>, DiagnoseError> {
+        let mut all = self.candidates(&current.model);
+        all.retain(|c| !c.is_noise() && c.main().is_some());
+        let probability = self.policy.round_false_alarm_probability / all.len().max(1) as f64;
+        let now = current.model.linearised(&current.theta, self.observations, self.selection);
+        let found = self.each(&all, |effect| self.limit(current, effect, &now, probability))?;
+        let mut out: Vec<Limit> = Vec::new();
+        for limit in found.into_iter().flatten() {
+            let is_same = |o: &Limit| o.effect == limit.effect && o.channel == limit.channel;
+            if !out.iter().any(is_same) {
+                out.push(limit);
+            }
+        }
+        Ok(out)
+    }
+
+    fn limit(&self, current: &Fitted, effect: &Shared, now: &Linearised, probability: f64) -> Option<Limit> {
+        let main = effect.main()?;
+        let model = current.model.with(effect.clone());
+        let mut theta = current.theta.clone();
+        theta.extend_from_slice(effect.starts().first()?);
+        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
+        let index = current.theta.len() + main;
+        let variance = dense::inverse(&products(&lin))?[index][index] * current.mean_energy().max(1.0);
+        let size = variance.sqrt() * threshold(effect.parameters().len(), probability).sqrt();
+        let parameter = &effect.parameters()[main];
+        (size > 0.0 && size.is_finite()).then(|| Limit {
+            effect: effect.identifier(),
+            channel: effect.channel(),
+            parameter: parameter.name.into(),
+            size,
+            unit: parameter.unit.into(),
+        })
+    }
+}
+
+/// What no record of two sensors shows, and what this one does not.
+///
+/// - `tones`: separate tones of the gas, where it has few
+pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>, policy: &Policy) -> Vec<String> {
+    let mut out = vec![
+        "anything that both sensors share (gain, offset, drift, delay, a second lag, a slow mode, \
+         radiation)"
+            .to_owned(),
+        "crosstalk that replaces part of a reading (it only makes one time constant wrong)".to_owned(),
+        "which channel picked up a sinusoid that is also in the gas".to_owned(),
+    ];
+    if let Some(tones) = tones.filter(|t| (2..=policy.most_counted_tones).contains(t)) {
+        let (equations, left) = (2 * tones, 2 * tones - 2);
+        out.push(format!(
+            "more than {left} numbers beside the time constants (the gas has {tones} tones with an amplitude \
+             and a phase each, which are {equations} equations, and the time constants take two of them)"
+        ));
+    }
+    if observations.period_s.is_none() {
+        out.push("coloured noise, input mismatch and lines (these need evenly spaced samples)".to_owned());
+    }
+    out
+}

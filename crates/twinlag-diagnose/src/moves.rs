@@ -1,0 +1,284 @@
+//! What the loop can do to a model. Each move is proposed with the evidence for it, applied in one
+//! place ([`State::apply`]), and kept in the answer.
+
+use serde::{Deserialize, Serialize};
+use twinlag_model::{DiagnoseError, Effort, Fitted, Identifier, Prepared, Settings, Watch};
+
+use crate::candidates::{Candidate, Search, kind};
+use crate::diagnosis::Evidence;
+use crate::rank::{LookAlike, successor, worth};
+use crate::remark::Remark;
+
+/// A change of the model, and why it was made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "move", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Move {
+    /// An effect was added.
+    Add {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// What it gained.
+        evidence: Evidence,
+        /// Effects that explained the record as well at the time.
+        ties: Vec<Identifier>,
+    },
+    /// An effect got a parameter more.
+    Extend {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// What the effect has gained in all.
+        evidence: Evidence,
+    },
+    /// A look-alike took the place of an effect.
+    Exchange {
+        /// The effect that went.
+        before: Identifier,
+        /// The effect that came.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// Deviance by which it is better, its parameters counted.
+        advantage: f64,
+    },
+    /// An effect was taken out.
+    Remove {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// Deviance that it saved; `None` of a noise, which went since none of its colour is left
+        /// over without it.
+        loss: Option<f64>,
+    },
+    /// Noise levels were lowered to what is left over.
+    LowerNoise {
+        /// Energy of the residual per residual beforehand.
+        energy: f64,
+    },
+    /// Frequencies were weighted by the spectrum of what is left over from there on.
+    Reweigh {
+        /// Energy of the residual per residual beforehand.
+        energy: f64,
+    },
+}
+
+impl Move {
+    /// What the reader has to know of it.
+    pub(crate) fn remark(&self) -> Option<Remark> {
+        match self {
+            Self::Exchange { before, effect, .. } => Some(Remark::Replaced { before: *before, after: *effect }),
+            Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
+            Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
+            Self::Add { .. } | Self::Extend { .. } | Self::Reweigh { .. } => None,
+        }
+    }
+}
+
+/// A move with what it makes of the model.
+pub(crate) struct Proposal {
+    entry: Move,
+    change: Change,
+}
+
+enum Change {
+    Append(Box<Taken>),
+    /// Another form of an effect, or another effect, in the place of one.
+    Put(usize, Box<Taken>),
+    /// Without an effect, fitted again.
+    Drop(usize, Box<Fitted>),
+    Levels,
+    Weights,
+}
+
+/// An effect that was added, with those that explain the record as well.
+#[derive(Clone)]
+pub(crate) struct Taken {
+    pub(crate) candidate: Candidate,
+    pub(crate) ties: Vec<Candidate>,
+}
+
+impl Taken {
+    fn effect(&self) -> Identifier {
+        self.candidate.effect.identifier()
+    }
+
+    fn is_noise(&self) -> bool {
+        self.candidate.effect.is_noise()
+    }
+}
+
+/// How far the loop has come.
+pub(crate) struct State<'a> {
+    pub(crate) prepared: Prepared,
+    settings: &'a Settings,
+    watch: Watch<'a>,
+    /// Two lags.
+    pub(crate) base: Fitted,
+    /// With what was added.
+    pub(crate) current: Fitted,
+    pub(crate) taken: Vec<Taken>,
+    pub(crate) moves: Vec<Move>,
+}
+
+impl<'a> State<'a> {
+    /// Two lags.
+    pub(crate) fn new(mut prepared: Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
+        let base = prepared.base(settings);
+        let current = base.clone();
+        Self { prepared, settings, watch, base, current, taken: Vec::new(), moves: Vec::new() }
+    }
+
+    pub(crate) fn search(&self) -> Search<'_> {
+        Search::of(&self.prepared, self.settings, self.watch)
+    }
+
+    pub(crate) fn has_noise(&self) -> bool {
+        self.current.model.noise().is_some()
+    }
+
+    /// Makes a move, and puts it down.
+    pub(crate) fn apply(&mut self, proposal: Proposal) {
+        let Proposal { entry, change } = proposal;
+        match change {
+            Change::Append(taken) => {
+                self.current = taken.candidate.fitted.clone().in_order();
+                if taken.effect().about().is_narrow {
+                    // A line is in the third differences as well.
+                    self.prepared.find_levels(&self.current, self.settings);
+                    self.refit();
+                }
+                self.taken.push(*taken);
+            }
+            Change::Put(index, taken) => {
+                self.current = taken.candidate.fitted.clone().in_order();
+                self.taken[index] = *taken;
+            }
+            Change::Drop(index, fitted) => {
+                self.current = *fitted;
+                self.taken.remove(index);
+            }
+            Change::Levels => {
+                self.prepared.lower_levels(&self.current, self.settings);
+                self.refit();
+            }
+            Change::Weights => {
+                self.prepared.weigh_by(&self.current);
+                self.refit();
+            }
+        }
+        self.moves.push(entry);
+    }
+
+    /// Both models with the levels and weights that there are now.
+    fn refit(&mut self) {
+        (self.current, self.base) = (self.prepared.refit(&self.current), self.prepared.refit(&self.base));
+    }
+
+    /// Adds the effect that explains best what is left over.
+    pub(crate) fn add(&self) -> Result<Option<Proposal>, DiagnoseError> {
+        let search = self.search().beside(&self.current);
+        let candidates = search.fitted(&self.current)?;
+        let Some((candidate, ties)) = search.accepted(&self.current, &candidates) else { return Ok(None) };
+        let entry = Move::Add {
+            effect: candidate.effect.identifier(),
+            channel: candidate.effect.channel(),
+            evidence: Evidence::of(&candidate),
+            ties: ties.iter().map(|t| t.effect.identifier()).collect(),
+        };
+        Ok(Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) }))
+    }
+
+    /// Gives effect `index` a parameter more, now that more is known.
+    pub(crate) fn extend(&self, index: usize) -> Option<Proposal> {
+        let Taken { candidate, ties } = &self.taken[index];
+        let candidate = self.search().extended(&self.current, index, candidate)?;
+        let entry = Move::Extend {
+            effect: candidate.effect.identifier(),
+            channel: candidate.effect.channel(),
+            evidence: Evidence::of(&candidate),
+        };
+        let taken = Taken { candidate, ties: ties.clone() };
+        Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
+    }
+
+    /// Takes effect `index` out if the later ones have made it needless. The last one has none
+    /// after it; and while there is noise in the model, weights that are those of the residual hide
+    /// what made them.
+    pub(crate) fn remove_needless(&self, index: usize) -> Option<Proposal> {
+        if index + 1 == self.taken.len() || self.has_noise() {
+            return None;
+        }
+        let (model, theta) = self.current.without(index);
+        let search = self.search();
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
+        let (n, parameters) = (self.current.count, self.current.model.range(index).len());
+        let loss = n * (without.mean_energy() / self.current.mean_energy()).ln();
+        (loss < worth(parameters, n, search.policy)).then(|| self.removal(index, without, Some(loss)))
+    }
+
+    /// Takes noise out that came before the effects that explain it: model error, seen from afar,
+    /// looks like noise.
+    pub(crate) fn remove_explained_noise(&self) -> Option<Proposal> {
+        let index = self.current.model.noise().filter(|index| index + 1 < self.taken.len())?;
+        let (model, theta) = self.current.without(index);
+        let model = model.with_noise(self.prepared.levels.std_k);
+        let search = self.search();
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
+        let is_explained = !search.needs_noise(&without, &self.taken[index].candidate);
+        is_explained.then(|| self.removal(index, without, None))
+    }
+
+    fn removal(&self, index: usize, without: Fitted, loss: Option<f64>) -> Proposal {
+        let effect = &self.taken[index].candidate.effect;
+        let entry = Move::Remove { effect: effect.identifier(), channel: effect.channel(), loss };
+        Proposal { entry, change: Change::Drop(index, Box::new(without)) }
+    }
+
+    /// Puts a look-alike in the place of effect `index`, now that more is known, if one is better.
+    /// Those that are as good become its ties.
+    pub(crate) fn exchange(&mut self, index: usize) -> Result<Option<Proposal>, DiagnoseError> {
+        let search = self.search();
+        let taken = &self.taken[index];
+        let mut alike = search.look_alikes(&self.current, index, &taken.candidate)?;
+        let values: Vec<LookAlike> =
+            alike.iter().map(|r| LookAlike { kind: kind(&r.candidate.effect), advantage: r.advantage }).collect();
+        let policy = &self.settings.policy;
+        let Some(at) = successor(kind(&taken.candidate.effect), &values, policy) else {
+            if !taken.is_noise() {
+                let tied = alike.into_iter().zip(values).filter(|(_, value)| value.is_tied(policy));
+                self.taken[index].ties = tied.map(|(replacement, _)| replacement.candidate).collect();
+            }
+            return Ok(None);
+        };
+        let replacement = alike.swap_remove(at);
+        let entry = Move::Exchange {
+            before: taken.effect(),
+            effect: replacement.candidate.effect.identifier(),
+            channel: replacement.candidate.effect.channel(),
+            advantage: replacement.advantage,
+        };
+        let taken = Taken { candidate: replacement.candidate, ties: Vec::new() };
+        Ok(Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) }))
+    }
+
+    /// Lowers noise levels to what is left over, where that is clearly less.
+    pub(crate) fn lower_noise(&self) -> Option<Proposal> {
+        let is_due = self.prepared.has_high_levels(&self.current, self.settings);
+        let entry = Move::LowerNoise { energy: self.current.mean_energy() };
+        is_due.then_some(Proposal { entry, change: Change::Levels })
+    }
+
+    /// Weighs frequencies by the spectrum of what is left over, once, where nothing explains it and
+    /// it is far more than noise.
+    pub(crate) fn reweigh(&self) -> Option<Proposal> {
+        let is_reweighed = self.moves.iter().any(|m| matches!(m, Move::Reweigh { .. }));
+        let energy = self.current.mean_energy();
+        let is_due = !is_reweighed && !self.has_noise() && energy >= self.settings.policy.far_off_energy;
+        is_due.then_some(Proposal { entry: Move::Reweigh { energy }, change: Change::Weights })
+    }
+}

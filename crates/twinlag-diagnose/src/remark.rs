@@ -1,0 +1,111 @@
+//! What to know before using the numbers of a diagnosis, in words.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use twinlag_model::Identifier;
+
+/// Something to know before using the numbers of a diagnosis. Its [`Display`](fmt::Display) is a
+/// sentence for the reader.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "remark", rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Remark {
+    /// An effect took the place of one that looks like it.
+    Replaced {
+        /// The effect that was taken up first.
+        before: Identifier,
+        /// The effect in its place.
+        after: Identifier,
+    },
+    /// An effect was taken out again.
+    Needless {
+        /// The effect.
+        effect: Identifier,
+    },
+    /// Noise levels were lowered to what is left over.
+    NoiseLowered,
+    /// Intervals of the time constants were widened for effects that explain the record as well.
+    Widened {
+        /// The effects that put the time constants elsewhere.
+        effects: Vec<Identifier>,
+    },
+    /// Time constants and a delay cannot be distinguished.
+    LagAlone,
+    /// The gas is a single tone.
+    SingleTone,
+    /// What was taken for noise goes with the gas.
+    ModelErrorAsNoise,
+    /// Something is missing, and intervals do not know how far it moves the numbers.
+    BiasUnknown,
+}
+
+impl fmt::Display for Remark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Replaced { before, after } => {
+                write!(f, "{before} was added first and later replaced, because {after} explains more")
+            }
+            Self::Needless { effect } => write!(
+                f,
+                "{effect} was added first and later removed, because other effects explain the record \
+                 without it"
+            ),
+            Self::NoiseLowered => f.write_str(
+                "the noise levels come from the residual, because the fastest changes of the readings \
+                 are larger and belong to the gas",
+            ),
+            Self::Widened { effects } => {
+                let names: Vec<&str> = effects.iter().map(|e| e.name()).collect();
+                write!(
+                    f,
+                    "the intervals of the time constants also cover the alternatives ({}), which give \
+                     different values",
+                    names.join(", ")
+                )
+            }
+            Self::LagAlone => f.write_str(
+                "this record does not distinguish time constants from a delay: the difference is the \
+                 total delay of channel 2, τ2 − τ1 + delay",
+            ),
+            Self::SingleTone => f.write_str(
+                "the gas is a single tone. Its amplitude and phase are two equations for two time \
+                 constants, which absorb any missing effect without a trace. Take a record in which the \
+                 gas changes at more than one rate",
+            ),
+            Self::ModelErrorAsNoise => f.write_str(
+                "the residual is coherent with the gas temperature, so it is model error and not noise. \
+                 Its spectrum weights the fit and sets the intervals",
+            ),
+            Self::BiasUnknown => {
+                f.write_str("the intervals cover noise and the residual, but not the bias from the missing effect")
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remarks_are_running_text() {
+        let (before, after) = (Identifier::DRIFT, Identifier::CALIBRATION);
+        let all = [
+            Remark::Replaced { before, after },
+            Remark::Needless { effect: before },
+            Remark::NoiseLowered,
+            Remark::Widened { effects: vec![before, after] },
+            Remark::LagAlone,
+            Remark::SingleTone,
+            Remark::ModelErrorAsNoise,
+            Remark::BiasUnknown,
+        ];
+        for remark in all {
+            let text = remark.to_string();
+            assert!(!text.contains("  ") && !text.ends_with('.'), "{text}");
+            let json = serde_json::to_string(&remark).expect("plain data");
+            assert_eq!(serde_json::from_str::<Remark>(&json).expect("as it was written"), remark);
+        }
+    }
+}

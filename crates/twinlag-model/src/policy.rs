@@ -1,0 +1,266 @@
+//! Every number that decides what a user reads, in one place, each with where it comes from.
+//!
+//! Grids, starts, bounds and iteration counts are not here: they decide how a number is found, not
+//! which one, and stand beside the code that uses them. A policy can be stored, compared and
+//! changed one number at a time.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::DiagnoseError;
+
+/// Tests of a residual at most: three of its energy and whiteness, seven of what it goes with.
+const RESIDUAL_TESTS: f64 = 10.0;
+
+/// A number of a policy: a quantity, or a count.
+trait Number: Copy {
+    fn to_f64(self) -> f64;
+    fn of_f64(value: f64) -> Self;
+}
+
+impl Number for f64 {
+    fn to_f64(self) -> f64 {
+        self
+    }
+
+    fn of_f64(value: f64) -> Self {
+        value
+    }
+}
+
+impl Number for usize {
+    fn to_f64(self) -> f64 {
+        self as f64
+    }
+
+    fn of_f64(value: f64) -> Self {
+        value.round().max(1.0) as Self
+    }
+}
+
+/// One struct from one list: its fields with their documentation, their defaults, and access by
+/// name.
+macro_rules! policy {
+    ($($(#[doc = $doc:literal])+ $name:ident: $kind:ty = $default:expr,)+) => {
+        /// The numbers that decide what a user reads. Names end in the quantity or the unit;
+        /// energies are those of the whitened residual per residual, 1 for noise of the assumed
+        /// levels; deviances are differences of `−2 ln L`.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(deny_unknown_fields, default)]
+        pub struct Policy {
+            $($(#[doc = $doc])+ pub $name: $kind,)+
+        }
+
+        impl Default for Policy {
+            fn default() -> Self {
+                Self { $($name: $default,)+ }
+            }
+        }
+
+        impl Policy {
+            /// Names of all numbers, each with its documentation.
+            pub const ABOUT: &[(&str, &str)] = &[$((stringify!($name), concat!($($doc, "\n"),+)),)+];
+
+            /// Every number with its name.
+            pub fn numbers(&self) -> Vec<(&'static str, f64)> {
+                vec![$((stringify!($name), Number::to_f64(self.$name)),)+]
+            }
+
+            /// The policy with another `value` of the number `name`, counts rounded and at least 1;
+            /// `None` if there is no such number.
+            #[must_use]
+            pub fn with(&self, name: &str, value: f64) -> Option<Self> {
+                let mut out = self.clone();
+                match name {
+                    $(stringify!($name) => out.$name = Number::of_f64(value),)+
+                    _ => return None,
+                }
+                Some(out)
+            }
+        }
+    };
+}
+
+policy! {
+    /// Probability that one round adds an effect that is not there, all candidates together: the
+    /// rate that is promised. Experiment `false-alarms` measures what becomes of it.
+    round_false_alarm_probability: f64 = 1e-3,
+    /// Probability that noise alone lets one candidate be fitted: a screen that costs time alone,
+    /// ten times as wide as the promised rate, since a linearisation is not exact.
+    screening_probability: f64 = 0.01,
+    /// Probability that any of the tests of a right model fails. Each test has its share of it
+    /// ([`Policy::rejection_p_value`]).
+    record_rejection_probability: f64 = 1e-3,
+
+    /// Deviance up to which two effects explain a record equally well: a likelihood ratio of `e⁵`,
+    /// 150, which knowledge of the rig easily outweighs.
+    tie_deviance: f64 = 10.0,
+    /// Deviance, whatever the noise, up to which candidates are compared with white noise: two
+    /// ties, since either may be off by one.
+    near_deviance: f64 = 20.0,
+    /// Deviance up to which two candidates are one model in two guises, the effect that occurs more
+    /// often named: twice the logarithm of a likelihood ratio below 3 is no evidence (Kass and
+    /// Raftery 1995).
+    same_deviance: f64 = 2.0,
+
+    /// Part of what noise of another colour explains that an effect must explain whatever the
+    /// noise, to come before it: chosen.
+    beside_noise_share: f64 = 0.03,
+    /// Part of what noise of another colour explains that an effect must take off the energy, to
+    /// come before it all the same: chosen, the larger half.
+    instead_of_noise_share: f64 = 0.5,
+    /// Part of the best candidate's score that a static disagreement must have to come first where
+    /// no effect explains the record: chosen.
+    static_share: f64 = 0.25,
+    /// Part of the residuals that a model must keep: one that takes most of a short stretch away
+    /// explains nothing. Chosen.
+    kept_share: f64 = 0.8,
+
+    /// Energy beyond which a model is far off, and a linearisation there says little: chosen, 1.7
+    /// times the noise in amplitude.
+    far_off_energy: f64 = 3.0,
+    /// Energy that the best of the candidates leaves beyond which no single effect explains the
+    /// record: chosen.
+    incomplete_energy: f64 = 1.5,
+    /// Standard errors of the energy beyond which more parameters of an effect are tried: three,
+    /// once in 700 right models.
+    resize_standard_errors: f64 = 3.0,
+
+    /// Effects that are added at most: twice as many as can usually be distinguished, so that a
+    /// record in which they cannot is seen as one. Chosen.
+    most_effects: usize = 4,
+    /// Effects that can be distinguished; a verdict on more is partial. Chosen: experiment `pairs`
+    /// measures how often two are.
+    most_distinguished_effects: usize = 2,
+    /// Candidates that are fitted to the end, of some thirty: chosen, it costs time.
+    most_fitted_candidates: usize = 10,
+
+    /// Shortest time constant that samples resolve, sample periods: a fifth leaves `e⁻⁵`, less than
+    /// a hundredth, of a step to the next sample.
+    shortest_resolved_periods: f64 = 0.2,
+    /// Part of the longest time constant that a fit may reach beyond which it is as good as on that
+    /// bound. Chosen.
+    longest_resolved_share: f64 = 0.9,
+    /// Standard error of a time constant's logarithm beyond which it is not printed: its 95 %
+    /// interval spans a factor of seven, `exp(4 × 0.5)`.
+    vague_log_std: f64 = 0.5,
+    /// Standard error of a time constant's logarithm up to which the curvature is believed, and no
+    /// other minimum is looked for. Chosen.
+    certain_log_std: f64 = 0.03,
+    /// Factor by which a time constant is moved to see whether another fits as well: chosen.
+    ridge_factor: f64 = 2.0,
+
+    /// Standard errors by which energy is less than that of the levels before these are lowered:
+    /// four, once in 30 000 records.
+    lower_levels_standard_errors: f64 = 4.0,
+
+    /// Blocks along the record of which some judge: many short ones, so that they see the gas that
+    /// the others see. Chosen.
+    judging_blocks: usize = 80,
+    /// One block in so many judges: an eighth of the record makes its error certain to 4 % in 3000
+    /// samples.
+    judging_every_blocks: usize = 8,
+    /// Blocks along the record that are left out in turn when a candidate is accepted: chosen.
+    held_out_blocks: usize = 40,
+    /// Groups of those, each left out together: chosen, the usual five, which leave four fifths for
+    /// the fit.
+    held_out_folds: usize = 5,
+    /// Part of a block beside a left-out one that is in neither, since it shares readings with it:
+    /// chosen.
+    block_gap_share: f64 = 0.1,
+    /// The most samples of such a gap: chosen.
+    block_gap_most_samples: usize = 20,
+
+    /// Robust standard deviations beyond which a single reading is wrong: once in 500 million
+    /// readings of Gaussian noise.
+    spike_standard_deviations: f64 = 6.0,
+    /// The distance from which on a reading is wrong in a channel that has such: once in 150 000
+    /// readings.
+    further_spike_standard_deviations: f64 = 4.5,
+    /// Factor by which a reading that the residual hardly shows must stick out farther from its
+    /// neighbours: chosen.
+    spike_neighbour_factor: f64 = 1.7,
+    /// Part of a channel's readings beyond which these are not isolated: chosen.
+    most_spikes_share: f64 = 0.05,
+    /// Readings at one extreme value from which on the converter is taken to end there, if half of
+    /// them are neighbours: chosen.
+    fewest_readings_at_end: usize = 8,
+
+    /// Power of a tone over that of the noise from which on it counts: a bin of noise is beyond it
+    /// once in 10¹³.
+    tone_power_ratio: f64 = 30.0,
+    /// Samples below which tones are not counted: chosen.
+    tone_fewest_samples: usize = 200,
+    /// Periods of a tone in a record below which it is not seen to come back: chosen.
+    tone_fewest_periods: usize = 5,
+    /// Tones of the gas up to which the equations they give are counted for the reader: chosen.
+    most_counted_tones: usize = 4,
+}
+
+impl Policy {
+    /// The p-value below which a test of a residual rejects the model: all of them together do so
+    /// in [`Policy::record_rejection_probability`] of the right models at most (Bonferroni).
+    pub fn rejection_p_value(&self) -> f64 {
+        self.record_rejection_probability / RESIDUAL_TESTS
+    }
+
+    /// Samples beside a block of `blocks` in a record of `samples` that are neither in it nor out
+    /// of it.
+    pub(crate) fn block_gap_samples(&self, samples: usize, blocks: usize) -> usize {
+        let share = samples as f64 / blocks.max(1) as f64 * self.block_gap_share;
+        (share as usize).min(self.block_gap_most_samples)
+    }
+
+    /// That every number is positive, and that shares and probabilities are no more than 1.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Policy`] names the first that is not.
+    pub fn check(&self) -> Result<(), DiagnoseError> {
+        for (name, got) in self.numbers() {
+            let is_share = name.ends_with("_share") || name.ends_with("_probability");
+            if !got.is_finite() || got <= 0.0 || (is_share && got > 1.0) {
+                return Err(DiagnoseError::Policy { name, got });
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_number_changes_by_its_name() {
+        let policy = Policy::default();
+        let other = policy.with("tie_deviance", 7.5).expect("a number of the policy");
+        assert_eq!(other.tie_deviance, 7.5);
+        assert_eq!(Policy { tie_deviance: policy.tie_deviance, ..other }, policy);
+        assert_eq!(policy.with("most_effects", 0.2).expect("a number of the policy").most_effects, 1);
+        assert_eq!(policy.with("no_such_number", 1.0), None);
+    }
+
+    #[test]
+    fn what_means_nothing_is_refused_by_its_name() {
+        let policy = Policy::default();
+        policy.check().expect("the default is sound");
+        for (name, value) in [("tie_deviance", 0.0), ("kept_share", 1.1), ("far_off_energy", f64::NAN)] {
+            let error = policy.with(name, value).expect("a number of the policy").check().expect_err(name);
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        policy.with("kept_share", 1.0).expect("a number of the policy").check().expect("all of it");
+    }
+
+    /// A tenth of a block, rounded down, up to the cap.
+    #[test]
+    fn gaps_are_a_share_of_a_block_up_to_their_cap() {
+        let policy = Policy::default();
+        assert_eq!([799, 800, 15_999, 16_000, 100_000].map(|n| policy.block_gap_samples(n, 80)), [0, 1, 19, 20, 20]);
+    }
+
+    #[test]
+    fn tests_share_the_rate_of_a_record() {
+        let policy = Policy::default();
+        assert_eq!(RESIDUAL_TESTS * policy.rejection_p_value(), policy.record_rejection_probability);
+        assert_eq!(policy.rejection_p_value(), 1e-4);
+    }
+}
