@@ -11,7 +11,8 @@
 use std::collections::VecDeque;
 
 use twinlag_compensate::{Form, learn, reconstruct};
-use twinlag_model::{Extended, Fitted, Observations, Policy, held_out_gain};
+use twinlag_model::{Extended, Fitted, Observations, Policy, dense, held_out_gain};
+use twinlag_optimise::Scale;
 
 use crate::candidates::{Candidate, Search};
 use crate::rank::{Score, rank, threshold, ties};
@@ -28,13 +29,35 @@ impl Search<'_> {
                 first.held_out_nats =
                     held_out_gain(self.observations, self.selection, current, &first.fitted, self.policy);
             }
-            if first.held_out_nats > 0.0 && is_confirmed(&first, current, self.observations, self.policy) {
+            if first.held_out_nats > 0.0 && self.has_size(&first) && is_confirmed(&first, current, self.observations, self.policy) {
                 let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
                 let tied = ties(&first.score(current, self.policy), &others, self.policy);
                 return Some((first, tied.into_iter().map(|i| all[order[i]].clone()).collect()));
             }
         }
         None
+    }
+
+    /// Whether an effect that puts a factor into both inverses has a size of its own.
+    ///
+    /// Such an effect changes the model where its size is nothing as well: both disagreements pass the factor
+    /// `1 + τ s` once more, which takes off any exponential of time constant `τ`, as of an amplifier that warms up. A
+    /// gain that comes with a size of nothing is no sign of the effect.
+    fn has_size(&self, candidate: &Candidate) -> bool {
+        let effect = &candidate.effect;
+        let main = effect.main().map(|i| (i, &effect.parameters()[i]));
+        let Some((main, _)) = main.filter(|(_, p)| matches!(p.variable.scale, Scale::Linear { .. })) else {
+            return true;
+        };
+        if !effect.about().turns_phases {
+            return true;
+        }
+        let Fitted { model, theta, .. } = &candidate.fitted;
+        let index = model.range(model.effects.len() - 1).start + main;
+        let lin = model.linearised(theta, self.observations, self.selection);
+        let Some(inverse) = dense::inverse(&dense::gram(&lin.columns)) else { return false };
+        let variance = inverse[index][index] * candidate.fitted.mean_energy().max(1.0);
+        theta[index] * theta[index] > threshold(1, self.policy.round_false_alarm_probability) * variance
     }
 
     /// Whether the noise that is left over at `without` is of the colour of `taken`.

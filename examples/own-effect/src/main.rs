@@ -5,6 +5,8 @@
 
 mod warm_up;
 
+use std::ops::ControlFlow;
+
 use twinlag_diagnose::{Diagnosis, Observations, Settings, Stretch, Verdict, diagnose};
 use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Simulated, Turbulence};
 
@@ -50,7 +52,7 @@ fn diagnosed(simulated: &Simulated) -> Result<Diagnosis, Box<dyn std::error::Err
     settings.effects.push(WARM_UP);
     let stretch = Stretch::new(simulated.time_s.clone(), [simulated.t1_c.clone(), simulated.t2_c.clone()]);
     let observations = Observations::new(vec![stretch], Some(PERIOD_S))?;
-    Ok(diagnose(&observations, &settings, &|_, _, _| ())?)
+    Ok(diagnose(&observations, &settings, &|_, _, _| ControlFlow::Continue(()))?)
 }
 
 fn report(diagnosis: &Diagnosis) {
