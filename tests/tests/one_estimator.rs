@@ -3,7 +3,8 @@
 
 use std::path::PathBuf;
 
-use twinlag::estimate::{Estimate, NoiseKnowledge, Task};
+use twinlag::cross_relation::CostError;
+use twinlag::estimate::{Estimate, EstimateError, NoiseKnowledge, Task};
 use twinlag::record::{Record, Selection};
 use twinlag::{Estimator, Hold, Options, Status, characterise, readings};
 
@@ -23,7 +24,13 @@ fn characterise_reports_the_estimator_s_own_numbers() {
             let answer = characterise(&record, &options).expect("a sound question");
             let readings = readings(&record, &options).expect("usable");
             let task = Task { noise: NoiseKnowledge::default(), ..Task::new(&readings) };
-            let found = estimator.estimate(&task).expect("answered");
+            let found = match estimator.estimate(&task) {
+                Err(EstimateError::Cost(CostError::Singular)) => {
+                    assert_eq!(answer.status, Status::NotIdentifiable, "{name}, {estimator}");
+                    continue;
+                }
+                found => found.expect("a sound question"),
+            };
             if matches!(answer.status, Status::NotIdentifiable | Status::AtBound) {
                 continue;
             }

@@ -6,13 +6,14 @@
 
 use twinlag_bias::{Compensated, Hybrid, Noise, Normalised, plain_covariance};
 use twinlag_cross_relation::{CrossRelation, Segment};
-use twinlag_optimise::{Budget, Evaluations, Fit, MultiStart, Problem, Variable};
+use twinlag_optimise::{Budget, End, Evaluations, Fit, MultiStart, Problem, Variable};
 
 use crate::error::EstimateError;
 use crate::fitting::{add, free, sum};
 use crate::levels::Levels;
 use crate::objective::{EstimatorCost, Objective};
 use crate::outcome::Solved;
+use crate::starts::starts as own_starts;
 use crate::task::Task;
 use crate::vocabulary::{Estimator, NoiseKnowledge};
 use crate::whitened::WhitenedFit;
@@ -110,8 +111,15 @@ fn minimise<'a, const P: usize>(
     let mut run = |cost: &EstimatorCost<'_>, starts: &[Vec<f64>]| -> Result<Fit, EstimateError> {
         let objective = Objective::<P> { cost, priors: &[] };
         let problem = Problem::new(&objective, variables.to_vec())?;
-        let all = MultiStart::run(&problem, task.minimiser, starts, &Budget::default())?;
+        let mut all = MultiStart::run(&problem, task.minimiser, starts, &Budget::default())?;
         add(&mut evaluations, sum(all.fits()));
+        if all.best().end == End::LimitReached {
+            // In the right valley, but rounding keeps a solver that compares values from settling
+            // there: from elsewhere it may.
+            let own = own_starts(&objective, task.readings, variables);
+            all = MultiStart::run(&problem, task.minimiser, &own, &Budget::default())?;
+            add(&mut evaluations, sum(all.fits()));
+        }
         Ok(all.best().clone())
     };
     let knows_ratio_alone = matches!(task.noise, NoiseKnowledge::Ratio(_));
