@@ -1,6 +1,6 @@
 //! One trait for every estimator, and the family behind it.
 
-use twinlag_cross_relation::Middle;
+use twinlag_cross_relation::ScoreVariance;
 
 use crate::error::EstimateError;
 use crate::outcome::{Outcome, Solved};
@@ -73,7 +73,7 @@ impl Estimator {
             return Ok(self.solve::<P>(task, None)?.outcome());
         }
         let fit = WhitenedFit::<P>::find(task)?;
-        let middle = Middle::WhiteNoise;
+        let middle = ScoreVariance::WhiteNoise;
         let solved = fit.solved(if task.intervals { fit.covariance(middle) } else { None });
         let intervals = solved.covariance.map(|c| fit.intervals(&c, false));
         Ok(solved.outcome_with(intervals))
@@ -104,9 +104,11 @@ impl Estimator {
     ) -> Result<Solved<P>, EstimateError> {
         match self {
             Self::Whitened => {
-                let own = if beside.is_none() { Some(WhitenedFit::find(task)?) } else { None };
-                let fit = beside.or(own.as_ref()).expect("one of them is there");
-                Ok(fit.solved(fit.covariance(Middle::WhiteNoise)))
+                let of = |fit: &WhitenedFit<'_, P>| fit.solved(fit.covariance(ScoreVariance::WhiteNoise));
+                Ok(match beside {
+                    Some(fit) => of(fit),
+                    None => of(&WhitenedFit::find(task)?),
+                })
             }
             Self::CrossRelation | Self::BiasCompensated | Self::Normalised | Self::Hybrid => {
                 published::solve(self, task, beside)

@@ -21,7 +21,7 @@ pub fn other_hold(hold: Discretisation) -> Discretisation {
     }
 }
 
-impl<'a, const P: usize> WhitenedFit<'a, P> {
+impl<const P: usize> WhitenedFit<'_, P> {
     /// This fit with `hold`, at noise of one size, from where it ended: close to where it will end.
     ///
     /// # Errors

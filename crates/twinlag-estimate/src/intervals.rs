@@ -112,7 +112,7 @@ pub(crate) struct Minimum<'m, 'a, const P: usize> {
 }
 
 impl<const P: usize> Minimum<'_, '_, P> {
-    /// TauIntervals of both time constants; by the profile `always`, or where the quadratic form
+    /// Intervals of both time constants; by the profile `always`, or where the quadratic form
     /// does not describe it.
     pub(crate) fn intervals(&self, always: bool) -> TauIntervals {
         let mut out = TauIntervals::quadratic(&self.theta, self.covariance);

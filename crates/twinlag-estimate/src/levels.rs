@@ -194,6 +194,7 @@ impl Levels {
     }
 
     /// Levels that a cost has profiled itself: how well it knows them is not known.
+    #[must_use]
     pub fn profiled(mut self, std_k: [f64; 2]) -> Self {
         if std_k != self.std_k {
             (self.std_k, self.log_covariance) = (std_k, [[0.0; 2]; 2]);

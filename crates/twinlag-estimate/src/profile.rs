@@ -6,7 +6,7 @@
 //! unions over all that is allowed. Where the cost owes its shape to noise rather than to the
 //! signal it is not chi-square distributed, and far more is allowed.
 
-use twinlag_cross_relation::Middle;
+use twinlag_cross_relation::ScoreVariance;
 use twinlag_optimise::{Budget, End, Problem};
 
 use crate::error::EstimateError;
@@ -55,6 +55,7 @@ impl Ridge {
     }
 
     /// The union of two, where this one ended.
+    #[must_use]
     pub fn with(&self, other: &Self) -> Self {
         Self {
             difference: (self.difference.0, union(self.difference.1, other.difference.1)),
@@ -79,7 +80,7 @@ struct Walk<'w, 'a, const P: usize> {
     other: usize,
     /// What is fitted on the way.
     rest: Vec<usize>,
-    middle: Middle,
+    middle: ScoreVariance,
     lowest: f64,
     /// How much wider than white noise alone the residual makes the spread; thresholds grow by its
     /// square.
@@ -98,17 +99,17 @@ impl<const P: usize> WhitenedFit<'_, P> {
     /// [`EstimateError::Optimiser`] from the minimiser.
     /// ```
     #[doc = include_str!("../doc/readings.txt")]
-    /// use twinlag_cross_relation::Middle;
+    /// use twinlag_cross_relation::ScoreVariance;
     /// use twinlag_estimate::{Task, WhitenedFit};
     ///
     /// let fit = WhitenedFit::<2>::find(&Task::new(&readings))?;
-    /// let ridge = fit.ridge(0, Middle::WhiteNoise)?.expect("both are fitted");
+    /// let ridge = fit.ridge(0, ScoreVariance::WhiteNoise)?.expect("both are fitted");
     /// let (difference_s, [low_s, high_s]) = ridge.difference;
     /// assert!(low_s < difference_s && difference_s < high_s);
     /// assert!(low_s < 0.093 && 0.093 < high_s);
     /// # Ok::<(), twinlag_estimate::EstimateError>(())
     /// ```
-    pub fn ridge(&self, index: usize, middle: Middle) -> Result<Option<Ridge>, EstimateError> {
+    pub fn ridge(&self, index: usize, middle: ScoreVariance) -> Result<Option<Ridge>, EstimateError> {
         let other = 1 - index;
         let rest: Vec<usize> = self.free().into_iter().filter(|&i| i != index).collect();
         if !rest.contains(&other) {
@@ -118,7 +119,8 @@ impl<const P: usize> WhitenedFit<'_, P> {
         let mut walk =
             Walk { from: self, cost: &cost, index, other, rest, middle, lowest: self.value(), inflation: 1.0 };
         let best = &self.fit.x;
-        if let (Some(actual), Some(assumed)) = (walk.spread(best, middle), walk.spread(best, Middle::WhiteNoise)) {
+        if let (Some(actual), Some(assumed)) = (walk.spread(best, middle), walk.spread(best, ScoreVariance::WhiteNoise))
+        {
             walk.inflation = (actual / assumed).powi(2).max(1.0);
         }
         let mut found = walk.at(best);
@@ -131,7 +133,7 @@ impl<const P: usize> WhitenedFit<'_, P> {
 
 impl<const P: usize> Walk<'_, '_, P> {
     /// Standard error of the other time constant at `x`, s.
-    fn spread(&self, x: &[f64], middle: Middle) -> Option<f64> {
+    fn spread(&self, x: &[f64], middle: ScoreVariance) -> Option<f64> {
         let theta = std::array::from_fn(|i| x[i]);
         let covariance = self.from.whitened.covariance::<P>(&theta, &self.rest, &[f64::INFINITY; P], middle);
         covariance.map(|c| c[self.other][self.other].sqrt())

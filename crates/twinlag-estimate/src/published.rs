@@ -56,12 +56,11 @@ pub(crate) fn solve<const P: usize>(
     let own = if is_alone { Some(WhitenedFit::<P>::find(task)?) } else { None };
     let whitened = beside.or(own.as_ref());
     let evaluations = whitened.map_or_else(Evaluations::default, |fit| fit.evaluations);
-    let (variables, std_k, ar1) = match whitened {
-        Some(fit) => (fit.variables.clone(), fit.whitened.noise_std(), fit.levels.ar1),
-        None => {
-            let levels = Levels::of(task)?;
-            (task.variables::<P>(levels.std_k[1]), levels.std_k, levels.ar1)
-        }
+    let (variables, std_k, ar1) = if let Some(fit) = whitened {
+        (fit.variables.clone(), fit.whitened.noise_std(), fit.levels.ar1)
+    } else {
+        let levels = Levels::of(task)?;
+        (task.variables::<P>(levels.std_k[1]), levels.std_k, levels.ar1)
     };
     let starts = match whitened {
         Some(fit) if task.starts_s.is_empty() => vec![fit.fit.x.clone()],
@@ -140,12 +139,12 @@ fn minimise<'a, const P: usize>(
 }
 
 /// The cost of `estimator` for noise of levels `std_k` and autoregressive coefficients `ar1`.
-fn cost<'a>(
+fn cost(
     estimator: Estimator,
-    published: CrossRelation<'a>,
+    published: CrossRelation<'_>,
     std_k: [f64; 2],
     ar1: [f64; 2],
-) -> Result<EstimatorCost<'a>, EstimateError> {
+) -> Result<EstimatorCost<'_>, EstimateError> {
     let noise = [noise(std_k[0], ar1[0])?, noise(std_k[1], ar1[1])?];
     Ok(match estimator {
         Estimator::BiasCompensated => EstimatorCost::Compensated(Compensated::new(published, noise)),

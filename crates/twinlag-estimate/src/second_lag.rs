@@ -4,7 +4,7 @@
 //! fit. What remains is how large it may be: the profile of the cost, upwards. The time constants
 //! then hold for every second lag that the record allows.
 
-use twinlag_cross_relation::Middle;
+use twinlag_cross_relation::ScoreVariance;
 use twinlag_optimise::{Budget, End, Problem, Variable};
 
 use crate::error::EstimateError;
@@ -40,7 +40,7 @@ pub struct Unseen<const P: usize> {
     pub moves: [f64; P],
 }
 
-impl<'a, const P: usize> WhitenedFit<'a, P> {
+impl<const P: usize> WhitenedFit<'_, P> {
     /// Fits without the second lags that are not seen, which are held at none from here on. `true`
     /// where there were any.
     ///
@@ -60,7 +60,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     fn leave_out_least_seen(&mut self) -> Result<bool, EstimateError> {
         let free = self.free();
         let theta = self.theta();
-        let covariance = self.whitened.covariance(&theta, &free, &self.prior_std(), Middle::WhiteNoise);
+        let covariance = self.whitened.covariance(&theta, &free, &self.prior_std(), ScoreVariance::WhiteNoise);
         let doubt = |i: usize| match (&self.fit.end, covariance) {
             (End::OnBound(which), _) if which.contains(&i) => f64::INFINITY,
             (_, Some(c)) => c[i][i].sqrt() / theta[i],
@@ -121,7 +121,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
 
     fn covariance_of(&self, ended: &Ended<'_>) -> Option<[[f64; P]; P]> {
         let theta = std::array::from_fn(|i| ended.fit.x[i]);
-        ended.whitened.covariance(&theta, &self.free(), &self.prior_std(), Middle::WhiteNoise)
+        ended.whitened.covariance(&theta, &self.free(), &self.prior_std(), ScoreVariance::WhiteNoise)
     }
 
     /// Finds how large the second lags may be that are not seen: for each the profile of the cost,
@@ -132,17 +132,17 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     /// [`EstimateError::Optimiser`] from the minimiser.
     /// ```
     #[doc = include_str!("../doc/readings.txt")]
-    /// use twinlag_cross_relation::Middle;
+    /// use twinlag_cross_relation::ScoreVariance;
     /// use twinlag_estimate::{Task, WhitenedFit};
     ///
     /// // Sensors of first order, asked for a second lag of the first one.
     /// let mut fit = WhitenedFit::<6>::find(&Task { second_order: [true, false], ..Task::new(&readings) })?;
-    /// fit.bound_unseen_lags(Middle::WhiteNoise)?;
+    /// fit.bound_unseen_lags(ScoreVariance::WhiteNoise)?;
     /// let limit_s = fit.unseen()[0].expect("there is none").at_most_s.expect("bounded");
     /// assert!(limit_s < 0.005);
     /// # Ok::<(), twinlag_estimate::EstimateError>(())
     /// ```
-    pub fn bound_unseen_lags(&mut self, middle: Middle) -> Result<(), EstimateError> {
+    pub fn bound_unseen_lags(&mut self, middle: ScoreVariance) -> Result<(), EstimateError> {
         for sensor in 0..2 {
             if self.unseen[sensor].is_some() {
                 self.unseen[sensor] = Some(self.bound(sensor, middle)?);
@@ -151,12 +151,12 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
         Ok(())
     }
 
-    fn bound(&self, sensor: usize, middle: Middle) -> Result<Unseen<P>, EstimateError> {
+    fn bound(&self, sensor: usize, middle: ScoreVariance) -> Result<Unseen<P>, EstimateError> {
         let limit = match middle {
-            Middle::WhiteNoise => CHI2_95_ONE_SIDED,
+            ScoreVariance::WhiteNoise => CHI2_95_ONE_SIDED,
             // The cost is in units of the noise that the estimate rests on, which may be the
             // residual's own.
-            Middle::ResidualSpectrum => CHI2_95_ONE_SIDED * self.energy_of_assumed_noise().max(1.0),
+            ScoreVariance::ResidualSpectrum => CHI2_95_ONE_SIDED * self.energy_of_assumed_noise().max(1.0),
         };
         let cost = EstimatorCost::Whitened(self.whitened.clone());
         let objective = Objective::<P> { cost: &cost, priors: &self.priors };

@@ -7,7 +7,7 @@
 //! well. Both the levels as they were found and that size are kept, for whoever wants to test the
 //! model by them.
 
-use twinlag_cross_relation::{Middle, Parameter, Readings, Whitened};
+use twinlag_cross_relation::{Parameter, Readings, ScoreVariance, Whitened};
 use twinlag_optimise::{End, Evaluations, Fit, Variable};
 use twinlag_sensor::Discretisation;
 
@@ -32,13 +32,13 @@ pub const ENERGY_THAT_OUTWEIGHS_NOISE: f64 = 1.5;
 /// second lags.
 /// ```
 #[doc = include_str!("../doc/readings.txt")]
-/// use twinlag_cross_relation::Middle;
+/// use twinlag_cross_relation::ScoreVariance;
 /// use twinlag_estimate::{Task, WhitenedFit};
 ///
 /// let fit = WhitenedFit::<2>::find(&Task::new(&readings))?;
 /// // The levels of the third differences, and what the residual has of them.
 /// assert!((fit.levels().std_k[0] / 0.05 - 1.0).abs() < 0.1 && (fit.energy() - 1.0).abs() < 0.2);
-/// let covariance = fit.covariance(Middle::WhiteNoise).expect("a minimum");
+/// let covariance = fit.covariance(ScoreVariance::WhiteNoise).expect("a minimum");
 /// assert!((fit.theta()[0] - 0.0238).abs() < 4.0 * covariance[0][0].sqrt());
 /// # Ok::<(), twinlag_estimate::EstimateError>(())
 /// ```
@@ -321,7 +321,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     ///
     /// - `middle`: noise of the stated size, or the residual's own spectrum where the model leaves
     ///   more than noise
-    pub fn covariance(&self, middle: Middle) -> Option<[[f64; P]; P]> {
+    pub fn covariance(&self, middle: ScoreVariance) -> Option<[[f64; P]; P]> {
         if !self.fit.end.is_usable() {
             return None;
         }

@@ -9,7 +9,7 @@ mod conclude;
 mod explain;
 mod fill;
 
-use twinlag_cross_relation::{CostError, Middle, Parameter, Readings, ResidualTest, Segment, Steps};
+use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
 use twinlag_estimate::{
     ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, NoiseKnowledge, RunAtRest, Solved, Task, WhitenedFit,
     other_hold,
@@ -103,8 +103,8 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     // is held against them.
     if fit.lower_levels_to_residual() {
         warnings.push(
-            "the signal moves between samples as noise would: the noise levels are scaled to the residual, and their \
-             ratio is a guess; give --noise S1,S2 if you know them"
+            "the signal changes between samples as noise does, so the noise levels are scaled \
+                     to the residual and their ratio is a guess; give --noise S1,S2 if you know them"
                 .into(),
         );
     }
@@ -113,7 +113,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     let theta = fit.theta();
     let tests = asked.tests(&fit, &theta)?;
     let is_rejected = fit.is_rejected_by(&tests);
-    let middle = if is_rejected { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+    let middle = if is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
     let covariance = fit.covariance(middle);
     if covariance.is_some() {
         fit.bound_unseen_lags(middle)?;
@@ -232,15 +232,16 @@ impl Asked<'_> {
             solved => solved?,
         };
         let biased = match estimator {
-            Estimator::CrossRelation => "the plain cross-relation cost is biased to long time constants by noise",
+            Estimator::CrossRelation => "the plain cross-relation cost is biased towards long time constants by noise",
             Estimator::DifferenceEquationLs => {
-                "noise biases least squares on the difference equation, and which way depends on which sensor is called T1"
+                "noise biases least squares on the difference equation, in a direction that depends \
+                     on which sensor is called T1"
             }
             Estimator::DifferenceEquationTls => "noise biases total least squares on the difference equation",
             _ => "",
         };
         if !biased.is_empty() {
-            warnings.push(format!("{biased}; its intervals say how the estimate scatters, not how far it is off"));
+            warnings.push(format!("{biased}; its intervals cover the scatter of the estimate, not its bias"));
         }
         if !estimator.is_closed_form() {
             let discarded = solved.discarded;

@@ -22,7 +22,8 @@ pub(super) fn intervals<const P: usize>(
     let Intervals::Bootstrap(bootstrap) = asked.options.intervals else { return Ok(None) };
     if is_rejected {
         warnings.push(
-            "the bootstrap makes its records by the model, which this record contradicts: the intervals are not by it"
+            "the bootstrap simulates records with the model, which this record contradicts, so \
+                     it was not used for the intervals"
                 .into(),
         );
         return Ok(None);
@@ -33,7 +34,8 @@ pub(super) fn intervals<const P: usize>(
     let interval_95_s = bootstrap.intervals(&watched, &fit.task_of_replicates(), &outcome)?;
     let (Some(standard_error_s), Some(interval_95_s)) = (outcome.standard_error_s, interval_95_s) else {
         warnings.push(
-            "more than a tenth of the bootstrap's records have no answer, so it has no intervals; these are from standard errors"
+            "more than a tenth of the simulated records have no answer, so the bootstrap gives \
+                     no intervals; these are from standard errors"
                 .into(),
         );
         return Ok(None);

@@ -1,7 +1,7 @@
 //! The verdict: status and intervals, or in place of a number that the record does not determine,
 //! the reason.
 
-use twinlag_cross_relation::{Middle, ResidualTest};
+use twinlag_cross_relation::{ResidualTest, ScoreVariance};
 use twinlag_estimate::{Estimator, Hold, Intervals, Levels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
 use twinlag_optimise::{End, Fit};
 
@@ -142,7 +142,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let on_bound: &[usize] = if let End::OnBound(which) = &self.solved.end { which } else { &[] };
         let index = on_bound.iter().chain(vague).copied().find(|&i| i < 2 && !self.fit.is_held(i));
         let Some(index) = index.filter(|_| self.is_whitened()) else { return Ok(None) };
-        let middle = if self.judged.is_rejected { Middle::ResidualSpectrum } else { Middle::WhiteNoise };
+        let middle = if self.judged.is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
         let found = self.fit.ridge(index, middle)?;
         if self.asked.options.hold != Hold::Auto || self.fit.readings().even_period_s().is_none() {
             return Ok(found.map(|ridge| (index, ridge)));

@@ -22,7 +22,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             (0..Known::NAMES.len()).filter(|&i| unknown(i)).map(|i| Known::NAMES[i].to_owned()).collect();
         if !self.judged.is_determined {
             self.warnings.push(
-                "the whitened estimate finds nothing determined here; a number from this estimator would be chance"
+                "the whitened estimate finds that this record determines nothing; a number from \
+                     this estimator would be due to chance"
                     .into(),
             );
             out.not_identifiable.push("time_constant_difference_s".into());
@@ -60,8 +61,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             out.not_identifiable.retain(|name| name != Known::NAMES[other]);
         } else {
             self.warnings.push(
-                "the absolute time constants are not identifiable from this record; their difference is, over every \
-                 time constant that the record allows"
+                "this record does not determine the time constants themselves; it determines their \
+                     difference, over every time constant that it allows"
                     .into(),
             );
         }
@@ -80,20 +81,23 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                         (false, _) => "the two channels do not belong together",
                     };
                     self.warnings.push(format!(
-                        "the best fit lies on a bound of {}, {x:.3e}, and is no estimate: {meaning}",
+                        "the best fit lies on a bound of {}, {x:.3e}, so it is not an estimate: {meaning}",
                         variable.name
                     ));
                 }
-                out.not_identifiable.extend([2, 3].iter().filter(|i| which.contains(i)).map(|&i| Known::NAMES[i].into()));
+                out.not_identifiable
+                    .extend([2, 3].iter().filter(|i| which.contains(i)).map(|&i| Known::NAMES[i].into()));
             }
             End::Stalled(why) if self.asked.options.estimator.is_closed_form() => {
-                self.warnings.push(format!("{why}: the noise may be too much for this estimator"));
+                self.warnings.push(format!("{why}: there may be too much noise for this estimator"));
             }
-            End::Stalled(why) => self.warnings.push(format!("the optimiser stopped at no minimum: {why}")),
+            End::Stalled(why) => {
+                self.warnings.push(format!("the optimiser stopped at a point that is not a minimum: {why}"))
+            }
             End::LimitReached => self.warnings.push("the optimiser ran out of evaluations before it converged".into()),
             _ => self.warnings.push(
-                "the record fits time constants that differ by large factors about equally well, or best such as are long \
-                 beside the record itself: none is reported"
+                "time constants that differ by large factors fit the record about equally well, or \
+                     the best ones are long compared with the record, so none is reported"
                     .into(),
             ),
         }
@@ -125,7 +129,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             let (noise, levels) = if self.asked.options.noise_std_k.is_some() {
                 ("the given noise", "the noise levels given")
             } else {
-                ("the noise of the quiet segment", "the gas seems not to be at rest there: the levels")
+                ("the noise of the quiet segment", "the gas temperature seems not to be steady there: the levels")
             };
             out.warnings.push(format!(
                 "the residual is white, but its energy is {energy:.3} of what {noise} explains: {levels} are about {:.2} \
@@ -136,8 +140,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         }
         if self.judged.whitened_is_accepted {
             out.warnings.push(format!(
-                "at this estimate the residual is not noise (tests that fail: {}), but at the whitened one it is: the \
-                 estimator is at fault, not the model",
+                "with this estimate the residual is not noise (tests that fail: {}), but with the \
+                     whitened one it is, so the estimator is at fault and not the model",
                 failed.join(", ")
             ));
             return;
@@ -161,11 +165,13 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             "two first-order lags"
         };
         let hint = if !coarse.is_empty() {
-            format!("{}, coarser than its noise: that alone may be what is left", coarse.join(", "))
+            format!("{}, coarser than its noise, which alone may explain the residual", coarse.join(", "))
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
         } else if self.levels.outliers != [0, 0] && failed.contains(&"total-energy") {
-            "samples that no noise explains are among them (see below): mend or empty these cells first".into()
+            "some samples are too far off for noise (see below): correct or empty these cells \
+                     first"
+                .into()
         } else if failed.contains(&"calibration") {
             let colour = if may_be_coloured { ", and if it does not help --noise-colour autoregressive" } else { "" };
             format!("gain and offset of the second channel would explain it better: try --free gain,offset{colour}")
@@ -178,8 +184,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             )
         };
         out.warnings.push(format!(
-            "{model} do not explain this record (tests that fail: {}), and a time constant found with them \
-             need not be that of a sensor; {hint}",
+            "{model} do not explain this record (tests that fail: {}), so the fitted time \
+                     constants need not be those of the sensors; {hint}",
             failed.join(", ")
         ));
     }

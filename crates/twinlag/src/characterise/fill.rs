@@ -106,8 +106,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             sensor.interval_basis = Some(intervals.basis[i]);
             if from_hold[i].abs() > NOTICEABLE_STANDARD_ERRORS * noise {
                 self.warnings.push(format!(
-                    "{}: what the gas does between samples moves the time constant by {:.2} %, which is part of the \
-                     interval: sample faster",
+                    "{}: the assumption about the gas between samples changes the time constant by \
+                     {:.2} %, which is part of the interval; sample faster",
                     sensor.channel,
                     100.0 * hold_sensitivity.map_or(0.0, |m| m[i]).abs()
                 ));
@@ -157,13 +157,14 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 let allowed = match unseen.at_most_s {
                     Some(limit_s) => {
                         lag.interval_95 = Some([0.0, limit_s]);
-                        format!("the record allows one of {limit_s:.3e} s at most")
+                        format!("the record allows at most {limit_s:.3e} s")
                     }
-                    None => "it may be as large as the first one for all the record says".into(),
+                    None => "as far as the record shows, it may be as large as the first one".into(),
                 };
                 self.warnings.push(format!(
-                    "{channel}: no second lag is seen; {allowed}. The time constants are those without it, their intervals \
-                     hold with whatever of it is allowed; leave {} out of --second-order, or give --known {name}=...",
+                    "{channel}: no second lag is detected; {allowed}. The time constants are those \
+                     without it, and their intervals cover any second lag that is allowed; leave {} out \
+                     of --second-order, or give --known {name}=...",
                     ["T1", "T2"][sensor]
                 ));
             } else if self.fit.is_vague(i, &theta, Some(covariance)) {
@@ -172,8 +173,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                     lag.interval_95 = Some(self.fit.interval(i, covariance, true));
                 }
                 self.warnings.push(format!(
-                    "{channel}: the record needs a second lag but does not tell how large: a data-sheet value may, as \
-                     --known {name}=..."
+                    "{channel}: the record needs a second lag but does not determine its size; a \
+                     data-sheet value may help, as --known {name}=..."
                 ));
             } else {
                 let error = covariance[i][i].sqrt();
@@ -200,7 +201,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             let away = (theta[prior.index] - prior.mean) / prior.std;
             if away.abs() > CONTRADICTING_STANDARD_DEVIATIONS {
                 self.warnings.push(format!(
-                    "the record contradicts what was known of {}: it lies {:.1} standard deviations of that knowledge away",
+                    "the record contradicts the known value of {}: the estimate lies {:.1} of its \
+                     standard deviations away",
                     Known::NAMES[prior.index],
                     away.abs()
                 ));
