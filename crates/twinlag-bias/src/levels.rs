@@ -10,6 +10,18 @@ use twinlag_cross_relation::{Readings, Segment, Steps};
 
 use crate::error::NoiseError;
 
+/// A converter whose own noise `q/√12` is a larger share than this of a channel's noise level is
+/// coarse: its errors can no longer be taken for white noise. Dimensionless.
+///
+/// Gaussian noise of standard deviation `σ` ahead of a converter of step `q` leaves it a mean error
+/// of at most `(q/π) exp(−2π² σ²/q²)`, which repeats wherever the signal passes the same place
+/// between two steps. The level `s² = σ² + q²/12` with `q/√12 = s/2` means `σ = q/2`, and there
+/// that is 0.0023 `q`: 0.8 % of the converter's own noise. At a share of 0.7 it would be 20 %.
+///
+/// # Source
+/// Own derivation: first term of the Fourier series of the sawtooth error, averaged over the noise.
+pub const COARSE_STEP_NOISE_RATIO: f64 = 0.5;
+
 /// Noise of one channel as the data show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseLevel {
@@ -23,6 +35,14 @@ pub struct NoiseLevel {
     /// Number of third differences left out because they are too large for noise. A dropout causes
     /// up to four of them, and a sharp step of the gas some.
     pub outliers: usize,
+}
+
+impl NoiseLevel {
+    /// The converter's step, K, where it is coarser than the noise: see
+    /// [`COARSE_STEP_NOISE_RATIO`].
+    pub fn coarse_step_k(&self) -> Option<f64> {
+        self.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k)
+    }
 }
 
 /// Noise levels `[s1, s2]` of both channels.
@@ -183,6 +203,27 @@ mod tests {
         let step = levels[0].quantisation_step_k.expect("all readings lie on a grid");
         assert!((step - 0.0625).abs() < 1e-12, "got {step}"); // what taking off the mean rounds
         assert!(levels[0].std_k > 0.01804); // 0.0625/√12 = 0.018042
+    }
+
+    /// The mean error of a converter under Gaussian noise, by integration over the noise, at the
+    /// noise where a step is just coarse: its largest value over the places between two steps is
+    /// 0.8 % of `q/√12`, to the 0.1 % that two digits leave.
+    #[test]
+    fn noise_that_a_step_is_just_coarse_for_hides_the_step() {
+        let level = 1.0 / (12.0_f64.sqrt() * COARSE_STEP_NOISE_RATIO);
+        let sigma = (level * level - 1.0 / 12.0).sqrt();
+        assert!((sigma - 0.5).abs() < 1e-12, "half a step of noise ahead of the converter, got {sigma}");
+        let mean_error = |place: f64| {
+            let each = (-4000..4000).map(|k| {
+                let z = 2e-3 * f64::from(k);
+                let y = place + sigma * z;
+                (y.round() - y) * (-0.5 * z * z).exp() * 2e-3 / std::f64::consts::TAU.sqrt()
+            });
+            each.sum::<f64>()
+        };
+        let largest = (0..50).map(|i| mean_error(0.01 * f64::from(i)).abs()).fold(0.0, f64::max);
+        let share = largest * 12.0_f64.sqrt();
+        assert!((share - 0.008).abs() < 1e-3, "got {share}");
     }
 
     #[test]

@@ -37,6 +37,6 @@ mod noise_gain;
 pub use compensated::{Compensated, Normalised, plain_covariance};
 pub use error::NoiseError;
 pub use hybrid::Hybrid;
-pub use levels::{NoiseLevel, estimate_noise};
+pub use levels::{COARSE_STEP_NOISE_RATIO, NoiseLevel, estimate_noise};
 pub use moments::{JointLevels, NoiseMoments};
 pub use noise_gain::Noise;

@@ -1,12 +1,10 @@
-//! Intervals by parametric bootstrap: the estimate is repeated on records simulated with the
-//! estimated parameters.
+//! Intervals by parametric bootstrap: the same estimator on records simulated from what it found.
 //!
 //! A gas with the power that the record shows, noise taken off, is passed through both fitted
 //! sensors; noise of the found levels is added, anew for each replicate; and the estimator answers
 //! each. The spread of `ln(τ*/τ)` turned round gives the interval. It takes a hundred times as long
-//! as a standard error and does not use one. Use it for estimators without standard errors, and to
-//! check those that have them. The estimator's own model makes the records, so it cannot show that
-//! the model is wrong.
+//! as a standard error, and makes no use of one: for estimators that have none, and to check those
+//! that do. The estimator's own model makes the records, so it cannot tell that the model is wrong.
 //!
 //! # Source
 //! Efron and Tibshirani 1993, the basic bootstrap interval.
@@ -18,11 +16,19 @@ use twinlag_cross_relation::{CostError, InferredInputs, Readings, Segment, Steps
 use twinlag_transform::{Complex64, Forward, Inverse};
 
 use crate::error::EstimateError;
-use crate::task::{Estimate, Outcome, Task};
+use crate::estimate::Estimate;
+use crate::outcome::Outcome;
+use crate::task::Task;
 use crate::vocabulary::Bootstrap;
 
-/// Most of them that may fail.
-const MOST_FAILED: f64 = 0.1;
+/// Largest share of replicates that may have no answer: a tenth lost
+/// from one tail puts its 2.5 % point at 12.5 %, which shortens the interval by a fifth.
+const MAX_FAILED_SHARE: f64 = 0.1;
+/// A bin of this many times the power of its surroundings is a line of the gas: of noise alone, one
+/// in `e⁵`, 150, is, and three neighbours together one in `10⁵`.
+const LINE_OVER_SURROUNDINGS: f64 = 5.0;
+/// Gas is taken to be there where the power is this many standard errors above that of noise alone.
+const CLEAR_STANDARD_ERRORS: f64 = 2.0;
 
 impl Bootstrap {
     /// Fewest replicates: the outermost of 39 are the 2.5 % and 97.5 % points.
@@ -39,11 +45,22 @@ impl Bootstrap {
         })
     }
 
-    /// 95 % intervals of both time constants, s, for what `estimator` made of `task`; `None` where more than a tenth of the
-    /// replicates cannot be answered.
+    /// 95 % intervals of both time constants, s, for what `estimator` made of `task`; `None` where
+    /// more than a tenth of the replicates cannot be answered.
     ///
     /// # Errors
     /// [`EstimateError::Unexpected`] for too few replicates; what the estimator says of `task` itself, such as uneven sampling.
+    /// ```
+    #[doc = include_str!("../doc/readings.txt")]
+    /// use twinlag_estimate::{Bootstrap, Estimate, Estimator, Task};
+    ///
+    /// let task = Task::new(&readings);
+    /// let found = Estimator::DifferenceEquationGtls.estimate(&task)?;
+    /// let bootstrap = Bootstrap { replicates: 39, seed: 1 };
+    /// let intervals = bootstrap.intervals(&Estimator::DifferenceEquationGtls, &task, &found)?.expect("answered");
+    /// assert!(intervals[0][0] < found.tau_s[0] && found.tau_s[0] < intervals[0][1]);
+    /// # Ok::<(), twinlag_estimate::EstimateError>(())
+    /// ```
     pub fn intervals(
         &self,
         estimator: &dyn Estimate,
@@ -71,7 +88,7 @@ impl Bootstrap {
             }
         }
         let failed = self.replicates - logs[0].len();
-        if failed as f64 > MOST_FAILED * self.replicates as f64 {
+        if failed as f64 > MAX_FAILED_SHARE * self.replicates as f64 {
             return Ok(None);
         }
         logs.iter_mut().for_each(|l| l.sort_by(f64::total_cmp));
@@ -119,7 +136,8 @@ impl Bootstrap {
     }
 }
 
-/// Readings without noise whose gas has the power that `inputs` show: both channels of each stretch.
+/// Readings without noise whose gas has the power that `inputs` show: both channels of each
+/// stretch.
 fn clean_readings(inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) -> Vec<[Vec<f64>; 2]> {
     inputs
         .segments
@@ -134,8 +152,9 @@ fn clean_readings(inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) ->
 /// The best combination of both inferred inputs, its noise's power taken off.
 fn gas(f: [&[f64]; 2], inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2]) -> Vec<f64> {
     let n = f[0].len();
-    // A straight line through all samples is taken off before the circular transform, and put back after it. (One between the ends
-    // would hold their noise, ten times that of the readings, as a slow gas signal.)
+    // A straight line through all samples is taken off before the circular transform, and put back
+    // after it. (One between the ends would hold their noise, ten times that of the readings, as a
+    // slow gas signal.)
     let centre = 0.5 * (n - 1) as f64;
     let mean = f.iter().map(|f| f.iter().sum::<f64>()).sum::<f64>() / (2 * n) as f64;
     let moment = n as f64 * ((n * n) as f64 - 1.0) / 12.0;
@@ -170,10 +189,11 @@ fn gas(f: [&[f64]; 2], inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2
 
 /// The gas's share of the power at `bin`, given each bin's power over that of its noise.
 ///
-/// From the median over bins within an eighth of the frequency, which lines do not touch; where that is no clear sign of gas, two
-/// standard errors above noise alone, there is none. A bin that stands out five times above its surroundings, its neighbours with
-/// it, is a line and counts by itself. Anything less strict leaves noise in the gas, which would make the replicates more
-/// informative about the sensors than the record is.
+/// From the median over bins within an eighth of the frequency, which lines do not touch; where
+/// that is no clear sign of gas, two standard errors above noise alone, there is none. A bin that
+/// stands out five times above its surroundings, its neighbours with it, is a line and counts by
+/// itself. Anything less strict leaves noise in the gas, which would tell the replicates more about
+/// the sensors than the record does.
 fn gas_share(ratios: &[f64], bin: usize, bins: usize) -> f64 {
     let (low, high) = (bin - (bin / 8 + 4).min(bin), (bin + bin / 8 + 5).min(bins));
     let mut around = ratios[low..high].to_vec();
@@ -181,13 +201,14 @@ fn gas_share(ratios: &[f64], bin: usize, bins: usize) -> f64 {
     let median = *around.select_nth_unstable_by(count / 2, f64::total_cmp).1 / std::f64::consts::LN_2;
     let near = &ratios[bin.saturating_sub(1)..(bin + 2).min(bins)];
     let peak = near.iter().sum::<f64>() / near.len() as f64;
-    let level = if peak > 5.0 * median.max(1.0) { ratios[bin] } else { median };
+    let level = if peak > LINE_OVER_SURROUNDINGS * median.max(1.0) { ratios[bin] } else { median };
     // The median of so many exponential variables has the standard error 1/(ln 2 √count).
-    let clear = 1.0 + 2.0 / (std::f64::consts::LN_2 * (count as f64).sqrt());
+    let clear = 1.0 + CLEAR_STANDARD_ERRORS / (std::f64::consts::LN_2 * (count as f64).sqrt());
     if level > clear { 1.0 - 1.0 / level } else { 0.0 }
 }
 
-/// The series that `filter` (oldest sample first, unit gain at rest) takes to `f`, at rest before it.
+/// The series that `filter` (oldest sample first, unit gain at rest) takes to `f`, at rest before
+/// it.
 fn undo(filter: &[f64], f: &[f64]) -> Vec<f64> {
     let (newest, older) = filter.split_last().expect("a filter has coefficients");
     let mut y = vec![f[0]; older.len()];

@@ -26,7 +26,8 @@ pub enum EstimateError {
 }
 
 impl EstimateError {
-    /// Whether the question is at fault (a name that there is not, options that contradict each other), not the data.
+    /// Whether the question is at fault (a name that there is not, options that contradict each
+    /// other), not the data.
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Unexpected { .. } | Self::Optimiser(_))
     }

@@ -1,7 +1,8 @@
 //! 95 % intervals of the whitened estimate.
 //!
-//! Quadratic in `ln τ`, unless the cost's own profile disagrees: where at either end the profile has not risen by what the
-//! quadratic form says, within a fifth, the ends are moved to where it has.
+//! Quadratic in `ln τ`, unless the cost's own profile disagrees: where at either end the profile
+//! has not risen by what the quadratic form says, within a fifth, the ends are moved to where it
+//! has.
 
 use twinlag_cross_relation::{Whitened, sandwich};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
@@ -11,20 +12,25 @@ use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::profile::Z_975;
 use crate::vocabulary::IntervalBasis;
 
-/// A profile that has risen by this share more or less than the quadratic form is not described by it.
-const DISAGREES: f64 = 0.2;
-/// Bisections, in the logarithm, that place an end: a thousandth of a standard error.
-const HALVINGS: usize = 12;
+/// A profile that has risen by this share more or less than the quadratic form is not described by
+/// it: a fifth of the rise is a tenth of the interval's half width.
+const MAX_PROFILE_DISAGREEMENT: f64 = 0.2;
+/// Bisections, in the logarithm, that place an end: `1.96/2¹²`, less than a thousandth of a
+/// standard error.
+const END_BISECTIONS: usize = 12;
 
 /// Standard errors and intervals of both time constants, s.
 #[derive(Clone, Copy, Debug)]
-pub struct Intervals {
+pub struct TauIntervals {
+    /// Standard errors, s.
     pub standard_error_s: [f64; 2],
+    /// 95 % intervals, s.
     pub interval_95_s: [[f64; 2]; 2],
+    /// What each interval rests on.
     pub basis: [IntervalBasis; 2],
 }
 
-impl Intervals {
+impl TauIntervals {
     /// Quadratic in the logarithm.
     pub fn quadratic<const P: usize>(theta: &[f64; P], covariance: &[[f64; P]; P]) -> Self {
         Self {
@@ -40,9 +46,10 @@ fn quadratic(tau_s: f64, variance_s2: f64) -> [f64; 2] {
     [tau_s / factor, tau_s * factor]
 }
 
-/// `covariance` with what the uncertainty of found levels adds: the weights that they give move the minimum by
-/// `−A⁻¹ ½ (∂J(θ; s') − ∂J(θ; s))`, `A` half the Hessian with the priors' part, for levels `s'` one standard error off.
-pub fn with_level_uncertainty<const P: usize>(
+/// `covariance` with what the uncertainty of found levels adds: the weights that they give move the
+/// minimum by `−A⁻¹ ½ (∂J(θ; s') − ∂J(θ; s))`, `A` half the Hessian with the priors' part, for
+/// levels `s'` one standard error off.
+pub(crate) fn with_level_uncertainty<const P: usize>(
     whitened: &Whitened<'_>,
     theta: &[f64; P],
     free: &[usize],
@@ -94,28 +101,29 @@ fn inverse<const P: usize>(
 }
 
 /// A minimum of the whitened cost, and all that its neighbourhood depends on.
-pub struct Minimum<'m, 'a, const P: usize> {
-    pub whitened: &'m Whitened<'a>,
-    pub theta: [f64; P],
-    pub free: &'m [usize],
-    pub covariance: &'m [[f64; P]; P],
-    pub variables: &'m [Variable],
-    pub priors: &'m [Prior],
-    pub minimiser: &'m dyn Minimiser,
+pub(crate) struct Minimum<'m, 'a, const P: usize> {
+    pub(crate) whitened: &'m Whitened<'a>,
+    pub(crate) theta: [f64; P],
+    pub(crate) free: &'m [usize],
+    pub(crate) covariance: &'m [[f64; P]; P],
+    pub(crate) variables: &'m [Variable],
+    pub(crate) priors: &'m [Prior],
+    pub(crate) minimiser: &'m dyn Minimiser,
 }
 
 impl<const P: usize> Minimum<'_, '_, P> {
-    /// Intervals of both time constants; by the profile `always`, or where the quadratic form does not describe it.
-    pub fn intervals(&self, always: bool) -> Intervals {
-        let mut out = Intervals::quadratic(&self.theta, self.covariance);
+    /// Intervals of both time constants; by the profile `always`, or where the quadratic form
+    /// does not describe it.
+    pub(crate) fn intervals(&self, always: bool) -> TauIntervals {
+        let mut out = TauIntervals::quadratic(&self.theta, self.covariance);
         for i in (0..2).filter(|i| self.free.contains(i)) {
             (out.interval_95_s[i], out.basis[i]) = self.interval(i, always);
         }
         out
     }
 
-    /// The interval of the time constant `i` alone, which is free.
-    pub fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
+    /// Interval of the time constant `i` alone, which is free.
+    pub(crate) fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
         let Self { theta, free, variables, .. } = self;
         let ends = quadratic(theta[i], self.covariance[i][i]);
         let Some(inverse) = inverse(self.whitened, theta, free, self.priors) else {
@@ -146,7 +154,7 @@ impl<const P: usize> Minimum<'_, '_, P> {
         };
         let bounds = [variables[i].lower, variables[i].upper];
         let at_ends = || ends.map(|end| if end > bounds[0] && end < bounds[1] { rise(end) } else { None });
-        if !always && at_ends().iter().all(|r| r.is_some_and(|r| (r - 1.0).abs() < DISAGREES)) {
+        if !always && at_ends().iter().all(|r| r.is_some_and(|r| (r - 1.0).abs() < MAX_PROFILE_DISAGREEMENT)) {
             return (ends, IntervalBasis::StandardError);
         }
         (ends.map(|end| edge(theta[i], end, bounds, &rise)), IntervalBasis::Profile)
@@ -166,7 +174,7 @@ fn edge(inside: f64, guess: f64, [lower, upper]: [f64; 2], rise: &dyn Fn(f64) ->
         inside = outside;
         outside = if step > 0.0 { (outside + step).min(bound) } else { (outside + step).max(bound) };
     }
-    for _ in 0..HALVINGS {
+    for _ in 0..END_BISECTIONS {
         let middle = 0.5 * (inside + outside);
         if is_above(middle.exp()) { outside = middle } else { inside = middle }
     }

@@ -5,7 +5,7 @@ use twinlag_cross_relation::{CostValue, CrossRelation, Whitened};
 use twinlag_optimise::{Cost, Derivatives};
 
 /// Any of the estimators' costs.
-pub enum EstimatorCost<'a> {
+pub(crate) enum EstimatorCost<'a> {
     Whitened(Whitened<'a>),
     CrossRelation(CrossRelation<'a>),
     Compensated(Compensated<'a>),
@@ -14,7 +14,7 @@ pub enum EstimatorCost<'a> {
 }
 
 impl EstimatorCost<'_> {
-    pub fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
+    pub(crate) fn evaluate<const P: usize>(&self, theta: &[f64; P]) -> CostValue<P> {
         match self {
             Self::Whitened(cost) => cost.evaluate(theta),
             Self::CrossRelation(cost) => cost.evaluate(theta),
@@ -26,21 +26,24 @@ impl EstimatorCost<'_> {
 }
 
 /// Independent prior knowledge of one parameter, as one more residual `(θ − mean)/std`.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
+    /// Place of the parameter in [`twinlag_cross_relation::Parameter::ALL`].
     pub index: usize,
+    /// Where it is known to lie, in the parameter's unit.
     pub mean: f64,
+    /// Standard deviation of that knowledge, in the parameter's unit.
     pub std: f64,
 }
 
 /// A cost over the first `P` parameters, with priors.
-pub struct Objective<'a, 'c, const P: usize> {
-    pub cost: &'c EstimatorCost<'a>,
-    pub priors: &'c [Prior],
+pub(crate) struct Objective<'a, 'c, const P: usize> {
+    pub(crate) cost: &'c EstimatorCost<'a>,
+    pub(crate) priors: &'c [Prior],
 }
 
 impl<const P: usize> Objective<'_, '_, P> {
-    pub fn at(&self, x: &[f64]) -> CostValue<P> {
+    pub(crate) fn at(&self, x: &[f64]) -> CostValue<P> {
         let theta: [f64; P] = std::array::from_fn(|i| x[i]);
         let mut out = self.cost.evaluate(&theta);
         for prior in self.priors {

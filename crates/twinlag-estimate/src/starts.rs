@@ -5,25 +5,38 @@ use twinlag_optimise::Variable;
 
 use crate::objective::Objective;
 
-/// Time constants per decade-spanning axis of the grid.
-const GRID: usize = 6;
-/// Starts kept for each order of the two time constants.
-const KEPT: usize = 2;
+/// Time constants on each axis of the grid, logarithmic. With six a record of 2500 samples has a
+/// point in each half decade; how far off a start may lie is in the experiment `starts`.
+const GRID_POINTS: usize = 6;
+/// Shortest time constant of the grid's range, sample periods.
+const GRID_MIN_PERIODS: f64 = 0.5;
+/// Longest time constant of the grid's range, spans of the record.
+const GRID_MAX_SPANS: f64 = 0.25;
+/// Starts kept for each order of the two time constants: a second one, should the lowest be in a
+/// spurious valley.
+const STARTS_KEPT_PER_ORDER: usize = 2;
+/// Noise makes the difference equation's time constants too short (experiment `bias-vs-noise`):
+/// these times as long is worth a start as well.
+const SLOWER_GUESS: [f64; 2] = [2.0, 1.5];
+/// Second lags that fits start from, as shares of the first: a small, a middle and a large one,
+/// since from a single one they may be missed.
+const SECOND_LAG_SHARES: [f64; 3] = [0.05, 0.3, 0.8];
 
-/// Starts for `objective`, data-driven: the difference equation's least squares, and the lowest points of a logarithmic grid
-/// for either order of the time constants. Gain and offset take one Newton step of their own at each point.
-pub fn starts<const P: usize>(
+/// Starts for `objective`, data-driven: the difference equation's least squares, and the lowest
+/// points of a logarithmic grid for either order of the time constants. Gain and offset take one
+/// Newton step of their own at each point.
+pub(crate) fn starts<const P: usize>(
     objective: &Objective<'_, '_, P>,
     readings: &Readings,
     variables: &[Variable],
 ) -> Vec<Vec<f64>> {
     let step_s = readings.mean_step_s();
-    let (shortest, longest) = (0.5 * step_s, 0.25 * readings.span_s());
+    let (shortest, longest) = (GRID_MIN_PERIODS * step_s, GRID_MAX_SPANS * readings.span_s());
     let axis: Vec<f64> =
-        (0..GRID).map(|i| shortest * (longest / shortest).powf((i as f64 + 0.5) / GRID as f64)).collect();
+        (0..GRID_POINTS).map(|i| shortest * (longest / shortest).powf((i as f64 + 0.5) / GRID_POINTS as f64)).collect();
     let mut grid: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut add = |tau1: f64, tau2: f64| {
-        let mut x: Vec<f64> = [tau1, tau2, 1.0, mean_difference(readings)][..P].to_vec();
+        let mut x: Vec<f64> = [tau1, tau2, 1.0, mean_difference(readings), 0.0, 0.0][..P].to_vec();
         hold_known(&mut x, variables);
         settle_calibration(objective, &mut x, variables);
         let value = objective.at(&x).value;
@@ -33,8 +46,7 @@ pub fn starts<const P: usize>(
     };
     if let Ok([tau1, tau2]) = difference_equation_least_squares(readings) {
         add(tau1, tau2);
-        // Noise makes it too short: the slower guess is worth having too.
-        add(2.0 * tau1, 1.5 * tau2);
+        add(SLOWER_GUESS[0] * tau1, SLOWER_GUESS[1] * tau2);
     }
     for (i, &tau1) in axis.iter().enumerate() {
         for (j, &tau2) in axis.iter().enumerate() {
@@ -46,20 +58,28 @@ pub fn starts<const P: usize>(
     grid.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for first_is_fast in [true, false] {
-        kept.extend(grid.iter().filter(|(_, x)| (x[0] < x[1]) == first_is_fast).take(KEPT).map(|(_, x)| x.clone()));
+        kept.extend(
+            grid.iter()
+                .filter(|(_, x)| (x[0] < x[1]) == first_is_fast)
+                .take(STARTS_KEPT_PER_ORDER)
+                .map(|(_, x)| x.clone()),
+        );
     }
     kept
 }
 
-/// Starts for `P = 6` beside a fit at first order: second lags of several sizes, since from a single one they may be missed.
+/// Starts for `P = 6` beside a fit at first order: second lags of several sizes, since from a
+/// single one they may be missed.
 ///
 /// - `first`: time constants, gain and offset of that fit
 /// - `second_order`: which sensors have a second lag
-pub fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
-    let shares: &[[f64; 2]] = match second_order {
-        [true, true] => &[[0.05, 0.05], [0.3, 0.3], [0.8, 0.8], [0.05, 0.8], [0.8, 0.05]],
-        [_, false] => &[[0.05, 0.0], [0.3, 0.0], [0.8, 0.0]],
-        [false, true] => &[[0.0, 0.05], [0.0, 0.3], [0.0, 0.8]],
+pub(crate) fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) -> Vec<Vec<f64>> {
+    let [small, middle, large] = SECOND_LAG_SHARES;
+    let each = SECOND_LAG_SHARES.into_iter();
+    let shares: Vec<[f64; 2]> = match second_order {
+        [true, true] => vec![[small; 2], [middle; 2], [large; 2], [small, large], [large, small]],
+        [_, false] => each.map(|share| [share, 0.0]).collect(),
+        [false, true] => each.map(|share| [0.0, share]).collect(),
     };
     let start = |[s1, s2]: &[f64; 2]| {
         // Both lags together delay as much as the one that was found.
@@ -69,7 +89,8 @@ pub fn second_lags<const P: usize>(first: &[f64; 4], second_order: [bool; 2]) ->
     shares.iter().map(start).collect()
 }
 
-pub fn hold_known(x: &mut [f64], variables: &[Variable]) {
+/// Moves `x` inside the bounds of `variables`, what is held to its value.
+pub(crate) fn hold_known(x: &mut [f64], variables: &[Variable]) {
     for (x, v) in x.iter_mut().zip(variables) {
         *x = x.clamp(v.lower, v.upper);
     }
@@ -82,7 +103,8 @@ fn mean_difference(readings: &Readings) -> f64 {
     (sum(twinlag_cross_relation::Segment::y2) - sum(twinlag_cross_relation::Segment::y1)) / readings.len() as f64
 }
 
-/// The residual is all but linear in gain and offset: one Newton step finds them for given time constants.
+/// Gain and offset that fit given time constants. The residual is all but linear in both: one
+/// Newton step finds them.
 fn settle_calibration<const P: usize>(objective: &Objective<'_, '_, P>, x: &mut [f64], variables: &[Variable]) {
     let free: Vec<usize> = (2..P).filter(|&i| variables[i].lower < variables[i].upper).collect();
     if free.is_empty() {

@@ -1,5 +1,5 @@
-//! The types that state a question: which estimator, what is known about noise and parameters, how
-//! to find intervals.
+//! The words in which a question is put: which estimator, what is known of noise and parameters,
+//! what intervals are made of.
 
 use std::fmt;
 use std::str::FromStr;
@@ -26,7 +26,8 @@ pub enum Estimator {
     Normalised,
     /// The compensated cost in units of the noise's own standard deviation; needs the noise levels.
     Hybrid,
-    /// Least squares on the difference equation. Noise biases it; which way depends on which sensor comes first.
+    /// Least squares on the difference equation. Noise biases it; which way depends on which sensor
+    /// comes first.
     DifferenceEquationLs,
     /// Total least squares on it. Biased too, since its columns share their noise.
     DifferenceEquationTls,
@@ -47,8 +48,8 @@ impl Estimator {
         Self::DifferenceEquationGtls,
     ];
 
-    /// Whether it is one of those on the difference equation: solved in closed form, for sensors of first order, and with nothing
-    /// else to find.
+    /// Whether it is one of those on the difference equation: solved in closed form, for sensors of
+    /// first order, and with nothing else to find.
     pub fn is_closed_form(self) -> bool {
         matches!(self, Self::DifferenceEquationLs | Self::DifferenceEquationTls | Self::DifferenceEquationGtls)
     }
@@ -86,7 +87,7 @@ impl FromStr for Estimator {
     }
 }
 
-/// How the gas is assumed to move between samples.
+/// What the gas is taken to do between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
@@ -102,7 +103,7 @@ pub enum Hold {
 }
 
 impl Hold {
-    /// The discretisation to begin with.
+    /// The discretisation to begin with, and to stay with unless the hold is to be found.
     pub fn first(self) -> Discretisation {
         match self {
             Self::Auto | Self::ZeroOrderHold => Discretisation::ZeroOrderHold,
@@ -130,24 +131,25 @@ impl FromStr for Hold {
     }
 }
 
-/// How to find 95 % intervals.
+/// What 95 % intervals are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Intervals {
-    /// Standard errors, with noise multiplied by noise and the uncertainty of found levels in them; the profile of the cost
-    /// where that has another shape.
+    /// Standard errors, with noise multiplied by noise and the uncertainty of found levels in them;
+    /// the profile of the cost where that has another shape.
     #[default]
     Auto,
     /// The profile of the whitened cost.
     Profile,
-    /// From repeating the estimate on simulated records.
+    /// The same estimator on simulated records.
     Bootstrap(Bootstrap),
 }
 
-/// Prior knowledge of a parameter: `T1.time_constant_s=0.5`, or `T1.time_constant_s=0.5+-0.05`.
+/// Something known of a parameter beforehand: `T1.time_constant_s=0.5`, or
+/// `T1.time_constant_s=0.5+-0.05`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Known {
-    /// The parameter.
+    /// Which one.
     pub parameter: Parameter,
     /// Its value: s for time constants, 1 for the gain, K at 0 °C for the offset.
     pub value: f64,
@@ -192,14 +194,15 @@ impl FromStr for Known {
     }
 }
 
-/// The assumed colour of the noise.
+/// What noise is taken to be like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseColour {
     /// Independent from sample to sample.
     #[default]
     White,
-    /// Each sample's noise carries a share of the last one's: `n[k] = φ n[k−1] + e[k]`, `φ` of each channel found from the data.
+    /// Each sample's noise carries a share of the last one's: `n[k] = φ n[k−1] + e[k]`, `φ` of each
+    /// channel found from the data.
     Autoregressive,
 }
 
@@ -224,7 +227,7 @@ impl FromStr for NoiseColour {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum NoiseSource {
-    /// The level was given.
+    /// It was given.
     Given,
     /// Scatter about a straight line in stretches in which the gas is at rest.
     QuietSegment,
@@ -232,23 +235,11 @@ pub enum NoiseSource {
     ThirdDifferences,
     /// How the two inferred gas temperatures disagree.
     InferredInputs,
-    /// The residual's own energy: only the ratio of the levels was given, or could be determined.
+    /// The residual's own energy: only the ratio of the levels was given, or could be told.
     Residual,
 }
 
-impl NoiseColour {
-    /// Rounds of levels and fit at most. For white noise the second changes levels by a few per cent of their standard error; with
-    /// its colour to be found as well, time constants, levels and coefficients follow each other slowly where the samples lie
-    /// far apart.
-    pub fn rounds(self) -> usize {
-        match self {
-            Self::White => 2,
-            Self::Autoregressive => 8,
-        }
-    }
-}
-
-/// What is known about the noise.
+/// What is known of the noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum NoiseKnowledge {
@@ -272,7 +263,7 @@ impl Default for NoiseKnowledge {
     }
 }
 
-/// How 95 % intervals were found.
+/// What 95 % intervals rest on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalBasis {
@@ -280,7 +271,7 @@ pub enum IntervalBasis {
     StandardError,
     /// The profile of the cost, where standard errors do not describe it.
     Profile,
-    /// From repeating the estimate on simulated records: see [`Bootstrap`].
+    /// The same estimator on simulated records: see [`Bootstrap`].
     Bootstrap,
 }
 

@@ -1,27 +1,44 @@
-//! Estimates both time constants of a record.
+//! The question that a record is asked first: both time constants.
+//!
+//! [`characterise`] puts the question to an estimator of `twinlag-estimate` and judges the answer. The steps, and why in this
+//! order, are in `answer`.
 
-use twinlag_cross_relation::{Parameter, Readings, Segment, Steps};
-use twinlag_estimate::{Bootstrap, Estimator, Intervals, Known, Levels, NoiseColour};
+mod bootstrap;
+mod check;
+mod conclude;
+mod explain;
+mod fill;
+
+use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
+use twinlag_estimate::{
+    ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, NoiseKnowledge, RunAtRest, Solved, Task, WhitenedFit,
+    other_hold,
+};
+use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, SamplingKind};
 
 use crate::characterisation::Characterisation;
 use crate::error::Error;
 use crate::options::Options;
-use crate::question::{Question, Watch};
 use crate::quiet;
+use check::{check, check_sampling};
+use conclude::Judged;
 
-/// Estimates both time constants of `record`, with intervals, noise levels and residual tests.
+/// Told of every replicate of a bootstrap: how many are done, of how many.
+pub type Watch<'a> = &'a (dyn Fn(usize, usize) + Sync);
+
+/// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
 /// # Errors
-/// [`Error`] if the question cannot be put: options that contradict each other, an estimator that
-/// cannot take the record's sampling, too few samples to distinguish noise from signal. A fit that
-/// ran is never an error; its [`Status`](crate::Status) says how good it is.
+/// [`Error`] if the question cannot be put: options that contradict each other, an estimator that cannot take the record's
+/// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its
+/// [`Status`](crate::Status) says what it is worth.
 pub fn characterise(record: &Record, options: &Options) -> Result<Characterisation, Error> {
     characterise_watched(record, options, &|_, _| ())
 }
 
-/// Characterises `record` as [`characterise`] does, and calls `watch` with `(done, total)` after
-/// every replicate of a bootstrap.
+/// Both time constants of `record`, as [`characterise`] finds them, with `watch` told of every
+/// replicate of a bootstrap: how many are done, of how many.
 ///
 /// # Errors
 /// As [`characterise`].
@@ -29,19 +46,22 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     check(options)?;
     let readings = readings(record, options)?;
     check_sampling(&readings, options)?;
-    let levels = levels(record, &readings, options)?;
-    if options.has_second_lag() != [false; 2] {
-        Question::<6>::new(record, &readings, options, levels, watch).answer()
-    } else if options.calibrates() {
-        Question::<4>::new(record, &readings, options, levels, watch).answer()
-    } else {
-        Question::<2>::new(record, &readings, options, levels, watch).answer()
+    let asked = Asked { record, options, watch };
+    // Levels that are given need no rest.
+    let quiet_s: &[[f64; 2]] = if options.noise_std_k.is_none() { &options.quiet_segments_s } else { &[] };
+    let at_rest = quiet::runs(record, quiet_s)?;
+    let task = asked.task(&readings, &at_rest);
+    match task.parameters() {
+        6 => answer::<6>(&asked, &task),
+        4 => answer::<4>(&asked, &task),
+        _ => answer::<2>(&asked, &task),
     }
 }
 
-/// The channels of a record in the form that the costs need, cut where samples are missing. The
-/// level that is subtracted is the mean, or 0 °C if an offset, which is stated there, is known or
-/// excluded.
+/// The channels of a record as the costs take them, cut where samples are missing.
+///
+/// The level taken off is the mean, or 0 °C where an offset is known or excluded: it is stated
+/// there.
 ///
 /// # Errors
 /// [`Error::Cost`] for a record without usable samples, which its constructors do not let through.
@@ -62,163 +82,171 @@ pub fn readings(record: &Record, options: &Options) -> Result<Readings, Error> {
     })
 }
 
-/// Levels that are given come first, then those of quiet segments, then a ratio, then what the whole record shows.
-fn levels(record: &Record, readings: &Readings, options: &Options) -> Result<Levels, Error> {
-    if let Some(std_k) = options.noise_std_k {
-        return Ok(Levels::given(std_k, [0.0; 2]));
+/// One record with one set of options.
+struct Asked<'a> {
+    record: &'a Record,
+    options: &'a Options,
+    watch: Watch<'a>,
+}
+
+/// Puts the question to the estimators, in steps of which each needs the one before.
+fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Characterisation, Error> {
+    let mut warnings = asked.needless();
+    // The whitened estimate comes first, whichever is asked: the others begin at it, and what it
+    // leaves says whether the model is right.
+    let mut fit = WhitenedFit::<'a, P>::find(task)?;
+    warnings.extend(outweighed(&fit));
+    // What the gas does between samples must be settled before the residual is judged: a wrong hold
+    // leaves more than noise.
+    let hold_sensitivity = asked.settle_hold(&mut fit)?;
+    // Levels that took the signal for noise are no measure for the residual, and must go before it
+    // is held against them.
+    if fit.lower_levels_to_residual() {
+        warnings.push(
+            "the signal changes between samples as noise does, so the noise levels are scaled \
+                     to the residual and their ratio is a guess; give --noise S1,S2 if you know them"
+                .into(),
+        );
     }
-    if !options.quiet_segments_s.is_empty() {
-        let runs = quiet::runs(record, &options.quiet_segments_s)?;
-        return Ok(Levels::from_differences(readings)?.at_rest(&runs, options.noise_colour));
+    // Only now is it known whether errors are those of noise or those of the residual, and all
+    // intervals rest on which.
+    let theta = fit.theta();
+    let tests = asked.tests(&fit, &theta)?;
+    let is_rejected = fit.is_rejected_by(&tests);
+    let middle = if is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
+    let covariance = fit.covariance(middle);
+    if covariance.is_some() {
+        fit.bound_unseen_lags(middle)?;
     }
-    Ok(match options.noise_ratio {
-        Some(ratio) => Levels::of_ratio(readings, ratio)?,
-        None => Levels::from_differences(readings)?,
+    if asked.options.estimator == Estimator::Whitened {
+        let solved = fit.solved(covariance);
+        let judged = Judged { tests, is_rejected, is_determined: true, whitened_is_accepted: false };
+        return conclude::conclude(asked, &fit, solved, judged, hold_sensitivity, warnings);
+    }
+    // What the whitened estimate cannot determine, the others only seem to determine.
+    let is_determined = fit.fit().end.is_usable() && fit.vague(&theta, covariance.as_ref()).is_empty();
+    let solved = asked.solve_beside(&fit, &mut warnings)?;
+    let tests = asked.tests(&fit, &solved.theta)?;
+    let rejects = fit.is_rejected_by(&tests);
+    let judged = Judged { tests, is_rejected: rejects, is_determined, whitened_is_accepted: !is_rejected };
+    conclude::conclude(asked, &fit, solved, judged, None, warnings)
+}
+
+/// What to say where knowledge was weighed against a residual that is louder than noise.
+fn outweighed<const P: usize>(fit: &WhitenedFit<'_, P>) -> Option<String> {
+    let energy = fit.energy();
+    let is_louder = !fit.knowledge().is_empty() && energy > ENERGY_THAT_OUTWEIGHS_NOISE;
+    is_louder.then(|| {
+        format!(
+            "the residual has {energy:.3} times the energy that sensor noise explains; the known values were weighed against \
+             the residual"
+        )
     })
 }
 
-/// What takes evenly spaced samples.
-fn check_sampling(readings: &Readings, options: &Options) -> Result<(), Error> {
-    let wants = [
-        (options.has_second_lag() != [false; 2], "--second-order"),
-        (options.noise_colour == NoiseColour::Autoregressive, "--noise-colour autoregressive"),
-        (matches!(options.intervals, Intervals::Bootstrap(_)), "--intervals bootstrap"),
-    ];
-    match wants.into_iter().find(|(is_asked, _)| *is_asked) {
-        Some((_, option)) if readings.even_period_s().is_none() => Err(Error::Option {
-            option,
-            expected: "a record with evenly spaced samples; if the stamps are only ragged, --sampling \
-                uniform"
-                .into(),
-            got: "uneven time stamps".into(),
-        }),
-        _ => Ok(()),
-    }
-}
-
-fn check(options: &Options) -> Result<(), Error> {
-    check_noise(options)?;
-    check_estimator(options)?;
-    if options.estimator != Estimator::Whitened && options.known.iter().any(|k| k.std.is_some()) {
-        return Err(Error::WhitenedOnly {
-            what: "a known value with an uncertainty (--known NAME=VALUE+-SD)",
-            estimator: options.estimator.name().into(),
-        });
-    }
-    for (i, known) in options.known.iter().enumerate() {
-        let name = Known::NAMES[Parameter::ALL.iter().position(|p| *p == known.parameter).unwrap_or(0)];
-        let wrong = |expected: &str| Error::Option {
-            option: "--known",
-            expected: expected.into(),
-            got: format!("{name}={}", known.value),
+impl Asked<'_> {
+    /// The question as estimators take it. Levels that are given come first, then those of a rest,
+    /// then a ratio.
+    fn task<'t>(&'t self, readings: &'t Readings, at_rest: &'t [RunAtRest<'t>]) -> Task<'t> {
+        let options = self.options;
+        let noise = match (options.noise_std_k, options.noise_ratio) {
+            (Some(std_k), _) => NoiseKnowledge::Known { std_k, ar1: [0.0; 2] },
+            (None, Some(ratio)) => NoiseKnowledge::Ratio(ratio),
+            (None, None) => NoiseKnowledge::Found(options.noise_colour),
         };
-        if options.known[..i].iter().any(|k| k.parameter == known.parameter) {
-            return Err(wrong("each parameter once"));
+        Task {
+            hold: options.hold.first(),
+            noise,
+            at_rest,
+            minimiser: &options.optimiser,
+            discard: options.discard,
+            free_gain: options.free_gain,
+            free_offset: options.free_offset,
+            second_order: options.second_order,
+            known: &options.known,
+            ..Task::new(readings)
         }
-        let is_freed = match known.parameter {
-            Parameter::Gain => options.free_gain,
-            Parameter::Offset => options.free_offset,
-            Parameter::SecondTau1 => options.second_order[0],
-            Parameter::SecondTau2 => options.second_order[1],
-            Parameter::Tau1 | Parameter::Tau2 => false,
+    }
+
+    /// Options that were given and have nothing to do.
+    fn needless(&self) -> Vec<String> {
+        let options = self.options;
+        let mut out = Vec::new();
+        if options.discard.is_some() && options.estimator == Estimator::Whitened {
+            out.push("the whitened estimator discards no samples: --discard was not needed".into());
+        }
+        if options.noise_std_k.is_some() && !options.quiet_segments_s.is_empty() {
+            out.push("--noise gives the levels: --quiet-segment was not needed".into());
+        }
+        out
+    }
+
+    /// The tests of what parameters `theta` leave; of the calibration too where `theta` is a
+    /// whitened minimum.
+    fn tests<const P: usize>(&self, fit: &WhitenedFit<'_, P>, theta: &[f64; P]) -> Result<Vec<ResidualTest>, Error> {
+        let is_minimum = self.options.estimator == Estimator::Whitened && fit.fit().end.is_usable();
+        Ok(fit.residual_tests(theta, is_minimum)?)
+    }
+
+    /// Compares with the other hold; where the hold is to be found, and the record is clearly
+    /// better explained with the other, `fit` is the estimate with that. Returns how far the time
+    /// constants move, relative.
+    fn settle_hold<const P: usize>(&self, fit: &mut WhitenedFit<'_, P>) -> Result<Option<[f64; 2]>, Error> {
+        if self.options.estimator != Estimator::Whitened || fit.readings().even_period_s().is_none() {
+            return Ok(None);
+        }
+        let hold = other_hold(fit.task().hold);
+        let other = fit.with_hold(hold)?;
+        let is_usable = other.fit().end.is_usable();
+        let both_usable = is_usable && fit.fit().end.is_usable();
+        let moved = [0, 1].map(|i| other.theta()[i] / fit.theta()[i] - 1.0);
+        let alone_is_accepted = || -> Result<bool, Error> {
+            let rejected =
+                |fit: &WhitenedFit<'_, P>| Ok::<_, Error>(fit.is_rejected_by(&self.tests(fit, &fit.theta())?));
+            Ok(rejected(fit)? && !rejected(&other)?)
         };
-        if known.std.is_none() && is_freed {
-            let expected =
-                "a standard deviation (NAME=VALUE+-SD) for what --free or --second-order lets float, or not both";
-            return Err(wrong(expected));
+        if self.options.hold == Hold::Auto && is_usable && (other.is_clearly_better_than(fit) || alone_is_accepted()?) {
+            *fit = WhitenedFit::find(&Task { hold, ..fit.task().clone() })?;
         }
+        Ok(both_usable.then_some(moved))
     }
-    let is_held = |p| options.known(p).is_some_and(|k| k.std.is_none());
-    if is_held(Parameter::Tau1) && is_held(Parameter::Tau2) {
-        return Err(Error::Option {
-            option: "--known",
-            expected: "at least one time constant to find: leave one out, or give it a standard deviation".into(),
-            got: format!("{} and {}", Known::NAMES[0], Known::NAMES[1]),
-        });
-    }
-    for (first, second) in [(Parameter::Tau1, Parameter::SecondTau1), (Parameter::Tau2, Parameter::SecondTau2)] {
-        if let (Some(first), Some(second)) = (options.known(first), options.known(second))
-            && second.value > first.value
-        {
-            return Err(Error::Option {
-                option: "--known",
-                expected: format!("a second time constant that is the smaller one, at most {}", first.value),
-                got: second.value.to_string(),
-            });
-        }
-    }
-    Ok(())
-}
 
-/// Whether what is said of the noise goes together.
-fn check_noise(options: &Options) -> Result<(), Error> {
-    let wrong = |option, expected: &str, got: String| Err(Error::Option { option, expected: expected.into(), got });
-    let is_sound = |s: f64| s.is_finite() && s > 0.0;
-    if let Some([a, b]) = options.noise_std_k
-        && !(is_sound(a) && is_sound(b))
-    {
-        return wrong("--noise", "two positive numbers, S1,S2 in K", format!("{a},{b}"));
-    }
-    if let Some(ratio) = options.noise_ratio {
-        if !is_sound(ratio) {
-            return wrong("--noise-ratio", "a positive number, S2/S1", ratio.to_string());
+    /// Where the estimator that was asked for ends, beside the whitened `fit`.
+    fn solve_beside<const P: usize>(
+        &self,
+        fit: &WhitenedFit<'_, P>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Solved<P>, Error> {
+        let estimator = self.options.estimator;
+        if estimator.is_closed_form() && self.options.discard.is_some() {
+            warnings.push("estimators in closed form discard no samples: --discard was not needed".into());
         }
-        if options.noise_std_k.is_some() || !options.quiet_segments_s.is_empty() {
-            let expected = "no --noise and no --quiet-segment beside it: levels have a ratio already";
-            return wrong("--noise-ratio", expected, ratio.to_string());
-        }
-    }
-    if options.noise_colour == NoiseColour::Autoregressive
-        && (options.noise_std_k.is_some() || options.noise_ratio.is_some())
-    {
-        let expected =
-            "white where --noise or --noise-ratio says what the noise is: colour and levels are found together";
-        return wrong("--noise-colour", expected, "autoregressive".into());
-    }
-    for &[from_s, to_s] in &options.quiet_segments_s {
-        if !(from_s.is_finite() && to_s.is_finite() && from_s < to_s) {
-            return wrong("--quiet-segment", "FROM..TO in seconds, FROM the smaller", format!("{from_s}..{to_s}"));
-        }
-    }
-    Ok(())
-}
-
-/// Whether the estimator can be asked this.
-fn check_estimator(options: &Options) -> Result<(), Error> {
-    let name = options.estimator.name();
-    if options.estimator.is_closed_form() {
-        let asked = [
-            (options.free_gain || options.free_offset, "--free"),
-            (options.has_second_lag() != [false; 2], "--second-order"),
-            (!options.known.is_empty(), "--known"),
-        ];
-        if let Some((_, what)) = asked.into_iter().find(|(is_asked, _)| *is_asked) {
-            return Err(Error::NotInClosedForm { what, estimator: name.into() });
-        }
-    }
-    match options.intervals {
-        Intervals::Profile if options.estimator != Estimator::Whitened => {
-            Err(Error::WhitenedOnly { what: "--intervals profile", estimator: name.into() })
-        }
-        Intervals::Bootstrap(bootstrap) => {
-            if bootstrap.replicates < Bootstrap::MIN_REPLICATES {
-                return Err(Error::Option {
-                    option: "--replicates",
-                    expected: format!("at least {}", Bootstrap::MIN_REPLICATES),
-                    got: bootstrap.replicates.to_string(),
-                });
+        let solved = match estimator.solve(fit.task(), Some(fit)) {
+            Err(EstimateError::Cost(CostError::Singular)) if estimator.is_closed_form() => {
+                let why = "the difference equation has no solution with two positive time constants";
+                let end = End::Stalled(why.into());
+                let mut solved = fit.solved(None);
+                solved.fit = solved.fit.map(|fit| Fit { optimiser: "closed-form".into(), end: end.clone(), ..fit });
+                return Ok(Solved { end, ..solved });
             }
-            if options.calibrates() || !options.known.is_empty() {
-                return Err(Error::Option {
-                    option: "--intervals",
-                    expected: "auto or profile with --free or --known, which the bootstrap does not \
-                        simulate"
-                        .into(),
-                    got: "bootstrap".into(),
-                });
+            solved => solved?,
+        };
+        let biased = match estimator {
+            Estimator::CrossRelation => "the plain cross-relation cost is biased towards long time constants by noise",
+            Estimator::DifferenceEquationLs => {
+                "noise biases least squares on the difference equation, in a direction that depends \
+                     on which sensor is called T1"
             }
-            Ok(())
+            Estimator::DifferenceEquationTls => "noise biases total least squares on the difference equation",
+            _ => "",
+        };
+        if !biased.is_empty() {
+            warnings.push(format!("{biased}; its intervals cover the scatter of the estimate, not its bias"));
         }
-        _ => Ok(()),
+        if !estimator.is_closed_form() {
+            let discarded = solved.discarded;
+            warnings.push(format!("the first {discarded} samples of each unbroken stretch were discarded"));
+        }
+        Ok(solved)
     }
 }

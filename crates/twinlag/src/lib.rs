@@ -65,17 +65,14 @@ mod diagnose;
 mod error;
 mod live;
 mod options;
-mod question;
 mod quiet;
-mod second_lag;
 mod track;
-mod verdict;
 
 pub use characterisation::{
     Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
     SensorEstimate, Status,
 };
-pub use characterise::{characterise, characterise_watched, readings};
+pub use characterise::{Watch, characterise, characterise_watched, readings};
 pub use compensate::{AgainstReference, CompensateOptions, Compensation, Quality, compensate};
 pub use diagnose::{
     DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, NamedLimit,
@@ -84,7 +81,6 @@ pub use diagnose::{
 pub use error::Error;
 pub use live::{Live, LiveAnswer, LiveOptions};
 pub use options::Options;
-pub use question::Watch;
 pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
 
 pub use twinlag_bias as bias;

@@ -5,7 +5,8 @@ use twinlag_record::Record;
 
 use crate::error::Error;
 
-/// The unbroken runs of `record` that lie in the stretches `quiet_s`, each `[from, to]` in seconds from the start.
+/// The unbroken runs of `record` that lie in the stretches `quiet_s`, each `[from, to]` in seconds
+/// from the start.
 ///
 /// # Errors
 /// [`Error::QuietSegment`] for a stretch without enough samples for a noise level.
