@@ -29,7 +29,10 @@ impl Search<'_> {
                 first.held_out_nats =
                     held_out_gain(self.observations, self.selection, current, &first.fitted, self.policy);
             }
-            if first.held_out_nats > 0.0 && self.has_size(&first) && is_confirmed(&first, current, self.observations, self.policy) {
+            if first.held_out_nats > 0.0
+                && self.has_size(&first)
+                && is_confirmed(&first, current, self.observations, self.policy)
+            {
                 let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
                 let tied = ties(&first.score(current, self.policy), &others, self.policy);
                 return Some((first, tied.into_iter().map(|i| all[order[i]].clone()).collect()));

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use twinlag_model::{
     Bands, Context, DiagnoseError, Effort, Fitted, Identifier, Linearised, Model, Observations, Parameter, Place,
-    Policy, Prepared, Selection, Settings, Shared, Stretch, Watch, candidates, dense, fit_noise, line_channel, lines,
-    report, runs,
+    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
+    runs,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -291,7 +291,7 @@ impl<'a> Search<'a> {
 
     /// The candidate with the best fit of all its starts.
     pub(crate) fn with(&self, current: &Fitted, effect: &Shared, robust_before: f64) -> Candidate {
-        let fitted = self.best_of_starts(current, effect, |model, theta| {
+        let fitted = Self::best_of_starts(current, effect, |model, theta| {
             vec![model.fit(theta, self.observations, self.selection, Effort::Look)]
         });
         let [white_gain, robust_gain] = self.gains(current, &fitted, effect, robust_before - self.robust(&fitted));
@@ -303,7 +303,7 @@ impl<'a> Search<'a> {
     /// fitted to the end.
     fn looked_at(&self, current: &Fitted, effect: &Shared, excerpt: &(Observations, Selection)) -> Candidate {
         let (observations, selection) = excerpt;
-        let fitted = self.best_of_starts(current, effect, |model, theta| {
+        let fitted = Self::best_of_starts(current, effect, |model, theta| {
             let mut fits = vec![model.fit(theta, observations, selection, Effort::Look)];
             if effect.parameters().len() <= MOST_GRID_PARAMETERS {
                 fits.push(self.over_grid(model, &theta[2..], excerpt));
@@ -315,12 +315,7 @@ impl<'a> Search<'a> {
         self.candidate(effect, fitted, gain, gain)
     }
 
-    fn best_of_starts(
-        &self,
-        current: &Fitted,
-        effect: &Shared,
-        fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>,
-    ) -> Fitted {
+    fn best_of_starts(current: &Fitted, effect: &Shared, fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>) -> Fitted {
         let model = current.model.with(effect.clone());
         let from = |start: Vec<f64>| {
             let mut theta = current.theta.clone();
@@ -355,7 +350,7 @@ impl<'a> Search<'a> {
     /// is too short.
     pub(crate) fn with_noise(&self, current: &Fitted, effect: &Shared) -> Option<Candidate> {
         let plant = current.model.plant(&current.theta, self.observations);
-        let longest = self.observations.stretches.iter().map(Stretch::len).max()?;
+        let longest = self.observations.stretches.iter().map(|s| s.time_s.len()).max()?;
         if longest < plant.consumed(true) + FEWEST_NOISE_SAMPLES {
             return None;
         }

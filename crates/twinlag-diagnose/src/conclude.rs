@@ -8,7 +8,7 @@ use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, 
 use crate::excitation::SINGLE;
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
-use crate::moves::State;
+use crate::moves::{Move, State};
 use crate::naming::{name, of_defect, widen};
 use crate::remark::Remark;
 
@@ -35,7 +35,7 @@ pub(crate) fn conclude(
     let with_effects = to_the_end(&state.current, &state);
     let mut last = summary(&with_effects, &state, policy);
     let mut remarks: Vec<Remark> = Vec::new();
-    for remark in state.moves.iter().filter_map(|m| m.remark()) {
+    for remark in state.moves.iter().filter_map(Move::remark) {
         if remark != Remark::NoiseLowered || !remarks.contains(&remark) {
             remarks.push(remark);
         }

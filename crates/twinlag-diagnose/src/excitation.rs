@@ -16,7 +16,7 @@ const LEAST_SHARE: f64 = 1e-9;
 pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usize> {
     observations.period_s?;
     let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
-    let stretch = observations.stretches.iter().max_by_key(|s| s.len())?;
+    let stretch = observations.stretches.iter().max_by_key(|s| s.time_s.len())?;
     let y = &stretch.reading_c[channel];
     let n = y.len() & !1;
     if n < policy.tone_fewest_samples {

@@ -222,3 +222,16 @@ fn the_start_of_time_does_not_matter() {
         assert!((a - b).abs() < 0.1 * error, "got {a} and {b}, which differ by more than 0.1 × {error}");
     }
 }
+
+/// An exponential in one reading is annihilated by the factor of any lag of its time constant, and so by a slow mode of
+/// no share. Failed: "explained: slow-mode" with a share of 0.000 ± 0.001.
+#[test]
+fn an_amplifier_that_warms_up_is_no_slow_mode() {
+    let mut simulated = readings(SEED, turbulence(), |_| ());
+    for (y, t) in simulated.t2_c.iter_mut().zip(&simulated.time_s) {
+        *y += 4.0 * (-t / 0.8).exp();
+    }
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    let told = told(&d);
+    assert!(d.effects.iter().all(|f| f.effect != Identifier::SLOW_MODE), "{told}");
+}

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use twinlag_bias::estimate_noise;
+use twinlag_bias::{COARSE_STEP_NOISE_RATIO, estimate_noise};
 use twinlag_cross_relation::{Readings, Segment, Steps};
 use twinlag_transform::Forward;
 
@@ -10,14 +10,13 @@ use crate::implied::{Evaluation, Part, median};
 use crate::observations::Observations;
 use crate::policy::Policy;
 
-/// A converter's own noise `q/√12` beside the noise, above which its steps are an effect of their own.
-const COARSE: f64 = 0.5;
 /// Bins beside a line that it is held against: beyond the window's main lobe.
 const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
 
 /// Noise of the channels as third differences show it.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
+    /// White noise, K.
     pub std_k: [f64; 2],
     /// Standard error of the logarithm.
     pub log_error: [f64; 2],
@@ -26,12 +25,12 @@ pub struct Levels {
 }
 
 /// Rows of a stretch that levels of noise can be found in.
-pub const SHORTEST: usize = 8;
+pub(crate) const SHORTEST: usize = 8;
 
 impl Levels {
     /// Step of each converter where it is coarse beside the noise, K.
     pub fn coarse_step_k(&self) -> [Option<f64>; 2] {
-        [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE * self.std_k[i]))
+        [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
     }
 
     /// Both times `factor`; none becomes less than its converter's own noise.
@@ -43,7 +42,7 @@ impl Levels {
 }
 
 /// The channels as the costs of the other layers take them, without what is masked.
-pub fn readings(observations: &Observations) -> Option<Readings> {
+pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
     let mut segments = Vec::new();
     for s in &observations.stretches {
         let is_masked = |k: usize| s.masked[0][k] || s.masked[1][k];
@@ -81,7 +80,11 @@ pub fn levels(observations: &Observations) -> Option<Levels> {
 /// channel.
 ///
 /// - `steps_k`: of a coarse converter, whose every value comes again and again
-pub fn mask_saturation(observations: &mut Observations, steps_k: [Option<f64>; 2], policy: &Policy) -> [usize; 2] {
+pub(crate) fn mask_saturation(
+    observations: &mut Observations,
+    steps_k: [Option<f64>; 2],
+    policy: &Policy,
+) -> [usize; 2] {
     let mut out = [0; 2];
     for i in 0..2 {
         let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
@@ -123,7 +126,12 @@ fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
 /// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
 /// particular.
-pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64, policy: &Policy) -> [Vec<usize>; 2] {
+pub(crate) fn spikes(
+    observations: &Observations,
+    evaluation: &Evaluation,
+    far: f64,
+    policy: &Policy,
+) -> [Vec<usize>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
@@ -171,7 +179,7 @@ pub fn spikes(observations: &Observations, evaluation: &Evaluation, far: f64, po
 }
 
 /// Masks `samples` of `channel`.
-pub fn mask(observations: &mut Observations, channel: usize, samples: &[usize]) {
+pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[usize]) {
     let mut first = 0;
     for stretch in &mut observations.stretches {
         for sample in samples {

@@ -62,10 +62,12 @@ pub fn log_determinant(matrix: &[Vec<f64>]) -> Option<f64> {
     Some((0..n).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum())
 }
 
+/// Product of a matrix with a vector.
 pub fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
     matrix.iter().map(|row| dot(row, vector)).collect()
 }
 
+/// Product of two square matrices.
 pub fn product(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..a.len()).map(|i| (0..b.len()).map(|j| (0..b.len()).map(|k| a[i][k] * b[k][j]).sum()).collect()).collect()
 }

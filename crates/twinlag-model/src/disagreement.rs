@@ -189,13 +189,7 @@ impl<'a> Evaluator<'a> {
     /// them, with the derivatives of what the parameter moves.
     ///
     /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
-    pub(crate) fn derivative(
-        &self,
-        plant: &Plant,
-        functions: [bool; 2],
-        memory: &mut MovedMemory,
-        out: &mut Vec<f64>,
-    ) {
+    pub(crate) fn derivative(&self, plant: &Plant, functions: [bool; 2], memory: &mut MovedMemory, out: &mut Vec<f64>) {
         let MovedMemory { disagreement, factor: of_factor } = memory;
         let moved = plant.moved(functions);
         let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());

@@ -35,6 +35,7 @@ impl PartialEq for Extended {
 }
 
 impl Extended {
+    /// A fitted model with the record that it was fitted to.
     pub fn new(fitted: &Fitted, observations: &Observations) -> Self {
         let observations = Arc::new(observations.clone());
         Self { model: fitted.model.clone(), theta: fitted.theta.clone(), observations }

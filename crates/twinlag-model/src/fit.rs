@@ -81,6 +81,9 @@ impl Fitted {
 
 impl Model {
     /// The fit from `start`, noise parameters held.
+    ///
+    /// # Panics
+    /// If both time constants are held, or `start` is not finite.
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
         let (iterations, step_tolerance) = match effort {
@@ -103,6 +106,9 @@ impl Model {
     }
 
     /// The best fit with effect values as given, from the best `most` points of a grid of time constants.
+    ///
+    /// # Panics
+    /// If both time constants are held, or `rest` is not finite.
     pub fn fit_over_grid(
         &self,
         rest: &[f64],

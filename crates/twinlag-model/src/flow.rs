@@ -10,7 +10,12 @@ pub struct Flow {
 }
 
 impl Flow {
+    /// The flow along a record.
+    ///
     /// - `stretches`: instants, s, and values of each
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Flow`] for values that are not positive, or not as many as instants.
     pub fn new(stretches: &[(&[f64], &[f64])]) -> Result<Self, DiagnoseError> {
         let is_sound = |(time_s, values): &(&[f64], &[f64])| {
             time_s.len() == values.len() && values.iter().all(|v| v.is_finite() && *v > 0.0)

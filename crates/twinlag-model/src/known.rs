@@ -28,14 +28,14 @@ pub fn fit_with(
 }
 
 /// A record with the model of it whose effects were known.
-pub struct Known {
+pub(crate) struct Known {
     pub prepared: Prepared,
     pub fitted: Fitted,
     pub fitted_again: Vec<Identifier>,
 }
 
 impl Known {
-    pub fn of(
+    pub(crate) fn of(
         observations: &Observations,
         settings: &Settings,
         effects: &[KnownEffect],

@@ -49,7 +49,7 @@ impl Stretch {
         0.5 * (self.reading_c[0][0] + self.reading_c[1][0])
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.time_s.len()
     }
 }
@@ -57,7 +57,9 @@ impl Stretch {
 /// Both channels of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observations {
+    /// Unbroken stretches, in order of time.
     pub stretches: Vec<Stretch>,
+    /// The sample period where samples are evenly spaced within each stretch, s.
     pub period_s: Option<f64>,
     /// Standard deviation of the more lively channel, K.
     swing_k: f64,
@@ -153,6 +155,7 @@ impl Observations {
 
     /// Pieces of `length` samples from each of `starts` on, counted through the stretches; those that would reach over the end of a
     /// stretch are left out.
+    #[must_use]
     pub fn excerpt(&self, starts: impl Iterator<Item = usize>, length: usize) -> Self {
         let mut stretches = Vec::new();
         for mut from in starts {

@@ -19,15 +19,19 @@ use crate::weighting::Weighting;
 const LONG: usize = 7000;
 const EXCERPT: usize = 500;
 /// Starts of the two-lag fit that the best points of a grid of time constants give.
-pub const GRID_STARTS: usize = 3;
+pub(crate) const GRID_STARTS: usize = 3;
 /// Times that spikes are looked for.
 const SPIKE_ROUNDS: usize = 3;
 
 /// A record with its defects masked, and the two-lag model of it.
 pub struct Prepared {
+    /// The record, its defects masked.
     pub observations: Observations,
+    /// Its noise.
     pub levels: Levels,
+    /// The numbers that decide.
     pub policy: Policy,
+    /// What candidates are made from.
     pub context: Context,
     /// Defects of the data.
     pub found: Vec<Defect>,
@@ -43,6 +47,10 @@ pub struct Prepared {
 
 impl Prepared {
     /// The record with saturation and coarse steps dealt with.
+    ///
+    /// # Errors
+    /// [`DiagnoseError`] for a policy that means nothing, a channel that never changes, and a record too fragmented for
+    /// noise levels.
     pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
         let policy = settings.policy.clone();
         policy.check()?;
@@ -104,7 +112,7 @@ impl Prepared {
         Some(model.fit(&base.theta, observations, &self.searched, Effort::Finish))
     }
 
-    pub fn mask_spikes(&mut self, base: &Fitted) -> bool {
+    pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
         let evaluation = base.model.evaluate(&base.theta, &self.observations);
         let mut counts = [0; 2];
         let policy = &self.policy;

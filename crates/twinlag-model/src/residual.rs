@@ -71,7 +71,7 @@ impl Pairs {
 }
 
 /// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
-pub fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
+pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
     let evaluation = plant.evaluate(observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
@@ -99,7 +99,7 @@ pub fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
 /// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
 ///
 /// - `is_coarse`: whether a converter is, whose rounding has no tails
-pub fn tests(
+pub(crate) fn tests(
     fitted: &Fitted,
     observations: &Observations,
     selection: &Selection,

@@ -44,7 +44,7 @@ pub struct Bands(pub Vec<Band>);
 
 /// The blocks that are used.
 #[derive(Clone, Copy)]
-pub enum Half {
+pub(crate) enum Half {
     Both,
     Even,
     Odd,
@@ -232,6 +232,9 @@ impl Cost for NoiseCost<'_> {
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
 /// - `is_coarse`: channels whose levels third differences do not determine
+///
+/// # Panics
+/// If extra noise is asked for without a start.
 pub fn fit_noise(
     plant: &Plant,
     observations: &Observations,
@@ -289,13 +292,14 @@ pub fn runs(evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Vec<f
         if !holds(*sample) {
             continue;
         }
-        if last.is_none_or(|l| *sample != l + 1) {
+        let is_next = last.is_some_and(|l| *sample == l + 1);
+        last = Some(*sample);
+        if !is_next || out.is_empty() {
             out.push(Vec::new());
         }
-        last = Some(*sample);
         // A masked reading takes one residual away; those around it are white all the same.
-        if evaluation.is_informed[k] {
-            out.last_mut().expect("begun").push(evaluation.residual[k]);
+        if let Some(run) = out.last_mut().filter(|_| evaluation.is_informed[k]) {
+            run.push(evaluation.residual[k]);
         }
     }
     out

@@ -88,6 +88,7 @@ impl Weighting {
     ///
     /// The filter is the prediction error of the autoregressive model that the autocorrelation gives (Yule and Walker), scaled to
     /// unit variance.
+    #[must_use]
     pub fn by_residual(&self, runs: &[Vec<f64>]) -> Self {
         let filtered: Vec<Vec<f64>> = runs.iter().map(|run| self.apply(run)).collect();
         let count: usize = filtered.iter().map(Vec::len).sum();

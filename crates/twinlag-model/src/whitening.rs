@@ -271,12 +271,7 @@ fn sum_over_same<T: Real>(sources: &[Source<'_, T>], lag: usize, product: impl F
 }
 
 /// `Σ σ² product(weight in value k, weight in value k − lag)` over the readings that both have in common.
-fn sum_over_readings<T: Real>(
-    sources: &[Source<'_, T>],
-    k: usize,
-    lag: usize,
-    product: impl Fn(T, T) -> f64,
-) -> f64 {
+fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
     let mut sum = 0.0;
     for Source { rows, variance } in sources {
         let (now, then) = (rows.at(k), rows.at(k - lag));

@@ -8,6 +8,7 @@ use crate::settings::KnownEffect;
 ///
 /// Made by [`About::new`] and the functions that follow it, in a `static`.
 #[derive(Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 #[non_exhaustive]
 pub struct About {
     /// The name that scripts use.

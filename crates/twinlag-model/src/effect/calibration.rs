@@ -69,6 +69,7 @@ fn of_kind(kind: Kind, context: &Context) -> Shared {
     Arc::new(Calibration { kind, seat, context: context.clone() })
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
     // A curvature is meant about the temperatures of the record that it was found in.
     let names = ["curvature_about", "curvature_variance", "curvature_skew"];

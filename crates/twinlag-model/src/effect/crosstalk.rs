@@ -47,6 +47,7 @@ fn about(channel: usize, about_c: f64) -> Shared {
     Arc::new(Crosstalk { channel, about_c, seat: Seat::new(Identifier::CROSSTALK, Some(channel), vec![share]) })
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
     let neutral_c = |channel: usize| known.parameter("neutral_temperature").unwrap_or(context.mean_c[1 - channel]);
     Ok(described_by(known, (0..2).map(|channel| about(channel, neutral_c(channel))).collect()))

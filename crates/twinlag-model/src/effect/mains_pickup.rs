@@ -31,6 +31,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
     at_lines(context.lines.iter().take(2), context)
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
     let lines: Vec<(f64, usize)> = known.parameter("frequency").into_iter().flat_map(|hz| [(hz, 0), (hz, 1)]).collect();
     Ok(described_by(known, at_lines(lines.iter(), context)))

@@ -31,6 +31,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
     about(context.mean_c, context)
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
     let mean_c = known.parameter("mean_temperature").map_or(context.mean_c, |mean_c| [mean_c; 2]);
     Ok(described_by(known, about(mean_c, context)))

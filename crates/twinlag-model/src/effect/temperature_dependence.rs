@@ -37,6 +37,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
     about(0.5 * (context.mean_c[0] + context.mean_c[1]), context)
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
     let here_c = 0.5 * (context.mean_c[0] + context.mean_c[1]);
     Ok(described_by(known, about(known.parameter("mean_temperature").unwrap_or(here_c), context)))
