@@ -30,6 +30,7 @@ pub(crate) fn run(tested: bool) -> Result<()> {
     step("example: a solver of one's own", "target/debug/own-solver", &[])?;
     step("example: a cost of one's own", "target/debug/own-cost", &[])?;
     step("example: an estimator of one's own", "target/debug/own-estimator", &[])?;
+    step("example: an effect of one's own", "target/debug/own-effect", &[])?;
     step("example: a live pipe", "target/debug/live-pipe", &[])?;
     let quick = root()?.join("target/quick-experiments");
     if quick.exists() {
