@@ -24,8 +24,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));
-        let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
-        twinlag::compensate(&record, &options, &watch)?
+        twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))?
     };
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =
