@@ -237,6 +237,23 @@ fn literals_have_no_runs_of_blanks() {
     assert_none("a run of blanks in a string", &places);
 }
 
+/// A library does not know the command line: its errors carry settings, and the program adds its options for them.
+#[test]
+fn no_library_names_an_option_of_the_program() {
+    let names_one = |text: &str| {
+        text.match_indices("--").any(|(at, _)| {
+            let before = text[..at].chars().next_back();
+            let after = text[at + 2..].chars().next();
+            !before.is_some_and(|c| c.is_alphanumeric() || c == '-') && after.is_some_and(|c| c.is_ascii_lowercase())
+        })
+    };
+    assert!(names_one("leave out --estimator") && !names_one("a -- b") && !names_one("---"));
+    let is_library = |t: &Text| t.kind == Kind::Literal && !t.file.starts_with("crates/twinlag-cli/");
+    // Style sheets have custom properties of the same form.
+    let places = found(|t| is_library(t) && names_one(&t.text) && !t.text.contains("var(--"));
+    assert_none("an option of the program in a library", &places);
+}
+
 /// The search finds what it is meant to find: strings over several lines, doc comments, whole words only.
 #[test]
 fn the_search_reads_literals_and_doc_comments() {

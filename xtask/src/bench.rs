@@ -170,7 +170,7 @@ fn closed_loop() -> Result<()> {
         let mut record = record_of(rig.simulate()?)?;
         record.reference_c = None;
         let start = Instant::now();
-        let answer = diagnose(&record, &DiagnoseOptions::default(), &|_, _, _| ())?;
+        let answer = diagnose(&record, &DiagnoseOptions::default())?;
         let seconds = start.elapsed().as_secs_f64();
         let named: Vec<&str> = answer.effects.iter().map(|e| e.effect.name()).collect();
         println!("{:36} {seconds:6.2} s   {}", kind.name(), named.join(", "));

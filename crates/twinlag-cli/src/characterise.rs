@@ -9,7 +9,7 @@ use twinlag::{Characterisation, Model, Options, Status};
 
 use crate::arguments::Characterise;
 use crate::console::Console;
-use crate::failure::Failure;
+use crate::failure::{Failure, explained};
 use crate::print;
 use crate::progress::Progress;
 
@@ -25,7 +25,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
                 | twinlag::Error::ModelNumber { .. }
                 | twinlag::Error::Diagnose(
                     DiagnoseError::Model { .. } | DiagnoseError::Parameter { .. } | DiagnoseError::Absurd,
-                ) => Failure::File(format!("{}: {e}", path.display())),
+                ) => Failure::File(format!("{}: {}", path.display(), explained(&e))),
                 e => e.into(),
             })?
         }
@@ -49,8 +49,7 @@ pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
 
 pub(crate) fn characterise(record: &Record, options: &Options, console: Console) -> Result<Characterisation, Failure> {
     let progress = Progress::start(console, format!("characterising {} samples", record.len()));
-    let watch = |done: usize, of: usize| progress.say(|| format!("bootstrap: {done} of {of} simulated records"));
-    Ok(twinlag::characterise_watched(record, options, &watch)?)
+    Ok(twinlag::characterise_watched(record, options, &|task, done, total| progress.watch(task, done, total))?)
 }
 
 /// The exit code: 0 for an answer, 4 if the data were read but do not give one.

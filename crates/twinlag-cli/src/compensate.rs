@@ -15,7 +15,11 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
     let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
     let options = CompensateOptions {
-        diagnose: DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() },
+        diagnose: DiagnoseOptions {
+            characterise: command.input.method.options()?,
+            without: command.without.clone(),
+            ..DiagnoseOptions::default()
+        },
         model: command.model.as_deref().map(model).transpose()?,
         form: command.form,
         trusted: usize::from(command.trust == Trust::T2),
@@ -24,8 +28,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));
-        let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
-        twinlag::compensate(&record, &options, &watch)?
+        twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))?
     };
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =

@@ -3,7 +3,7 @@
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis};
-use twinlag_pages::{ReportContext, diagnosis_report};
+use twinlag_pages::diagnosis_report;
 
 use crate::arguments::Diagnose;
 use crate::characterise::read;
@@ -17,7 +17,11 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     let outputs = [("--report", &command.report), ("--save", &command.save)];
     let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
     output::check(&command.input.file, &outputs, command.force)?;
-    let options = DiagnoseOptions { characterise: command.input.method.options()?, without: command.without.clone() };
+    let options = DiagnoseOptions {
+        characterise: command.input.method.options()?,
+        without: command.without.clone(),
+        ..DiagnoseOptions::default()
+    };
     let record = read(&command.input.file, &command.input.columns.selection())?;
     print::notes(&record, console);
     let answer = diagnose(&record, &options, console)?;
@@ -27,7 +31,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         output::write(path, &model)?;
     }
     if let Some(path) = &command.report {
-        output::write(path, &report(&record, &answer, output::command_line())?)?;
+        output::write(path, &diagnosis_report(&record, &answer, &output::command_line())?)?;
     }
     print::diagnosis(&answer, console)?;
     Ok(exit_code(&answer))
@@ -35,27 +39,10 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
     let progress = Progress::start(console, format!("diagnosing {} samples", record.len()));
-    let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
-    Ok(twinlag::diagnose(record, options, &watch)?)
+    Ok(twinlag::diagnose_watched(record, options, &|task, done, total| progress.watch(task, done, total))?)
 }
 
 /// The exit code: 0 for an answer, 4 if the data were read but do not give one.
 pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
     u8::from(answer.verdict == Verdict::Refused) * 4
-}
-
-fn report(record: &Record, answer: &Diagnosis, command: String) -> Result<String, Failure> {
-    let core = answer.core.as_deref().expect("it was made here, and not read from JSON");
-    let context = ReportContext {
-        source: record.source.clone(),
-        channels: record.channels.clone(),
-        time_s: &record.time_s,
-        t1_c: &record.t1_c,
-        t2_c: &record.t2_c,
-        reference_c: record.reference_c.as_deref(),
-        command,
-        version: answer.base.made_by.version.clone(),
-        notes: answer.base.notes.clone(),
-    };
-    Ok(diagnosis_report(core, &context)?)
 }

@@ -2,8 +2,10 @@
 
 use std::fmt;
 
-use twinlag::record::{RecordError, Setting};
+use twinlag::record::RecordError;
 use twinlag_pages::ReportError;
+
+use crate::settings::{options, reader_option};
 
 /// An error, by its exit code.
 #[derive(Debug)]
@@ -45,9 +47,9 @@ impl From<twinlag::Error> for Failure {
     fn from(error: twinlag::Error) -> Self {
         match error {
             twinlag::Error::Record(error) => error.into(),
-            twinlag::Error::LiveStart { .. } => Self::Undetermined(error.to_string()),
-            error if error.is_usage() => Self::Usage(error.to_string()),
-            error => Self::File(error.to_string()),
+            twinlag::Error::LiveStart { .. } => Self::Undetermined(explained(&error)),
+            error if error.is_usage() => Self::Usage(explained(&error)),
+            error => Self::File(explained(&error)),
         }
     }
 }
@@ -61,7 +63,7 @@ impl From<ReportError> for Failure {
 
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
-        let text = with_options(&error);
+        let text = with_options(&error, error.settings().iter().filter_map(reader_option));
         match error {
             RecordError::CannotWrite { .. } => Self::Other(text),
             RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {
@@ -72,25 +74,17 @@ impl From<RecordError> for Failure {
     }
 }
 
+/// The message of an answer that there is none, with the options of this program.
+pub(crate) fn explained(error: &twinlag::Error) -> String {
+    with_options(error, error.settings().into_iter().flat_map(options).copied())
+}
+
 /// The message, and the options of this program that set what it asks for.
-fn with_options(error: &RecordError) -> String {
-    let options: Vec<&str> = error.settings().iter().filter_map(option).collect();
+fn with_options(error: &impl fmt::Display, options: impl Iterator<Item = &'static str>) -> String {
+    let options: Vec<&str> = options.collect();
     match &options[..] {
         [] => error.to_string(),
         [one] => format!("{error} (option {one})"),
         _ => format!("{error} (options {})", options.join(", ")),
     }
-}
-
-/// The option for a setting of the reader.
-fn option(setting: &Setting) -> Option<&'static str> {
-    Some(match setting {
-        Setting::Time => "--time",
-        Setting::T1 => "--t1",
-        Setting::T2 => "--t2",
-        Setting::Reference => "--reference",
-        Setting::Flow => "--flow",
-        Setting::Period => "--period",
-        _ => return None,
-    })
 }

@@ -18,6 +18,7 @@ mod live;
 mod output;
 mod print;
 mod progress;
+mod settings;
 mod simulate;
 mod study;
 mod track;

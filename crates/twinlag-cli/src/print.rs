@@ -8,11 +8,13 @@ use twinlag::diagnosis::Verdict;
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::Record;
 use twinlag::{
-    Characterisation, Compensation, Diagnosis, IntervalMethod, NoiseSource, SecondLag, SensorEstimate, Status, Track,
+    Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag, SensorEstimate,
+    Status, Track,
 };
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::settings::usage;
 
 /// Prints exactly one JSON object on standard output.
 pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
@@ -83,7 +85,7 @@ fn text(answer: &Characterisation) -> String {
         IntervalMethod::ResidualSpectrum => "95 % intervals from the spectrum of the residual",
         IntervalMethod::Profile => "95 % intervals from every value that the record allows",
         IntervalMethod::Bootstrap => "95 % intervals from simulated records (bootstrap)",
-        IntervalMethod::None => "no intervals",
+        _ => "no intervals",
     };
     let by_profile = answer.sensors.iter().filter(|s| s.interval_basis == Some(IntervalBasis::Profile));
     let by_profile: Vec<&str> = by_profile.map(|s| s.channel.as_str()).collect();
@@ -94,6 +96,10 @@ fn text(answer: &Characterisation) -> String {
         lines.push(format!("not determined by this record: {}", answer.not_identifiable.join(", ")));
     }
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
+    if !answer.advice.is_empty() {
+        let options: Vec<&str> = answer.advice.iter().filter_map(|setting| usage(*setting)).collect();
+        lines.push(format!("options to try: {}", options.join(", ")));
+    }
     lines.push(String::new());
     lines.join("\n")
 }
@@ -194,7 +200,7 @@ fn track_text(answer: &Track, out: &Path) -> String {
     }
     if let Some(ratio) = &answer.ratio {
         let stays = if ratio.stays { "shows no change" } else { "changes" };
-        lines.push(format!("  their ratio {stays}: p = {:.2e}", ratio.p_value));
+        lines.push(format!("  their ratio {stays}: p = {:.2e}", ratio.test.p_value));
     }
     lines.push(format!("status: {}", status(answer.status)));
     if !answer.time_s.is_empty() {
@@ -221,41 +227,62 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     let mut lines =
         vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
     lines.push(format!("verdict: {}", verdict(answer.verdict)));
-    for effect in &answer.effects {
-        lines.push(String::new());
-        let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
-        lines.push(format!("  {}{place}: {}", effect.effect, effect.explanation));
-        if let Some(seen) = &effect.seen {
-            lines.push(format!("    {seen}"));
-        }
-        for p in effect.parameters.iter().take(MAX_PARAMETERS) {
-            let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-            let number = match p.interval_95 {
-                Some([low, high]) => interval(p.value, low, high, &unit),
-                None => format!("{}{unit}", digits(p.value, 4)),
-            };
-            lines.push(format!("    {} {number}", p.name.replace('_', " ")));
-        }
-        if effect.parameters.len() > MAX_PARAMETERS {
-            lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
-        }
-        if let Some(e) = &effect.evidence {
-            let plural = if e.dof == 1 { "" } else { "s" };
-            let sign = if e.held_out_gain_nats < 0.0 { "" } else { "+" };
-            lines.push(format!(
-                "    evidence: likelihood-ratio statistic {} ({} parameter{plural}); held-out log-likelihood {sign}{} nats",
-                digits(e.statistic, 3),
-                e.dof,
-                digits(e.held_out_gain_nats, 3)
-            ));
-        }
-        if !effect.alternatives.is_empty() {
-            let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
-            lines.push(format!("    equally well explained by: {}", names.join(", ")));
-        }
-        lines.push(format!("    at the rig: {}", effect.advice));
-    }
+    lines.extend(answer.effects.iter().flat_map(effect_lines));
+    lines.extend(before_and_after(answer));
     lines.push(String::new());
+    if let Some(left) = &answer.unexplained {
+        lines.push(format!("left over: {}", left.description));
+    }
+    lines.extend(answer.remarks.iter().map(|r| format!("note: {r}")));
+    if !answer.last.not_identifiable.is_empty() {
+        lines.push(format!("not determined by this record: {}", answer.last.not_identifiable.join(", ")));
+    }
+    lines.push(format!("these readings cannot reveal: {}", answer.not_testable.join("; ")));
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// What is said of an effect, after an empty line.
+fn effect_lines(effect: &NamedEffect) -> Vec<String> {
+    let about = effect.effect.about();
+    let mut lines = vec![String::new()];
+    let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
+    lines.push(format!("  {}{place}: {}", effect.effect, about.explanation));
+    if let Some(seen) = &effect.seen {
+        lines.push(format!("    {seen}"));
+    }
+    for p in effect.parameters.iter().take(MAX_PARAMETERS) {
+        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+        let number = match p.interval_95 {
+            Some([low, high]) => interval(p.value, low, high, &unit),
+            None => format!("{}{unit}", digits(p.value, 4)),
+        };
+        lines.push(format!("    {} {number}", p.name.replace('_', " ")));
+    }
+    if effect.parameters.len() > MAX_PARAMETERS {
+        lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
+    }
+    if let Some(e) = &effect.evidence {
+        let plural = if e.dof == 1 { "" } else { "s" };
+        let sign = if e.held_out_gain_nats < 0.0 { "" } else { "+" };
+        lines.push(format!(
+            "    evidence: likelihood-ratio statistic {} ({} parameter{plural}); held-out log-likelihood {sign}{} nats",
+            digits(e.statistic, 3),
+            e.dof,
+            digits(e.held_out_gain_nats, 3)
+        ));
+    }
+    if !effect.alternatives.is_empty() {
+        let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
+        lines.push(format!("    equally well explained by: {}", names.join(", ")));
+    }
+    lines.push(format!("    at the rig: {}", about.advice));
+    lines
+}
+
+/// The table of both models, after an empty line.
+fn before_and_after(answer: &Diagnosis) -> Vec<String> {
+    let mut lines = vec![String::new()];
     let mut row = |name: &str, before: &str, after: &str| {
         lines.push(format!("  {name:34} {before:>12}  {after:>12}"));
     };
@@ -270,27 +297,21 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
         };
         row("", &error(&answer.base), &error(&answer.last));
     }
-    let e = &answer.error;
+    for i in 0..2 {
+        let noise = |c: &Characterisation| format!("{} K", digits(c.sensors[i].noise_std_k, 3));
+        row(&format!("noise {}", answer.base.sensors[i].channel), &noise(&answer.base), &noise(&answer.last));
+    }
+    let e = &answer.error.budget;
     row("residual energy / noise energy", &number(e.chi2_per_dof.before), &number(e.chi2_per_dof.after));
     let rms = e.held_out_normalised_rms;
     row("rms residual, held out", &number(rms.before), &number(rms.after));
     let k = |x: f64| format!("{} K", digits(x, 3));
     let inputs = e.held_out_input_difference_k;
     row("rms input difference, held out", &k(inputs.before), &k(inputs.after));
-    if let Some(r) = e.reference_rmse_k {
+    if let Some(r) = answer.error.reference_rmse_k {
         row("rms gas error against reference", &k(r.before), &k(r.after));
     }
-    lines.push(String::new());
-    if let Some(left) = &answer.unexplained {
-        lines.push(format!("left over: {}", left.description));
-    }
-    lines.extend(answer.remarks.iter().map(|r| format!("note: {r}")));
-    if !answer.last.not_identifiable.is_empty() {
-        lines.push(format!("not determined by this record: {}", answer.last.not_identifiable.join(", ")));
-    }
-    lines.push(format!("these readings cannot reveal: {}", answer.not_testable.join("; ")));
-    lines.push(String::new());
-    lines.join("\n")
+    lines
 }
 
 /// Number of parameters of one effect that are printed.
@@ -340,15 +361,19 @@ fn second_lag(lag: &SecondLag) -> String {
 fn noise(sensor: &SensorEstimate) -> String {
     let error = sensor.noise_standard_error_k.map_or(String::new(), |e| format!(" ± {}", digits(e, 2)));
     let colour = sensor.noise_ar1.map_or(String::new(), |phi| format!(", autoregressive {phi:.2}"));
-    let source = match sensor.noise_from {
+    let source = sensor.noise_from.map_or(String::new(), |from| format!(" ({})", noise_source(from)));
+    format!("{}{error} K{colour}{source}", digits(sensor.noise_std_k, 3))
+}
+
+fn noise_source(from: NoiseSource) -> &'static str {
+    match from {
         NoiseSource::Given => "given",
         NoiseSource::QuietSegment => "quiet segment",
         NoiseSource::ThirdDifferences => "third differences",
         NoiseSource::InferredInputs => "inferred inputs",
         NoiseSource::Residual => "residual",
         _ => "unknown source",
-    };
-    format!("{}{error} K{colour} ({source})", digits(sensor.noise_std_k, 3))
+    }
 }
 
 fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {

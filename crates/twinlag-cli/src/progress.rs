@@ -1,5 +1,6 @@
 //! Progress on standard error during long work.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -23,8 +24,14 @@ impl Progress {
         Self(Some((bar, Instant::now())))
     }
 
+    /// How far a verb has come; it is never cancelled from here.
+    pub(crate) fn watch(&self, task: &str, done: usize, total: usize) -> ControlFlow<()> {
+        self.say(|| format!("{task}: {done} of {total}"));
+        ControlFlow::Continue(())
+    }
+
     /// Shows how far the work has come, once it has taken two seconds.
-    pub(crate) fn say(&self, message: impl Fn() -> String) {
+    fn say(&self, message: impl Fn() -> String) {
         if let Some((bar, since)) = &self.0
             && since.elapsed() > LONG
         {

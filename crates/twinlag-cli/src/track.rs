@@ -27,8 +27,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));
-        let watch = |what: &str, done: usize, of: usize| progress.say(|| format!("{what}: {done} of {of}"));
-        twinlag::track(&record, &options, &watch)?
+        twinlag::track_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))?
     };
     let is_answered = !answer.time_s.is_empty();
     if is_answered {

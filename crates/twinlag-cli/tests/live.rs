@@ -154,5 +154,5 @@ fn what_cannot_be_answered_live_is_refused() {
     }
     let rest = bench.run_with_input(&["track", "-", "--live", "300", "--out", "-"], rest.as_bytes());
     assert_eq!(rest.code, 4, "{rest:#?}");
-    rest.says(&["the start of --live needs"]);
+    rest.says(&["live tracking has to start with"]);
 }

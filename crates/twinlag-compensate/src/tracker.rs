@@ -118,7 +118,7 @@ impl<const D: usize> Tracker<D> {
 }
 
 /// [`Tracker::push`] with as many states as are needed.
-pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send>;
+pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send + Sync>;
 
 /// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more
 /// than the largest.

@@ -55,16 +55,16 @@ impl Evidence {
     }
 }
 
-/// An effect that was found.
+/// An effect that was found; `Channel` is the place of a channel, 0 or 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Found {
+pub struct Found<Channel = usize> {
     /// The effect.
     pub effect: Identifier,
-    /// Channel that has the effect, 0 or 1; `None` if both have it, or if the record does not
-    /// determine which.
-    pub channel: Option<usize>,
-    /// Channel to which the parameters refer, 0 or 1; `None` if they refer to both.
-    pub fitted_in: Option<usize>,
+    /// Channel that has the effect; `None` if both have it, or if the record does not determine
+    /// which.
+    pub channel: Option<Channel>,
+    /// Channel to which the parameters refer; `None` if they refer to both.
+    pub fitted_in: Option<Channel>,
     /// Parameters of the effect.
     pub parameters: Vec<Value>,
     /// Why the effect was added; `None` for defects of the data, which are seen directly and not
@@ -113,19 +113,49 @@ pub struct Unexplained {
     pub worst_s: Option<[f64; 2]>,
 }
 
-/// The detection limit of an effect that was not found.
+impl Found {
+    /// This effect with the names of its channels.
+    pub fn named(&self, channels: &[String; 2]) -> Found<String> {
+        let name = |place: Option<usize>| place.map(|i| channels[i].clone());
+        Found {
+            effect: self.effect,
+            channel: name(self.channel),
+            fitted_in: name(self.fitted_in),
+            parameters: self.parameters.clone(),
+            evidence: self.evidence,
+            alternatives: self.alternatives.clone(),
+            seen: self.seen.clone(),
+        }
+    }
+}
+
+/// The detection limit of an effect that was not found; `Channel` is the place of a channel, 0 or
+/// 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Limit {
+pub struct Limit<Channel = usize> {
     /// The effect.
     pub effect: Identifier,
-    /// Channel, 0 or 1; `None` if the effect is of both, or relative.
-    pub channel: Option<usize>,
+    /// Channel; `None` if the effect is of both, or relative.
+    pub channel: Option<Channel>,
     /// Main parameter of the effect.
     pub parameter: String,
     /// The smallest size that would have been distinguished from chance.
     pub size: f64,
     /// Unit of the size.
     pub unit: String,
+}
+
+impl Limit {
+    /// This limit with the name of its channel.
+    pub fn named(&self, channels: &[String; 2]) -> Limit<String> {
+        Limit {
+            effect: self.effect,
+            channel: self.channel.map(|i| channels[i].clone()),
+            parameter: self.parameter.clone(),
+            size: self.size,
+            unit: self.unit.clone(),
+        }
+    }
 }
 
 /// The result of a diagnosis.

@@ -20,7 +20,7 @@ pub enum EstimateError {
     Unexpected { what: &'static str, expected: String, got: String },
     #[error(
         "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
-         use a longer record, a smaller --discard, or the whitened estimator, which discards none"
+         use a longer record, discard fewer, or the whitened estimator, which discards none"
     )]
     DiscardsAll { discard: usize, longest: usize },
 }

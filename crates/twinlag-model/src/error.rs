@@ -25,7 +25,7 @@ pub enum DiagnoseError {
     Flow,
     #[error("channel {channel} never changes, so it shows no dynamics")]
     Constant { channel: usize },
-    #[error("the model has time constants that depend on a measured flow: name its column (--flow COL)")]
+    #[error("the model has time constants that depend on a measured flow: name its column")]
     NeedsFlow,
     #[error(
         "the model has \"{effect}\" with parameters that it does not have here: was it made by another \

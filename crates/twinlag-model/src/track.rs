@@ -1,5 +1,6 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
+use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::dense;
@@ -48,7 +49,7 @@ pub enum Change {
 }
 
 /// A step of both time constants.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ChangePoint {
     /// When, s.
     pub at_s: f64,
@@ -61,7 +62,7 @@ pub struct ChangePoint {
 }
 
 /// Whether the ratio of the time constants stays while they change.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RatioTest {
     /// Reduction of `−2 ln L` by a changing ratio.
     pub statistic: f64,

@@ -12,7 +12,7 @@ const PARTS: usize = 100;
 /// A step longer than this multiple of the usual one is a gap.
 const GAP: f64 = 10.0;
 
-/// A chart of the series that there are; `None` if there is none.
+/// A chart of the series that are there; `None` without any.
 pub(crate) fn chart(
     title: impl Into<String>,
     [x, y]: [Axis; 2],
@@ -126,8 +126,8 @@ pub(crate) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
     Some(Figure::new("").panel_size(WIDTH_PX, 360.0).panel(chart("Power of the residual", axes, series)?))
 }
 
-/// The range that contains the mean square of a number of values of white noise of unit variance in
-/// 95 % of all cases.
+/// The range that holds the mean square of so many values of white noise of unit variance in 95 %
+/// of all cases.
 pub(crate) fn white_noise(dof: f64) -> Option<[f64; 2]> {
     let chi_square = ChiSquared::new(dof).ok()?;
     Some([0.025, 0.975].map(|p| chi_square.inverse_cdf(p) / dof))

@@ -8,12 +8,14 @@ use crate::pictures::{spectra, temperature_figure, track_picture};
 use crate::words::{ABSENT, listed, sentence, with_unit, words};
 use twinlag::{Characterisation, Compensation, Track};
 
-/// The report on a gas temperature: an HTML page that needs no other file. The same answer gives the same bytes.
+/// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
+/// bytes.
 ///
 /// - `command`: the one that makes it again
 ///
 /// # Errors
-/// [`ReportError`], if something cannot be drawn. Where there is no gas temperature the page says why, and that is no error.
+/// [`ReportError`], if something cannot be drawn. Where there is no gas temperature the page says
+/// why, and that is no error.
 pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
     let mut document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
     document = match &answer.gas {
@@ -96,10 +98,9 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
     if let Some(ratio) = &answer.ratio {
         let stays = if ratio.stays { "shows no change" } else { "changes" };
         let text = format!(
-            "{stays} (p = {}, {} degrees of \
-                freedom)",
-            probability(ratio.p_value),
-            ratio.degrees_of_freedom
+            "{stays} (p = {}, {} degrees of freedom)",
+            probability(ratio.test.p_value),
+            ratio.test.degrees_of_freedom
         );
         document = document.facts([("The ratio of both", text)]);
     }

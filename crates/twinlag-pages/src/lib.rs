@@ -2,9 +2,9 @@
 //!
 //! For whoever shows an answer to people: what a diagnosis found and how well it is shown
 //! ([`diagnosis_report`]), a gas temperature with its band ([`gas_report`]), time constants along a
-//! record ([`track_report`]), and the pictures of each alone. A page computes nothing that an answer
-//! says: every number on it is a field of the answer that it shows. Numbers alone need `twinlag`, and
-//! no crate of pictures; figures of other data need `twinlag-report`.
+//! record ([`track_report`]), and the pictures of each alone. A page computes nothing that an
+//! answer says: every number on it is a field of the answer that it shows. Numbers alone need
+//! `twinlag`, and no crate of pictures; figures of other data need `twinlag-report`.
 
 mod diagnosis;
 mod figures;
@@ -12,7 +12,7 @@ mod gas;
 mod pictures;
 mod words;
 
-pub use diagnosis::{ReportContext, diagnosis_report, residual_picture};
+pub use diagnosis::{diagnosis_report, residual_picture};
 pub use gas::{gas_report, track_report};
 pub use pictures::{gas_picture, track_picture};
 pub use twinlag_report::ReportError;

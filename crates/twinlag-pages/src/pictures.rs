@@ -8,15 +8,15 @@ use crate::figures::{WIDTH_PX, trace};
 use twinlag::{Compensation, Track};
 
 /// Half width of a 95 % interval of a normal distribution, in standard deviations.
-const Z_975: f64 = 1.959_963_984_540_054;
+pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
 /// A step longer than this multiple of the period is a gap.
 const GAP: f64 = 2.5;
 
-/// Readings and gas temperature with its band, over the record and where it moves most, and the spectra before and after with the
-/// frequency up to which the readings decide: one SVG.
+/// Readings and gas temperature with its band, over the record and where it moves most, and the
+/// spectra before and after with the frequency up to which the readings decide: one SVG.
 ///
 /// # Errors
 /// [`ReportError`], if there is nothing to draw.

@@ -1,7 +1,10 @@
 //! Words and numbers of the report.
 
-use twinlag::diagnosis::{Identifier, TimeConstant};
+use twinlag::diagnosis::Identifier;
+use twinlag::{Difference, SensorEstimate};
 use twinlag_report::{between, plus_minus};
+
+use crate::pictures::Z_975;
 
 pub(crate) const ABSENT: &str = "not determined";
 
@@ -58,12 +61,24 @@ pub(crate) fn parameter(value: &twinlag::diagnosis::Value) -> String {
     format!("{} {}", value.name.replace('_', " "), with_unit(&number, &value.unit))
 }
 
-pub(crate) fn estimate(of: &TimeConstant) -> String {
-    of.value_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
+/// A time constant with its standard error.
+pub(crate) fn estimate(of: &SensorEstimate) -> String {
+    of.time_constant_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
 }
 
-pub(crate) fn interval(of: &TimeConstant) -> String {
-    of.interval_95_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
+/// A difference with its standard error, that of a normal interval.
+pub(crate) fn apart(of: &Difference) -> String {
+    let standard_error_s = of.interval_95_s.map(|[low, high]| (high - low) / (2.0 * Z_975));
+    of.value.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, standard_error_s), "s"))
+}
+
+pub(crate) fn interval(ends_s: Option<[f64; 2]>) -> String {
+    ends_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
+}
+
+/// Where an effect sits.
+pub(crate) fn place(channel: Option<&String>) -> String {
+    channel.map_or("both, or between them".into(), Clone::clone)
 }
 
 /// What a test asks, by its name.

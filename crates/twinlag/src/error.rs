@@ -8,7 +8,10 @@ use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
 use twinlag_signal::SignalError;
 
-/// Why a question could not be put to a record. A fit that ran is never an error: see [`crate::Status`].
+use crate::setting::Setting;
+
+/// Why a question could not be put to a record. A fit that ran is never an error: see
+/// [`crate::Status`].
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]
@@ -20,7 +23,7 @@ pub enum Error {
     #[error(transparent)]
     Cost(#[from] CostError),
     #[error(transparent)]
-    Diagnose(#[from] DiagnoseError),
+    Diagnose(DiagnoseError),
     #[error(transparent)]
     Estimate(#[from] EstimateError),
     #[error(transparent)]
@@ -29,45 +32,68 @@ pub enum Error {
     Optimiser(#[from] ProblemError),
     #[error(transparent)]
     Signal(#[from] SignalError),
-    #[error("{option}: expected {expected}, got \"{got}\"")]
-    Option { option: &'static str, expected: String, got: String },
-    #[error("{what} needs the whitened estimator, not {estimator}: leave out --estimator")]
-    WhitenedOnly { what: &'static str, estimator: String },
+    #[error("cancelled")]
+    Cancelled,
+    #[error("{setting}: expected {expected}, got \"{got}\"")]
+    Setting { setting: Setting, expected: String, got: String, also: Vec<Setting> },
+    #[error("{what} needs the whitened estimator, not {estimator}")]
+    WhitenedOnly { what: &'static str, setting: Setting, estimator: String },
     #[error(
-        "{what} cannot be used with {estimator}, which is in closed form: leave it out, or use another \
-        estimator"
+        "{setting}: cannot be used with {estimator}, which is in closed form: leave it out, or use another estimator"
     )]
-    NotInClosedForm { what: &'static str, estimator: String },
+    NotInClosedForm { setting: Setting, estimator: String },
     #[error(
-        "the model has the channels {} and {}, in this order, but the record has {} and {}; gain, offset and \
-         delay are those of the second relative to the first. Choose the same channels with --t1 and \
-         --t2", model[0], model[1], record[0], record[1]
+        "the model has the channels {} and {}, in this order, but the record has {} and {}; gain, offset and delay are \
+         those of the second relative to the first. Choose the same channels, in this order", model[0], model[1], record[0], record[1]
     )]
     ModelChannels { model: [String; 2], record: [String; 2] },
     #[error(
-        "--quiet-segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at \
-         {last_s} s, with \
+        "quiet segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
          {needed} samples or more in unbroken stretches there"
     )]
     QuietSegment { from_s: f64, to_s: f64, last_s: f64, needed: usize },
     #[error(
-        "--live: the model has {effect}, which cannot be undone reading by reading: leave out --live, or use \
-         a model with calibration, second lags, slow paths and noise only"
+        "the model has {effect}, which cannot be undone reading by reading: track the whole record, or use a model with \
+         calibration, second lags, slow paths and noise only"
     )]
     LiveEffect { effect: &'static str },
-    #[error("the start of --live needs {why}")]
+    #[error("live tracking has to start with {why}")]
     LiveStart { why: String },
     #[error("the model has {what} {got}: expected a finite number above 0")]
     ModelNumber { what: String, got: f64 },
 }
 
+impl From<DiagnoseError> for Error {
+    fn from(error: DiagnoseError) -> Self {
+        if error == DiagnoseError::Cancelled { Self::Cancelled } else { Self::Diagnose(error) }
+    }
+}
+
 impl Error {
+    /// Settings that the error is about: a program can add what it calls them.
+    pub fn settings(&self) -> Vec<Setting> {
+        match self {
+            Self::Setting { setting, also, .. } => [&[*setting], &also[..]].concat(),
+            Self::WhitenedOnly { setting, .. } | Self::NotInClosedForm { setting, .. } => {
+                vec![*setting, Setting::Estimator]
+            }
+            Self::QuietSegment { .. } => vec![Setting::QuietSegment],
+            Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
+            Self::Diagnose(DiagnoseError::NeedsFlow) => vec![Setting::Flow],
+            Self::ModelChannels { .. } => vec![Setting::Channels],
+            Self::ModelNumber { .. } => vec![Setting::Model],
+            Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],
+            Self::LiveStart { .. } => vec![Setting::Live, Setting::Known],
+            _ => Vec::new(),
+        }
+    }
+
     /// Whether the way the question was put is at fault, rather than the record.
     pub fn is_usage(&self) -> bool {
         matches!(self, Self::Estimate(error) if error.is_usage())
             || matches!(
                 self,
-                Self::Option { .. }
+                Self::Setting { .. }
                     | Self::WhitenedOnly { .. }
                     | Self::NotInClosedForm { .. }
                     | Self::QuietSegment { .. }

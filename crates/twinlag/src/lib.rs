@@ -1,11 +1,22 @@
-//! Identifies the time constants of two temperature sensors from their readings alone.
+//! Two temperature sensors' time constants, and the gas temperature, from their readings alone.
 //!
-//! Two sensors of different thickness in one gas lag differently. From how their readings differ,
-//! [`characterise()`] estimates the time constant of each without knowing the gas temperature. Its
-//! 95 % intervals account for the noise, and it says so if the record does not determine the
-//! answer. Use this crate for whole records; each layer is re-exported as a module and can be used
-//! alone: [`sensor`] (models), [`signal`] (simulated records), [`cross_relation`] (the costs),
-//! [`bias`] (noise in the published cost), [`optimise`] (solvers), [`record`] (logger files).
+//! Two sensors of different thickness in one gas lag differently. A record of both is asked by a
+//! verb, and each verb has an answer that says how far it can be trusted:
+//!
+//! - [`characterise()`]: the time constant of each sensor *blind*, without knowing the gas
+//!   temperature, with 95 % intervals that account for the noise it finds;
+//! - [`diagnose()`]: which physical effect the model of two first-order lags lacks, and how much
+//!   better it is with it; [`characterise_with`] takes that model to other records of the rig;
+//! - [`compensate()`]: the gas temperature at every sample, with its standard deviation;
+//! - [`track()`]: the time constants along the record, in flow that changes;
+//! - [`Live`]: gas temperature and time constants row by row, as readings come in.
+//!
+//! A verb that may take long has a second form, such as [`diagnose_watched`], that reports how far
+//! it has come and can be cancelled. This crate is the one to take for whole records; each layer is
+//! re-exported as a module and can be taken alone: [`sensor`] (models), [`signal`] (simulated
+//! records), [`cross_relation`] (the costs), [`bias`] (noise in the published cost), [`estimate`]
+//! (estimators), [`optimise`] (solvers), [`diagnosis`] (the loop), [`compensation`] (filter and
+//! smoother), [`record`] (logger files). Answers as pages are in `twinlag-pages`.
 //!
 //! ```
 //! use twinlag::record::{Channels, Record, SamplingChoice};
@@ -58,30 +69,33 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod characterisation;
-mod characterise;
-mod compensate;
-mod diagnose;
+mod answers;
+mod bands;
 mod error;
-mod live;
 mod options;
+mod parallel;
 mod quiet;
-mod track;
+mod reference;
+mod rows;
+mod setting;
+mod verbs;
+mod watch;
 
-pub use characterisation::{
-    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
-    SensorEstimate, Status,
-};
-pub use characterise::{Watch, characterise, characterise_watched, readings};
-pub use compensate::{AgainstReference, CompensateOptions, Compensation, Quality, compensate};
-pub use diagnose::{
-    DiagnoseOptions, DiagnoseWatch, Diagnosis, ErrorBeforeAfter, Model, ModelEffect, NamedEffect, NamedLimit,
-    characterise_with, diagnose,
+pub use answers::{
+    Along, Characterisation, Compensation, Diagnosis, Difference, ErrorBeforeAfter, Estimate, FreeParameters,
+    IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio, RecordSummary, Residual,
+    SecondLag, SensorEstimate, Status, Track,
 };
 pub use error::Error;
-pub use live::{Live, LiveAnswer, LiveOptions};
 pub use options::Options;
-pub use track::{Along, Ratio, StepFound, Track, TrackOptions, track};
+pub use reference::AgainstReference;
+pub use setting::Setting;
+pub use verbs::{
+    CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
+    characterise_watched, characterise_with, compensate, compensate_watched, diagnose, diagnose_watched, readings,
+    track, track_watched,
+};
+pub use watch::Watch;
 
 pub use twinlag_bias as bias;
 pub use twinlag_compensate as compensation;
@@ -93,3 +107,11 @@ pub use twinlag_optimise as optimise;
 pub use twinlag_record as record;
 pub use twinlag_sensor as sensor;
 pub use twinlag_signal as signal;
+
+/// Answers and options may go to any thread, and be read by several.
+const _: () = {
+    const fn may_cross_threads<T: Send + Sync>() {}
+    may_cross_threads::<(Characterisation, Diagnosis, Compensation, Track, Model)>();
+    may_cross_threads::<(Options, DiagnoseOptions, CompensateOptions, TrackOptions, LiveOptions)>();
+    may_cross_threads::<(Live, LiveAnswer, Error)>();
+};

@@ -1,11 +1,14 @@
 //! What is asked of a record: by which estimator, with what known beforehand.
 
+mod check;
+
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::Parameter;
 use twinlag_estimate::{Estimator, Hold, Intervals, Known, NoiseColour};
 use twinlag_optimise::Optimiser;
 
 use crate::error::Error;
+use crate::setting::Setting;
 
 /// Everything that a characterisation depends on besides the record.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -21,7 +24,8 @@ pub struct Options {
     pub noise_std_k: Option<[f64; 2]>,
     /// Ratio `s2/s1` of the noise levels where only that is known.
     pub noise_ratio: Option<f64>,
-    /// Stretches `[from, to]` in which the gas is at rest, s from the start of the record: noise levels are taken from there.
+    /// Stretches `[from, to]` in which the gas is at rest, s from the start of the record: noise
+    /// levels are taken from there.
     pub quiet_segments_s: Vec<[f64; 2]>,
     /// What noise is taken to be like where its levels are found.
     pub noise_colour: NoiseColour,
@@ -33,33 +37,19 @@ pub struct Options {
     pub second_order: [bool; 2],
     /// What is known beforehand.
     pub known: Vec<Known>,
-    /// Samples left out at the start of each unbroken stretch by the published family; by default ten times the
-    /// longest time constant of the whitened estimate.
+    /// Samples left out at the start of each unbroken stretch by the published family; by default
+    /// ten times the longest time constant of the whitened estimate.
     pub discard: Option<usize>,
     /// What intervals are made of.
     pub intervals: Intervals,
 }
 
 impl Options {
-    /// Refuses to leave out what was asked to be fitted: `what` takes calibration and second lags from a model.
-    pub(crate) fn check_not_fitted(&self, what: &str) -> Result<(), Error> {
-        let (option, got) = if self.free_gain || self.free_offset {
-            ("--free", "gain or offset")
-        } else if self.second_order != [false; 2] {
-            ("--second-order", "a second lag")
-        } else {
-            return Ok(());
-        };
-        let expected = format!(
-            "no such request, because {what} takes its effects from a model (`twinlag diagnose --save`, then --model)"
-        );
-        Err(Error::Option { option, expected, got: got.into() })
-    }
-
-    /// Parses a list such as `gain,offset` into [`Options::free_gain`] and [`Options::free_offset`].
+    /// Parses a list such as `gain,offset` into [`Options::free_gain`] and
+    /// [`Options::free_offset`].
     ///
     /// # Errors
-    /// [`Error::Option`] for any other name.
+    /// [`Error::Setting`] for any other name.
     pub fn free(mut self, list: &str) -> Result<Self, Error> {
         for name in list.split(',').map(str::trim).filter(|n| !n.is_empty()) {
             match name {
@@ -67,7 +57,8 @@ impl Options {
                 "offset" => self.free_offset = true,
                 _ => {
                     let expected = "gain, offset or gain,offset".into();
-                    return Err(Error::Option { option: "--free", expected, got: name.into() });
+                    let setting = Setting::Free;
+                    return Err(Error::Setting { setting, expected, got: name.into(), also: Vec::new() });
                 }
             }
         }
@@ -77,7 +68,7 @@ impl Options {
     /// Parses `T1`, `T2` or `T1,T2` into [`Options::second_order`].
     ///
     /// # Errors
-    /// [`Error::Option`] for any other name.
+    /// [`Error::Setting`] for any other name.
     pub fn second_order(mut self, list: &str) -> Result<Self, Error> {
         for name in list.split(',').map(str::trim).filter(|n| !n.is_empty()) {
             match name {
@@ -85,7 +76,8 @@ impl Options {
                 "T2" => self.second_order[1] = true,
                 _ => {
                     let expected = "T1, T2 or T1,T2".into();
-                    return Err(Error::Option { option: "--second-order", expected, got: name.into() });
+                    let setting = Setting::SecondOrder;
+                    return Err(Error::Setting { setting, expected, got: name.into(), also: Vec::new() });
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 mod common;
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::record;
@@ -52,9 +53,10 @@ fn a_bootstrap_is_repeatable_and_tells_how_far_it_is() {
     let record = rig(2, 800);
     let ask = |seed: u64| {
         let told = AtomicUsize::new(0);
-        let watch = |done: usize, of: usize| {
+        let watch = |_: &str, done: usize, of: usize| {
             assert!(done <= of && of == 39);
             told.fetch_add(1, Ordering::Relaxed);
+            ControlFlow::Continue(())
         };
         let intervals = Intervals::Bootstrap(Bootstrap { replicates: 39, seed });
         let options = Options { intervals, ..Options::default() };

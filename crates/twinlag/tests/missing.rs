@@ -32,7 +32,7 @@ fn without(record: &Record, is_missing: impl Fn(usize) -> bool) -> Record {
 }
 
 fn found(record: &Record) -> Diagnosis {
-    diagnose(record, &DiagnoseOptions::default(), &|_, _, _| ()).expect("a record that can be diagnosed")
+    diagnose(record, &DiagnoseOptions::default()).expect("a record that can be diagnosed")
 }
 
 /// Of the first effect.
@@ -104,7 +104,7 @@ fn a_saved_crosstalk_gives_its_own_record_the_same_time_constants() {
     let record = rig(11, "crosstalk = 0.05", "");
     let without = vec![Identifier::CALIBRATION, Identifier::RADIATION, Identifier::SLOW_MODE];
     let options = DiagnoseOptions { without, ..DiagnoseOptions::default() };
-    let answer = diagnose(&record, &options, &|_, _, _| ()).expect("a record that can be diagnosed");
+    let answer = diagnose(&record, &options).expect("a record that can be diagnosed");
     assert_eq!(answer.effects[0].effect, Identifier::CROSSTALK, "{:?}", answer.effects);
     let fitted = characterise_with(&record, &answer.model(), &Options::default()).expect("its own model");
     for (one, other) in answer.last.sensors.iter().zip(&fitted.sensors) {

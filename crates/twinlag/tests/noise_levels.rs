@@ -4,7 +4,7 @@ mod common;
 
 use common::{record, recovers};
 use twinlag::bias::estimate_noise;
-use twinlag::{Error, NoiseColour, NoiseSource, Options, Status, characterise, readings};
+use twinlag::{Error, NoiseColour, NoiseSource, Options, Setting, Status, characterise, readings};
 
 const TRUTH_S: [f64; 2] = [0.0238, 0.1168];
 const FAST: &str = "time_constant_s = 0.0238";
@@ -26,7 +26,7 @@ fn levels_are_right_where_the_gas_moves_from_sample_to_sample() {
         assert!((2.3..2.9).contains(&by_differences), "third differences: {by_differences} times the level");
         let answer = characterise(&record, &Options::default()).expect("a sound question");
         assert_eq!(answer.status, Status::Ok, "{:?}", answer.warnings);
-        assert_eq!(answer.sensors[0].noise_from, NoiseSource::InferredInputs);
+        assert_eq!(answer.sensors[0].noise_from, Some(NoiseSource::InferredInputs));
         for sensor in &answer.sensors {
             let (got, error) = (sensor.noise_std_k, sensor.noise_standard_error_k.expect("found"));
             assert!((got - truth_k).abs() < 4.0 * error, "seed {seed}: {got} K ± {error} K, want {truth_k} K");
@@ -48,7 +48,7 @@ fn autoregressive_noise_is_found_and_the_time_constants_with_it() {
         let record = record(seed, 4000, 0.002, gas, [&sensors[0], &sensors[1]]);
         let white = characterise(&record, &Options::default()).expect("a sound question");
         assert_eq!(white.status, Status::ModelRejected);
-        assert!(white.warnings.iter().any(|w| w.contains("--noise-colour autoregressive")), "{:?}", white.warnings);
+        assert!(white.advice.contains(&Setting::NoiseColour), "{:?}", white.warnings);
         assert!(white.sensors.iter().all(|s| s.noise_ar1.is_none()));
         let options = Options { noise_colour: NoiseColour::Autoregressive, ..Options::default() };
         let answer = characterise(&record, &options).expect("a sound question");
@@ -76,7 +76,7 @@ fn a_quiet_segment_gives_the_levels() {
         let options = Options { quiet_segments_s: vec![[0.0, 1.0]], noise_colour: colour, ..Options::default() };
         let answer = characterise(&record, &options).expect("a sound question");
         for (sensor, truth_k) in answer.sensors.iter().zip([0.4, 0.2]) {
-            assert_eq!(sensor.noise_from, NoiseSource::QuietSegment);
+            assert_eq!(sensor.noise_from, Some(NoiseSource::QuietSegment));
             let (got, error) = (sensor.noise_std_k, sensor.noise_standard_error_k.expect("found"));
             let want = truth_k * (0.5 / 499.0 * (1.0 + phi * phi) / (1.0 - phi * phi)).sqrt();
             // The coefficient that is found and the level itself are 10 % off at most in three standard errors.
@@ -97,7 +97,7 @@ fn a_given_level_comes_before_a_quiet_segment_and_a_short_one_is_refused() {
     let both = Options { noise_std_k: Some([0.5, 0.5]), quiet_segments_s: vec![[0.0, 1.0]], ..Options::default() };
     let answer = characterise(&record, &both).expect("a sound question");
     for sensor in &answer.sensors {
-        assert_eq!((sensor.noise_from, sensor.noise_std_k), (NoiseSource::Given, 0.5));
+        assert_eq!((sensor.noise_from, sensor.noise_std_k), (Some(NoiseSource::Given), 0.5));
         assert!(sensor.noise_standard_error_k.is_none());
     }
     for stretch in [[0.0, 0.01], [-3.0, -2.0], [100.0, 200.0]] {
@@ -122,7 +122,7 @@ fn a_ratio_is_enough_for_the_time_constants() {
         let (a_s, b_s) = (a.time_constant_s.expect("determined"), b.time_constant_s.expect("determined"));
         assert!((a_s / b_s - 1.0).abs() < 1e-6, "{a_s} s by the ratio, {b_s} s by the levels");
         let error = a.noise_standard_error_k.expect("found");
-        assert_eq!(a.noise_from, NoiseSource::Residual);
+        assert_eq!(a.noise_from, Some(NoiseSource::Residual));
         assert!(
             (a.noise_std_k - b.noise_std_k).abs() < 4.0 * error,
             "{} ± {error}, want {}",

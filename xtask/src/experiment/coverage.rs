@@ -128,7 +128,7 @@ impl Study for Plan {
             let characterise = if case == 0 { all_known.clone() } else { Options::default() };
             let diagnose = DiagnoseOptions { characterise, ..DiagnoseOptions::default() };
             let options = CompensateOptions { diagnose, model, form, trusted: 0 };
-            let answer = compensate(&record, &options, &|_, _, _| ())?;
+            let answer = compensate(&record, &options)?;
             score(case, &answer.gas_c, &answer.gas_std_k);
         }
         Ok(())

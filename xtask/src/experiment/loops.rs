@@ -116,7 +116,7 @@ impl Study for Plan {
         let own = || Identifier::ALL.into_iter().filter(|e| wanted.contains(&e.name()));
         let options = |without: Vec<Identifier>| DiagnoseOptions { without, ..DiagnoseOptions::default() };
         let without = if self.without_own { own().collect() } else { Vec::new() };
-        let answer = diagnose(&record, &options(without), &|_, _, _| ())?;
+        let answer = diagnose(&record, &options(without))?;
 
         let is_alien = kinds.iter().any(|k| k.effect().is_none());
         let named = |e: &twinlag::NamedEffect, name: &str| e.effect.name() == name;
@@ -143,7 +143,7 @@ impl Study for Plan {
         outcome.event(WRONG, is_confident && first.is_some_and(|e| e.alternatives.is_empty() && !looks_like(e)));
         // The scatter that is due: that of the same estimator where it is told which effects there are.
         let others = || Identifier::ALL.into_iter().filter(|e| !wanted.contains(&e.name())).collect();
-        let told = if is_alien { None } else { Some(diagnose(&record, &options(others()), &|_, _, _| ())?) };
+        let told = if is_alien { None } else { Some(diagnose(&record, &options(others()))?) };
         let told = told.filter(|t| own().all(|o| t.effects.iter().any(|e| e.effect == o)));
         for i in 0..2 {
             let sensor = &answer.last.sensors[i];
@@ -158,7 +158,7 @@ impl Study for Plan {
                 }
             }
         }
-        outcome.value(HELD_OUT, answer.error.held_out_normalised_rms.after);
+        outcome.value(HELD_OUT, answer.error.budget.held_out_normalised_rms.after);
         for (i, effect) in Identifier::ALL.iter().enumerate() {
             outcome.event(FIRST + i, first.is_some_and(|e| e.effect == *effect));
         }

@@ -189,7 +189,7 @@ impl Study for Reconstruction {
             model: Some(Model::of_two_lags(record.channels.clone())),
             ..CompensateOptions::default()
         };
-        let answer = compensate(&record, &options, &|_, _, _| ())?;
+        let answer = compensate(&record, &options)?;
         if !answer.gas_c.is_empty() {
             outcome.value(1, mean_square(&answer.gas_c));
             let inside = (0..n).filter(|&k| (answer.gas_c[k] - truth[k]).abs() <= 1.96 * answer.gas_std_k[k]).count();

@@ -183,7 +183,7 @@ impl Tracking {
         let rig = |noise_std_k: Option<f64>| self.plan.rig(100 + cell as u64, gas, flow, noise_std_k);
         let clean = rig(None)?.simulate_trial(index)?;
         let record = super::record_of(rig(Some(noise_std_k))?.simulate_trial(index)?)?;
-        let answer = track(&record, &TrackOptions::default(), &|_, _, _| ())?;
+        let answer = track(&record, &TrackOptions::default())?;
         Ok(Trial { clean, noise_std_k, flow, answer })
     }
 }
@@ -296,7 +296,7 @@ impl Study for Tracking {
             }
             if let Some(ratio) = &answer.ratio {
                 outcome.event(RATIO, !ratio.stays);
-                outcome.event(RATIO_5, ratio.p_value < 0.05);
+                outcome.event(RATIO_5, ratio.test.p_value < 0.05);
             }
             outcome.event(REJECTED, answer.status == twinlag::Status::ModelRejected);
             if let Some(coefficients) = answer.coefficients {

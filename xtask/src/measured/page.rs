@@ -32,7 +32,7 @@ impl Page {
         let effects = if effects.is_empty() { "none".to_owned() } else { effects.join(", ") };
         let verdict = serde_json::to_value(answer.verdict)?;
         let verdict = verdict.as_str().unwrap_or("?");
-        let rms = answer.error.held_out_normalised_rms;
+        let rms = answer.error.budget.held_out_normalised_rms;
         let from = self.table.len();
         let _ = writeln!(
             self.table,
@@ -72,7 +72,7 @@ impl Page {
                 .collect();
             lines.push(format!("- time constants, {name}: {}", sensors.join(", ")));
         }
-        let error = &answer.error;
+        let error = &answer.error.budget;
         lines.push(format!(
             "- residual, rms on held-out blocks: {} before, {} after; energy per degree of freedom {} before, {} after; \
              rms difference of the inferred gas temperatures {} K before, {} K after",
@@ -88,7 +88,7 @@ impl Page {
             None => "- no test finds more than noise in the residual".into(),
         });
         lines.push(String::new());
-        if let Some(svg) = answer.core.as_deref().map(residual_picture).transpose()?.flatten() {
+        if let Some(svg) = residual_picture(answer)? {
             let stem = |text: &str| text.replace(['/', '_', '.', '='], "-").to_lowercase();
             let name = format!(
                 "{}-{}{}.svg",

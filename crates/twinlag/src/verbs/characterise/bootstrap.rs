@@ -1,14 +1,16 @@
-//! Intervals by the bootstrap, told replicate by replicate.
+//! Intervals by the bootstrap, which reports replicate by replicate and can be cancelled.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use twinlag_cross_relation::CostError;
 use twinlag_estimate::{
     Bootstrap, Estimate, EstimateError, Estimator, IntervalBasis, Intervals, Outcome, Solved, Task, TauIntervals,
     WhitenedFit,
 };
 
-use super::{Asked, Watch};
+use super::Asked;
 use crate::error::Error;
+use crate::watch::Stop;
 
 /// Intervals by the bootstrap around `solved`, which has a covariance; `None` where it was not
 /// asked for or says nothing, the latter with a warning.
@@ -29,7 +31,7 @@ pub(super) fn intervals<const P: usize>(
         return Ok(None);
     }
     let estimator = asked.options.estimator;
-    let watched = Watched { estimator, done: AtomicUsize::new(0), bootstrap, watch: asked.watch };
+    let watched = Watched { estimator, done: AtomicUsize::new(0), bootstrap, stop: asked.stop };
     let outcome = solved.outcome();
     let interval_95_s = bootstrap.intervals(&watched, &fit.task_of_replicates(), &outcome)?;
     let (Some(standard_error_s), Some(interval_95_s)) = (outcome.standard_error_s, interval_95_s) else {
@@ -48,7 +50,7 @@ struct Watched<'a> {
     estimator: Estimator,
     done: AtomicUsize,
     bootstrap: Bootstrap,
-    watch: Watch<'a>,
+    stop: &'a Stop<'a>,
 }
 
 impl Estimate for Watched<'_> {
@@ -65,9 +67,13 @@ impl Estimate for Watched<'_> {
     }
 
     fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
+        if self.stop.is_wanted() {
+            // The verb ends as cancelled, whatever the replicates that are left say.
+            return Err(CostError::Singular.into());
+        }
         let outcome = self.estimator.estimate(task);
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        (self.watch)(done, self.bootstrap.replicates);
+        self.stop.say("simulated records of the bootstrap", done, self.bootstrap.replicates);
         outcome
     }
 }

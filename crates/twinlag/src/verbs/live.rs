@@ -1,24 +1,27 @@
 //! Gas temperature and time constants, reading by reading.
 
+use std::fmt;
+
 use twinlag_compensate::{TrackerFn, learn, tracker};
 use twinlag_diagnose::Identifier;
+use twinlag_estimate::Z_975;
 use twinlag_record::{Record, SamplingKind};
 
-use crate::characterisation::{Characterisation, Status};
-use crate::diagnose::{Model, with_model};
+use crate::answers::{Characterisation, Model, Status};
 use crate::error::Error;
 use crate::options::Options;
-use twinlag_estimate::Z_975;
+use crate::verbs::with_model::with_model;
 
-/// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower sensor, where nothing is said.
+/// By how much time constants are taken to change in [`CHANGE_OVER`] time constants of the slower
+/// sensor, where nothing is said.
 const CHANGE: f64 = 0.1;
 const CHANGE_OVER: f64 = 10.0;
-/// Missing samples of a gap that are passed through one by one; a time farther off is refused.
+/// Missing samples of a gap that are gone through one by one; a row farther off is left out.
 const LONGEST_GAP: f64 = 100_000.0;
 /// Chance that the time constants are beyond the range in view, above which that is said.
 const LIKELY: f64 = 0.05;
-/// Rows over which it is watched whether readings are what the start led to expect, and by how many standard deviations of such a mean
-/// they may differ before bands are widened.
+/// Rows over which it is watched whether readings are what the start led to expect, and by how many
+/// standard deviations of such a mean they may differ before bands are widened.
 const WATCHED: f64 = 100.0;
 const CLEARLY: f64 = 4.0;
 
@@ -29,14 +32,15 @@ pub struct LiveOptions {
     pub characterise: Options,
     /// A model that was found in another record; its effects stay fixed.
     pub model: Option<Model>,
-    /// How far the time constants may change within one second, as a fraction (standard deviation;
-    /// it grows with the square root of time). The default is 0.1 within ten time constants of the
+    /// By how much the time constants may change in a second, as a share: the standard deviation,
+    /// which grows as the root of time. Where nothing is said, a tenth in ten time constants of the
     /// slower sensor.
     pub change_per_root_s: Option<f64>,
 }
 
 /// Gas temperature and time constants at an instant, from the readings up to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LiveAnswer {
     /// The instant, s.
     pub time_s: f64,
@@ -50,8 +54,8 @@ pub struct LiveAnswer {
     pub tau_95_s: [[f64; 2]; 2],
     /// Whether the time constants may have left the range that is tracked.
     pub is_beyond: bool,
-    /// Factor by which the bands were widened: recent readings deviate from the predictions by more
-    /// than noise, so the gas or a sensor has changed since the start.
+    /// What the bands were multiplied by, since readings of late are farther from what was expected
+    /// of them than noise takes them: the gas is not what it was in the start.
     pub widened_by: f64,
 }
 
@@ -70,35 +74,46 @@ pub struct Live {
     energy: f64,
 }
 
+impl fmt::Debug for Live {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { start, tau_s, period_s, last_s, energy, .. } = self;
+        let mut out = f.debug_struct("Live");
+        out.field("start", start).field("tau_s", tau_s).field("period_s", period_s);
+        out.field("last_s", last_s).field("energy", energy).finish_non_exhaustive()
+    }
+}
+
 impl Live {
-    /// Characterises `record`, the start, and learns the spectrum of the gas from it. The gas is
-    /// assumed to keep fluctuating in the same way.
+    /// Characterises `record`, the start, and learns from it what the gas is like: what comes after
+    /// is taken to go on so.
     ///
     /// # Errors
-    /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a stream cannot undo,
-    /// [`Error::LiveStart`] where the start does not determine both time constants, or is not evenly spaced.
+    /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a
+    /// stream cannot undo, [`Error::LiveStart`] where the start does not determine both time
+    /// constants, or is not evenly spaced.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let model = twinlag::diagnose(&record, &DiagnoseOptions::default())?.model();
+    /// let mut live = Live::start(&record, &LiveOptions { model: Some(model), ..LiveOptions::default() })?;
+    /// for k in 0..record.len() {
+    ///     let row = [Some(record.t1_c[k]), Some(record.t2_c[k])];
+    ///     let now = live.push(Some(record.time_s[k]), row).expect("later than the row before");
+    ///     assert!(now.gas_std_k > 0.0);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn start(record: &Record, options: &LiveOptions) -> Result<Self, Error> {
-        options.characterise.check_not_fitted("track --live")?;
+        options.characterise.check_not_fitted("live tracking")?;
         if record.sampling.kind == SamplingKind::Irregular {
             return Err(Error::LiveStart { why: "rows that are evenly spaced in time".into() });
         }
-        let mut model = options.model.clone().unwrap_or_else(|| Model::of_two_lags(record.channels.clone()));
-        // What masks readings belongs to a record; what changes the time constants is what is followed.
-        let is_of_the_record = |effect: Identifier| effect.about().is_defect || effect.about().changes_time_constants;
-        model.effects.retain(|e| !is_of_the_record(e.effect));
-        let is_curved = |name: &str| name.starts_with("curvature");
-        for e in &model.effects {
-            if !e.effect.about().is_streamable || e.parameters.iter().any(|p| is_curved(&p.name)) {
-                return Err(Error::LiveEffect { effect: e.effect.name() });
-            }
-        }
-        let (mut start, fit) = with_model(record, &model, &options.characterise)?;
+        let model = options.model.as_ref().map(streamable).transpose()?;
+        let (mut start, fit) = with_model(record, model.as_ref(), &options.characterise)?;
         let tau_s = [0, 1].map(|i| fit.time_constants[i].value_s);
         let (Some(extended), [Some(tau1_s), Some(tau2_s)]) = (&fit.extended, tau_s) else {
             return Err(Error::LiveStart {
-                why: "rows that determine both time constants: wait for more rows, or give a known time \
-                    constant (--known \
-                      T1.time_constant_s=VALUE)"
+                why: "rows that determine both time constants: wait for more rows, or give a known time constant"
                     .into(),
             });
         };
@@ -109,9 +124,8 @@ impl Live {
         let change = options.change_per_root_s.unwrap_or(CHANGE / (CHANGE_OVER * tau1_s.max(tau2_s)).sqrt());
         if start.status == Status::ModelRejected {
             start.warnings.push(
-                "the start contradicts the model, so the errors of gas temperature and time constants may \
-                 exceed their bands. `twinlag diagnose START.csv --save model.json` looks for \
-                 what is missing, --model model.json takes it"
+                "the start contradicts the model, so the errors of gas temperature and time constants may exceed their bands. A \
+                 diagnosis of the start looks for what is missing, and its model can be used here"
                     .into(),
             );
         }
@@ -124,10 +138,10 @@ impl Live {
         Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None, energy: 1.0 })
     }
 
-    /// Adds a row and returns the answer at its instant. `reading_c` has both readings, °C, `None`
-    /// for a missing one. Without `time_s` the row is one sample after the last. Returns `None` and
-    /// leaves the row out if it is not later than the last one, or more than 100 000 samples after
-    /// it. The missing samples of a gap are passed through one by one.
+    /// What is known once a row is read: both readings, °C, `None` for one that is missing, at
+    /// `time_s`; a sample after the last one where that is not said. `None` for a row that is not
+    /// later than the last one, or 100 000 samples after it, which is left out. Samples that are
+    /// missing in a gap are gone through as such.
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
         let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);
@@ -164,4 +178,19 @@ impl Live {
             widened_by,
         })
     }
+}
+
+/// The effects of a model that a stream can undo.
+fn streamable(model: &Model) -> Result<Model, Error> {
+    // What masks readings belongs to a record; what changes the time constants is what is followed.
+    let is_of_the_record = |effect: Identifier| effect.about().is_defect || effect.about().changes_time_constants;
+    let mut model = model.clone();
+    model.effects.retain(|e| !is_of_the_record(e.effect));
+    let is_curved = |name: &str| name.starts_with("curvature");
+    for e in &model.effects {
+        if !e.effect.about().is_streamable || e.parameters.iter().any(|p| is_curved(&p.name)) {
+            return Err(Error::LiveEffect { effect: e.effect.name() });
+        }
+    }
+    Ok(model)
 }

@@ -7,10 +7,11 @@ use twinlag_estimate::{
 use twinlag_sensor::Discretisation;
 
 use super::conclude::Conclusion;
-use crate::characterisation::{
+use crate::answers::{
     Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
     SensorEstimate, Status,
 };
+use crate::setting::Setting;
 
 /// Share of a standard error that the choice of hold may cost without a word: half of one widens
 /// the interval by an eighth.
@@ -27,15 +28,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let chi2_per_dof = self.levels.energy_as_found.or(total);
         Characterisation {
             schema: Characterisation::SCHEMA.into(),
-            record: RecordSummary {
-                source: self.asked.record.source.clone(),
-                samples: self.asked.record.len(),
-                sample_period_s: self.fit.readings().mean_step_s(),
-                missing: self.asked.record.missing,
-                channels: self.asked.record.channels.clone(),
-                segments: self.asked.record.segments.len(),
-                sampling: self.asked.record.sampling,
-            },
+            record: RecordSummary::of(self.asked.record),
             estimator: self.asked.options.estimator.name().into(),
             optimiser: self.best.optimiser.clone(),
             hold: hold_name(self.fit.whitened().hold()).into(),
@@ -52,14 +45,11 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             status,
             not_identifiable: Vec::new(),
             warnings: Vec::new(),
+            advice: Vec::new(),
             fit: self.best.clone(),
-            starts: self.solved.starts,
+            starts: Some(self.solved.starts),
             notes: self.asked.record.notes.iter().map(ToString::to_string).collect(),
-            made_by: MadeBy {
-                program: "twinlag".into(),
-                version: env!("CARGO_PKG_VERSION").into(),
-                options: self.asked.options.clone(),
-            },
+            made_by: MadeBy::with(self.asked.options),
         }
     }
 
@@ -78,7 +68,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             noise_std_k: self.levels.std_k[i],
             noise_standard_error_k: self.levels.standard_error_k()[i],
             noise_ar1: is_coloured.then_some(self.levels.ar1[i]),
-            noise_from: self.levels.source[i],
+            noise_from: Some(self.levels.source[i]),
             known: self.fit.is_held(i),
         }
     }
@@ -163,10 +153,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 };
                 self.warnings.push(format!(
                     "{channel}: no second lag is detected; {allowed}. The time constants are those \
-                     without it, and their intervals cover any second lag that is allowed; leave {} out \
-                     of --second-order, or give --known {name}=...",
-                    ["T1", "T2"][sensor]
+                     without it, and their intervals cover any second lag that is allowed; do not fit \
+                     one, or give a known value of {name}"
                 ));
+                out.advice.extend([Setting::SecondOrder, Setting::Known]);
             } else if self.fit.is_vague(i, &theta, Some(covariance)) {
                 out.not_identifiable.push(name.into());
                 if self.asked.options.estimator == Estimator::Whitened {
@@ -174,8 +164,9 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 }
                 self.warnings.push(format!(
                     "{channel}: the record needs a second lag but does not determine its size; a \
-                     data-sheet value may help, as --known {name}=..."
+                     data-sheet value may help, as a known value of {name}"
                 ));
+                out.advice.push(Setting::Known);
             } else {
                 let error = covariance[i][i].sqrt();
                 let factor = (Z_975 * error / theta[i]).exp();

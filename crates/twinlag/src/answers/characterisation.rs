@@ -4,9 +4,10 @@ use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
 use twinlag_estimate::{IntervalBasis, NoiseSource};
 use twinlag_optimise::Fit;
-use twinlag_record::Sampling;
+use twinlag_record::{Record, Sampling, SamplingKind};
 
 use crate::options::Options;
+use crate::setting::Setting;
 
 /// Whether there is an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,15 +18,17 @@ pub enum Status {
     Ok,
     /// The best fit lies on a bound, so it is not an estimate.
     AtBound,
-    /// The record does not determine both time constants; [`Characterisation::not_identifiable`]
-    /// lists what it does not determine.
+    /// The record does not determine the time constants apart;
+    /// [`Characterisation::not_identifiable`] names what it does not.
     NotIdentifiable,
-    /// The time constants are the best of a model that the record contradicts: the residual is not noise.
+    /// The time constants are the best of a model that the record contradicts: the residual is not
+    /// noise.
     ModelRejected,
 }
 
 /// A number with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
@@ -37,6 +40,7 @@ pub struct Estimate {
 
 /// Summary of the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RecordSummary {
     /// File or name.
     pub source: String,
@@ -54,8 +58,31 @@ pub struct RecordSummary {
     pub sampling: Sampling,
 }
 
-/// Estimates for one sensor; `None` for numbers that the record does not determine.
+impl RecordSummary {
+    pub(crate) fn of(record: &Record) -> Self {
+        let steps = || record.segments.iter().filter(|rows| rows.len() > 1);
+        let sample_period_s = match record.sampling.kind {
+            SamplingKind::Irregular => {
+                let span_s: f64 = steps().map(|rows| record.time_s[rows.end - 1] - record.time_s[rows.start]).sum();
+                span_s / steps().map(|rows| rows.len() - 1).sum::<usize>() as f64
+            }
+            _ => record.sampling.period_s,
+        };
+        Self {
+            source: record.source.clone(),
+            samples: record.len(),
+            sample_period_s,
+            missing: record.missing,
+            channels: record.channels.clone(),
+            segments: record.segments.len(),
+            sampling: record.sampling,
+        }
+    }
+}
+
+/// What is found of one sensor; `None` where the record does not determine it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SensorEstimate {
     /// Name of the channel.
     pub channel: String,
@@ -67,9 +94,9 @@ pub struct SensorEstimate {
     pub interval_95_s: Option<[f64; 2]>,
     /// How the interval was found.
     pub interval_basis: Option<IntervalBasis>,
-    /// Time constant of the sensor's second lag, s, the smaller of the two; `None` if it was not
-    /// asked for. It has no value if no second lag is detected or if it is not determined; the
-    /// interval then says how large it may be.
+    /// Time constant of its second lag, s, the smaller of the two; `None` where it was not asked.
+    /// Without a value where none is seen or it is not determined: the interval then says how large
+    /// it may be.
     pub second_time_constant_s: Option<SecondLag>,
     /// Noise standard deviation that was given or found, K.
     #[serde(rename = "noise_std_K")]
@@ -79,14 +106,15 @@ pub struct SensorEstimate {
     pub noise_standard_error_k: Option<f64>,
     /// First-order autoregressive coefficient of the noise; `None` where it was taken to be white.
     pub noise_ar1: Option<f64>,
-    /// Where the noise level comes from.
-    pub noise_from: NoiseSource,
-    /// Whether the time constant was given, not estimated.
+    /// Where the noise level comes from; `None` where the fit does not say.
+    pub noise_from: Option<NoiseSource>,
+    /// Whether the time constant was given, not found.
     pub known: bool,
 }
 
 /// Estimate of a sensor's second lag.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SecondLag {
     /// The estimate, s; `None` if no second lag is detected, or if it is not determined.
     pub value: Option<f64>,
@@ -98,8 +126,10 @@ pub struct SecondLag {
     pub known: bool,
 }
 
-/// Relative calibration of channel 2 against channel 1: `y2 = gain · y1 + offset` at rest. `None` where not fitted.
+/// Relative calibration of channel 2 against channel 1: `y2 = gain · y1 + offset` at rest. `None`
+/// where not fitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FreeParameters {
     /// Gain of channel 2 relative to channel 1.
     pub gain: Option<Estimate>,
@@ -110,6 +140,7 @@ pub struct FreeParameters {
 
 /// `time_constant_difference_s` of the schema.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Difference {
     /// `τ2 − τ1`, s.
     pub value: Option<f64>,
@@ -119,10 +150,11 @@ pub struct Difference {
 
 /// The residual of the fit, and its tests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Residual {
     /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated
-    /// level is left. `None` if there are no degrees of freedom, or if the levels were scaled to
-    /// the residual because only their ratio was given.
+    /// level is left. `None` if there are no degrees of freedom, or if the levels were made to fit
+    /// since only their ratio was given.
     pub chi2_per_dof: Option<f64>,
     /// Whether the autocorrelations of the residual are those of white noise.
     pub white: bool,
@@ -133,15 +165,16 @@ pub struct Residual {
 /// How the intervals were found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum IntervalMethod {
-    /// From the stated noise levels, including the noise-noise term and the uncertainty of
-    /// estimated levels.
+    /// Noise of the stated levels, the noise-noise term and what found levels are uncertain by
+    /// included.
     Information,
     /// From the spectrum of the residual itself, which includes model error.
     ResidualSpectrum,
     /// From every value of the undetermined time constant that the record allows.
     Profile,
-    /// From repeating the estimate on simulated records.
+    /// Estimates of this estimator on simulated records.
     Bootstrap,
     /// There are no intervals.
     None,
@@ -149,6 +182,7 @@ pub enum IntervalMethod {
 
 /// What made this answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct MadeBy {
     /// `twinlag`.
     pub program: String,
@@ -158,8 +192,17 @@ pub struct MadeBy {
     pub options: Options,
 }
 
+impl MadeBy {
+    /// This version, asked so.
+    pub(crate) fn with(options: &Options) -> Self {
+        let version = env!("CARGO_PKG_VERSION").into();
+        Self { program: "twinlag".into(), version, options: options.clone() }
+    }
+}
+
 /// Both time constants of a record, with everything needed to judge and repeat them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Characterisation {
     /// `twinlag.characterisation/1`.
     pub schema: String,
@@ -171,12 +214,12 @@ pub struct Characterisation {
     pub optimiser: String,
     /// How the gas was assumed to move between samples.
     pub hold: String,
-    /// Relative change of each time constant with the other assumption about the gas between
-    /// samples; `None` if this was not tried.
+    /// How much each time constant moves, relative, if the gas is taken to do the other thing
+    /// between samples; `None` where this was not tried.
     pub hold_sensitivity: Option<[f64; 2]>,
     /// Sensors 1 and 2.
     pub sensors: [SensorEstimate; 2],
-    /// Difference of the time constants, which the record often determines best.
+    /// The difference, which a record determines best.
     pub time_constant_difference_s: Difference,
     /// Relative calibration, where fitted.
     pub free: FreeParameters,
@@ -190,11 +233,15 @@ pub struct Characterisation {
     pub not_identifiable: Vec<String>,
     /// What to know before using the numbers.
     pub warnings: Vec<String>,
-    /// How the best fit ended. Its end point is an estimate only if the status says so.
+    /// Settings that may help where there is no answer, the most likely first.
+    #[serde(default)]
+    pub advice: Vec<Setting>,
+    /// How the best fit ended. Its point is where it ended, not an estimate, unless the status says
+    /// so.
     pub fit: Fit,
-    /// Number of starts.
-    pub starts: usize,
-    /// How the file was read.
+    /// Number of starts; `None` where the fit does not say.
+    pub starts: Option<usize>,
+    /// How the file was understood.
     pub notes: Vec<String>,
     /// What made this answer.
     pub made_by: MadeBy,

@@ -4,7 +4,8 @@ use twinlag_estimate::{Known, NoiseColour, REJECTION_P_VALUE, Ridge, spans_too_m
 use twinlag_optimise::End;
 
 use super::conclude::Conclusion;
-use crate::characterisation::{Characterisation, Difference, IntervalMethod};
+use crate::answers::{Characterisation, Difference, IntervalMethod};
+use crate::setting::Setting;
 
 impl<const P: usize> Conclusion<'_, '_, P> {
     /// What the record determines where it does not determine both time constants.
@@ -155,7 +156,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let may_be_coloured =
             failed.contains(&"whiteness") && is_white_assumed && self.fit.readings().even_period_s().is_some();
         let colour = if may_be_coloured {
-            "the noise is not white: try --noise-colour autoregressive"
+            "the noise is not white: try autoregressive noise"
         } else {
             "the noise is not of the kind assumed"
         };
@@ -164,6 +165,13 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         } else {
             "two first-order lags"
         };
+        let is_unhelpful = !coarse.is_empty() || self.levels.energy_as_found.is_some();
+        if !is_unhelpful && (failed.contains(&"calibration") || !self.asked.options.calibrates()) {
+            out.advice.push(Setting::Free);
+        }
+        if !is_unhelpful && may_be_coloured {
+            out.advice.push(Setting::NoiseColour);
+        }
         let hint = if !coarse.is_empty() {
             format!("{}, coarser than its noise, which alone may explain the residual", coarse.join(", "))
         } else if self.levels.energy_as_found.is_some() {
@@ -173,13 +181,13 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                      first"
                 .into()
         } else if failed.contains(&"calibration") {
-            let colour = if may_be_coloured { ", and if it does not help --noise-colour autoregressive" } else { "" };
-            format!("gain and offset of the second channel would explain it better: try --free gain,offset{colour}")
+            let colour = if may_be_coloured { ", and if it does not help autoregressive noise" } else { "" };
+            format!("gain and offset of the second channel would explain it better: try to fit them{colour}")
         } else if self.asked.options.calibrates() {
             format!("an effect that {model} lack is at work, or {colour}")
         } else {
             format!(
-                "try --free gain,offset first: thermometers rarely agree at rest; otherwise an effect that {model} lack is at \
+                "try to fit gain and offset first: thermometers rarely agree at rest; otherwise an effect that {model} lack is at \
                  work, or {colour}"
             )
         };

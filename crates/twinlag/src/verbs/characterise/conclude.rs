@@ -6,7 +6,7 @@ use twinlag_estimate::{Estimator, Hold, Intervals, Levels, Ridge, Solved, TauInt
 use twinlag_optimise::{End, Fit};
 
 use super::{Asked, bootstrap};
-use crate::characterisation::{Characterisation, IntervalMethod, Status};
+use crate::answers::{Characterisation, IntervalMethod, Status};
 use crate::error::Error;
 
 /// What the residual says of the model.

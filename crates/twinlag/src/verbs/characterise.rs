@@ -4,58 +4,57 @@
 //! order, are in `answer`.
 
 mod bootstrap;
-mod check;
 mod conclude;
 mod explain;
 mod fill;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
 use twinlag_estimate::{
-    ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, NoiseKnowledge, RunAtRest, Solved, Task, WhitenedFit,
-    other_hold,
+    ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, Intervals, NoiseColour, NoiseKnowledge, RunAtRest,
+    Solved, Task, WhitenedFit, other_hold,
 };
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, SamplingKind};
 
-use crate::characterisation::Characterisation;
+use crate::answers::Characterisation;
 use crate::error::Error;
 use crate::options::Options;
 use crate::quiet;
-use check::{check, check_sampling};
+use crate::setting::Setting;
+use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
-
-/// Told of every replicate of a bootstrap: how many are done, of how many.
-pub type Watch<'a> = &'a (dyn Fn(usize, usize) + Sync);
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
 /// # Errors
 /// [`Error`] if the question cannot be put: options that contradict each other, an estimator that cannot take the record's
-/// sampling, too few samples to tell noise from signal. A fit that ran is never an error: its
+/// sampling, too few samples to distinguish noise from signal. A fit that ran is never an error: its
 /// [`Status`](crate::Status) says what it is worth.
 pub fn characterise(record: &Record, options: &Options) -> Result<Characterisation, Error> {
-    characterise_watched(record, options, &|_, _| ())
+    characterise_watched(record, options, UNWATCHED)
 }
 
-/// Both time constants of `record`, as [`characterise`] finds them, with `watch` told of every
-/// replicate of a bootstrap: how many are done, of how many.
+/// [`characterise`], with `watch` called for every replicate of a bootstrap.
 ///
 /// # Errors
-/// As [`characterise`].
+/// As [`characterise`]; [`Error::Cancelled`].
 pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>) -> Result<Characterisation, Error> {
-    check(options)?;
+    options.check()?;
     let readings = readings(record, options)?;
     check_sampling(&readings, options)?;
-    let asked = Asked { record, options, watch };
+    let stop = Stop::new(watch);
+    let asked = Asked { record, options, stop: &stop };
     // Levels that are given need no rest.
     let quiet_s: &[[f64; 2]] = if options.noise_std_k.is_none() { &options.quiet_segments_s } else { &[] };
     let at_rest = quiet::runs(record, quiet_s)?;
     let task = asked.task(&readings, &at_rest);
-    match task.parameters() {
+    let answer = match task.parameters() {
         6 => answer::<6>(&asked, &task),
         4 => answer::<4>(&asked, &task),
         _ => answer::<2>(&asked, &task),
-    }
+    };
+    stop.check()?;
+    answer
 }
 
 /// The channels of a record as the costs take them, cut where samples are missing.
@@ -82,11 +81,29 @@ pub fn readings(record: &Record, options: &Options) -> Result<Readings, Error> {
     })
 }
 
+/// What takes evenly spaced samples.
+fn check_sampling(readings: &Readings, options: &Options) -> Result<(), Error> {
+    let wants = [
+        (options.has_second_lag() != [false; 2], Setting::SecondOrder),
+        (options.noise_colour == NoiseColour::Autoregressive, Setting::NoiseColour),
+        (matches!(options.intervals, Intervals::Bootstrap(_)), Setting::Intervals),
+    ];
+    match wants.into_iter().find(|(is_asked, _)| *is_asked) {
+        Some((_, setting)) if readings.even_period_s().is_none() => Err(Error::Setting {
+            setting,
+            expected: "a record with evenly spaced samples; if the stamps are only ragged, uniform sampling".into(),
+            got: "uneven time stamps".into(),
+            also: vec![Setting::Sampling],
+        }),
+        _ => Ok(()),
+    }
+}
+
 /// One record with one set of options.
 struct Asked<'a> {
     record: &'a Record,
     options: &'a Options,
-    watch: Watch<'a>,
+    stop: &'a Stop<'a>,
 }
 
 /// Puts the question to the estimators, in steps of which each needs the one before.
@@ -104,7 +121,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     if fit.lower_levels_to_residual() {
         warnings.push(
             "the signal changes between samples as noise does, so the noise levels are scaled \
-                     to the residual and their ratio is a guess; give --noise S1,S2 if you know them"
+                     to the residual and their ratio is a guess; give both levels if you know them"
                 .into(),
         );
     }
@@ -173,10 +190,10 @@ impl Asked<'_> {
         let options = self.options;
         let mut out = Vec::new();
         if options.discard.is_some() && options.estimator == Estimator::Whitened {
-            out.push("the whitened estimator discards no samples: --discard was not needed".into());
+            out.push("the whitened estimator discards no samples: the number to discard was not needed".into());
         }
         if options.noise_std_k.is_some() && !options.quiet_segments_s.is_empty() {
-            out.push("--noise gives the levels: --quiet-segment was not needed".into());
+            out.push("the noise levels are given: the quiet segment was not needed".into());
         }
         out
     }
@@ -219,7 +236,7 @@ impl Asked<'_> {
     ) -> Result<Solved<P>, Error> {
         let estimator = self.options.estimator;
         if estimator.is_closed_form() && self.options.discard.is_some() {
-            warnings.push("estimators in closed form discard no samples: --discard was not needed".into());
+            warnings.push("estimators in closed form discard no samples: the number to discard was not needed".into());
         }
         let solved = match estimator.solve(fit.task(), Some(fit)) {
             Err(EstimateError::Cost(CostError::Singular)) if estimator.is_closed_form() => {

@@ -1,0 +1,113 @@
+//! Time constants, noise and errors, before and after.
+
+use twinlag::{IntervalMethod, SensorEstimate};
+use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table, rounded};
+
+use super::{Column, Page};
+use crate::figures::{WIDTH_PX, chart};
+use crate::words::{ABSENT, apart, estimate, interval, short, with_unit};
+
+impl Page<'_> {
+    pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
+        let columns = self.columns();
+        let interval_95 = || "95 % interval".to_owned();
+        let header = columns.iter().flat_map(|m| [m.column.to_owned(), interval_95()]);
+        let mut table = Table::new([String::new()].into_iter().chain(header));
+        for (k, channel) in self.channels().iter().enumerate() {
+            let of = |m: &Column<'_>| [estimate(&m.answer.sensors[k]), interval(m.answer.sensors[k].interval_95_s)];
+            table = table.row([format!("time constant of {channel}")].into_iter().chain(columns.iter().flat_map(of)));
+        }
+        let of = |m: &Column<'_>| {
+            let difference = &m.answer.time_constant_difference_s;
+            [apart(difference), interval(difference.interval_95_s)]
+        };
+        table = table.row(["difference".to_owned()].into_iter().chain(columns.iter().flat_map(of)));
+        for (k, channel) in self.channels().iter().enumerate() {
+            let noise = |m: &Column<'_>| with_unit(&rounded(m.answer.sensors[k].noise_std_k, 3), "K");
+            let cells = columns.iter().flat_map(|m| [noise(m), String::new()]);
+            table = table.row([format!("noise of {channel}")].into_iter().chain(cells));
+        }
+        let mut document = document.heading("Time constants and noise, before and after").table(table);
+        for model in columns.iter().filter(|m| m.answer.interval_method == IntervalMethod::ResidualSpectrum) {
+            let when = if self.changed { format!(" {}", model.column) } else { String::new() };
+            document = document.note(format!(
+                "The residual{when} is not white, so the errors{when} follow from its own \
+                 spectrum. They do not cover the bias that its cause may have."
+            ));
+        }
+        if let Some(figure) = self.time_constant_figure() {
+            document = document.figure(figure.to_svg()?, "Both time constants with their 95 % intervals.");
+        }
+        Ok(document)
+    }
+
+    fn time_constant_figure(&self) -> Option<Figure> {
+        let columns = self.columns();
+        let mut figure = None;
+        for k in 0..2 {
+            let of: Vec<&SensorEstimate> = columns.iter().map(|m| &m.answer.sensors[k]).collect();
+            let names = columns.iter().map(|m| match m.answer.sensors[k].time_constant_s {
+                Some(_) => m.name.to_owned(),
+                None => format!("{}: {ABSENT}", m.name),
+            });
+            let values: Vec<f64> = of.iter().map(|t| t.time_constant_s.unwrap_or(f64::NAN)).collect();
+            let (low, high): (Vec<f64>, Vec<f64>) =
+                of.iter().map(|t| t.interval_95_s.map_or((f64::NAN, f64::NAN), |[a, b]| (a, b))).unzip();
+            let places: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
+            let known = values.iter().any(|v| v.is_finite());
+            let series = known.then(|| Series::points("", places, values).interval(low, high).colour(Colour::Blue));
+            let axes = [Axis::categories("", names), Axis::linear("time constant (s)")];
+            if let Some(chart) = chart(short(&self.channels()[k]), axes, [series]) {
+                figure =
+                    Some(figure.unwrap_or(Figure::new("").columns(2).panel_size(WIDTH_PX / 2.0, 270.0)).panel(chart));
+            }
+        }
+        figure
+    }
+
+    pub(super) fn errors(&self, document: Document) -> Document {
+        let budget = &self.answer.error.budget;
+        let mut rows = vec![
+            ("Energy of the residual per degree of freedom, whole record", "", budget.chi2_per_dof),
+            ("Residual on held-out blocks, root mean square", "", budget.held_out_normalised_rms),
+            (
+                "Difference of the inferred gas temperatures on held-out blocks, root mean square",
+                "K",
+                budget.held_out_input_difference_k,
+            ),
+        ]
+        .into_iter()
+        .map(|(name, unit, pair)| (name, unit, pair.before, pair.after))
+        .collect::<Vec<_>>();
+        if let Some(rmse) = self.answer.error.reference_rmse_k {
+            rows.push((
+                "Reconstructed gas temperature less the reference on held-out blocks, root mean square",
+                "K",
+                rmse.before,
+                rmse.after,
+            ));
+        }
+        let mut table =
+            Table::new(if self.changed { vec!["", "before", "after", "after / before"] } else { vec!["", "value"] });
+        for (name, unit, before, after) in rows {
+            let ratio = rounded(after / before, 3);
+            let cells = [with_unit(&rounded(before, 4), unit), with_unit(&rounded(after, 4), unit), ratio];
+            let shown = if self.changed { 3 } else { 1 };
+            table = table.row([name.to_owned()].into_iter().chain(cells.into_iter().take(shown)));
+        }
+        let document = document
+            .heading("Error before and after")
+            .paragraph(
+                "Held-out blocks are parts of the record that took no part in choosing effects or in fitting them. In the \
+                 first two rows, 1 is what noise alone makes.",
+            )
+            .table(table);
+        if self.answer.error.reference_rmse_k.is_none() {
+            return document;
+        }
+        document.paragraph(
+            "The diagnosis has not seen the reference. The error against it includes what two sensors alone cannot \
+             reveal: what both share, and which of them is right where they disagree about gain and offset.",
+        )
+    }
+}

@@ -1,0 +1,103 @@
+//! What a diagnosis says in short: verdict, effects, the record.
+
+use twinlag::NamedEffect;
+use twinlag::diagnosis::{Identifier, Verdict};
+use twinlag_report::{Document, rounded};
+
+use super::Page;
+use crate::words::{capital, estimate, identifiers, listed, parameter, place, sentence, with_unit, words};
+
+impl Page<'_> {
+    pub(super) fn verdict(&self, document: Document) -> Document {
+        let (answer, record) = (self.answer, self.record);
+        let mut document = document.heading("Verdict").lead(self.lead());
+        if answer.verdict != Verdict::Refused {
+            let [first, second] = &answer.last.sensors;
+            document = document.paragraph(format!(
+                "Time constants{}: {} {}, {} {}.",
+                if self.changed { " with the effects" } else { "" },
+                first.channel,
+                estimate(first),
+                second.channel,
+                estimate(second)
+            ));
+        }
+        // Why it was refused, or what to know before the numbers are used.
+        for remark in &answer.remarks {
+            document = document.warning(sentence(remark));
+        }
+        if answer.verdict == Verdict::Unexplained {
+            document = document.paragraph(
+                "What to do: see below where in frequency and in time most of it lies, and look for what happens at the \
+                 rig there. Time constants and gas temperature are biased by it to an extent that the record does not \
+                 reveal.",
+            );
+        }
+        for found in &answer.effects {
+            document = document.subheading(capital(&words(found.effect))).facts(facts(found));
+        }
+        let samples = record.time_s.len();
+        let span_s = record.time_s.last().zip(record.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
+        document.subheading("The record").facts([
+            ("Source", record.source.clone()),
+            ("Channels", listed(self.channels())),
+            ("Samples", format!("{samples}, over {}", with_unit(&rounded(span_s, 4), "s"))),
+        ])
+    }
+
+    fn lead(&self) -> String {
+        let answer = self.answer;
+        let effects = listed(&answer.effects.iter().map(named).collect::<Vec<_>>());
+        let many = answer.effects.len() > 1;
+        match answer.verdict {
+            Verdict::Adequate => {
+                "Two first-order lags explain this record: what they leave over cannot be distinguished \
+                                  from noise."
+                    .into()
+            }
+            Verdict::Explained => format!(
+                "Two first-order lags alone do not explain this record; with {} more, {effects}, what is left cannot be \
+                 distinguished from noise.",
+                if many { "these effects" } else { "one effect" },
+            ),
+            Verdict::PartlyExplained if answer.unexplained.is_some() => format!(
+                "{effects} {} part of the residual of two first-order lags, but more than noise \
+                 is left.",
+                if many { "explain" } else { "explains" },
+            ),
+            Verdict::PartlyExplained => format!(
+                "With {effects} what is left looks like noise, but one record cannot keep so many effects apart: \
+                 together they may imitate another cause."
+            ),
+            Verdict::Unexplained => "Two first-order lags do not explain this record, and no \
+                                     known effect explains the residual."
+                .into(),
+            Verdict::Refused => "This record cannot be diagnosed.".into(),
+            _ => "The verdict is one that this report does not know.".into(),
+        }
+    }
+}
+
+/// `delay (T2) or second order`.
+fn named(found: &NamedEffect) -> String {
+    let place = found.channel.as_ref().map_or(String::new(), |name| format!(" ({name})"));
+    let first = format!("{}{place}", words(found.effect));
+    let others = found.alternatives.iter().map(|other| words(*other));
+    [first].into_iter().chain(others).collect::<Vec<_>>().join(" or ")
+}
+
+/// What is said of an effect.
+fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
+    let about = found.effect.about();
+    let mut facts = vec![("Where", place(found.channel.as_ref())), ("What it is", sentence(about.explanation))];
+    let sizes: Vec<String> = found.parameters.iter().map(parameter).collect();
+    let seen = found.seen.iter().cloned().chain((!sizes.is_empty()).then(|| sizes.join("; ")));
+    facts.push(("What was found", sentence(&seen.collect::<Vec<_>>().join("; "))));
+    facts.push(("What to do", sentence(about.advice)));
+    facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
+    let confusable: Vec<Identifier> =
+        found.effect.imitates().filter(|other| !found.alternatives.contains(other)).collect();
+    facts.push(("Resembles, if it is small", identifiers(&confusable)));
+    facts.retain(|(_, text)| !text.is_empty());
+    facts
+}

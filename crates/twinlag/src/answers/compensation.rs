@@ -1,0 +1,78 @@
+//! The gas temperature of a record: schema `twinlag.compensation/1`.
+
+use serde::{Deserialize, Serialize};
+use twinlag_compensate::{Form, Prior, Rig};
+use twinlag_diagnose::Verdict;
+
+use crate::answers::diagnosis::explained;
+use crate::answers::{Characterisation, NamedEffect, Status};
+use crate::reference::AgainstReference;
+
+/// How good a gas temperature is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Quality {
+    /// Median of its standard deviation, K.
+    #[serde(rename = "median_std_K")]
+    pub median_std_k: f64,
+    /// Root mean square of the part of it that is due to the model's parameters, K.
+    #[serde(rename = "parameter_std_K")]
+    pub parameter_std_k: f64,
+    /// Highest frequency of which the readings say more than the prior, Hz: above it the answer is
+    /// what the gas is like, not what it did. `None` if they do so at no frequency.
+    #[serde(rename = "bandwidth_Hz")]
+    pub bandwidth_hz: Option<f64>,
+    /// Mean square of readings less what earlier ones led to expect, over its variance: 1 where
+    /// model and prior are right.
+    pub innovation_energy: f64,
+    /// What the bands were multiplied by where the innovation energy is too large.
+    pub widened_by: f64,
+    /// What the gas is like, learned from the readings.
+    pub prior: Prior,
+    /// Errors against the reference; `None` without one.
+    pub reference: Option<AgainstReference>,
+}
+
+/// The gas temperature of a record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Compensation {
+    /// `twinlag.compensation/1`.
+    pub schema: String,
+    /// `ok`, or `not-identifiable` where the record does not determine the time constants: there
+    /// is no gas temperature then.
+    pub status: Status,
+    /// Which readings the answer for an instant rests on.
+    pub form: Form,
+    /// How good the gas temperature is; `None` if the record has none.
+    pub gas: Option<Quality>,
+    /// Instants, s: those of the record, and those that are missing in an even grid. The series are
+    /// not part of the JSON.
+    #[serde(skip)]
+    pub time_s: Vec<f64>,
+    /// The gas temperature, °C.
+    #[serde(skip)]
+    pub gas_c: Vec<f64>,
+    /// Standard deviation of the gas temperature, K: noise, prior and the uncertainty of the
+    /// model's parameters.
+    #[serde(skip)]
+    pub gas_std_k: Vec<f64>,
+    /// What the diagnosis said; `None` if the model was given.
+    pub verdict: Option<Verdict>,
+    /// The effects in the model.
+    #[serde(serialize_with = "explained")]
+    pub effects: Vec<NamedEffect>,
+    /// The model.
+    #[serde(rename = "final")]
+    pub last: Characterisation,
+    /// What to know before using the numbers.
+    pub warnings: Vec<String>,
+    /// The rig, for pictures.
+    #[serde(skip)]
+    pub rig: Option<Rig>,
+}
+
+impl Compensation {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.compensation/1";
+}

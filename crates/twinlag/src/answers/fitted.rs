@@ -1,0 +1,106 @@
+//! A fit of the model of a rig as a characterisation.
+
+use twinlag_cross_relation::Parameter;
+use twinlag_diagnose::{Identifier, ModelFit, TimeConstant, Value};
+use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
+use twinlag_record::Record;
+
+use crate::answers::{
+    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    SensorEstimate, Status,
+};
+use crate::options::Options;
+
+/// Name of the estimator: maximum likelihood of the whitened disagreement under a model of the
+/// whole rig, with the gas as a spline between samples.
+const ESTIMATOR: &str = "whitened-rig";
+/// p-value below which the autocorrelations of a residual are not those of white noise.
+const NOT_WHITE: f64 = 1e-3;
+
+/// A fit of the model of a rig, and what it is of.
+pub(crate) struct Fitted<'a> {
+    pub(crate) record: &'a Record,
+    pub(crate) fit: &'a ModelFit,
+    pub(crate) options: &'a Options,
+    /// Whether samples are evenly spaced.
+    pub(crate) is_even: bool,
+    /// Whether the levels of the noise were given, by the options or a model.
+    pub(crate) is_noise_given: bool,
+}
+
+impl Fitted<'_> {
+    /// Whether both time constants are determined.
+    pub(crate) fn is_determined(&self) -> bool {
+        self.fit.time_constants.iter().all(|t| t.value_s.is_some())
+    }
+
+    /// The characterisation with the numbers of this fit and of no other: what it does not say is
+    /// `None`.
+    pub(crate) fn characterisation(&self, status: Status) -> Characterisation {
+        let Self { record, fit, options, .. } = *self;
+        let undetermined = (0..2).filter(|&i| fit.time_constants[i].value_s.is_none());
+        Characterisation {
+            schema: Characterisation::SCHEMA.into(),
+            record: RecordSummary::of(record),
+            estimator: ESTIMATOR.into(),
+            optimiser: fit.fit.optimiser.clone(),
+            hold: if self.is_even { "cubic-spline" } else { "bilinear" }.into(),
+            hold_sensitivity: None,
+            sensors: [self.sensor(0), self.sensor(1)],
+            time_constant_difference_s: Difference {
+                value: fit.difference.value_s,
+                interval_95_s: fit.difference.interval_95_s,
+            },
+            free: FreeParameters { gain: None, offset_k: None },
+            residual: Residual {
+                chi2_per_dof: Some(fit.chi2_per_dof),
+                white: fit.tests.iter().find(|t| t.test == "whiteness").is_none_or(|t| t.p_value > NOT_WHITE),
+                tests: fit.tests.clone(),
+            },
+            interval_method: if fit.is_weighted_by_residual {
+                IntervalMethod::ResidualSpectrum
+            } else {
+                IntervalMethod::Information
+            },
+            status,
+            not_identifiable: undetermined.map(|i| Known::NAMES[i].to_owned()).collect(),
+            warnings: Vec::new(),
+            advice: Vec::new(),
+            fit: fit.fit.clone(),
+            starts: None,
+            notes: record.notes.iter().map(ToString::to_string).collect(),
+            made_by: MadeBy::with(options),
+        }
+    }
+
+    fn sensor(&self, i: usize) -> SensorEstimate {
+        let TimeConstant { value_s, standard_error_s, interval_95_s } = self.fit.time_constants[i];
+        SensorEstimate {
+            channel: self.record.channels[i].clone(),
+            time_constant_s: value_s,
+            standard_error_s,
+            interval_95_s,
+            interval_basis: interval_95_s.map(|_| IntervalBasis::StandardError),
+            second_time_constant_s: None,
+            noise_std_k: self.fit.noise_std_k[i],
+            noise_standard_error_k: None,
+            noise_ar1: None,
+            noise_from: self.is_noise_given.then_some(NoiseSource::Given),
+            known: self.options.known(Parameter::ALL[i]).is_some_and(|k| k.std.is_none()),
+        }
+    }
+}
+
+impl FreeParameters {
+    /// Gain and offset among the parameters of effects.
+    pub(crate) fn among<'a>(effects: impl Iterator<Item = (Identifier, &'a [Value])> + Clone) -> Self {
+        let free = |name: &str| {
+            let of_calibration = effects.clone().filter(|(effect, _)| *effect == Identifier::CALIBRATION);
+            of_calibration.flat_map(|(_, parameters)| parameters).find(|p| p.name == name).and_then(|p| {
+                let interval_95 = p.interval_95?;
+                Some(Estimate { value: p.value, standard_error: p.standard_error, interval_95 })
+            })
+        };
+        Self { gain: free("gain"), offset_k: free("offset") }
+    }
+}

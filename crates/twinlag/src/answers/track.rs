@@ -1,0 +1,67 @@
+//! Time constants along a record: schema `twinlag.track/1`.
+
+use serde::{Deserialize, Serialize};
+use twinlag_diagnose::{ChangePoint, RatioTest};
+
+use crate::answers::{Characterisation, Status};
+
+/// One sensor's time constant along the record.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Along {
+    /// Time constant, s; NaN where a window does not determine it.
+    pub tau_s: Vec<f64>,
+    /// Lower ends of the pointwise 95 % band, s; NaN where a window does not determine it.
+    pub low_s: Vec<f64>,
+    /// Upper ends of the pointwise 95 % band, s; NaN where a window does not determine it.
+    pub high_s: Vec<f64>,
+}
+
+/// Whether the ratio of the time constants stays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Ratio {
+    /// Whether it does, as far as the record shows.
+    pub stays: bool,
+    /// The test.
+    #[serde(flatten)]
+    pub test: RatioTest,
+}
+
+/// How time constants change along a record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Track {
+    /// `twinlag.track/1`.
+    pub schema: String,
+    /// `ok`, `model-rejected` where something is left over, `not-identifiable` where the record
+    /// does not determine time constants.
+    pub status: Status,
+    /// `constant`, `smooth`, `step` or `windows`.
+    pub change: String,
+    /// Coefficients of a smooth change.
+    pub coefficients: Option<usize>,
+    /// Instants, s. The series are not part of the JSON.
+    #[serde(skip)]
+    pub time_s: Vec<f64>,
+    /// Both time constants.
+    #[serde(skip)]
+    pub sensors: [Along; 2],
+    /// Smallest and largest time constant of each sensor, s.
+    pub range_s: Option<[[f64; 2]; 2]>,
+    /// The step that explains most, if a step was taken.
+    pub step: Option<ChangePoint>,
+    /// Whether the ratio stays; not of windows.
+    pub ratio: Option<Ratio>,
+    /// The fit that the track is of, with the means of the time constants over the record; of
+    /// windows the fit of the whole record.
+    #[serde(rename = "final")]
+    pub last: Characterisation,
+    /// What to know before using the numbers.
+    pub warnings: Vec<String>,
+}
+
+impl Track {
+    /// The schema's name and number.
+    pub const SCHEMA: &'static str = "twinlag.track/1";
+}

@@ -1,0 +1,177 @@
+//! A gas temperature with everything that its bands rest on.
+//!
+//! The band of a sample adds up variances: that of the smoother, given model and prior; what the
+//! model's parameters and the prior's numbers move it by, a standard error at a time; and how far
+//! priors apart that fit as well put it.
+
+use twinlag_compensate::{Gas, Learned, Prior, Readings, Rig, learn, learn_with_noise, reconstruct};
+use twinlag_diagnose::{Extended, ModelFit};
+
+use crate::error::Error;
+use crate::parallel::in_parallel;
+use crate::verbs::CompensateOptions;
+use crate::watch::Stop;
+
+/// Standard errors by which innovations may be larger than expected before bands are widened.
+const MAX_INNOVATION_EXCESS: f64 = 4.0;
+/// Factor by which noise is made louder in a step.
+const NOISE_INFLATION_STEP: f64 = 1.05;
+/// Most steps by which noise is made louder.
+const MAX_NOISE_INFLATIONS: usize = 6;
+
+/// The gas with everything that its bands rest on.
+pub(crate) struct Banded {
+    pub(crate) readings: Readings,
+    pub(crate) rig: Rig,
+    pub(crate) prior: Prior,
+    pub(crate) gas: Gas,
+    pub(crate) std_k: Vec<f64>,
+    pub(crate) parameter_std_k: f64,
+    pub(crate) widened_by: f64,
+}
+
+/// How the gas is reconstructed by the model of a fit.
+pub(crate) struct Reconstruction<'a> {
+    fit: &'a ModelFit,
+    extended: &'a Extended,
+    options: &'a CompensateOptions,
+    stop: &'a Stop<'a>,
+}
+
+impl<'a> Reconstruction<'a> {
+    pub(crate) fn of(fit: &'a ModelFit, options: &'a CompensateOptions, stop: &'a Stop<'a>) -> Result<Self, Error> {
+        let extended = fit.extended.as_ref().expect("a fit of a record");
+        stop.check()?;
+        Ok(Self { fit, extended, options, stop })
+    }
+
+    /// The gas temperature, and how much it moves with each standard error of the model's
+    /// parameters and of the prior's numbers: a column of the covariance's Cholesky factor at a
+    /// time, so that what goes together moves together (JCGM 100, 5.2; of the prior Kackar and
+    /// Harville 1984, Prasad and Rao 1990).
+    pub(crate) fn banded(&self) -> Result<Banded, Error> {
+        let theta = self.extended.parameters();
+        let (readings, nominal) = self.rig(theta, [1.0; 2])?;
+        let is_found = is_noise_found(self.options, &nominal);
+        self.stop.say("what the gas is like", 0, 1);
+        self.stop.check()?;
+        let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
+        let Learned { prior, sigma_priors, alternatives, mut noise_factor } = learned;
+        let mut gas = self.gas(theta, &prior, noise_factor)?;
+        if is_found && is_excessive(&gas) {
+            (noise_factor, gas) = self.louder(&prior, noise_factor, gas)?;
+        }
+        let (_, rig) = self.rig(theta, noise_factor)?;
+        let columns = self.fit.covariance.as_deref().map(columns).unwrap_or_default();
+        let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
+        let of_model = moved.map(|moved: Vec<f64>| (moved, &prior));
+        let of_prior = sigma_priors.iter().map(|prior| (theta.to_vec(), prior));
+        let of_alternative = alternatives.iter().map(|(_, prior)| (theta.to_vec(), prior));
+        let cases: Vec<(Vec<f64>, &Prior)> = of_model.chain(of_prior).chain(of_alternative).collect();
+        let task = "how model and prior move the gas temperature";
+        let others = in_parallel(&cases, task, self.stop, |(theta, prior)| self.gas(theta, prior, noise_factor).ok());
+        self.stop.check()?;
+        let (of_model, rest) = others.split_at(columns.len());
+        let (of_prior, of_alternative) = rest.split_at(sigma_priors.len());
+        let (of_model, of_prior) = (moved_by(&gas, of_model), moved_by(&gas, of_prior));
+        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
+        let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
+        // The prior's share counts twice: an estimated prior takes the gas for better known than it
+        // is, by as much as it moves it.
+        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
+        let gas = averaged(&gas, alternatives.iter().map(|(weight, _)| *weight).zip(of_alternative));
+        let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
+        Ok(Banded { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
+    }
+
+    fn rig(&self, theta: &[f64], noise_factor: [f64; 2]) -> Result<(Readings, Rig), Error> {
+        let (readings, mut rig) = self.extended.rig(theta)?;
+        rig.sensors.iter_mut().zip(noise_factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
+        Ok((readings, Rig { clock: self.options.trusted, ..rig }))
+    }
+
+    fn gas(&self, theta: &[f64], prior: &Prior, noise_factor: [f64; 2]) -> Result<Gas, Error> {
+        let (readings, rig) = self.rig(theta, noise_factor)?;
+        let mut gas = reconstruct(&readings, &rig, prior, self.options.form)?;
+        if self.options.trusted == 1 {
+            let [gain, offset_k] = self.extended.calibration(theta);
+            gas.gas_c.iter_mut().for_each(|c| *c = gain * *c + offset_k);
+            gas.std_k.iter_mut().for_each(|k| *k *= gain.abs());
+        }
+        Ok(gas)
+    }
+
+    /// Noise made louder as long as readings become more probable. Where the prior's spectrum does
+    /// not end as the gas's does, it has pushed the noise aside: it comes back as far as the
+    /// readings say.
+    fn louder(&self, prior: &Prior, noise_factor: [f64; 2], gas: Gas) -> Result<([f64; 2], Gas), Error> {
+        let mut best = (noise_factor, gas);
+        for _ in 0..MAX_NOISE_INFLATIONS {
+            let louder = best.0.map(|factor| factor * NOISE_INFLATION_STEP);
+            let other = self.gas(self.extended.parameters(), prior, louder)?;
+            if other.log_likelihood <= best.1.log_likelihood {
+                break;
+            }
+            best = (louder, other);
+        }
+        Ok(best)
+    }
+}
+
+/// The sum of squares by which `others` differ from `gas`, at each sample.
+fn moved_by(gas: &Gas, others: &[Option<Gas>]) -> Vec<f64> {
+    let mut variance = vec![0.0; gas.gas_c.len()];
+    for other in others.iter().flatten() {
+        for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
+            *v += (a - b) * (a - b);
+        }
+    }
+    variance
+}
+
+/// Whether readings are clearly farther from what the others led to expect than they should be.
+fn is_excessive(gas: &Gas) -> bool {
+    gas.innovation_energy - 1.0 > MAX_INNOVATION_EXCESS * (2.0 / gas.innovations as f64).sqrt()
+}
+
+/// Whether the white noise of both channels is what the record itself seemed to say.
+fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
+    let given = &options.diagnose.characterise;
+    let is_white = rig.mismatch.is_none() && rig.sensors.iter().all(|s| s.coloured.is_none());
+    is_white && options.model.is_none() && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
+}
+
+/// The mean of `gas` and of those by other priors, with the variance of the mixture.
+fn averaged<'a>(gas: &Gas, others: impl Iterator<Item = (f64, &'a Option<Gas>)>) -> Gas {
+    let others: Vec<(f64, &Gas)> = others.filter_map(|(weight, other)| Some((weight, other.as_ref()?))).collect();
+    let own = 1.0 - others.iter().map(|(weight, _)| weight).sum::<f64>();
+    let of = |k: usize| {
+        let all = || others.iter().copied().chain([(own, gas)]);
+        let mean_c: f64 = all().map(|(w, g)| w * g.gas_c[k]).sum();
+        let variance: f64 = all().map(|(w, g)| w * (g.std_k[k].powi(2) + (g.gas_c[k] - mean_c).powi(2))).sum();
+        (mean_c, variance.sqrt())
+    };
+    let (gas_c, std_k) = (0..gas.gas_c.len()).map(of).unzip();
+    Gas { gas_c, std_k, ..gas.clone() }
+}
+
+/// Columns of the Cholesky factor of `covariance`; what is held has none.
+fn columns(covariance: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = covariance.len();
+    let mut left: Vec<Vec<f64>> = covariance.to_vec();
+    let mut out = Vec::new();
+    for j in 0..n {
+        let pivot = left[j][j];
+        if !pivot.is_finite() || pivot <= 1e-12 * covariance[j][j].abs() {
+            continue;
+        }
+        let column: Vec<f64> = (0..n).map(|i| left[i][j] / pivot.sqrt()).collect();
+        for a in 0..n {
+            for b in 0..n {
+                left[a][b] -= column[a] * column[b];
+            }
+        }
+        out.push(column);
+    }
+    out
+}

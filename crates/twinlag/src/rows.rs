@@ -1,0 +1,52 @@
+//! The rows of a record as the model of a rig takes them.
+
+use twinlag_diagnose::{KnownTimeConstant, Observations, Stretch};
+use twinlag_record::Record;
+
+use twinlag_cross_relation::Parameter;
+
+use crate::error::Error;
+use crate::options::Options;
+
+/// Samples of a stretch below which it is left out.
+const MIN_STRETCH_SAMPLES: usize = 8;
+
+/// Readings, and the row of the record that each is.
+pub(crate) struct Rows {
+    pub(crate) observations: Observations,
+    /// The row of each sample through all stretches; `None` for one that is missing from the
+    /// record.
+    pub(crate) of_sample: Vec<Option<usize>>,
+    /// Whether samples are evenly spaced.
+    pub(crate) is_even: bool,
+}
+
+impl Rows {
+    pub(crate) fn of(record: &Record) -> Result<Self, Error> {
+        let grid = record.grid().without_short(MIN_STRETCH_SAMPLES);
+        let of_sample = grid.rows().collect();
+        let stretches = grid.stretches.into_iter().map(|stretch| {
+            let missing = stretch.missing();
+            let out = Stretch::new(stretch.time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
+            match stretch.flow {
+                Some(flow) => out.with_flow(flow),
+                None => out,
+            }
+        });
+        let observations = Observations::new(stretches.collect(), grid.period_s)?;
+        Ok(Self { observations, of_sample, is_even: grid.period_s.is_some() })
+    }
+}
+
+/// What the options say of the time constants beforehand.
+pub(crate) fn known_time_constants(options: &Options) -> Vec<KnownTimeConstant> {
+    let known = options.known.iter().filter_map(|k| {
+        let sensor = match k.parameter {
+            Parameter::Tau1 => 0,
+            Parameter::Tau2 => 1,
+            _ => return None,
+        };
+        Some(KnownTimeConstant { sensor, value_s: k.value, std_s: k.std })
+    });
+    known.collect()
+}

@@ -1,0 +1,156 @@
+//! The gas temperature of a record with its standard deviation.
+
+use twinlag_compensate::{Form, bandwidth_hz};
+use twinlag_diagnose::{ModelFit, Verdict};
+use twinlag_record::Record;
+
+use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
+use crate::bands::{Banded, Reconstruction};
+use crate::error::Error;
+use crate::reference::Reference;
+use crate::rows::Rows;
+use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, with_effects};
+use crate::verbs::with_model::with_model;
+use crate::watch::{Stop, UNWATCHED, Watch};
+
+/// What a compensation may assume.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CompensateOptions {
+    /// How the model is found, where none is given.
+    pub diagnose: DiagnoseOptions,
+    /// A model that was found in another record: its effects stay as they are.
+    pub model: Option<Model>,
+    /// Which readings the gas temperature at an instant may rest on.
+    pub form: Form,
+    /// The channel, 0 or 1, that is taken to be right where gain, offset or delay differ: two
+    /// sensors alone cannot reveal which is.
+    pub trusted: usize,
+}
+
+/// The gas temperature of `record` with its standard deviation: by the model that a diagnosis
+/// finds, or by the one given.
+///
+/// # Errors
+/// As [`crate::diagnose()`] and [`crate::characterise_with`].
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let answer = twinlag::compensate(&record, &CompensateOptions::default())?;
+/// assert_eq!(answer.gas_c.len(), record.len());
+/// // The simulated record has the true gas temperature beside it, which no estimate uses.
+/// let against = answer.gas.expect("determined").reference.expect("there is one");
+/// assert!(against.rmse_k < 0.5 * against.raw_rmse_k);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn compensate(record: &Record, options: &CompensateOptions) -> Result<Compensation, Error> {
+    compensate_watched(record, options, UNWATCHED)
+}
+
+/// [`compensate`], with `watch` called as it goes on.
+///
+/// # Errors
+/// As [`compensate`]; [`Error::Cancelled`].
+pub fn compensate_watched(
+    record: &Record,
+    options: &CompensateOptions,
+    watch: Watch<'_>,
+) -> Result<Compensation, Error> {
+    let Modelled { last, fit, verdict, effects, warnings, rows } = Modelled::of(record, options, watch)?;
+    let mut out = Compensation {
+        schema: Compensation::SCHEMA.into(),
+        status: Status::NotIdentifiable,
+        form: options.form,
+        gas: None,
+        time_s: Vec::new(),
+        gas_c: Vec::new(),
+        gas_std_k: Vec::new(),
+        verdict,
+        effects,
+        last,
+        warnings,
+        rig: None,
+    };
+    let is_unknown =
+        fit.time_constants.iter().any(|t| t.value_s.is_none()) || out.last.status == Status::NotIdentifiable;
+    if is_unknown || verdict == Some(Verdict::Refused) {
+        out.warnings.push(
+            "the record does not determine both time constants, so the gas temperature cannot be reconstructed: give a \
+             known time constant, or use a model from another record"
+                .into(),
+        );
+        return Ok(out);
+    }
+    if matches!(verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained)) {
+        out.warnings.push(
+            "the model does not explain the record: the bands cover noise and parameters, but \
+             not the error of the model"
+                .into(),
+        );
+    }
+    let stop = Stop::new(watch);
+    let found = Reconstruction::of(&fit, options, &stop)?.banded()?;
+    stop.check()?;
+    fill(&mut out, found, record, &rows);
+    Ok(out)
+}
+
+/// Writes the gas temperature into the answer.
+fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows) {
+    if found.widened_by > 1.0 {
+        out.warnings.push(format!(
+            "readings deviate from their predictions {:.2} times as far as noise explains; the \
+             bands are widened by this factor",
+            found.widened_by
+        ));
+    }
+    out.warnings.push(
+        "errors that both sensors share (a gain, an offset, a delay, a second lag) remain in the \
+         gas temperature, and no band covers them"
+            .into(),
+    );
+    let mut sorted = found.std_k.clone();
+    sorted.sort_by(f64::total_cmp);
+    let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
+    let reference = Reference::of(record, &rows.of_sample);
+    out.status = Status::Ok;
+    out.gas = Some(Quality {
+        median_std_k: sorted.get(sorted.len() / 2).copied().unwrap_or(0.0),
+        parameter_std_k: found.parameter_std_k,
+        bandwidth_hz: bandwidth_hz(&found.rig, &found.prior, out.last.record.sample_period_s),
+        innovation_energy: found.gas.innovation_energy,
+        widened_by: found.widened_by,
+        reference: reference.and_then(|r| r.against(&found.gas.gas_c, &found.std_k, faster)),
+        prior: found.prior,
+    });
+    out.time_s = found.readings.time_s().to_vec();
+    (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.std_k, Some(found.rig));
+}
+
+/// The model, and where it comes from.
+struct Modelled {
+    last: Characterisation,
+    fit: ModelFit,
+    verdict: Option<Verdict>,
+    effects: Vec<NamedEffect>,
+    warnings: Vec<String>,
+    rows: Rows,
+}
+
+impl Modelled {
+    fn of(record: &Record, options: &CompensateOptions, watch: Watch<'_>) -> Result<Self, Error> {
+        if let Some(model) = &options.model {
+            let (last, fit) = with_model(record, Some(model), &options.diagnose.characterise)?;
+            let warnings = last.warnings.clone();
+            return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings, rows: Rows::of(record)? });
+        }
+        let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
+        Ok(Self {
+            last: with_effects(record, &options.diagnose, &rows, &core),
+            verdict: Some(core.verdict),
+            effects: core.effects.iter().map(|f| f.named(&record.channels)).collect(),
+            warnings: core.remarks.iter().map(ToString::to_string).collect(),
+            fit: core.last,
+            rows,
+        })
+    }
+}

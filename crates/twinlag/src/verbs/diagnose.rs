@@ -1,0 +1,176 @@
+//! The closed loop on a record.
+
+use twinlag_cross_relation::Parameter;
+use twinlag_diagnose::{Diagnosis as Core, Identifier, Policy, Settings, Verdict, diagnose as close_the_loop};
+use twinlag_estimate::{Hold, Intervals};
+use twinlag_record::Record;
+
+use crate::answers::{Characterisation, Diagnosis, ErrorBeforeAfter, Fitted, FreeParameters, Status};
+use crate::error::Error;
+use crate::options::Options;
+use crate::reference::Reference;
+use crate::rows::{Rows, known_time_constants};
+use crate::setting::{Setting, listed};
+use crate::watch::{UNWATCHED, Watch};
+
+/// What a diagnosis may assume.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DiagnoseOptions {
+    /// Noise and known time constants. The other options of a characterisation say how the two-lag
+    /// model is fitted; the loop has its own way, and remarks on those that are set.
+    pub characterise: Options,
+    /// Effects that are not to be considered.
+    pub without: Vec<Identifier>,
+    /// The numbers that decide what is said.
+    pub policy: Policy,
+}
+
+/// Finds what two first-order lags leave over in `record`, and which effects account for it.
+///
+/// # Errors
+/// [`Error::Diagnose`] for a record that is too short or in which a channel never changes;
+/// [`Error::Setting`] for options that contradict each other.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// // The second channel of this record reads 2 K too hot. Nobody says so.
+/// let answer = twinlag::diagnose(&record, &DiagnoseOptions::default())?;
+/// assert_eq!(answer.verdict, Verdict::Explained);
+/// assert_eq!(answer.effects[0].effect, Identifier::CALIBRATION);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosis, Error> {
+    diagnose_watched(record, options, UNWATCHED)
+}
+
+/// [`diagnose`], with `watch` called as it goes on.
+///
+/// # Errors
+/// As [`diagnose`]; [`Error::Cancelled`].
+pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Diagnosis, Error> {
+    let Diagnosed { rows, core } = Diagnosed::of(record, options, watch)?;
+    let reference = Reference::of(record, &rows.of_sample);
+    let error = ErrorBeforeAfter {
+        budget: core.error,
+        reference_rmse_k: reference.and_then(|reference| reference.before_and_after(&core)),
+    };
+    let mut remarks: Vec<String> = core.remarks.iter().map(ToString::to_string).collect();
+    remarks.extend(remark_on_reference(&error));
+    remarks.extend(remark_on_options(&options.characterise));
+    Ok(Diagnosis {
+        schema: Diagnosis::SCHEMA.into(),
+        base: base(record, options, &rows, &core),
+        verdict: core.verdict,
+        effects: core.effects.iter().map(|f| f.named(&record.channels)).collect(),
+        error,
+        last: with_effects(record, options, &rows, &core),
+        unexplained: core.unexplained.clone(),
+        not_testable: core.not_testable.clone(),
+        limits: core.limits.iter().map(|l| l.named(&record.channels)).collect(),
+        remarks,
+        without: options.without.clone(),
+        has_flow: record.flow.is_some(),
+        moves: core.moves.clone(),
+        policy: core.policy.clone(),
+        core: Some(Box::new(core)),
+    })
+}
+
+/// What the loop says of a record, and the rows that it is of.
+pub(crate) struct Diagnosed {
+    pub(crate) rows: Rows,
+    pub(crate) core: Core,
+}
+
+impl Diagnosed {
+    pub(crate) fn of(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Self, Error> {
+        options.characterise.check()?;
+        let rows = Rows::of(record)?;
+        let settings = Settings {
+            noise_std_k: options.characterise.noise_std_k,
+            known: known_time_constants(&options.characterise),
+            effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
+            policy: options.policy.clone(),
+        };
+        let core = close_the_loop(&rows.observations, &settings, watch)?;
+        Ok(Self { rows, core })
+    }
+}
+
+/// The two-lag model that the effects were added to.
+fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
+    let fitted = fitted(record, options, rows, &core.base);
+    let lacks_an_effect = core.base.is_contradicted() || core.effects.iter().any(|e| e.evidence.is_some());
+    let status = if core.verdict == Verdict::Refused || !fitted.is_determined() {
+        Status::NotIdentifiable
+    } else if core.verdict != Verdict::Adequate && lacks_an_effect {
+        Status::ModelRejected
+    } else {
+        Status::Ok
+    };
+    let mut out = fitted.characterisation(status);
+    if status == Status::ModelRejected {
+        out.warnings.push("two first-order lags do not explain this record: the diagnosis says what they lack".into());
+    } else if status == Status::NotIdentifiable {
+        out.warnings.push("two first-order lags: this record does not determine both time constants".into());
+    }
+    out
+}
+
+/// The model with the effects.
+pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
+    let fitted = fitted(record, options, rows, &core.last);
+    let status = match (core.verdict, fitted.is_determined()) {
+        (Verdict::Refused, _) | (_, false) => Status::NotIdentifiable,
+        (Verdict::Adequate | Verdict::Explained, _) => Status::Ok,
+        _ => Status::ModelRejected,
+    };
+    let mut out = fitted.characterisation(status);
+    out.free = FreeParameters::among(core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
+    out.warnings = core.remarks.iter().map(ToString::to_string).collect();
+    out
+}
+
+fn fitted<'a>(
+    record: &'a Record,
+    options: &'a DiagnoseOptions,
+    rows: &Rows,
+    fit: &'a twinlag_diagnose::ModelFit,
+) -> Fitted<'a> {
+    let options = &options.characterise;
+    Fitted { record, fit, options, is_even: rows.is_even, is_noise_given: options.noise_std_k.is_some() }
+}
+
+fn remark_on_reference(error: &ErrorBeforeAfter) -> Option<String> {
+    let rmse = error.reference_rmse_k?;
+    (rmse.after > rmse.before).then(|| {
+        "with the effects the gas temperature is farther from the reference. Two sensors alone cannot reveal errors that \
+         both share, nor which of them has a gain, an offset or a delay"
+            .into()
+    })
+}
+
+/// What was asked of the two-lag model that the loop does not use.
+fn remark_on_options(options: &Options) -> Option<String> {
+    let is_time_constant = |p: Parameter| matches!(p, Parameter::Tau1 | Parameter::Tau2);
+    let asked = [
+        (options.estimator != Options::default().estimator, Setting::Estimator),
+        (options.hold != Hold::Auto, Setting::Hold),
+        (options.noise_ratio.is_some(), Setting::NoiseRatio),
+        (!options.quiet_segments_s.is_empty(), Setting::QuietSegment),
+        (options.noise_colour != Options::default().noise_colour, Setting::NoiseColour),
+        (options.free_gain || options.free_offset, Setting::Free),
+        (options.second_order != [false; 2], Setting::SecondOrder),
+        (options.known.iter().any(|k| !is_time_constant(k.parameter)), Setting::Known),
+        (options.discard.is_some(), Setting::Discard),
+        (options.intervals != Intervals::Auto, Setting::Intervals),
+    ];
+    let unused: Vec<Setting> = asked.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect();
+    (!unused.is_empty()).then(|| {
+        format!(
+            "a diagnosis uses the noise levels and the time constants that are given, and nothing else that is asked of \
+             a characterisation: not used here: {}",
+            listed(&unused)
+        )
+    })
+}

@@ -1,0 +1,216 @@
+//! Time constants along a record.
+
+use std::ops::Range;
+
+use twinlag_diagnose::{Change, Settings, track as follow};
+use twinlag_estimate::Z_975;
+use twinlag_record::{Channels, Record, SamplingChoice};
+
+use crate::answers::{Along, Fitted, Model, Ratio, Status, Track};
+use crate::error::Error;
+use crate::options::Options;
+use crate::rows::{Rows, known_time_constants};
+use crate::setting::Setting;
+use crate::verbs::characterise;
+use crate::watch::{UNWATCHED, Watch};
+
+/// Below this chance the ratio does not stay.
+const RATIO_CHANGES: f64 = 1e-3;
+/// Windows of a sliding estimate that overlap.
+const OVERLAP: f64 = 4.0;
+/// Fewest samples of a window.
+const SHORTEST_WINDOW: usize = 200;
+
+/// What tracking may assume.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrackOptions {
+    /// Noise, known time constants, and how windows are characterised.
+    pub characterise: Options,
+    /// A model that was found in another record; its effects stay fixed.
+    pub model: Option<Model>,
+    /// Length of a sliding window, s: the published way, each window characterised by itself;
+    /// `None` for the whole record at once.
+    pub window_s: Option<f64>,
+}
+
+/// Both time constants along `record`.
+///
+/// # Errors
+/// As [`crate::diagnose()`] and [`crate::characterise_with`]; [`Error::Setting`] for a window that
+/// is too short or longer than the record.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let answer = twinlag::track(&record, &TrackOptions::default())?;
+/// assert_eq!(answer.change, "constant");
+/// assert_eq!(answer.sensors[0].tau_s.len(), record.len());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn track(record: &Record, options: &TrackOptions) -> Result<Track, Error> {
+    track_watched(record, options, UNWATCHED)
+}
+
+/// [`track`], with `watch` called as it goes on.
+///
+/// # Errors
+/// As [`track`]; [`Error::Cancelled`].
+pub fn track_watched(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Track, Error> {
+    match options.window_s {
+        Some(window_s) => windows(record, options, window_s, watch),
+        None => whole(record, options, watch),
+    }
+}
+
+fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Track, Error> {
+    options.characterise.check_not_fitted("tracking")?;
+    options.model.as_ref().map_or(Ok(()), |model| model.check(record))?;
+    let effects = options.model.as_ref().map(Model::known_effects).unwrap_or_default();
+    let Rows { observations, is_even, .. } = Rows::of(record)?;
+    let settings = Settings {
+        noise_std_k: options.characterise.noise_std_k,
+        known: known_time_constants(&options.characterise),
+        ..Settings::default()
+    };
+    let found = follow(&observations, &settings, &effects, watch)?;
+    let is_left = found.fit.is_contradicted();
+    let status = match (&found.log_error, is_left) {
+        (None, _) => Status::NotIdentifiable,
+        (Some(_), true) => Status::ModelRejected,
+        (Some(_), false) => Status::Ok,
+    };
+    let fitted = Fitted {
+        record,
+        fit: &found.fit,
+        options: &options.characterise,
+        is_even,
+        is_noise_given: settings.noise_std_k.is_some(),
+    };
+    let last = fitted.characterisation(status);
+    let mut warnings = Vec::new();
+    if is_left {
+        warnings.push(
+            "the residual is more than noise: the bands follow from its spectrum and cover no missing effect. A diagnosis \
+             looks for one"
+                .into(),
+        );
+    }
+    let stays = found.ratio.p_value >= RATIO_CHANGES;
+    if !stays {
+        warnings.push(
+            "the ratio of the time constants changes: the two sensors do not follow the same \
+            flow"
+                .into(),
+        );
+    }
+    let sensors = found.log_error.as_ref().map(|errors| [0, 1].map(|i| along(&found.tau_s[i], &errors[i])));
+    let (change, coefficients) = match found.change {
+        Change::Smooth(size) => ("smooth", Some(size)),
+        Change::Step => ("step", None),
+        _ => ("constant", None),
+    };
+    Ok(Track {
+        schema: Track::SCHEMA.into(),
+        status,
+        change: change.into(),
+        coefficients,
+        range_s: sensors.as_ref().map(range),
+        time_s: if sensors.is_some() { found.time_s } else { Vec::new() },
+        sensors: sensors.unwrap_or_default(),
+        step: found.step.filter(|_| found.change == Change::Step),
+        ratio: Some(Ratio { stays, test: found.ratio }),
+        last,
+        warnings,
+    })
+}
+
+/// A time constant with its band, whose logarithm is normal.
+fn along(tau_s: &[f64], log_error: &[f64]) -> Along {
+    let by = |sign: f64| tau_s.iter().zip(log_error).map(|(tau, e)| tau * (sign * Z_975 * e).exp()).collect();
+    Along { tau_s: tau_s.to_vec(), low_s: by(-1.0), high_s: by(1.0) }
+}
+
+fn range(sensors: &[Along; 2]) -> [[f64; 2]; 2] {
+    [0, 1].map(|i| {
+        let known = sensors[i].tau_s.iter().copied().filter(|t| t.is_finite());
+        known.fold([f64::INFINITY, 0.0], |[low, high], t| [low.min(t), high.max(t)])
+    })
+}
+
+/// Some rows of a record.
+fn part(record: &Record, rows: Range<usize>) -> Result<Record, Error> {
+    let channels = Channels {
+        source: record.source.clone(),
+        names: record.channels.clone(),
+        time_s: record.time_s[rows.clone()].to_vec(),
+        t1_c: record.t1_c[rows.clone()].to_vec(),
+        t2_c: record.t2_c[rows].to_vec(),
+        reference_c: None,
+    };
+    Ok(Record::from_channels(channels, SamplingChoice::Auto)?)
+}
+
+/// Each window by itself, a quarter of a window apart, at its middle.
+fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<'_>) -> Result<Track, Error> {
+    let last = characterise(record, &options.characterise)?;
+    let span_s = record.time_s.last().copied().unwrap_or(0.0) - record.time_s.first().copied().unwrap_or(0.0);
+    let least_s = SHORTEST_WINDOW as f64 * record.sampling.period_s;
+    if !(window_s >= least_s && window_s <= span_s) {
+        return Err(Error::Setting {
+            setting: Setting::Window,
+            expected: format!(
+                "seconds from {least_s:.4} ({SHORTEST_WINDOW} samples) to {span_s:.4}, the record's length"
+            ),
+            got: window_s.to_string(),
+            also: Vec::new(),
+        });
+    }
+    let hop_s = window_s / OVERLAP;
+    let count = ((span_s - window_s) / hop_s).floor() as usize + 1;
+    let (mut time_s, mut sensors, mut rejected) = (Vec::new(), [Along::default(), Along::default()], 0);
+    for k in 0..count {
+        if watch("windows", k, count).is_break() {
+            return Err(Error::Cancelled);
+        }
+        let from_s = record.time_s[0] + k as f64 * hop_s;
+        let rows =
+            record.time_s.partition_point(|t| *t < from_s)..record.time_s.partition_point(|t| *t <= from_s + window_s);
+        let Ok(answer) = part(record, rows).and_then(|part| characterise(&part, &options.characterise)) else {
+            continue;
+        };
+        rejected += usize::from(answer.status == Status::ModelRejected);
+        time_s.push(from_s + 0.5 * window_s);
+        for (along, sensor) in sensors.iter_mut().zip(&answer.sensors) {
+            let [low, high] = sensor.interval_95_s.unwrap_or([f64::NAN; 2]);
+            along.tau_s.push(sensor.time_constant_s.unwrap_or(f64::NAN));
+            along.low_s.push(low);
+            along.high_s.push(high);
+        }
+    }
+    let warnings = of_windows(&sensors, rejected, time_s.len());
+    let is_any = sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()));
+    Ok(Track {
+        schema: Track::SCHEMA.into(),
+        status: if is_any { Status::Ok } else { Status::NotIdentifiable },
+        change: "windows".into(),
+        coefficients: None,
+        range_s: is_any.then(|| range(&sensors)),
+        time_s,
+        sensors,
+        step: None,
+        ratio: None,
+        last,
+        warnings,
+    })
+}
+
+fn of_windows(sensors: &[Along; 2], rejected: usize, count: usize) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let empty = sensors[0].tau_s.iter().filter(|t| !t.is_finite()).count();
+    if empty > 0 {
+        warnings.push(format!("{empty} of {count} windows do not determine both time constants"));
+    }
+    if rejected > 0 {
+        warnings.push(format!("in {rejected} of {count} windows the residual is more than noise"));
+    }
+    warnings
+}

@@ -1,0 +1,77 @@
+//! A record with the effects of a model that was found in another one.
+
+use twinlag_diagnose::{Identifier, ModelFit, Settings, fit_with};
+use twinlag_record::Record;
+
+use crate::answers::{Characterisation, Fitted, Model, Status};
+use crate::error::Error;
+use crate::options::Options;
+use crate::rows::{Rows, known_time_constants};
+use crate::verbs::characterise;
+
+/// Estimates both time constants of `record`, with the effects of `model` held fixed.
+///
+/// # Errors
+/// As [`crate::diagnose()`]; [`Error::ModelChannels`] and [`Error::ModelNumber`] for a model of other
+/// channels, or with impossible numbers; also if an effect has parameters that this version does
+/// not know.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// let model = twinlag::diagnose(&record, &DiagnoseOptions::default())?.model();
+/// let later = Record::from_channels(channels(2)?, SamplingChoice::Auto)?;
+/// let answer = twinlag::characterise_with(&later, &model, &Options::default())?;
+/// assert_eq!(answer.status, Status::Ok);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> Result<Characterisation, Error> {
+    if model.effects.is_empty() {
+        model.check(record)?;
+        let mut out = characterise(record, options)?;
+        out.warnings.push("the model has no effects: it is two first-order lags".into());
+        return Ok(out);
+    }
+    Ok(with_model(record, Some(model), options)?.0)
+}
+
+/// The fit of `record` with the effects of `model`, none without one, and its characterisation.
+pub(crate) fn with_model(
+    record: &Record,
+    model: Option<&Model>,
+    options: &Options,
+) -> Result<(Characterisation, ModelFit), Error> {
+    model.map_or(Ok(()), |model| model.check(record))?;
+    let Rows { observations, is_even, .. } = Rows::of(record)?;
+    // Coloured noise was found beside white noise of these levels: third differences see both.
+    let noisy = model.filter(|m| m.effects.iter().any(|e| e.effect.is_noise()));
+    let noise_std_k = options.noise_std_k.or(noisy.and_then(|m| m.noise_std_k));
+    let settings = Settings { noise_std_k, known: known_time_constants(options), ..Settings::default() };
+    let effects = model.map(Model::known_effects).unwrap_or_default();
+    let known = fit_with(&observations, &settings, &effects)?;
+    let fitted = Fitted { record, fit: &known.fit, options, is_even, is_noise_given: noise_std_k.is_some() };
+    let status = match (fitted.is_determined(), known.fit.is_contradicted()) {
+        (false, _) => Status::NotIdentifiable,
+        (true, true) => Status::ModelRejected,
+        (true, false) => Status::Ok,
+    };
+    let mut out = fitted.characterisation(status);
+    let listed = |effects: &mut dyn Iterator<Item = Identifier>| -> String {
+        effects.map(Identifier::name).collect::<Vec<_>>().join(", ")
+    };
+    if !effects.is_empty() {
+        let names = listed(&mut effects.iter().map(|e| e.effect));
+        out.warnings.push(format!("effects held at the values of the model: {names}"));
+    }
+    if !known.fitted_again.is_empty() {
+        let again = listed(&mut known.fitted_again.iter().copied());
+        out.warnings.push(format!("effects fitted again, because they belong to a record and not to the rig: {again}"));
+    }
+    if options.free_gain || options.free_offset || options.second_order != [false; 2] {
+        out.warnings.push(
+            "the request to fit gain, offset or second lags is ignored, because the model \
+                   determines what is fitted"
+                .into(),
+        );
+    }
+    Ok((out, known.fit))
+}
