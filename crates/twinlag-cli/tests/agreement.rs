@@ -180,11 +180,13 @@ fn page_text_and_json_agree_on_a_record_without_an_effect() {
 fn both_models_say_what_made_them() {
     let said = Said::of("made", RIG);
     for model in said.columns() {
-        assert_eq!(model["estimator"], "whitened-rig");
+        assert_eq!(model["estimator"], "whitened");
         assert!(model["starts"].is_null(), "{model:#}");
         for i in 0..2 {
             let sensor = &model["sensors"][i];
-            for name in ["noise_from", "noise_standard_error_K", "noise_ar1"] {
+            let sources = ["third-differences", "residual"];
+            assert!(sources.contains(&sensor["noise_from"].as_str().expect("a text")), "{sensor:#}");
+            for name in ["noise_standard_error_K", "noise_ar1"] {
                 assert!(sensor[name].is_null(), "{name} is of another fit: {sensor:#}");
             }
         }

@@ -22,6 +22,8 @@ pub struct Levels {
     pub log_error: [f64; 2],
     /// Step of each converter, where there is one, K.
     pub step_k: [Option<f64>; 2],
+    /// Whether they are those of what a model leaves over, and no longer of third differences.
+    pub is_of_residual: bool,
 }
 
 /// Rows of a stretch that levels of noise can be found in.
@@ -73,6 +75,7 @@ pub fn levels(observations: &Observations) -> Option<Levels> {
         std_k: found.map(|l| l.std_k.max(nothing)),
         log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
         step_k: found.map(|l| l.quantisation_step_k),
+        is_of_residual: false,
     })
 }
 

@@ -63,6 +63,8 @@ pub struct ModelFit {
     pub fit: Fit,
     /// Noise of the channels, K.
     pub noise_std_k: [f64; 2],
+    /// Whether noise levels that were not given are those of what a model leaves over, and not of third differences.
+    pub is_noise_of_residual: bool,
     /// Tests of the residual.
     pub tests: Vec<ResidualTest>,
     /// Energy of the residual per degree of freedom.

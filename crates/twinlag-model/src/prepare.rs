@@ -158,6 +158,7 @@ impl Prepared {
     /// Lowers the levels to what `fitted` leaves over, which may show that a converter is coarse.
     pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
         self.levels.scale(fitted.mean_energy().sqrt());
+        self.levels.is_of_residual = true;
         self.context = context(&self.observations, &self.levels);
         if settings.effects.contains(&Identifier::QUANTISATION) {
             self.found.extend(coarse_steps(&self.levels));

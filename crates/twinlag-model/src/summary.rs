@@ -176,6 +176,7 @@ pub fn summarise(
         difference: time_constant(difference_value, difference, false),
         fit: fitted.report.clone(),
         noise_std_k: fitted.model.noise_std_k(),
+        is_noise_of_residual: levels.is_of_residual || fitted.model.noise().is_some(),
         tests,
         chi2_per_dof,
         is_weighted_by_residual: rejects,

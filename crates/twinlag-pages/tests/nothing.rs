@@ -53,6 +53,7 @@ fn core(verdict: Verdict, trace: Trace) -> Core {
             evaluations: Evaluations::default(),
         },
         noise_std_k: [f64::NAN; 2],
+        is_noise_of_residual: false,
         tests: Vec::new(),
         chi2_per_dof: f64::NAN,
         is_weighted_by_residual: false,

@@ -1,7 +1,7 @@
 //! A fit of the model of a rig as a characterisation.
 
 use twinlag_cross_relation::Parameter;
-use twinlag_diagnose::{Identifier, ModelFit, TimeConstant, Value};
+use twinlag_diagnose::{Identifier, ModelFit, Policy, TimeConstant, Value};
 use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_record::Record;
 
@@ -13,9 +13,7 @@ use crate::options::Options;
 
 /// Name of the estimator: maximum likelihood of the whitened disagreement under a model of the
 /// whole rig, with the gas as a spline between samples.
-const ESTIMATOR: &str = "whitened-rig";
-/// p-value below which the autocorrelations of a residual are not those of white noise.
-const NOT_WHITE: f64 = 1e-3;
+const ESTIMATOR: &str = "whitened";
 
 /// A fit of the model of a rig, and what it is of.
 pub(crate) struct Fitted<'a> {
@@ -54,7 +52,11 @@ impl Fitted<'_> {
             free: FreeParameters { gain: None, offset_k: None },
             residual: Residual {
                 chi2_per_dof: Some(fit.chi2_per_dof),
-                white: fit.tests.iter().find(|t| t.test == "whiteness").is_none_or(|t| t.p_value > NOT_WHITE),
+                white: fit
+                    .tests
+                    .iter()
+                    .find(|t| t.test == "whiteness")
+                    .is_none_or(|t| t.p_value > Policy::default().rejection_p_value()),
                 tests: fit.tests.clone(),
             },
             interval_method: if fit.is_weighted_by_residual {
@@ -85,7 +87,11 @@ impl Fitted<'_> {
             noise_std_k: self.fit.noise_std_k[i],
             noise_standard_error_k: None,
             noise_ar1: None,
-            noise_from: self.is_noise_given.then_some(NoiseSource::Given),
+            noise_from: Some(match (self.is_noise_given, self.fit.is_noise_of_residual) {
+                (true, _) => NoiseSource::Given,
+                (false, true) => NoiseSource::Residual,
+                (false, false) => NoiseSource::ThirdDifferences,
+            }),
             known: self.options.known(Parameter::ALL[i]).is_some_and(|k| k.std.is_none()),
         }
     }
