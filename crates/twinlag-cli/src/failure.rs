@@ -63,7 +63,7 @@ impl From<ReportError> for Failure {
 
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
-        let text = with_options(&error, error.settings().iter().filter_map(reader_option));
+        let text = with_options(&error, error.settings().iter().copied().filter_map(reader_option));
         match error {
             RecordError::CannotWrite { .. } => Self::Other(text),
             RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {

@@ -29,7 +29,7 @@ pub(crate) fn options(setting: Setting) -> &'static [&'static str] {
 }
 
 /// The option for a setting of the reader.
-pub(crate) fn reader_option(setting: &ReaderSetting) -> Option<&'static str> {
+pub(crate) fn reader_option(setting: ReaderSetting) -> Option<&'static str> {
     Some(match setting {
         ReaderSetting::Time => "--time",
         ReaderSetting::T1 => "--t1",

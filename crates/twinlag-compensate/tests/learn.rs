@@ -36,7 +36,7 @@ fn engine() -> Signal {
     Signal::Engine(Engine { amplitude_relative_std: 0.1, period_relative_std: 0.02, ..pulses })
 }
 
-/// In 32 periods, each with a innovation_variance of 2 %, the mean frequency scatters by 0.35 %; four of these.
+/// In 32 periods, each with a scatter of 2 %, the mean frequency scatters by 0.35 %; four of these.
 #[test]
 fn a_pulsation_is_learned_as_a_comb() {
     let prior = learn(&case(engine()).readings, &rig()).expect("long enough").prior;

@@ -83,7 +83,7 @@ fn moves(before: &Diagnosis, after: &Diagnosis) -> [bool; 4] {
     let effects = |d: &Diagnosis| -> Vec<Identifier> { d.effects.iter().map(|f| f.effect).collect() };
     let (named, named_after) = (effects(before), effects(after));
     let pairs = before.last.time_constants.iter().zip(&after.last.time_constants);
-    let has_moved = pairs.map(|(a, b)| match (a.value_s, b.value_s) {
+    let mut has_moved = pairs.map(|(a, b)| match (a.value_s, b.value_s) {
         (Some(x), Some(y)) => (x - y).abs() > NOTICEABLE * a.standard_error_s.unwrap_or(0.0),
         (x, y) => x.is_some() != y.is_some(),
     });
@@ -91,7 +91,7 @@ fn moves(before: &Diagnosis, after: &Diagnosis) -> [bool; 4] {
         before.verdict != after.verdict,
         named.first() != named_after.first(),
         named != named_after,
-        has_moved.fold(false, |any, one| any || one),
+        has_moved.any(|one| one),
     ]
 }
 

@@ -99,7 +99,7 @@ impl Fitted<'_> {
 
 impl FreeParameters {
     /// Gain and offset among the parameters of effects.
-    pub(crate) fn among<'a>(effects: impl Iterator<Item = (Identifier, &'a [Value])> + Clone) -> Self {
+    pub(crate) fn among<'a>(effects: &(impl Iterator<Item = (Identifier, &'a [Value])> + Clone)) -> Self {
         let free = |name: &str| {
             let of_calibration = effects.clone().filter(|(effect, _)| *effect == Identifier::CALIBRATION);
             of_calibration.flat_map(|(_, parameters)| parameters).find(|p| p.name == name).and_then(|p| {

@@ -126,7 +126,7 @@ pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Ro
         _ => Status::ModelRejected,
     };
     let mut out = fitted.characterisation(status);
-    out.free = FreeParameters::among(core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
+    out.free = FreeParameters::among(&core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
     out.warnings = core.remarks.iter().map(ToString::to_string).collect();
     out
 }

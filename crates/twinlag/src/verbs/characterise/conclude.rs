@@ -82,16 +82,13 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             _ => Status::Ok,
         };
         let mut out = self.skeleton(status);
-        match (status, answer) {
-            (Status::Ok | Status::ModelRejected, Some((covariance, intervals))) => {
-                self.report(&mut out, &covariance, intervals)?;
-            }
-            _ => {
-                let found = self.walk(&vague)?;
-                self.explain(&mut out, found);
-                if found.is_none() && matches!(self.solved.end, End::OnBound(_)) {
-                    out.status = Status::AtBound;
-                }
+        if let (Status::Ok | Status::ModelRejected, Some((covariance, intervals))) = (status, answer) {
+            self.report(&mut out, &covariance, intervals)?;
+        } else {
+            let found = self.walk(&vague)?;
+            self.explain(&mut out, found);
+            if found.is_none() && matches!(self.solved.end, End::OnBound(_)) {
+                out.status = Status::AtBound;
             }
         }
         Ok(self.finish(out))

@@ -93,7 +93,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 self.warnings.push(format!("{why}: there may be too much noise for this estimator"));
             }
             End::Stalled(why) => {
-                self.warnings.push(format!("the optimiser stopped at a point that is not a minimum: {why}"))
+                self.warnings.push(format!("the optimiser stopped at a point that is not a minimum: {why}"));
             }
             End::LimitReached => self.warnings.push("the optimiser ran out of evaluations before it converged".into()),
             _ => self.warnings.push(
