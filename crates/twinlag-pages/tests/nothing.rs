@@ -30,7 +30,7 @@ fn record() -> Record {
         source: "a <b>.csv".into(),
         names: ["T\"1\"".into(), "T2 & more".into()],
         t1_c: time_s.clone(),
-        t2_c: time_s.clone(),
+        t2_c: time_s.iter().map(|t| t + 1.0).collect(),
         reference_c: Some(time_s.clone()),
         time_s,
     };
