@@ -167,7 +167,7 @@ pub struct Diagnosis {
     pub effects: Vec<Found>,
     /// Two first-order lags.
     pub base: ModelFit,
-    /// The value with the effects in the model.
+    /// The model with the effects.
     pub last: ModelFit,
     /// Errors before and after.
     pub error: ErrorBudget,

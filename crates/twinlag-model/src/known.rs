@@ -12,10 +12,10 @@ use crate::summary::summarise;
 
 /// Both time constants of `observations` with `effects` held as they are in the model, except
 /// parameters that belong to a record, which are fitted again; defects of the data are dealt with
-/// as in [`crate::diagnose()`].
+/// as in a diagnosis.
 ///
 /// # Errors
-/// As [`crate::diagnose()`]; [`DiagnoseError::Model`] for an effect that is not in this library, or
+/// [`DiagnoseError`] as of a diagnosis; [`DiagnoseError::Model`] for an effect whose `restore` gives none, or
 /// has other parameters.
 pub fn fit_with(
     observations: &Observations,

@@ -86,7 +86,7 @@ impl Domain {
             }
     }
 
-    /// Description of the residual in words.
+    /// What is expected, in words.
     pub fn expected(self) -> &'static str {
         match self {
             Self::Finite => "a finite number",
