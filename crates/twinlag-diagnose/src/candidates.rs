@@ -78,7 +78,7 @@ impl Candidate {
     }
 
     /// Whether its fit says anything: it has ended well, and keeps most residuals. A time constant
-    /// that is too short to be seen may lie on its bound: the effect is none the worse for it.
+    /// that is too short to be seen may lie on its bound, which says nothing against the effect.
     fn is_sound(&self, current: &Fitted, policy: &Policy) -> bool {
         let has_ended = match &self.fitted.end {
             End::OnBound(which) => which.iter().all(|i| *i < 2),

@@ -7,7 +7,7 @@ use twinlag_transform::Tapered;
 pub(crate) const SINGLE: usize = 1;
 /// Bins of one tone under the window: its main lobe and rounding.
 const TONE_BINS: usize = 12;
-/// Power of a tone's side lobes beside its own: what is less is none.
+/// Power of a tone's side lobes beside its own: less than that is no tone.
 const LEAST_SHARE: f64 = 1e-9;
 
 /// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples

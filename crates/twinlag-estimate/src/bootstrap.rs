@@ -4,7 +4,7 @@
 //! sensors; noise of the found levels is added, anew for each replicate; and the estimator answers
 //! each. The spread of `ln(τ*/τ)` turned round gives the interval. It takes a hundred times as long
 //! as a standard error, and makes no use of one: for estimators that have none, and to check those
-//! that do. The estimator's own model makes the records, so it cannot tell that the model is wrong.
+//! that do. The estimator's own model makes the records, so it cannot show that the model is wrong.
 //!
 //! # Source
 //! Efron and Tibshirani 1993, the basic bootstrap interval.
@@ -190,10 +190,10 @@ fn gas(f: [&[f64]; 2], inputs: &InferredInputs, levels_k: [f64; 2], ar1: [f64; 2
 /// The gas's share of the power at `bin`, given each bin's power over that of its noise.
 ///
 /// From the median over bins within an eighth of the frequency, which lines do not touch; where
-/// that is no clear sign of gas, two standard errors above noise alone, there is none. A bin that
+/// that is no clear sign of gas, two standard errors above noise alone, the share is zero. A bin that
 /// stands out five times above its surroundings, its neighbours with it, is a line and counts by
-/// itself. Anything less strict leaves noise in the gas, which would tell the replicates more about
-/// the sensors than the record does.
+/// itself. Anything less strict leaves noise in the gas, which would give the replicates more information
+/// about the sensors than the record has.
 fn gas_share(ratios: &[f64], bin: usize, bins: usize) -> f64 {
     let (low, high) = (bin - (bin / 8 + 4).min(bin), (bin + bin / 8 + 5).min(bins));
     let mut around = ratios[low..high].to_vec();

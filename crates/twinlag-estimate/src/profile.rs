@@ -1,4 +1,5 @@
-//! What a record tells when it does not tell both time constants: the range of their difference.
+//! What a record determines when it does not determine both time constants: the range of their
+//! difference.
 //!
 //! One time constant is held at one value after another, away from where the fit ended, and the
 //! rest is fitted. Every value for which the cost stays within the 95 % point of chi-square above

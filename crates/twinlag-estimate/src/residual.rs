@@ -17,7 +17,7 @@ impl<const P: usize> WhitenedFit<'_, P> {
     ///   not fitted
     ///
     /// # Errors
-    /// [`EstimateError::Cost`] if the levels are none.
+    /// [`EstimateError::Cost`] if the levels are not finite and positive.
     /// ```
     #[doc = include_str!("../doc/readings.txt")]
     /// use twinlag_estimate::{Task, WhitenedFit};

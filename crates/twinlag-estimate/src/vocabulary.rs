@@ -141,7 +141,7 @@ pub enum Intervals {
     Auto,
     /// The profile of the whitened cost.
     Profile,
-    /// The same estimator on simulated records.
+    /// This estimator on simulated records.
     Bootstrap(Bootstrap),
 }
 
@@ -235,7 +235,7 @@ pub enum NoiseSource {
     ThirdDifferences,
     /// How the two inferred gas temperatures disagree.
     InferredInputs,
-    /// The residual's own energy: only the ratio of the levels was given, or could be told.
+    /// The residual's own energy: only the ratio of the levels was given, or could be determined.
     Residual,
 }
 
@@ -271,7 +271,7 @@ pub enum IntervalBasis {
     StandardError,
     /// The profile of the cost, where standard errors do not describe it.
     Profile,
-    /// The same estimator on simulated records: see [`Bootstrap`].
+    /// This estimator on simulated records: see [`Bootstrap`].
     Bootstrap,
 }
 

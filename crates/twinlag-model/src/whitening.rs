@@ -31,7 +31,7 @@ pub(crate) struct Variance {
 }
 
 impl Variance {
-    /// The same for all readings.
+    /// One variance for all readings.
     pub(crate) fn same(plain: f64) -> Self {
         Self { plain, boundless: plain, masked: Vec::new() }
     }

@@ -41,7 +41,10 @@ pub struct TrackOptions {
 ///
 /// ```
 #[doc = include_str!("../example.txt")]
-/// let answer = twinlag::track(&record, &TrackOptions::default())?;
+/// // What the sensors are like apart from that: here, one of them reads too hot.
+/// let model = twinlag::diagnose(&record, &DiagnoseOptions::default())?.model();
+/// let options = TrackOptions { model: Some(model), ..TrackOptions::default() };
+/// let answer = twinlag::track(&record, &options)?;
 /// assert_eq!(answer.change, "constant");
 /// assert_eq!(answer.sensors[0].tau_s.len(), record.len());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
