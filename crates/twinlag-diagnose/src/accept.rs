@@ -30,7 +30,7 @@ impl Search<'_> {
                     held_out_gain(self.observations, self.selection, current, &first.fitted, self.policy);
             }
             if first.held_out_nats > 0.0
-                && self.has_size(&first)
+                && self.has_size(&first.fitted, current.model.effects.len())
                 && is_confirmed(&first, current, self.observations, self.policy)
             {
                 let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
@@ -41,13 +41,14 @@ impl Search<'_> {
         None
     }
 
-    /// Whether an effect that puts a factor into both inverses has a size of its own.
+    /// Whether effect `index`, if it puts a factor into both inverses, has a size of its own.
     ///
     /// Such an effect changes the model where its size is nothing as well: both disagreements pass the factor
     /// `1 + τ s` once more, which takes off any exponential of time constant `τ`, as of an amplifier that warms up. A
     /// gain that comes with a size of nothing is no sign of the effect.
-    fn has_size(&self, candidate: &Candidate) -> bool {
-        let effect = &candidate.effect;
+    pub(crate) fn has_size(&self, fitted: &Fitted, index: usize) -> bool {
+        let Fitted { model, theta, .. } = fitted;
+        let effect = &model.effects[index];
         let main = effect.main().map(|i| (i, &effect.parameters()[i]));
         let Some((main, _)) = main.filter(|(_, p)| matches!(p.variable.scale, Scale::Linear { .. })) else {
             return true;
@@ -55,12 +56,11 @@ impl Search<'_> {
         if !effect.about().turns_phases {
             return true;
         }
-        let Fitted { model, theta, .. } = &candidate.fitted;
-        let index = model.range(model.effects.len() - 1).start + main;
+        let main = model.range(index).start + main;
         let lin = model.linearised(theta, self.observations, self.selection);
         let Some(inverse) = dense::inverse(&dense::gram(&lin.columns)) else { return false };
-        let variance = inverse[index][index] * candidate.fitted.mean_energy().max(1.0);
-        theta[index] * theta[index] > threshold(1, self.policy.round_false_alarm_probability) * variance
+        let variance = inverse[main][main] * fitted.mean_energy().max(1.0);
+        theta[main] * theta[main] > threshold(1, self.policy.round_false_alarm_probability) * variance
     }
 
     /// Whether the noise that is left over at `without` is of the colour of `taken`.

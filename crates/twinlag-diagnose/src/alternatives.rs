@@ -1,7 +1,7 @@
 //! Other forms of an effect that has been chosen: another size, one parameter more, a look-alike in
 //! its place.
 
-use twinlag_model::{DiagnoseError, Effort, Fitted, Shared, held_out_gain};
+use twinlag_model::{DiagnoseError, Effort, Fitted, Shared, held_out_gain, is_unresolved};
 
 use crate::candidates::{Candidate, Search, accepts, white_gain};
 use crate::rank::worth;
@@ -85,6 +85,14 @@ impl Search<'_> {
             replaced.into_iter().flatten().filter(|r| r.candidate.is_clear_of_bounds()).collect();
         alike.sort_by(|a, b| b.advantage.total_cmp(&a.advantage));
         Ok(alike)
+    }
+
+    /// Whether a look-alike of effect `index` can take its place: its fit has ended, it has a size,
+    /// and time constants that the record resolves under `current` are resolved under it as well.
+    /// One that fits better by taking a sensor's lag away replaces the sensor, not the effect.
+    pub(crate) fn can_replace(&self, current: &Fitted, index: usize, other: &Fitted) -> bool {
+        let is_unresolved = |fitted| is_unresolved(fitted, self.observations, self.policy);
+        other.end.is_usable() && self.has_size(other, index) && (is_unresolved(current) || !is_unresolved(other))
     }
 
     /// `other` in the place of effect `index`, everything fitted again.

@@ -4,6 +4,7 @@
 use serde::{Deserialize, Serialize};
 use twinlag_model::{DiagnoseError, Effort, Fitted, Identifier, Prepared, Settings, Watch};
 
+use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::diagnosis::Evidence;
 use crate::rank::{LookAlike, successor, worth};
@@ -245,8 +246,12 @@ impl<'a> State<'a> {
         let search = self.search();
         let taken = &self.taken[index];
         let mut alike = search.look_alikes(&self.current, index, &taken.candidate)?;
-        let values: Vec<LookAlike> =
-            alike.iter().map(|r| LookAlike { kind: kind(&r.candidate.effect), advantage: r.advantage }).collect();
+        let value = |Replacement { candidate, advantage }: &Replacement| LookAlike {
+            kind: kind(&candidate.effect),
+            can_replace: search.can_replace(&self.current, index, &candidate.fitted),
+            advantage: *advantage,
+        };
+        let values: Vec<LookAlike> = alike.iter().map(value).collect();
         let policy = &self.settings.policy;
         let Some(at) = successor(kind(&taken.candidate.effect), &values, policy) else {
             if !taken.is_noise() {

@@ -146,6 +146,8 @@ pub(crate) fn ties(first: &Score, others: &[Score], policy: &Policy) -> Vec<usiz
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LookAlike {
     pub(crate) kind: Kind,
+    /// Whether its fit is one that may take another's place.
+    pub(crate) can_replace: bool,
     pub(crate) advantage: f64,
 }
 
@@ -161,7 +163,7 @@ impl LookAlike {
 pub(crate) fn successor(kind: Kind, look_alikes: &[LookAlike], policy: &Policy) -> Option<usize> {
     look_alikes.iter().position(|l| {
         let is_due = kind == Kind::Imitator && l.kind == Kind::Static && l.is_tied(policy);
-        l.advantage > policy.tie_deviance || is_due
+        l.can_replace && (l.advantage > policy.tie_deviance || is_due)
     })
 }
 

@@ -191,7 +191,7 @@ fn ties_are_other_effects_that_explain_as_much() {
 fn a_look_alike_takes_the_place_if_it_is_clearly_better() {
     let policy = Policy::default();
     let tie = policy.tie_deviance;
-    let with = |of, kind, advantage| successor(of, &[LookAlike { kind, advantage }], &policy);
+    let with = |of, kind, advantage| successor(of, &[LookAlike { kind, can_replace: true, advantage }], &policy);
     assert_eq!(with(Kind::Sensor, Kind::Sensor, tie + EPSILON), Some(0));
     assert_eq!(with(Kind::Sensor, Kind::Sensor, tie - EPSILON), None);
     assert_eq!(with(Kind::Sensor, Kind::Static, tie - EPSILON), None);
@@ -199,8 +199,10 @@ fn a_look_alike_takes_the_place_if_it_is_clearly_better() {
     assert_eq!(with(Kind::Imitator, Kind::Static, -tie + EPSILON), Some(0));
     assert_eq!(with(Kind::Imitator, Kind::Static, -tie - EPSILON), None);
     assert_eq!(with(Kind::Imitator, Kind::Sensor, tie - EPSILON), None);
-    let both = [-tie - EPSILON, tie + EPSILON].map(|advantage| LookAlike { kind: Kind::Sensor, advantage });
+    let look_alike = |advantage| LookAlike { kind: Kind::Sensor, can_replace: true, advantage };
+    let both = [-tie - EPSILON, tie + EPSILON].map(look_alike);
     assert_eq!(successor(Kind::Sensor, &both, &policy), Some(1));
+    assert_eq!(successor(Kind::Sensor, &both.map(|l| LookAlike { can_replace: false, ..l }), &policy), None);
     assert!(!both[0].is_tied(&policy) && both[1].is_tied(&policy));
 }
 
