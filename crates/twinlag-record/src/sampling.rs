@@ -37,7 +37,8 @@ pub struct Sampling {
     /// Largest departure of a stamp from the line.
     pub largest_departure_s: f64,
     /// The grid that the stamps lie on, if any: the coarsest power of ten (or common divisor of the
-    /// steps) of the file's time unit that divides them all.
+    /// steps) of the file's time unit that divides them all; the last digit of the largest stamp
+    /// where all are printed to one number of significant digits.
     pub stamp_resolution_s: Option<f64>,
     /// What they are taken to be.
     pub kind: SamplingKind,
@@ -45,6 +46,8 @@ pub struct Sampling {
 
 /// A beat is at least one in so many steps: a logger's period is not off its clock's unit by less.
 const MAX_STEPS_PER_BEAT: usize = 50;
+/// Significant digits of a stamp, at most: those of more are not rounded to any number of them.
+const MAX_DIGITS: i32 = 12;
 /// Departure, in periods, below which stamps count as even.
 const EXACT_PERIODS: f64 = 0.01;
 
@@ -195,10 +198,25 @@ fn grid(time_s: &[f64], steps: &[f64], unit_s: f64) -> Option<f64> {
         unit <= 1.001 * shortest && time_s.iter().all(|t| off_grid((t - first) / unit) < 0.01)
     })?;
     let unit = power * unit_s;
+    if let Some(coarsest) = last_digit(time_s, unit_s).filter(|last| *last > unit && *last <= shortest) {
+        return Some(coarsest);
+    }
     let common = steps.iter().map(|step| (step / unit).round() as u64).fold(0, divisor);
     let shortest = (shortest / unit).round() as u64;
     // Where all steps are multiples of the shortest one the divisor is the sampling, not the clock.
     Some(if common < shortest { unit * common.max(1) as f64 } else { unit })
+}
+
+/// The last digit of the largest stamp, where all are printed to one number of significant digits:
+/// seven of them give 0.04167 s and 1049.958 s.
+fn last_digit(time_s: &[f64], unit_s: f64) -> Option<f64> {
+    let exponent = |stamp: f64| stamp.abs().log10().floor() as i32;
+    let digits =
+        |stamp: f64| (1..=MAX_DIGITS).find(|digits| off_grid(stamp / 10_f64.powi(exponent(stamp) + 1 - digits)) < 0.01);
+    let stamps = || time_s.iter().map(|t| t / unit_s).filter(|stamp| *stamp != 0.0);
+    let most = stamps().map(digits).try_fold(0, |most, digits| Some(digits?.max(most)))?;
+    let largest = stamps().map(exponent).max()?;
+    Some(10_f64.powi(largest + 1 - most) * unit_s)
 }
 
 fn off_grid(position: f64) -> f64 {
@@ -228,6 +246,18 @@ mod tests {
         assert!((got.period_s - 1.0 / 24.0).abs() < 5e-11, "got {}, want {}", got.period_s, 1.0 / 24.0);
         assert!(got.largest_departure_s < 6e-6, "got {}, want half a unit, 5e-6", got.largest_departure_s);
         assert!((got.stamp_resolution_s.unwrap() - 1e-5).abs() < 1e-12);
+    }
+
+    /// Seven significant digits leave milliseconds after 1000 s, which are more than a hundredth of the period. The slope has
+    /// less than their (q/√12) √12 n^-3/2 = 2.5e-10 s: ten of these are 2.5e-9 s.
+    #[test]
+    fn stamps_of_seven_significant_digits_are_rounded_even_sampling() {
+        let rounded = |t: f64| format!("{t:.6e}").parse::<f64>().expect("a number that was just printed");
+        let time_s: Vec<f64> = (0..25_200).map(|k| rounded(f64::from(k) / 24.0)).collect();
+        let got = auto(&time_s);
+        assert_eq!(got.kind, SamplingKind::Rounded);
+        assert!((got.period_s - 1.0 / 24.0).abs() < 2.5e-9, "got {}, want {}", got.period_s, 1.0 / 24.0);
+        assert!((got.stamp_resolution_s.unwrap() - 1e-3).abs() < 1e-12);
     }
 
     /// 3.86 s with stamps cut to whole seconds: steps of 3 and 4 s. The slope's error is below the
