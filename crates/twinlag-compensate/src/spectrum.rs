@@ -13,7 +13,10 @@ use crate::slopes::{Direction, add_autocovariance_slope, density_slope};
 
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
 /// lasts longer the smoother sees all the same.
-const MAX_PIECE_SAMPLES: usize = 16384;
+pub(crate) const MAX_PIECE_SAMPLES: usize = 16384;
+/// Longest piece where a prior is wanted quickly: a quarter of the time, and lines are four times as
+/// wide.
+pub(crate) const MAX_QUICK_PIECE_SAMPLES: usize = 4096;
 /// Multiples of the sampling frequency from which power folds back; what is farther away is taken
 /// as if the gas were sampled.
 const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
@@ -64,13 +67,15 @@ impl Periodogram {
     ///
     /// The inferred gas is `Σ H_i* Y_i/N_i` over `Σ |H_i|²/N_i`, which has the least noise of all
     /// that are true to the gas.
-    pub(crate) fn of(readings: &Readings, rig: &Rig, level_c: f64) -> Self {
+    ///
+    /// - `max_piece_samples`: the longest piece that is transformed at once
+    pub(crate) fn of(readings: &Readings, rig: &Rig, level_c: f64, max_piece_samples: usize) -> Self {
         let period_s = readings.period_s();
         let first_s = readings.time_s()[0];
         let span_s = readings.time_s()[readings.len() - 1] - first_s;
         let all = (span_s / period_s).round() as usize + 1;
         let even = [0, 1].map(|i| on_grid(readings, i, first_s, period_s, all));
-        let count = if all > MAX_PIECE_SAMPLES { 2 * all.div_ceil(MAX_PIECE_SAMPLES) - 1 } else { 1 };
+        let count = if all > max_piece_samples { 2 * all.div_ceil(max_piece_samples) - 1 } else { 1 };
         let samples = 2 * all / (count + 1);
         let tapered = Tapered::new(taper(samples));
         let transform = |values: &[f64]| tapered.transform(values.iter().map(|y| y - level_c));

@@ -10,7 +10,7 @@
 
 use std::collections::VecDeque;
 
-use twinlag_compensate::{Form, learn, reconstruct};
+use twinlag_compensate::{Form, learn_quickly, reconstruct};
 use twinlag_model::{Extended, Fitted, Observations, Policy, dense, held_out_gain};
 use twinlag_optimise::Scale;
 
@@ -90,7 +90,7 @@ fn is_confirmed(candidate: &Candidate, without: &Fitted, observations: &Observat
 /// Logarithm of the likelihood of the readings, up to what is the same for all models of a record.
 fn log_likelihood(fitted: &Fitted, observations: &Observations) -> Option<f64> {
     let (readings, rig) = Extended::new(fitted, observations).rig(&fitted.theta).ok()?;
-    let prior = learn(&readings, &rig).ok()?.prior;
+    let prior = learn_quickly(&readings, &rig).ok()?.prior;
     let gas = reconstruct(&readings, &rig, &prior, Form::Filter).ok()?;
     // Of the readings as they were before they were taken back through a gain.
     let noise_std_k = fitted.model.noise_std_k();

@@ -6,6 +6,10 @@ use twinlag_model::{DiagnoseError, Effort, Fitted, Shared, held_out_gain, is_unr
 use crate::candidates::{Candidate, Search, accepts, white_gain};
 use crate::rank::worth;
 
+/// Deviance per residual by which a look-alike may be worse at first sight and still be fitted to
+/// the end: a tenth more energy, which the last iterations of a fit do not take off.
+const MAX_LOOK_DEFICIT_SHARE: f64 = 0.1;
+
 /// A look-alike in the place of an effect.
 pub(crate) struct Replacement {
     pub(crate) candidate: Candidate,
@@ -27,7 +31,7 @@ impl Search<'_> {
             if effect.parameters().len() > chosen.added && chosen.fitted.mean_energy() < left {
                 continue;
             }
-            let other = self.with(current, &effect, robust_before);
+            let other = self.with(current, &effect, &effect.starts(), robust_before);
             let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
             if white(&other) > white(&chosen) {
                 chosen = other;
@@ -105,6 +109,9 @@ impl Search<'_> {
             model.fit(&theta, self.observations, self.selection, Effort::Look)
         };
         let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
+        if white_gain(current, &best) < -MAX_LOOK_DEFICIT_SHARE * best.count {
+            return None;
+        }
         let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);
         let more = other.parameters().len() as f64 - range.len() as f64;
         let white_gain = white_gain(current, &fitted);

@@ -45,6 +45,12 @@ pub(crate) struct Candidate {
     pub(crate) share: f64,
 }
 
+/// An effect that is worth a fit, and where from.
+struct Promising {
+    effect: Shared,
+    starts: Vec<Vec<f64>>,
+}
+
 /// What an effect is to the order of candidates.
 pub(crate) fn kind(effect: &Shared) -> Kind {
     let about = effect.about();
@@ -214,13 +220,13 @@ impl<'a> Search<'a> {
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
         // well.
         let excerpt = self.is_far_off(current).then(|| self.prepared.excerpt());
-        let looked = self.each(&promising, |effect| {
+        let looked = self.each(&promising, |Promising { effect, starts }| {
             if effect.is_noise() {
                 return self.with_noise(current, effect);
             }
             Some(match &excerpt {
                 Some(excerpt) => self.looked_at(current, effect, excerpt),
-                None => self.with(current, effect, robust_before),
+                None => self.with(current, effect, starts, robust_before),
             })
         })?;
         let (noise, mut mean): (Vec<Candidate>, Vec<Candidate>) =
@@ -228,6 +234,11 @@ impl<'a> Search<'a> {
         let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
         mean.sort_by(|a, b| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
+        let best = |gain: fn(&Candidate) -> f64| mean.iter().map(gain).fold(0.0, f64::max);
+        let [white, robust] = [best(|c| c.white_gain), best(|c| c.robust_gain)];
+        // With a smaller part of the best gain than this none is taken, not even a static one.
+        let share = self.policy.static_share;
+        mean.retain(|c| c.white_gain > share * white || c.robust_gain > share * robust);
         let finished = self.each(&mean, |looked| {
             let model = &looked.fitted.model;
             let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);
@@ -245,53 +256,51 @@ impl<'a> Search<'a> {
     /// The candidates that are worth a fit, the most promising first: all of them where the model
     /// is far off, and its score there says little; else noise, lines, and those that would gain
     /// more than chance if the residual were linear.
-    fn screened(&self, current: &Fitted) -> Result<Vec<Shared>, DiagnoseError> {
+    fn screened(&self, current: &Fitted) -> Result<Vec<Promising>, DiagnoseError> {
         let all = self.candidates(&current.model);
         let is_far_off = self.is_far_off(current);
         let now = (!is_far_off).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
-        let gains = self.each(&all, |effect| {
+        let scored = self.each(&all, |effect| {
             if effect.is_noise() || effect.about().is_narrow || is_far_off {
-                return f64::INFINITY;
+                return (f64::INFINITY, Promising { effect: effect.clone(), starts: effect.starts() });
             }
-            self.score_gain(current, effect, now.as_ref())
+            let scores = effect.starts().into_iter().map(|s| (self.score_gain(current, effect, &s, now.as_ref()), s));
+            let (gain, start) = scores.max_by(|a, b| a.0.total_cmp(&b.0)).expect("every effect has a start");
+            (gain, Promising { effect: effect.clone(), starts: vec![start] })
         })?;
         let least = |effect: &Shared| {
             threshold(effect.parameters().len(), self.policy.screening_probability) * current.mean_energy().max(1.0)
         };
-        let mut promising: Vec<(f64, Shared)> =
-            gains.into_iter().zip(all).filter(|(gain, effect)| *gain > least(effect)).collect();
+        let mut promising: Vec<(f64, Promising)> =
+            scored.into_iter().filter(|(gain, promising)| *gain > least(&promising.effect)).collect();
         promising.sort_by(|a, b| b.0.total_cmp(&a.0));
         let certain = promising.iter().take_while(|p| p.0.is_infinite()).count();
         promising.truncate(certain + self.policy.most_fitted_candidates);
         Ok(promising.into_iter().map(|p| p.1).collect())
     }
 
-    /// Energy that a candidate would take off if the residual were linear in everything, from the
-    /// best of its starts.
+    /// Energy that a candidate would take off from `start` if the residual were linear in
+    /// everything.
     ///
     /// The residual is that of the candidate's own model: another number of factors is another
     /// whitening of the same disagreement.
     ///
     /// - `now`: the current model, linearised
-    fn score_gain(&self, current: &Fitted, effect: &Shared, now: Option<&Linearised>) -> f64 {
+    fn score_gain(&self, current: &Fitted, effect: &Shared, start: &[f64], now: Option<&Linearised>) -> f64 {
         let model = current.model.with(effect.clone());
-        let from = |start: &Vec<f64>| -> f64 {
-            let mut theta = current.theta.clone();
-            theta.extend_from_slice(start);
-            let lin = model.linearised_beside(&theta, self.observations, self.selection, now);
-            let slope: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
-            // Where it is singular, along the diagonal: less than it could take off, but no more
-            // than it can.
-            let taken = dense::inverse(&products(&lin))
-                .map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
-            current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
-        };
-        effect.starts().iter().map(from).fold(0.0, f64::max)
+        let theta = [&current.theta[..], start].concat();
+        let lin = model.linearised_beside(&theta, self.observations, self.selection, now);
+        let slope = lin.slope();
+        // Where it is singular, along the diagonal: less than it could take off, but no more
+        // than it can.
+        let taken = dense::inverse(&dense::gram(&lin.columns))
+            .map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
+        current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
     }
 
-    /// The candidate with the best fit of all its starts.
-    pub(crate) fn with(&self, current: &Fitted, effect: &Shared, robust_before: f64) -> Candidate {
-        let fitted = Self::best_of_starts(current, effect, |model, theta| {
+    /// The candidate with the best fit of all from `starts`.
+    pub(crate) fn with(&self, current: &Fitted, effect: &Shared, starts: &[Vec<f64>], robust_before: f64) -> Candidate {
+        let fitted = Self::best_of_starts(current, effect, starts, |model, theta| {
             vec![model.fit(theta, self.observations, self.selection, Effort::Look)]
         });
         let [white_gain, robust_gain] = self.gains(current, &fitted, effect, robust_before - self.robust(&fitted));
@@ -303,7 +312,7 @@ impl<'a> Search<'a> {
     /// fitted to the end.
     fn looked_at(&self, current: &Fitted, effect: &Shared, excerpt: &(Observations, Selection)) -> Candidate {
         let (observations, selection) = excerpt;
-        let fitted = Self::best_of_starts(current, effect, |model, theta| {
+        let fitted = Self::best_of_starts(current, effect, &effect.starts(), |model, theta| {
             let mut fits = vec![model.fit(theta, observations, selection, Effort::Look)];
             if effect.parameters().len() <= MOST_GRID_PARAMETERS {
                 fits.push(self.over_grid(model, &theta[2..], excerpt));
@@ -315,14 +324,15 @@ impl<'a> Search<'a> {
         self.candidate(effect, fitted, gain, gain)
     }
 
-    fn best_of_starts(current: &Fitted, effect: &Shared, fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>) -> Fitted {
+    fn best_of_starts(
+        current: &Fitted,
+        effect: &Shared,
+        starts: &[Vec<f64>],
+        fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>,
+    ) -> Fitted {
         let model = current.model.with(effect.clone());
-        let from = |start: Vec<f64>| {
-            let mut theta = current.theta.clone();
-            theta.extend(start);
-            fits(&model, &theta)
-        };
-        let all = effect.starts().into_iter().flat_map(from);
+        let from = |start: &Vec<f64>| fits(&model, &[&current.theta[..], start].concat());
+        let all = starts.iter().flat_map(from);
         all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start")
     }
 

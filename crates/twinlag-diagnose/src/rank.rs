@@ -96,7 +96,7 @@ pub(crate) fn rank(scores: &[Score], policy: &Policy) -> Vec<usize> {
     // Fitted with wrong weights, an effect absorbs a little of any noise.
     let loudest = noise.first().map_or(0.0, |i| scores[*i].white_gain);
     let is_beside_noise = |s: &Score| {
-        s.robust_gain > policy.beside_noise_share * loudest || s.saved_energy > policy.instead_of_noise_share * loudest
+        s.robust_gain > policy.beside_noise_share * loudest || s.white_gain > policy.instead_of_noise_share * loudest
     };
     let effects = best_first(scores, Score::robust, |s| {
         !s.is_noise() && s.is_sound && is_worth(s, s.robust_gain) && is_beside_noise(s)

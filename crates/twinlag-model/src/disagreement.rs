@@ -108,11 +108,6 @@ impl<T: Real> Disagreement<T> {
         let extra = self.extra_rows.iter().zip(&self.extra_variances);
         readings.chain(extra).map(|(rows, variance)| Source { rows, variance }).collect()
     }
-
-    /// Whether no row has a derivative.
-    fn is_equally_noisy(&self) -> bool {
-        self.reading_rows.iter().chain(&self.extra_rows).all(Rows::is_constant)
-    }
 }
 
 /// Whether a stretch has disagreements under `plant`.
@@ -205,10 +200,11 @@ impl<'a> Evaluator<'a> {
             let from = out.len();
             out.extend(disagreement.values.iter().map(|v| v.eps));
             let values = &mut out[from..];
-            if disagreement.is_equally_noisy() {
+            let mut sources = disagreement.sources(&self.variances[piece.stretch]);
+            sources.retain(|source| !source.rows.is_constant());
+            if sources.is_empty() {
                 factor.whiten(values);
             } else {
-                let sources = disagreement.sources(&self.variances[piece.stretch]);
                 let residual = &self.residual[from..from + piece.count];
                 of_factor.whiten(factor, &sources, residual, values);
             }

@@ -173,7 +173,7 @@ mod tests {
         };
         let readings = Readings::new(time_s.clone(), [reading(0.02, 170.0), reading(0.1, 230.0)]).expect("readings");
         let rig = Rig::new([Sensor::new(0.02, STD_K[0]), Sensor::new(0.1, STD_K[1])]);
-        Periodogram::of(&readings, &rig, 300.0)
+        Periodogram::of(&readings, &rig, 300.0, 16384)
     }
 
     fn parts() -> Vec<Vec<Part>> {
