@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use twinlag_model::{
     Bands, Context, DiagnoseError, Effort, Fitted, Identifier, Linearised, Model, Observations, Parameter, Place,
-    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
-    runs,
+    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, deviance_at_free_level, fit_noise,
+    line_channel, lines, report, runs,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -78,7 +78,8 @@ impl Candidate {
             white_gain: self.white_gain,
             robust_gain: self.robust_gain,
             share: self.share,
-            saved_energy: current.chi2 - self.fitted.chi2,
+            saved_deviance: self.fitted.count
+                * (deviance_at_free_level(current.mean_energy()) - deviance_at_free_level(self.fitted.mean_energy())),
             energy: self.fitted.mean_energy(),
         }
     }
@@ -234,11 +235,13 @@ impl<'a> Search<'a> {
         let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
         mean.sort_by(|a, b| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
-        let best = |gain: fn(&Candidate) -> f64| mean.iter().map(gain).fold(0.0, f64::max);
-        let [white, robust] = [best(|c| c.white_gain), best(|c| c.robust_gain)];
-        // With a smaller part of the best gain than this none is taken, not even a static one.
-        let share = self.policy.static_share;
-        mean.retain(|c| c.white_gain > share * white || c.robust_gain > share * robust);
+        if excerpt.is_none() {
+            // With a smaller part of the best gain than this none is taken, not even a static one.
+            let best = |gain: fn(&Candidate) -> f64| mean.iter().map(gain).fold(0.0, f64::max);
+            let [white, robust] =
+                [best(|c| c.white_gain), best(|c| c.robust_gain)].map(|g| self.policy.static_share * g);
+            mean.retain(|c| c.white_gain > white || c.robust_gain > robust);
+        }
         let finished = self.each(&mean, |looked| {
             let model = &looked.fitted.model;
             let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);

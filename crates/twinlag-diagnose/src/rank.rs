@@ -40,8 +40,8 @@ pub(crate) struct Score {
     /// What its gains count beside those of the others: those of a line are of all frequencies,
     /// whatever weight these have.
     pub(crate) share: f64,
-    /// Energy that it takes off.
-    pub(crate) saved_energy: f64,
+    /// Deviance that it saves with levels as free as those beside a noise.
+    pub(crate) saved_deviance: f64,
     /// Energy per residual that it leaves.
     pub(crate) energy: f64,
 }
@@ -96,7 +96,8 @@ pub(crate) fn rank(scores: &[Score], policy: &Policy) -> Vec<usize> {
     // Fitted with wrong weights, an effect absorbs a little of any noise.
     let loudest = noise.first().map_or(0.0, |i| scores[*i].white_gain);
     let is_beside_noise = |s: &Score| {
-        s.robust_gain > policy.beside_noise_share * loudest || s.white_gain > policy.instead_of_noise_share * loudest
+        s.robust_gain > policy.beside_noise_share * loudest
+            || s.saved_deviance > policy.instead_of_noise_share * loudest
     };
     let effects = best_first(scores, Score::robust, |s| {
         !s.is_noise() && s.is_sound && is_worth(s, s.robust_gain) && is_beside_noise(s)

@@ -105,8 +105,8 @@ policy! {
     /// Part of what noise of another colour explains that an effect must explain whatever the
     /// noise, to come before it: chosen.
     beside_noise_share: f64 = 0.03,
-    /// Part of what noise of another colour explains that an effect must take off the energy, to
-    /// come before it all the same: chosen, the larger half.
+    /// Part of what noise of another colour explains that an effect must explain with levels as free
+    /// as those beside the noise, to come before it all the same: chosen, the larger half.
     instead_of_noise_share: f64 = 0.5,
     /// Part of the best candidate's score that a static disagreement must have to come first where
     /// no effect explains the record: chosen.

@@ -186,6 +186,8 @@ pub struct NoiseFit {
     pub held_out: f64,
 }
 
+/// Factor by which a fitted noise may change the level of white noise, either way.
+const MAX_LEVEL_FACTOR: f64 = 5.0;
 /// Standard deviations of the logarithm of levels from third differences: below, since these see coloured noise and what is left
 /// of the gas as well; above, where nothing but scatter is.
 const LEVELS_LOOSE: f64 = 0.3;
@@ -229,6 +231,14 @@ impl Cost for NoiseCost<'_> {
     }
 }
 
+/// Deviance per residual of white noise whose mean energy is `energy`, its level as free as that of a fitted noise: `ln
+/// f + energy/f` with the best `f`.
+pub fn deviance_at_free_level(energy: f64) -> f64 {
+    let most = MAX_LEVEL_FACTOR * MAX_LEVEL_FACTOR;
+    let variance_factor = energy.clamp(1.0 / most, most);
+    variance_factor.ln() + energy / variance_factor
+}
+
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
 /// - `is_coarse`: channels whose levels third differences do not determine
@@ -248,8 +258,9 @@ pub fn fit_noise(
         bands.0.iter().map(|b| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE)).collect();
     let solve = |half: Half| -> (Vec<f64>, f64) {
         let cost = NoiseCost { bands, paths: &paths, base: &base, place, half, is_coarse };
-        let mut variables =
-            vec![Variable::logarithmic("level 1", 0.2, 5.0), Variable::logarithmic("level 2", 0.2, 5.0)];
+        let mut variables = ["level 1", "level 2"]
+            .map(|name| Variable::logarithmic(name, 1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR))
+            .to_vec();
         let mut all = vec![vec![1.0, 1.0]];
         if place.is_some() {
             let swing = observations.swing_k();
