@@ -31,7 +31,8 @@ impl Search<'_> {
             if effect.parameters().len() > chosen.added && chosen.fitted.mean_energy() < left {
                 continue;
             }
-            let other = self.with(current, &effect, &effect.starts(), robust_before);
+            let looked = self.with(current, &effect, &effect.starts(), robust_before);
+            let other = self.finished(current, &looked, robust_before);
             let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
             if white(&other) > white(&chosen) {
                 chosen = other;

@@ -24,6 +24,10 @@ const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
+/// Part of the logarithm of the energy that the best candidate takes off in an excerpt, below which
+/// another one is no rival of it where that one leaves but noise: half of it leaves the square root
+/// of an energy that is far off.
+const RIVAL_SHARE: f64 = 0.5;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -235,21 +239,33 @@ impl<'a> Search<'a> {
         let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
         mean.sort_by(|a, b| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
+        let mut finished = Vec::new();
         if excerpt.is_none() {
             // With a smaller part of the best gain than this none is taken, not even a static one.
             let best = |gain: fn(&Candidate) -> f64| mean.iter().map(gain).fold(0.0, f64::max);
             let [white, robust] =
                 [best(|c| c.white_gain), best(|c| c.robust_gain)].map(|g| self.policy.static_share * g);
             mean.retain(|c| c.white_gain > white || c.robust_gain > robust);
+        } else if !mean.is_empty() {
+            let looked = mean.remove(0);
+            let best = self.finished(current, &looked, robust_before);
+            // Where this one leaves but noise, those that explain far less are not fitted to the end.
+            if best.fitted.mean_energy() < self.policy.incomplete_energy {
+                mean.retain(|c| c.white_gain > RIVAL_SHARE * looked.white_gain);
+            }
+            finished.push(best);
         }
-        let finished = self.each(&mean, |looked| {
-            let model = &looked.fitted.model;
-            let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);
-            let robust = robust_before - self.robust(&fitted);
-            let [white_gain, robust_gain] = self.gains(current, &fitted, &looked.effect, robust);
-            Candidate { fitted, white_gain, robust_gain, ..looked.clone() }
-        })?;
+        finished.extend(self.each(&mean, |looked| self.finished(current, looked, robust_before))?);
         Ok(finished.into_iter().chain(noise).collect())
+    }
+
+    /// A candidate that was looked at, fitted to the end.
+    pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
+        let model = &looked.fitted.model;
+        let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);
+        let robust = robust_before - self.robust(&fitted);
+        let [white_gain, robust_gain] = self.gains(current, &fitted, &looked.effect, robust);
+        Candidate { fitted, white_gain, robust_gain, ..looked.clone() }
     }
 
     fn is_far_off(&self, current: &Fitted) -> bool {

@@ -1,10 +1,12 @@
 //! Defects of the data, which come before every model: readings at the end of the range, coarse steps, isolated wrong readings.
 
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 
+use num_complex::Complex64;
 use twinlag_bias::{COARSE_STEP_NOISE_RATIO, estimate_noise};
 use twinlag_cross_relation::{Readings, Segment, Steps};
-use twinlag_transform::Forward;
+use twinlag_transform::{Forward, hann};
 
 use crate::implied::{Evaluation, Part, median};
 use crate::observations::Observations;
@@ -195,28 +197,36 @@ pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[u
 }
 
 /// The channel in whose own readings the line at `hz` sticks out most of what is beside it: pick-up comes after the lag, and the other
-/// channel does not show it.
+/// channel does not show it. Samples are even.
 pub fn line_channel(observations: &Observations, hz: f64) -> usize {
     let Some(stretch) = observations.stretches.iter().max_by_key(|s| s.len()) else { return 0 };
-    let span_s = stretch.len() as f64 * observations.step_s();
+    let (step_s, taper) = (observations.step_s(), hann(stretch.len()));
+    let span_s = stretch.len() as f64 * step_s;
     let sticks_out = |i: usize| {
-        let power = |hz: f64| tone_power(&stretch.time_s, &stretch.reading_c[i], hz);
+        let y = &stretch.reading_c[i];
+        let mean = y.iter().sum::<f64>() / y.len() as f64;
+        let tapered: Vec<f64> = y.iter().zip(&taper).map(|(y, w)| w * (y - mean)).collect();
+        let power = |hz: f64| tone(tapered.iter().copied().enumerate(), TAU * hz * step_s).norm_sqr();
         let beside = BESIDE.map(|bins| power((hz + bins / span_s).abs())).iter().sum::<f64>() / BESIDE.len() as f64;
         power(hz) / beside.max(f64::MIN_POSITIVE)
     };
     usize::from(sticks_out(1) > sticks_out(0))
 }
 
-/// Power of `values` at `hz` under Hann's window.
-fn tone_power(time_s: &[f64], values: &[f64], hz: f64) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let sum = time_s.iter().zip(values).enumerate().fold((0.0, 0.0), |(c, s), (k, (t, y))| {
-        let window = (std::f64::consts::PI * (k as f64 + 0.5) / n).sin().powi(2);
-        let (sine, cosine) = (std::f64::consts::TAU * hz * (t - time_s[0])).sin_cos();
-        (c + window * (y - mean) * cosine, s + window * (y - mean) * sine)
-    });
-    sum.0 * sum.0 + sum.1 * sum.1
+/// `Σ v e^(iωk)` over samples `k` in rising order.
+fn tone(values: impl Iterator<Item = (usize, f64)>, omega: f64) -> Complex64 {
+    let turn = Complex64::cis(omega);
+    let mut next = 0;
+    let mut phase = Complex64::ONE;
+    let mut sum = Complex64::ZERO;
+    for (k, v) in values {
+        if k != next {
+            phase = Complex64::cis(omega * k as f64);
+        }
+        sum += phase * v;
+        (phase, next) = (phase * turn, k + 1);
+    }
+    sum
 }
 
 /// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
@@ -241,11 +251,14 @@ pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl F
     let mut found: HashMap<usize, f64> = HashMap::new();
     for bin in 3..power.len().saturating_sub(1) {
         let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];
+        if !is_peak {
+            continue;
+        }
         // Around it, the peak itself left out.
         let (from, to) = (bin.saturating_sub(60).max(1), (bin + 61).min(power.len()));
         let around = (from..to).filter(|j| j.abs_diff(bin) > 5).map(|j| power[j]);
         let level = median(around.collect()) / std::f64::consts::LN_2;
-        if is_peak && level > 0.0 {
+        if level > 0.0 {
             let ratio = power[bin] / level;
             // Of exponentially distributed powers the largest of all exceeds this once in a thousand records.
             if ratio > (power.len() as f64 / 1e-3).ln() + 3.0 {
@@ -253,10 +266,8 @@ pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl F
             }
         }
     }
-    let mut out: Vec<(usize, f64)> = found
-        .into_iter()
-        .filter(|(bin, _)| !is_in_the_gas(evaluation, std::f64::consts::TAU * *bin as f64 / n as f64))
-        .collect();
+    let mut out: Vec<(usize, f64)> =
+        found.into_iter().filter(|(bin, _)| !is_in_the_gas(evaluation, TAU * *bin as f64 / n as f64)).collect();
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
     out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
 }
@@ -266,13 +277,7 @@ pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl F
 fn is_in_the_gas(evaluation: &Evaluation, omega: f64) -> bool {
     let amplitude = |values: &[f64]| -> f64 {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        let (mut re, mut im) = (0.0, 0.0);
-        for (v, sample) in values.iter().zip(&evaluation.sample) {
-            let (s, c) = (omega * *sample as f64).sin_cos();
-            re += (v - mean) * c;
-            im += (v - mean) * s;
-        }
-        re.hypot(im)
+        tone(evaluation.sample.iter().copied().zip(values.iter().map(|v| v - mean)), omega).norm()
     };
     amplitude(&evaluation.disagreement_k) < 0.7 * amplitude(&evaluation.gas_c)
 }

@@ -20,7 +20,7 @@ const GRID_POINTS: usize = 7;
 const GRID_MIN_STEPS: f64 = 1.5;
 const GRID_MAX_SPANS: f64 = 0.1;
 /// Iterations, and the relative step at which a fit ends: to be ranked, and to the end.
-const LOOK: (u64, f64) = (10, 2e-2);
+const LOOK: (u64, f64) = (5, 2e-2);
 const FINISH: (u64, f64) = (40, 1e-4);
 /// Evaluations for each iteration.
 const EVALUATIONS_PER_ITERATION: u64 = 4;
