@@ -18,27 +18,37 @@ pub(crate) struct Replacement {
 }
 
 impl Search<'_> {
-    /// The chosen candidate in the size that the data support.
-    pub(crate) fn resized(&self, current: &Fitted, mut chosen: Candidate) -> Candidate {
-        let sizes = chosen.effect.sizes();
-        if sizes.is_empty() {
-            return chosen;
+    /// The chosen candidate in the size that the data support: larger ones are tried where something
+    /// is left, smaller ones where those do not help, as long as each is better.
+    pub(crate) fn resized(&self, current: &Fitted, chosen: Candidate) -> Candidate {
+        let mut sizes = chosen.effect.sizes();
+        sizes.sort_by_key(|effect| effect.parameters().len());
+        let smaller = sizes.partition_point(|effect| effect.parameters().len() < chosen.added);
+        let larger = sizes.split_off(smaller);
+        let left = 1.0 + self.policy.resize_standard_errors * (2.0 / chosen.fitted.count).sqrt();
+        if chosen.fitted.mean_energy() > left
+            && let Some(better) = self.better(current, &chosen, larger.into_iter())
+        {
+            return better;
         }
+        self.better(current, &chosen, sizes.into_iter().rev()).unwrap_or(chosen)
+    }
+
+    /// The best of `sizes` before the first that is no better than the one before it; `None` where
+    /// none is better than `chosen`.
+    fn better(&self, current: &Fitted, chosen: &Candidate, sizes: impl Iterator<Item = Shared>) -> Option<Candidate> {
         let robust_before = self.robust(current);
+        let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
+        let mut best: Option<Candidate> = None;
         for effect in sizes {
-            // More of it where something is left.
-            let left = 1.0 + self.policy.resize_standard_errors * (2.0 / chosen.fitted.count).sqrt();
-            if effect.parameters().len() > chosen.added && chosen.fitted.mean_energy() < left {
-                continue;
-            }
             let looked = self.with(current, &effect, &effect.starts(), robust_before);
             let other = self.finished(current, &looked, robust_before);
-            let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
-            if white(&other) > white(&chosen) {
-                chosen = other;
+            if white(&other) <= white(best.as_ref().unwrap_or(chosen)) {
+                break;
             }
+            best = Some(other);
         }
-        chosen
+        best
     }
 
     /// Effect `index` of `current` with one parameter more, where the data support that.

@@ -28,6 +28,8 @@ const MOST_GRID_PARAMETERS: usize = 3;
 /// another one is no rival of it where that one leaves but noise: half of it leaves the square root
 /// of an energy that is far off.
 const RIVAL_SHARE: f64 = 0.5;
+/// Part of its penalty that a candidate must gain at first sight to be fitted to the end.
+const HOPEFUL_SHARE: f64 = 0.25;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -246,6 +248,8 @@ impl<'a> Search<'a> {
             let [white, robust] =
                 [best(|c| c.white_gain), best(|c| c.robust_gain)].map(|g| self.policy.static_share * g);
             mean.retain(|c| c.white_gain > white || c.robust_gain > robust);
+            // What is far from worth its parameters is not, whatever the last iterations bring.
+            mean.retain(|c| c.white_gain > HOPEFUL_SHARE * c.added as f64 * c.fitted.count.max(2.0).ln());
         } else if !mean.is_empty() {
             let looked = mean.remove(0);
             let best = self.finished(current, &looked, robust_before);
