@@ -28,8 +28,6 @@ const MOST_GRID_PARAMETERS: usize = 3;
 /// another one is no rival of it where that one leaves but noise: half of it leaves the square root
 /// of an energy that is far off.
 const RIVAL_SHARE: f64 = 0.5;
-/// Part of its penalty that a candidate must gain at first sight to be fitted to the end.
-const HOPEFUL_SHARE: f64 = 0.25;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -55,6 +53,9 @@ pub(crate) struct Candidate {
 struct Promising {
     effect: Shared,
     starts: Vec<Vec<f64>>,
+    /// Energy that it takes off if the residual is linear in everything; boundless where that was
+    /// not asked.
+    gain: f64,
 }
 
 /// What an effect is to the order of candidates.
@@ -227,40 +228,35 @@ impl<'a> Search<'a> {
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
         // well.
         let excerpt = self.is_far_off(current).then(|| self.prepared.excerpt());
-        let looked = self.each(&promising, |Promising { effect, starts }| {
-            if effect.is_noise() {
-                return self.with_noise(current, effect);
-            }
-            Some(match &excerpt {
+        let looked = self.each(&promising, |Promising { effect, starts, gain }| {
+            let looked = match &excerpt {
+                _ if effect.is_noise() => self.with_noise(current, effect)?,
                 Some(excerpt) => self.looked_at(current, effect, excerpt),
                 None => self.with(current, effect, starts, robust_before),
-            })
+            };
+            Some((gain.max(looked.white_gain).max(looked.robust_gain), looked))
         })?;
-        let (noise, mut mean): (Vec<Candidate>, Vec<Candidate>) =
-            looked.into_iter().flatten().partition(|c| c.effect.is_noise());
+        let (noise, mut mean): (Vec<_>, Vec<_>) = looked.into_iter().flatten().partition(|(_, c)| c.effect.is_noise());
         let unshared = |c: &Candidate| c.white_gain - c.added as f64 * c.fitted.count.max(2.0).ln();
-        mean.sort_by(|a, b| unshared(b).total_cmp(&unshared(a)));
+        mean.sort_by(|(_, a), (_, b)| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
         let mut finished = Vec::new();
         if excerpt.is_none() {
             // With a smaller part of the best gain than this none is taken, not even a static one.
-            let best = |gain: fn(&Candidate) -> f64| mean.iter().map(gain).fold(0.0, f64::max);
-            let [white, robust] =
-                [best(|c| c.white_gain), best(|c| c.robust_gain)].map(|g| self.policy.static_share * g);
-            mean.retain(|c| c.white_gain > white || c.robust_gain > robust);
-            // What is far from worth its parameters is not, whatever the last iterations bring.
-            mean.retain(|c| c.white_gain > HOPEFUL_SHARE * c.added as f64 * c.fitted.count.max(2.0).ln());
+            let finite = mean.iter().map(|(gain, _)| *gain).filter(|gain| gain.is_finite());
+            let least = self.policy.static_share * finite.fold(0.0, f64::max);
+            mean.retain(|(gain, _)| *gain > least);
         } else if !mean.is_empty() {
-            let looked = mean.remove(0);
+            let (_, looked) = mean.remove(0);
             let best = self.finished(current, &looked, robust_before);
             // Where this one leaves but noise, those that explain far less are not fitted to the end.
             if best.fitted.mean_energy() < self.policy.incomplete_energy {
-                mean.retain(|c| c.white_gain > RIVAL_SHARE * looked.white_gain);
+                mean.retain(|(_, c)| c.white_gain > RIVAL_SHARE * looked.white_gain);
             }
             finished.push(best);
         }
-        finished.extend(self.each(&mean, |looked| self.finished(current, looked, robust_before))?);
-        Ok(finished.into_iter().chain(noise).collect())
+        finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
+        Ok(finished.into_iter().chain(noise.into_iter().map(|(_, c)| c)).collect())
     }
 
     /// A candidate that was looked at, fitted to the end.
@@ -285,21 +281,20 @@ impl<'a> Search<'a> {
         let now = (!is_far_off).then(|| current.model.linearised(&current.theta, self.observations, self.selection));
         let scored = self.each(&all, |effect| {
             if effect.is_noise() || effect.about().is_narrow || is_far_off {
-                return (f64::INFINITY, Promising { effect: effect.clone(), starts: effect.starts() });
+                return Promising { effect: effect.clone(), starts: effect.starts(), gain: f64::INFINITY };
             }
             let scores = effect.starts().into_iter().map(|s| (self.score_gain(current, effect, &s, now.as_ref()), s));
             let (gain, start) = scores.max_by(|a, b| a.0.total_cmp(&b.0)).expect("every effect has a start");
-            (gain, Promising { effect: effect.clone(), starts: vec![start] })
+            Promising { effect: effect.clone(), starts: vec![start], gain }
         })?;
         let least = |effect: &Shared| {
             threshold(effect.parameters().len(), self.policy.screening_probability) * current.mean_energy().max(1.0)
         };
-        let mut promising: Vec<(f64, Promising)> =
-            scored.into_iter().filter(|(gain, promising)| *gain > least(&promising.effect)).collect();
-        promising.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let certain = promising.iter().take_while(|p| p.0.is_infinite()).count();
+        let mut promising: Vec<Promising> = scored.into_iter().filter(|p| p.gain > least(&p.effect)).collect();
+        promising.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let certain = promising.iter().take_while(|p| p.gain.is_infinite()).count();
         promising.truncate(certain + self.policy.most_fitted_candidates);
-        Ok(promising.into_iter().map(|p| p.1).collect())
+        Ok(promising)
     }
 
     /// Energy that a candidate would take off from `start` if the residual were linear in
