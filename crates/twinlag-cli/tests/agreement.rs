@@ -69,10 +69,14 @@ impl Said {
         row.split("<td>").skip(1).map(|cell| numbers(cell.split("</td>").next().unwrap_or(""))).collect()
     }
 
-    /// The models of both columns: with no effect there is one.
+    /// The models of both columns; one where both are the two lags.
     fn columns(&self) -> Vec<&Value> {
         let has_effects = !self.json["effects"].as_array().expect("a list").is_empty();
-        if has_effects { vec![&self.json["base"], &self.json["final"]] } else { vec![&self.json["base"]] }
+        if has_effects || self.json["base"]["sensors"] != self.json["final"]["sensors"] {
+            vec![&self.json["base"], &self.json["final"]]
+        } else {
+            vec![&self.json["base"]]
+        }
     }
 
     fn agrees(&self) {

@@ -400,8 +400,3 @@ impl<'a> Search<'a> {
         Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }
 }
-
-/// Products of the columns of a linearisation.
-pub(crate) fn products(lin: &Linearised) -> Vec<Vec<f64>> {
-    lin.columns.iter().map(|a| lin.columns.iter().map(|b| dense::dot(a, b)).collect()).collect()
-}

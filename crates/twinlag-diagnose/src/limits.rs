@@ -2,7 +2,7 @@
 
 use twinlag_model::{DiagnoseError, Fitted, Linearised, Observations, Policy, Shared, dense};
 
-use crate::candidates::{Search, products};
+use crate::candidates::Search;
 use crate::diagnosis::Limit;
 use crate::rank::threshold;
 
@@ -15,8 +15,8 @@ impl Search<'_> {
     /// [`DiagnoseError::Cancelled`] if the watch says so.
     pub(crate) fn limits(&self, current: &Fitted) -> Result<Vec<Limit>, DiagnoseError> {
         let mut all = self.candidates(&current.model);
-        all.retain(|c| !c.is_noise() && c.main().is_some());
         let probability = self.policy.round_false_alarm_probability / all.len().max(1) as f64;
+        all.retain(|c| !c.is_noise() && c.main().is_some());
         let now = current.model.linearised(&current.theta, self.observations, self.selection);
         let found = self.each(&all, |effect| self.limit(current, effect, &now, probability))?;
         let mut out: Vec<Limit> = Vec::new();
@@ -36,7 +36,7 @@ impl Search<'_> {
         theta.extend_from_slice(effect.starts().first()?);
         let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
         let index = current.theta.len() + main;
-        let variance = dense::inverse(&products(&lin))?[index][index] * current.mean_energy().max(1.0);
+        let variance = dense::inverse(&dense::gram(&lin.columns))?[index][index] * current.mean_energy().max(1.0);
         let size = variance.sqrt() * threshold(effect.parameters().len(), probability).sqrt();
         let parameter = &effect.parameters()[main];
         (size > 0.0 && size.is_finite()).then(|| Limit {

@@ -39,6 +39,8 @@ pub enum Move {
     Exchange {
         /// The effect that went.
         before: Identifier,
+        /// Its channel, as that of the effect that came.
+        before_channel: Option<usize>,
         /// The effect that came.
         effect: Identifier,
         /// Its channel, 0 or 1; `None` where it is of both, or relative.
@@ -72,6 +74,7 @@ impl Move {
     /// What the reader has to know of it.
     pub(crate) fn remark(&self) -> Option<Remark> {
         match self {
+            Self::Exchange { before, effect, .. } if before == effect => Some(Remark::OtherChannel { effect: *effect }),
             Self::Exchange { before, effect, .. } => Some(Remark::Replaced { before: *before, after: *effect }),
             Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
@@ -263,6 +266,7 @@ impl<'a> State<'a> {
         let replacement = alike.swap_remove(at);
         let entry = Move::Exchange {
             before: taken.effect(),
+            before_channel: taken.candidate.effect.channel(),
             effect: replacement.candidate.effect.identifier(),
             channel: replacement.candidate.effect.channel(),
             advantage: replacement.advantage,

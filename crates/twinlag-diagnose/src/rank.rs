@@ -89,8 +89,11 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
 ///    occurs more often.
 /// 3. A static disagreement before its imitators, and where no effect explains the record; noise
 ///    there, if there is no static one.
-pub(crate) fn rank(scores: &[Score], policy: &Policy) -> Vec<usize> {
-    let probability = policy.round_false_alarm_probability / scores.len().max(1) as f64;
+///
+/// - `considered`: candidates of the round, those among them that were not worth a fit as well: any of them may have
+///   been the one that chance favours
+pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<usize> {
+    let probability = policy.round_false_alarm_probability / considered.max(scores.len()).max(1) as f64;
     let is_worth = |s: &Score, gain: f64| gain > threshold(s.added, probability) && s.white() > 0.0;
     let noise = best_first(scores, Score::white, |s| s.is_noise() && is_worth(s, s.white_gain));
     // Fitted with wrong weights, an effect absorbs a little of any noise.

@@ -18,6 +18,11 @@ pub enum Remark {
         /// The effect in its place.
         after: Identifier,
     },
+    /// An effect moved to the other channel.
+    OtherChannel {
+        /// The effect.
+        effect: Identifier,
+    },
     /// An effect was taken out again.
     Needless {
         /// The effect.
@@ -45,6 +50,9 @@ impl fmt::Display for Remark {
         match self {
             Self::Replaced { before, after } => {
                 write!(f, "{before} was added first and later replaced, because {after} explains more")
+            }
+            Self::OtherChannel { effect } => {
+                write!(f, "{effect} was first placed in the other channel, but explains more in this one")
             }
             Self::Needless { effect } => write!(
                 f,
@@ -93,6 +101,7 @@ mod tests {
         let (before, after) = (Identifier::DRIFT, Identifier::CALIBRATION);
         let all = [
             Remark::Replaced { before, after },
+            Remark::OtherChannel { effect: before },
             Remark::Needless { effect: before },
             Remark::NoiseLowered,
             Remark::Widened { effects: vec![before, after] },

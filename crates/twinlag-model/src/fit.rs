@@ -63,6 +63,7 @@ impl Fitted {
                 effect.order(&mut rest[range.start - 2..range.end - 2], tau_s);
             }
         }
+        self.report.x.clone_from(&self.theta);
         self
     }
 

@@ -67,6 +67,8 @@ pub struct ModelFit {
     pub is_noise_of_residual: bool,
     /// Tests of the residual.
     pub tests: Vec<ResidualTest>,
+    /// The p-value below which a test rejects the model.
+    pub rejection_p_value: f64,
     /// Energy of the residual per degree of freedom.
     pub chi2_per_dof: f64,
     /// Whether the intervals follow from the spectrum of the residual itself.

@@ -49,11 +49,11 @@ impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     ///
     /// # Errors
-    /// [`DiagnoseError`] for a policy that means nothing, a channel that never changes, and a record too fragmented for
+    /// [`DiagnoseError`] for settings that mean nothing, a channel that never changes, and a record too fragmented for
     /// noise levels.
     pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
+        settings.check()?;
         let policy = settings.policy.clone();
-        policy.check()?;
         for i in 0..2 {
             let first = observations.channel(i).next();
             if observations.channel(i).all(|y| Some(y) == first) {

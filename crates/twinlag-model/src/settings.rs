@@ -26,6 +26,35 @@ impl Default for Settings {
     }
 }
 
+impl Settings {
+    /// That noise levels and time constants are positive, the policy means something, and one time constant at least is
+    /// left to find.
+    ///
+    /// # Errors
+    /// [`DiagnoseError::Setting`], [`DiagnoseError::Policy`].
+    pub fn check(&self) -> Result<(), DiagnoseError> {
+        let is_positive = |x: f64| x.is_finite() && x > 0.0;
+        let wrong = |what, got| Err(DiagnoseError::Setting { what, got });
+        self.policy.check()?;
+        for std_k in self.noise_std_k.into_iter().flatten().filter(|s| !is_positive(*s)) {
+            return wrong("a noise level that is positive", std_k);
+        }
+        for known in &self.known {
+            if known.sensor > 1 {
+                return wrong("sensor 0 or 1", known.sensor as f64);
+            }
+            for value_s in [known.value_s].into_iter().chain(known.std_s).filter(|s| !is_positive(*s)) {
+                return wrong("a time constant and a standard deviation that are positive", value_s);
+            }
+        }
+        let is_held = |sensor: usize| self.known.iter().any(|k| k.sensor == sensor && k.std_s.is_none());
+        if (0..2).all(is_held) {
+            return wrong("at most one time constant that is held", 2.0);
+        }
+        Ok(())
+    }
+}
+
 /// An effect as it was found in another record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KnownEffect {
@@ -56,5 +85,26 @@ pub fn report(watch: Watch<'_>, task: &str, done: usize, of: usize) -> Result<()
     match watch(task, done, of) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(DiagnoseError::Cancelled),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_that_mean_nothing_are_refused() {
+        let known = |sensor, value_s, std_s| KnownTimeConstant { sensor, value_s, std_s };
+        let refused = |settings: Settings| settings.check().is_err();
+        assert!(!refused(Settings::default()));
+        for std_k in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            assert!(refused(Settings { noise_std_k: Some([0.1, std_k]), ..Settings::default() }), "{std_k}");
+        }
+        for one in [known(2, 1.0, None), known(0, 0.0, None), known(0, f64::NAN, None), known(1, 1.0, Some(0.0))] {
+            assert!(refused(Settings { known: vec![one], ..Settings::default() }), "{one:?}");
+        }
+        let both = |std_s| vec![known(0, 1.0, None), known(1, 3.0, std_s)];
+        assert!(refused(Settings { known: both(None), ..Settings::default() }));
+        assert!(!refused(Settings { known: both(Some(0.2)), ..Settings::default() }));
     }
 }

@@ -138,7 +138,7 @@ pub fn summarise(
                 [value - Z_975 * se, value + Z_975 * se]
             }
         });
-        // A factor of seven either way is no estimate.
+        // An interval that spans a factor of seven is no estimate.
         let known = !is_log || se.is_some_and(|se| se / value < policy.vague_log_std);
         let held = variance == Some(0.0);
         TimeConstant {
@@ -153,7 +153,7 @@ pub fn summarise(
     let variance = |i: usize| c.map(|c| c[i][i]);
     let unresolved =
         is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
-    // Where the time constants are not told apart from a delay, what is told is how much later channel 2 is as a whole.
+    // Where the time constants cannot be distinguished from a delay, the total lag of channel 2 is reported.
     let delay = fitted.model.parameters().position(|p| p.is_lateness);
     let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
         Some(index) => vec![(0, -1.0), (1, 1.0), (2 + index, 1.0)],
@@ -178,6 +178,7 @@ pub fn summarise(
         noise_std_k: fitted.model.noise_std_k(),
         is_noise_of_residual: levels.is_of_residual || fitted.model.noise().is_some(),
         tests,
+        rejection_p_value: policy.rejection_p_value(),
         chi2_per_dof,
         is_weighted_by_residual: rejects,
         covariance,

@@ -27,7 +27,7 @@ const AFTER: &str = "with the effects";
 /// [`ReportError`] if something cannot be drawn. What a diagnosis does not determine, up to one
 /// that was refused, is said in the report and is no error.
 pub fn diagnosis_report(record: &Record, answer: &Diagnosis, command: &str) -> Result<String, ReportError> {
-    let page = Page { record, answer, changed: !answer.effects.is_empty() };
+    let page = Page { record, answer, changed: has_two_models(answer) };
     let mut document = Document::new(format!("Diagnosis of {}", record.source));
     document = page.verdict(document);
     document = page.traces(document)?;
@@ -50,10 +50,16 @@ pub fn residual_picture(answer: &Diagnosis) -> Result<Option<String>, ReportErro
     frequency_figure(&models(answer)).map(|figure| figure.to_svg()).transpose()
 }
 
+/// Whether the answer has a model beside that of two lags: one with effects, or one in which model error that was taken
+/// for noise weights the fit.
+fn has_two_models(answer: &Diagnosis) -> bool {
+    !answer.effects.is_empty() || answer.base.sensors != answer.last.sensors
+}
+
 struct Page<'a> {
     record: &'a Record,
     answer: &'a Diagnosis,
-    /// Whether any effect was added, so that there is a before and an after.
+    /// Whether there is a before and an after.
     changed: bool,
 }
 
@@ -77,7 +83,7 @@ fn models(answer: &Diagnosis) -> Vec<Model<'_>> {
     let Some(core) = answer.core.as_deref() else { return Vec::new() };
     let before = Model { name: BEFORE, fit: &core.base, colour: Colour::Vermilion };
     let after = Model { name: AFTER, fit: &core.last, colour: Colour::Blue };
-    if answer.effects.is_empty() { vec![before] } else { vec![before, after] }
+    if has_two_models(answer) { vec![before, after] } else { vec![before] }
 }
 
 impl Page<'_> {
@@ -93,7 +99,7 @@ impl Page<'_> {
         models(self.answer)
     }
 
-    /// The models to be shown in tables: one, if no effect was added.
+    /// The models to be shown in tables.
     fn columns(&self) -> Vec<Column<'_>> {
         let before = Column { name: BEFORE, column: "before", answer: &self.answer.base };
         let after = Column { name: AFTER, column: "after", answer: &self.answer.last };

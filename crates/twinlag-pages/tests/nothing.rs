@@ -41,6 +41,7 @@ fn record() -> Record {
 fn core(verdict: Verdict, trace: Trace) -> Core {
     let none = TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None };
     let fit = ModelFit {
+        rejection_p_value: 1e-4,
         time_constants: [none; 2],
         difference: none,
         fit: Fit {

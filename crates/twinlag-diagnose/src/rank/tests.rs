@@ -49,7 +49,7 @@ fn noise(gain: f64) -> Score {
 }
 
 fn ranked(scores: &[Score]) -> Vec<usize> {
-    rank(scores, &Policy::default())
+    rank(scores, scores.len(), &Policy::default())
 }
 
 #[test]
@@ -76,6 +76,10 @@ fn a_robust_gain_must_be_beyond_chance_of_all_candidates_together() {
         };
         assert_eq!(with(least + EPSILON), [0]);
         assert_eq!(with(least - EPSILON), Vec::<usize>::new());
+        // Those that were not worth a fit count as well.
+        let alone = |robust_gain: f64| rank(&[Score { robust_gain, ..delay(MUCH) }], 1 + others, &policy);
+        assert_eq!(alone(least + EPSILON), [0]);
+        assert_eq!(alone(least - EPSILON), Vec::<usize>::new());
     }
 }
 

@@ -1,7 +1,7 @@
 //! A fit of the model of a rig as a characterisation.
 
 use twinlag_cross_relation::Parameter;
-use twinlag_diagnose::{Identifier, ModelFit, Policy, TimeConstant, Value};
+use twinlag_diagnose::{Identifier, ModelFit, TimeConstant, Value};
 use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_record::Record;
 
@@ -56,7 +56,7 @@ impl Fitted<'_> {
                     .tests
                     .iter()
                     .find(|t| t.test == "whiteness")
-                    .is_none_or(|t| t.p_value > Policy::default().rejection_p_value()),
+                    .is_none_or(|t| t.p_value >= fit.rejection_p_value),
                 tests: fit.tests.clone(),
             },
             interval_method: if fit.is_weighted_by_residual {

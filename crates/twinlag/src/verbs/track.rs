@@ -65,6 +65,7 @@ pub fn track_watched(record: &Record, options: &TrackOptions, watch: Watch<'_>) 
 }
 
 fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Track, Error> {
+    options.characterise.check()?;
     options.characterise.check_not_fitted("tracking")?;
     options.model.as_ref().map_or(Ok(()), |model| model.check(record))?;
     let effects = options.model.as_ref().map(Model::known_effects).unwrap_or_default();

@@ -40,6 +40,7 @@ pub(crate) fn with_model(
     model: Option<&Model>,
     options: &Options,
 ) -> Result<(Characterisation, ModelFit), Error> {
+    options.check()?;
     model.map_or(Ok(()), |model| model.check(record))?;
     let Rows { observations, is_even, .. } = Rows::of(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
