@@ -101,8 +101,7 @@ impl Candidate {
         has_ended && self.fitted.count > policy.kept_share * current.count && self.is_clear_of_bounds()
     }
 
-    /// Whether the effect's parameters are clear of nothing, or of a bound that means nothing, and
-    /// leave those of the others there.
+    /// Whether every parameter of an effect, noise left out, lies inside its bounds.
     pub(crate) fn is_clear_of_bounds(&self) -> bool {
         let model = &self.fitted.model;
         let is_clear = |(p, x): (&Parameter, &f64)| {

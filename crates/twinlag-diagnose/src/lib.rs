@@ -2,7 +2,7 @@
 //! better the model is with them. Two first-order lags are seldom the whole truth of a measured
 //! record. [`diagnose()`] examines the disagreement of the two gas temperatures that the sensors
 //! imply, finds the effect in [`Identifier::ALL`] that explains it, adds it, repeats, and reports
-//! errors before and after on blocks of the record that neither chose nor were fitted; or it says
+//! errors before and after on blocks of the record that took no part in choosing or fitting; or it says
 //! that nothing is missing, or that something is and no known effect accounts for it. [`fit_with`]
 //! puts effects that are known already into the model.
 //!

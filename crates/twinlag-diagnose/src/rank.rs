@@ -37,8 +37,8 @@ pub(crate) struct Score {
     pub(crate) white_gain: f64,
     /// Deviance that it saves with a free noise level in every band of frequency.
     pub(crate) robust_gain: f64,
-    /// What its gains count beside those of the others: those of a line are of all frequencies,
-    /// whatever weight these have.
+    /// Weight of its gains against those of other candidates: those of a line are of all
+    /// frequencies, whatever weight these have.
     pub(crate) share: f64,
     /// Deviance that it saves with levels as free as those beside a noise.
     pub(crate) saved_deviance: f64,
@@ -82,13 +82,11 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
 /// The candidates that may be taken, the first choice first.
 ///
 /// 1. Effects of the sensors whose robust gain is beyond chance and whose white gain is beyond the
-///    penalty; noise, where there is
-///    none, or where it explains incomparably more.
-/// 2. Of those nearly the best whatever the noise the best with white noise, and of these, where
-///    they are the same, the one that
-///    occurs more often.
-/// 3. A static disagreement before its imitators, and where no effect explains the record; noise
-///    there, if there is no static one.
+///    penalty. Noise comes where there are none, or where it explains incomparably more.
+/// 2. Of those with nearly the best robust gain the one with the best white gain; of these, where
+///    they hardly differ, the one that occurs more often.
+/// 3. A static disagreement before its imitators, and where no effect explains the record. Noise
+///    comes first there if there is no static disagreement.
 ///
 /// - `considered`: candidates of the round, those among them that were not worth a fit as well: any of them may have
 ///   been the one that chance favours

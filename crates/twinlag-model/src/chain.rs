@@ -20,7 +20,7 @@ use crate::rows::Rows;
 /// How many samples a delay may reach where they are uneven.
 pub(crate) const UNEVEN_REACH: usize = 3;
 
-/// Samples beside the reach that a delay takes: the four taps of a spline, less one.
+/// Taps of the spline that a delay needs.
 pub(crate) const DELAY_TAPS: usize = 4;
 
 /// A number that may change along the record.

@@ -39,7 +39,7 @@ pub enum Effort {
 pub struct Fitted {
     /// The model.
     pub model: Model,
-    /// Parameters of the effect.
+    /// All parameters: `τ₁`, `τ₂`, then those of each effect.
     pub theta: Vec<f64>,
     /// Energy of the residuals that count, as the fit weighs frequencies.
     pub chi2: f64,

@@ -37,8 +37,7 @@ impl Stretch {
         Self { masked, ..self }
     }
 
-    /// These observations with a measured flow velocity or density at each sample, positive, in any
-    /// unit.
+    /// This stretch with a measured flow velocity or density at each sample, positive, in any unit.
     #[must_use]
     pub fn with_flow(self, flow: Vec<f64>) -> Self {
         Self { flow: Some(flow), ..self }

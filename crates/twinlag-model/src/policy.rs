@@ -1,4 +1,4 @@
-//! Every number that decides what a user reads, in one place, each with where it comes from.
+//! The thresholds of the search and of the verdict in one place, each with where it comes from.
 //!
 //! Grids, starts, bounds and iteration counts are not here: they decide how a number is found, not
 //! which one, and stand beside the code that uses them. A policy can be stored, compared and
@@ -149,8 +149,8 @@ policy! {
     /// Factor by which a time constant is moved to see whether another fits as well: chosen.
     ridge_factor: f64 = 2.0,
 
-    /// Standard errors by which energy is less than that of the levels before these are lowered:
-    /// four, once in 30 000 records.
+    /// How many standard errors the energy must lie below that of the assumed levels before they are
+    /// lowered: four, once in 30 000 records.
     lower_levels_standard_errors: f64 = 4.0,
 
     /// Blocks along the record of which some judge: many short ones, so that they see the gas that
@@ -173,8 +173,8 @@ policy! {
     /// Robust standard deviations beyond which a single reading is wrong: once in 500 million
     /// readings of Gaussian noise.
     spike_standard_deviations: f64 = 6.0,
-    /// The distance from which on a reading is wrong in a channel that has such: once in 150 000
-    /// readings.
+    /// Robust standard deviations beyond which a reading is wrong in a channel that already has
+    /// spikes: once in 150 000 readings.
     further_spike_standard_deviations: f64 = 4.5,
     /// Factor by which a reading that the residual hardly shows must stick out farther from its
     /// neighbours: chosen.
@@ -192,7 +192,7 @@ policy! {
     tone_fewest_samples: usize = 200,
     /// Periods of a tone in a record below which it is not seen to come back: chosen.
     tone_fewest_periods: usize = 5,
-    /// Tones of the gas up to which the equations they give are counted for the reader: chosen.
+    /// Most tones of the gas for which the answer states how many numbers they determine: chosen.
     most_counted_tones: usize = 4,
 }
 

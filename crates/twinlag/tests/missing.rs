@@ -3,9 +3,13 @@
 mod common;
 
 use common::{record, recovers};
+use twinlag::cross_relation::Parameter;
 use twinlag::diagnosis::Identifier;
 use twinlag::record::{Channels, Record, SamplingChoice};
-use twinlag::{DiagnoseOptions, Diagnosis, Options, characterise_with, diagnose};
+use twinlag::{
+    CompensateOptions, DiagnoseOptions, Diagnosis, Error, Known, Live, LiveOptions, Options, TrackOptions,
+    characterise, characterise_with, compensate, diagnose, track,
+};
 
 const GAS: &str = "kind = \"turbulence\"\nstd_k = 20.0\ncorner_hz = 0.5\ncutoff_hz = 20.0";
 const TAU_S: [f64; 2] = [0.12, 0.45];
@@ -111,5 +115,30 @@ fn a_saved_crosstalk_gives_its_own_record_the_same_time_constants() {
         let (one, other) = (one.time_constant_s.expect("determined"), other.time_constant_s.expect("determined"));
         // Both solvers stop where no logarithm would move by more than 1e-4.
         assert!((one / other - 1.0).abs() < 5e-4, "{one} and {other}");
+    }
+}
+
+/// Two held time constants leave nothing to find, and a level of noise is a positive number: each verb says so.
+#[test]
+fn options_that_cannot_be_are_refused_by_every_verb() {
+    let record = rig(5, "", "");
+    let held = |parameter, value| Known { parameter, value, std: None };
+    let both = vec![held(Parameter::Tau1, TAU_S[0]), held(Parameter::Tau2, TAU_S[1])];
+    let impossible = [
+        Options { known: both, ..Options::default() },
+        Options { noise_std_k: Some([0.15, f64::NAN]), ..Options::default() },
+        Options { noise_std_k: Some([0.0, 0.15]), ..Options::default() },
+    ];
+    for options in impossible {
+        let is_setting = |error: Error| matches!(error, Error::Setting { .. });
+        let diagnose_options = DiagnoseOptions { characterise: options.clone(), ..DiagnoseOptions::default() };
+        assert!(characterise(&record, &options).is_err_and(is_setting), "characterise, {options:?}");
+        assert!(diagnose(&record, &diagnose_options).is_err_and(is_setting), "diagnose, {options:?}");
+        let compensate_options = CompensateOptions { diagnose: diagnose_options, ..CompensateOptions::default() };
+        assert!(compensate(&record, &compensate_options).is_err_and(is_setting), "compensate, {options:?}");
+        let track_options = TrackOptions { characterise: options.clone(), ..TrackOptions::default() };
+        assert!(track(&record, &track_options).is_err_and(is_setting), "track, {options:?}");
+        let live_options = LiveOptions { characterise: options.clone(), ..LiveOptions::default() };
+        assert!(Live::start(&record, &live_options).is_err_and(is_setting), "live, {options:?}");
     }
 }

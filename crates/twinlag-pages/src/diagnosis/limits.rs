@@ -34,7 +34,7 @@ impl Page<'_> {
             if !said.contains(&found.effect) {
                 said.push(found.effect);
                 items.push(format!(
-                    "{}: not detectable is {}.",
+                    "{}: two sensors cannot reveal {}.",
                     capital(&words(found.effect)),
                     found.effect.about().unseen
                 ));

@@ -223,7 +223,7 @@ pub struct Characterisation {
     pub time_constant_difference_s: Difference,
     /// Relative calibration, where fitted.
     pub free: FreeParameters,
-    /// The unexplained part of the residual, if there is one.
+    /// What the fit leaves over, and its tests.
     pub residual: Residual,
     /// How the intervals were found; [`SensorEstimate::interval_basis`] has the shape of each.
     pub interval_method: IntervalMethod,
