@@ -1,5 +1,7 @@
 //! One trial: a noisy record, answered by every method of the plan.
 
+use std::fmt;
+
 use twinlag::Estimator;
 use twinlag::cross_relation::{CostError, Readings, Segment, Steps, Whitened};
 use twinlag::estimate::{Estimate, EstimateError, Task};
@@ -47,6 +49,25 @@ pub struct Own<'a> {
     pub optimisers: Vec<(&'a str, &'a (dyn Minimiser + Sync))>,
 }
 
+/// Estimators and optimisers by their names.
+impl fmt::Debug for Experiment<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let estimators: Vec<String> = self.estimators.iter().map(|e| e.name()).collect();
+        let optimisers: Vec<String> = self.optimisers.iter().map(|o| o.name()).collect();
+        let mut out = f.debug_struct("Experiment");
+        out.field("plan", self.plan).field("estimators", &estimators).field("optimisers", &optimisers).finish()
+    }
+}
+
+/// Estimators and optimisers by their names in the plan.
+impl fmt::Debug for Own<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let estimators: Vec<&str> = self.estimators.iter().map(|(name, _)| *name).collect();
+        let optimisers: Vec<&str> = self.optimisers.iter().map(|(name, _)| *name).collect();
+        f.debug_struct("Own").field("estimators", &estimators).field("optimisers", &optimisers).finish()
+    }
+}
+
 /// A borrowed estimator is one.
 struct Borrowed<'a>(&'a dyn Estimate);
 
@@ -82,6 +103,7 @@ impl Minimiser for BorrowedMinimiser<'_> {
 }
 
 /// What a thread keeps of a cell.
+#[derive(Debug)]
 pub struct Scratch {
     bench: Bench,
     clean: Clean,

@@ -35,7 +35,7 @@ pub enum Effort {
 }
 
 /// A fitted model.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Fitted {
     /// The model.
     pub model: Model,

@@ -1,5 +1,7 @@
 //! A model: two lags and the effects added so far.
 
+use std::fmt;
+
 use twinlag_optimise::Variable;
 
 use crate::effect::{Parameter, Shared};
@@ -33,6 +35,16 @@ pub struct Model {
     noise_std_k: [f64; 2],
     /// Whether the effects stay as they are, and the time constants alone are fitted.
     pub(crate) is_frozen: bool,
+}
+
+impl fmt::Debug for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { effects, known, noise_std_k, is_frozen } = self;
+        let effects: Vec<&str> = effects.iter().map(|e| e.identifier().name()).collect();
+        let mut out = f.debug_struct("Model");
+        out.field("effects", &effects).field("known", known).field("noise_std_k", noise_std_k);
+        out.field("is_frozen", is_frozen).finish()
+    }
 }
 
 impl Model {

@@ -4,6 +4,8 @@
 //! which of these numbers and functions are made of its parameters, nothing more, so any of them can be in the model
 //! together. [`crate::disagreement`] inverts it.
 
+use std::fmt;
+
 use crate::chain::{Chain, DELAY_TAPS, UNEVEN_REACH};
 use crate::number::{Curve, Number, TimeFunction};
 use crate::observations::{Observations, Stretch};
@@ -29,6 +31,17 @@ pub struct Reading {
     pub crosstalk: Number,
     /// The temperature `m` of the other channel that adds nothing, °C.
     pub crosstalk_about_c: f64,
+}
+
+/// Functions are counted, or said to be there.
+impl fmt::Debug for Reading {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { gain, offset_k, disturbances, straighten, crosstalk, crosstalk_about_c } = self;
+        let mut out = f.debug_struct("Reading");
+        out.field("gain", gain).field("offset_k", offset_k).field("disturbances", &disturbances.len());
+        out.field("is_straightened", &straighten.is_some()).field("crosstalk", crosstalk);
+        out.field("crosstalk_about_c", crosstalk_about_c).finish()
+    }
 }
 
 impl Reading {
@@ -80,6 +93,17 @@ pub struct Sensor {
     pub heat: Option<Curve>,
 }
 
+/// Functions are counted, or said to be there.
+impl fmt::Debug for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { reading, tau_s, changes, second_tau_s, slow, rest, heat } = self;
+        let mut out = f.debug_struct("Sensor");
+        out.field("reading", reading).field("tau_s", tau_s).field("changes", &changes.len());
+        out.field("second_tau_s", second_tau_s).field("slow", slow);
+        out.field("loses_heat", &rest.is_some()).field("heat_varies", &heat.is_some()).finish()
+    }
+}
+
 impl Sensor {
     fn first_order(tau_s: Number) -> Self {
         let reading = Reading::exact();
@@ -121,7 +145,7 @@ impl Extra {
 }
 
 /// The rig: two sensors, the delay between them, their noise.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Plant {
     /// Both sensors.
     pub sensors: [Sensor; 2],

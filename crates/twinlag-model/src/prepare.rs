@@ -24,6 +24,7 @@ pub(crate) const GRID_STARTS: usize = 3;
 const SPIKE_ROUNDS: usize = 3;
 
 /// A record with its defects masked, and the two-lag model of it.
+#[derive(Debug)]
 pub struct Prepared {
     /// The record, its defects masked.
     pub observations: Observations,

@@ -176,6 +176,7 @@ impl Paths {
 }
 
 /// Levels of the channels' white noise, and with them one more source of noise if there is one.
+#[derive(Debug)]
 pub struct NoiseFit {
     /// White noise, K.
     pub noise_std_k: [f64; 2],

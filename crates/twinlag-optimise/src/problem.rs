@@ -1,6 +1,8 @@
 //! The problem to minimise: a cost over named variables with bounds, in coordinates in which they
 //! are all of size one.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -156,6 +158,13 @@ pub(crate) enum NoDerivatives {
     Anywhere,
     #[error("the cost has no finite derivatives at this point")]
     NotFinite,
+}
+
+/// Without the cost, which need not be printable.
+impl fmt::Debug for Problem<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Problem").field("variables", &self.variables).finish_non_exhaustive()
+    }
 }
 
 impl<'a> Problem<'a> {

@@ -1,5 +1,7 @@
 //! Parameters of effects.
 
+use std::fmt;
+
 use twinlag_optimise::Variable;
 
 /// A parameter of an effect.
@@ -109,6 +111,12 @@ pub struct Derived {
     pub unit: &'static str,
     /// The number from the parameters.
     pub of: OfParameters,
+}
+
+impl fmt::Debug for Derived {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Derived").field("name", &self.name).field("unit", &self.unit).finish_non_exhaustive()
+    }
 }
 
 impl Derived {
