@@ -53,6 +53,24 @@ impl<'a> Compensated<'a> {
     /// linearly to the minimum of [`Normalised`], which is the shorter way to the same point and
     /// has its covariance; `ℓ` then is the level of the noise. NaN if neither channel has noise.
     ///
+    /// ```
+    /// use twinlag_bias::{Compensated, Noise};
+    /// use twinlag_cross_relation::{CrossRelation, Readings};
+    /// # let y1: Vec<f64> = (0..300).map(|k| (0.05 * f64::from(k)).sin()).collect();
+    /// # let y2: Vec<f64> = (0..300).map(|k| 0.6 * (0.05 * f64::from(k) - 0.4).sin()).collect();
+    ///
+    /// // `y1` and `y2` are the channels, and the second is known to be twice as noisy as the first.
+    /// let readings = Readings::even(&y1, &y2, 0.002)?;
+    /// let relative = [Noise::white(1.0)?, Noise::white(2.0)?];
+    /// let cost = Compensated::new(CrossRelation::new(&readings, 100)?, relative);
+    /// let at = [0.0238, 0.1168];
+    /// let level = cost.profiled_level(&at); // K², the variance of the first channel's noise
+    /// // With this level nothing is left there, but for the rounding of a difference.
+    /// let left = cost.with_level(level)?.evaluate(&at).value;
+    /// assert!(left.abs() < 1e-12 * cost.cost().evaluate(&at).value);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Source
     /// Dinkelbach 1967 for the minimum of a ratio (recalled, not consulted); docs, chapter
     /// "Theory", section 2.
@@ -140,6 +158,23 @@ pub struct Normalised<'a> {
 impl<'a> Normalised<'a> {
     /// `cost` normalised by white noise of standard deviation ratio `s2/s1 = ratio`, in units of
     /// `s1² = 1 K²`.
+    ///
+    /// ```
+    /// use twinlag_bias::{NoiseError, Normalised};
+    /// use twinlag_cross_relation::{CrossRelation, Readings};
+    /// # let y1: Vec<f64> = (0..300).map(|k| (0.07 * f64::from(k)).sin()).collect();
+    /// # let y2: Vec<f64> = (0..300).map(|k| 0.5 * (0.07 * f64::from(k) - 0.5).sin()).collect();
+    ///
+    /// let readings = Readings::even(&y1, &y2, 0.002)?;
+    /// let cost = CrossRelation::new(&readings, 100)?;
+    /// // At equal noise of `s` K in both channels it is the plain cost over `s² (h(c) + h(a))`, in units of s = 1 K.
+    /// let (at, gain) = ([0.0238, 0.1168], |tau_s: f64| (0.002 / (2.0 * tau_s)).tanh());
+    /// let want = cost.evaluate(&at).value / (gain(at[0]) + gain(at[1]));
+    /// let got = Normalised::with_ratio(cost.clone(), 1.0)?.evaluate(&at).value;
+    /// assert!((got / want - 1.0).abs() < 1e-12); // rounding
+    /// assert_eq!(Normalised::with_ratio(cost, 0.0).err(), Some(NoiseError::Ratio { value: 0.0 }));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     ///
     /// # Errors
     /// [`NoiseError::Ratio`] unless the ratio is finite and positive.

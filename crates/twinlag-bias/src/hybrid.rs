@@ -39,6 +39,23 @@ impl<'a> Hybrid<'a> {
 
     /// As [`Hybrid::new`], with `weight` `w` from 0 (normalised, less 1) to 1 (compensated).
     ///
+    /// ```
+    /// use twinlag_bias::{Compensated, Hybrid, Noise, Normalised};
+    /// use twinlag_cross_relation::{CrossRelation, Readings};
+    /// # let (y1, y2): (Vec<f64>, Vec<f64>) = (0..300).map(|k| (0.1 * f64::from(k)).sin_cos()).unzip();
+    ///
+    /// // `y1` and `y2` are the channels; at weight 1 this is the compensated cost, at 0 the normalised one less 1.
+    /// let readings = Readings::even(&y1, &y2, 0.002)?;
+    /// let cost = CrossRelation::new(&readings, 100)?;
+    /// let noise = [Noise::white(0.05)?, Noise::white(0.1)?];
+    /// let (at, hybrid) = ([0.03, 0.1], |weight| Hybrid::with_weight(cost.clone(), noise.clone(), weight));
+    /// let compensated = Compensated::new(cost.clone(), noise.clone()).evaluate(&at).value;
+    /// let normalised = Normalised::new(cost.clone(), noise.clone()).evaluate(&at).value;
+    /// assert_eq!(hybrid(1.0)?.evaluate(&at).value, compensated);
+    /// assert!((hybrid(0.0)?.evaluate(&at).value / (normalised - 1.0) - 1.0).abs() < 1e-12); // rounding
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`NoiseError::Weight`], [`NoiseError::NoNoise`].
     pub fn with_weight(cost: CrossRelation<'a>, noise: [Noise; 2], weight: f64) -> Result<Self, NoiseError> {

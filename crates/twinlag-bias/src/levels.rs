@@ -40,6 +40,22 @@ pub struct NoiseLevel {
 impl NoiseLevel {
     /// The converter's step, K, where it is coarser than the noise: see
     /// [`COARSE_STEP_NOISE_RATIO`].
+    ///
+    /// ```
+    /// use twinlag_bias::estimate_noise;
+    /// use twinlag_cross_relation::Readings;
+    ///
+    /// // Both channels come from a converter of 0.25 K, without any noise.
+    /// let coarse = |phase: f64| -> Vec<f64> {
+    ///     (0..400).map(|k| (20.0 * (0.02 * f64::from(k) + phase).sin()).round() / 4.0).collect()
+    /// };
+    /// let levels = estimate_noise(&Readings::even(&coarse(0.0), &coarse(0.5), 0.1)?)?;
+    /// for level in levels {
+    ///     let step_k = level.coarse_step_k().expect("nothing but steps");
+    ///     assert!((step_k - 0.25).abs() < 1e-12); // differences of readings less their mean: rounding
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn coarse_step_k(&self) -> Option<f64> {
         self.quantisation_step_k.filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k)
     }
@@ -49,6 +65,25 @@ impl NoiseLevel {
 ///
 /// For uneven steps the third divided difference takes the place of the third difference, each
 /// scaled to unit noise.
+///
+/// ```
+/// use rand::SeedableRng;
+/// use rand_distr::{Distribution, Normal};
+/// use twinlag_bias::estimate_noise;
+/// use twinlag_cross_relation::Readings;
+///
+/// let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+/// let mut noisy = |std_k: f64| -> Result<Vec<f64>, rand_distr::NormalError> {
+///     let noise = Normal::new(0.0, std_k)?;
+///     Ok((0..1000).map(|k| 10.0 * (0.01 * f64::from(k)).sin() + noise.sample(&mut rng)).collect())
+/// };
+/// let readings = Readings::even(&noisy(0.05)?, &noisy(0.2)?, 0.002)?;
+/// for (level, truth) in estimate_noise(&readings)?.iter().zip([0.05, 0.2]) {
+///     // Beyond four standard errors once in 16 000; the gas, slow as it is, adds 1e-5 K.
+///     assert!((level.std_k - truth).abs() < 4.0 * level.standard_error_k, "{level:?}");
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.

@@ -43,6 +43,18 @@ pub enum DifferenceEquationEstimator {
 impl DifferenceEquationEstimator {
     /// Time constants `[τ1, τ2]` (s).
     ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // An error that goes up and down from sample to sample, in the second channel alone.
+    /// let wrong: Vec<f64> = (0..).zip(&y2).map(|(k, y)| if k % 2 == 0 { y + 0.05 } else { y - 0.05 }).collect();
+    /// let readings = Readings::even(&y1, &wrong, 0.002)?;
+    ///
+    /// // Errors among the regressors pull least squares to short time constants where sensor 1 is the faster.
+    /// let [tau1_s, tau2_s] = DifferenceEquationEstimator::LeastSquares.estimate(&readings)?;
+    /// assert!(tau1_s < 0.0238 && tau2_s < 0.1168, "{tau1_s} {tau2_s}");
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// [`CostError::UnevenSampling`]; [`CostError::NotPositive`] for an invalid noise ratio;
     /// [`CostError::Singular`] if the solution is not a pair of positive time constants.
@@ -170,6 +182,16 @@ impl DifferenceEquationEstimator {
 
 /// Time constants `[τ1, τ2]` (s) by least squares on the difference equation: a start that costs
 /// almost nothing, not an estimate.
+///
+/// ```
+#[doc = include_str!("example.txt")]
+/// let tau_s = difference_equation_least_squares(&readings)?;
+/// // Without noise, and with gas that is held between samples, the equation is exact.
+/// for (got, want) in tau_s.iter().zip([0.0238, 0.1168]) {
+///     assert!((got / want - 1.0).abs() < 1e-9, "{got}");
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// As [`DifferenceEquationEstimator::estimate`].

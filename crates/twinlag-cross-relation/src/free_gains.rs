@@ -30,6 +30,17 @@ impl<'a> FreeGains<'a> {
     /// The filters start at the steady state of their first sample, as with unit gain. With static
     /// gains `β = b/(1 − a)`, `δ = d/(1 − c)` the error is `δ` times the unit-gain error at
     /// relative gain `g = δ/β`; derivatives follow by the chain rule.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let cost = FreeGains::new(&readings, 100)?;
+    /// let (a, c) = (0.92, 0.98);
+    /// let unit = cost.evaluate([a, 1.0 - a, c, 1.0 - c]).value;
+    /// // Both gains doubled leave the relative gain as it is: four times the cost, so it has no minimum of its own.
+    /// let doubled = cost.evaluate([a, 2.0 * (1.0 - a), c, 2.0 * (1.0 - c)]).value;
+    /// assert!((doubled / unit - 4.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn evaluate(&self, [a, b, c, d]: [f64; 4]) -> CostValue<4> {
         let period_s = self.unity.period_s();
         let delta = d / (1.0 - c);

@@ -54,6 +54,21 @@ impl<'a> CrossRelation<'a> {
     /// the channels' unit. A second time constant of 0 is a sensor of first order, and the
     /// derivatives with respect to it are 0.
     ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// // Channel 2 through an amplifier of gain 1.1 that adds 3 K.
+    /// let amplified: Vec<f64> = y2.iter().map(|y| 1.1 * y + 3.0).collect();
+    /// let readings = Readings::even(&y1, &amplified, 0.002)?;
+    /// let cost = CrossRelation::new(&readings, 1200)?;
+    ///
+    /// // The offset is stated at the level that was taken off, where the gain adds to it.
+    /// let truth = [0.0238, 0.1168, 1.1, 3.0 + 0.1 * readings.level()];
+    /// // The start of the filters has fallen to e⁻²⁰ of the swing after 1200 samples, ten of the slower time constants.
+    /// assert!(cost.evaluate(&truth).value < 1e-12);
+    /// assert!(cost.evaluate(&[0.0238, 0.1168, 1.0, 0.0]).value > 1.0); // K²
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Source
     /// Hung, McLoone, Irwin, Kee, *Blind two-thermocouple sensor characterisation*, 2007 (abstract
     /// seen); Gillespie, Hung, Kee, McLoone 2016 (abstract seen), for `g = 1`, `o = 0` and first

@@ -4,6 +4,18 @@
 use crate::error::CostError;
 
 /// Times between the samples of one segment, s.
+///
+/// ```
+/// use twinlag_cross_relation::{CostError, CrossRelation, Readings, Segment, Steps};
+///
+/// let steps = Steps::Uneven(vec![0.1, 0.25, 0.125]);
+/// let segment = Segment::new(vec![20.0, 20.5, 22.0, 22.5], vec![20.0, 20.25, 21.0, 21.5], steps)?;
+/// let readings = Readings::new(vec![segment])?;
+/// assert_eq!(readings.even_period_s(), None);
+/// // The whitened cost takes such readings as they are, the published one does not.
+/// assert_eq!(CrossRelation::new(&readings, 0).err(), Some(CostError::UnevenSampling));
+/// # Ok::<(), CostError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub enum Steps {
     /// All the same.
@@ -105,6 +117,19 @@ pub struct Readings {
 
 impl Readings {
     /// Joins `segments` into one record, the mean of both channels' means taken off.
+    ///
+    /// ```
+    /// use twinlag_cross_relation::{Readings, Segment, Steps};
+    ///
+    /// // A reading is missing between the two stretches.
+    /// let before = Segment::new(vec![20.0, 21.0, 23.0], vec![20.0, 20.5, 21.5], Steps::Even(0.1))?;
+    /// let after = Segment::new(vec![24.0, 24.5], vec![22.5, 23.0], Steps::Even(0.1))?;
+    /// let readings = Readings::new(vec![before, after])?;
+    /// assert_eq!(readings.level(), 22.0); // the mean of 22.5 and 21.5, exact in binary
+    /// assert_eq!(readings.segments()[0].y1(), [-2.0, -1.0, 1.0]);
+    /// assert_eq!((readings.len(), readings.even_period_s()), (5, Some(0.1)));
+    /// # Ok::<(), twinlag_cross_relation::CostError>(())
+    /// ```
     ///
     /// # Errors
     /// [`CostError::TooShort`] if they hold fewer than 4 samples in all.

@@ -29,6 +29,17 @@ pub struct ResidualTest {
 /// band (Wilson-Hilferty), its p-value for that many bands (Šidák). `whiteness`: Ljung-Box
 /// statistic of the first 20 autocorrelations, chi-square distributed.
 ///
+/// ```
+/// use twinlag_cross_relation::residual_tests;
+///
+/// // Unit variance, but up and down from sample to sample: as loud as it should be, and not white.
+/// let residual: Vec<f64> = (0..400).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+/// let tests = residual_tests(&[residual], 0, 0.0);
+/// assert_eq!((tests[0].test.as_str(), tests[0].p_value), ("total-energy", 1.0));
+/// assert_eq!(tests[2].test, "whiteness");
+/// assert!(tests[2].p_value < 1e-12); // its statistic is near 20 lags × 400, with 20 degrees of freedom
+/// ```
+///
 /// # Source
 /// Ljung and Box 1978; Wilson and Hilferty 1931.
 pub fn residual_tests(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Vec<ResidualTest> {

@@ -10,6 +10,16 @@ use nalgebra::DMatrix;
 /// `None` if `A` over the free parameters is not positive definite, or a variance comes out as
 /// none. The parameters may differ by orders of magnitude: singular is judged after scaling to unit
 /// diagonal.
+///
+/// ```
+/// use twinlag_cross_relation::sandwich;
+///
+/// let (curvature, score) = ([[4.0, 2.0], [2.0, 9.0]], [[8.0, 0.0], [0.0, 1.0]]);
+/// // With the second parameter held: 8/4². All numbers are exact in binary.
+/// assert_eq!(sandwich(&curvature, &score, &[0]), Some([[0.5, 0.0], [0.0, 0.0]]));
+/// // Where the cost does not rise there is no covariance.
+/// assert_eq!(sandwich(&[[0.0]], &[[1.0]], &[0]), None);
+/// ```
 pub fn sandwich<const P: usize>(
     curvature: &[[f64; P]; P],
     score: &[[f64; P]; P],

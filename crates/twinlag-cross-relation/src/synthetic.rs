@@ -13,6 +13,19 @@ use twinlag_sensor::{Discretisation, FirstOrderCoefficients, SecondOrderCoeffici
 /// sample period (s).
 ///
 /// `second_tau_s = 0` is the sensor of first order, `n2 = d2 = 0`, which does not depend on `τ₂`.
+///
+/// ```
+/// use twinlag_cross_relation::synthetic_filter;
+///
+/// let filter = synthetic_filter(0.0238, 0.005, 0.002);
+/// let sum = |terms: &[num_dual::Dual2SVec64<2>]| terms.iter().map(|t| t.re).sum::<f64>();
+/// // Unit gain at rest, whatever the time constants are: rounding only.
+/// assert!((sum(&filter.numerator) / sum(&filter.denominator) - 1.0).abs() < 1e-12);
+/// // Without a second lag it is the filter of first order, whose pole is e^(−Ts/τ).
+/// let first = synthetic_filter(0.0238, 0.0, 0.002);
+/// assert!((first.denominator[1].re + (-0.002_f64 / 0.0238).exp()).abs() < 1e-15);
+/// assert_eq!((first.numerator[2].re, first.denominator[2].re), (0.0, 0.0));
+/// ```
 #[expect(clippy::missing_panics_doc, reason = "the zero-order hold has a difference equation")]
 pub fn synthetic_filter(tau_s: f64, second_tau_s: f64, period_s: f64) -> SecondOrderCoefficients<Dual2SVec64<2>> {
     let hold = Discretisation::ZeroOrderHold;

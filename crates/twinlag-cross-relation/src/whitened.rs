@@ -227,6 +227,18 @@ impl<'a> Whitened<'a> {
 
     /// The whitened residual in order of time, one vector for each segment: white, of unit
     /// variance, if model and noise levels are right.
+    ///
+    /// ```
+    #[doc = include_str!("example.txt")]
+    /// let cost = Whitened::new(&readings, Discretisation::ZeroOrderHold, [0.1, 0.2])?;
+    /// let wrong = [0.03, 0.1];
+    /// let residual = cost.residual(&wrong);
+    /// assert_eq!(residual[0].len(), cost.terms(&wrong));
+    /// // Its sum of squares is the cost: two ways to one number, each of some thousand roundings.
+    /// let sum: f64 = residual[0].iter().map(|r| r * r).sum();
+    /// assert!((sum / cost.evaluate(&wrong).value - 1.0).abs() < 1e-9);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn residual<const P: usize>(&self, theta: &[f64; P]) -> Vec<Vec<f64>> {
         self.jacobian(theta).into_iter().map(|s| s.into_iter().map(|(r, _)| r).collect()).collect()
     }

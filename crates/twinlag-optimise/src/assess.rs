@@ -21,6 +21,28 @@ impl Problem<'_> {
     /// positive and a Newton step would move no coordinate by more than 1e-3, [`End::Stalled`]
     /// where not, with `failure` (what the solver itself said) as the reason if there is one;
     /// [`End::Unchecked`] for a cost without derivatives.
+    ///
+    /// ```
+    /// use twinlag_optimise::{Cost, Derivatives, End, Problem, Variable};
+    ///
+    /// /// `(x − 2)²`.
+    /// struct Parabola;
+    ///
+    /// impl Cost for Parabola {
+    ///     fn value(&self, x: &[f64]) -> f64 {
+    ///         (x[0] - 2.0).powi(2)
+    ///     }
+    ///
+    ///     fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
+    ///         Some(Derivatives { value: self.value(x), gradient: vec![2.0 * (x[0] - 2.0)], curvature: vec![vec![2.0]] })
+    ///     }
+    /// }
+    ///
+    /// let problem = Problem::new(&Parabola, vec![Variable::linear("x", 1.0, 0.0, 5.0)])?;
+    /// assert_eq!(problem.assess(&[2.0], None), End::Converged);
+    /// assert!(matches!(problem.assess(&[3.0], None), End::Stalled(_))); // a Newton step would move it by 1
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
     pub fn assess(&self, z: &[f64], failure: Option<&str>) -> End {
         self.judge(z, || self.value_at(z), self.derivatives_at(z).as_ref(), failure)
     }

@@ -9,6 +9,39 @@ use crate::report::{Budget, Fit, Progress};
 /// start, [`Problem::bounds`], [`Problem::value_at`] and [`Problem::derivatives_at`];
 /// [`Problem::point`] takes its answer back to the variables' own units, and [`Problem::assess`]
 /// says what kind of point it is.
+///
+/// ```
+/// use twinlag_optimise::{Budget, Cost, End, Evaluations, Fit, Minimiser, Problem, ProblemError, Variable};
+///
+/// /// Looks at 101 points between the bounds of one variable.
+/// struct Grid;
+///
+/// impl Minimiser for Grid {
+///     fn name(&self) -> String {
+///         "grid".into()
+///     }
+///
+///     fn minimise(&self, problem: &Problem<'_>, start: &[f64], _: &Budget) -> Result<Fit, ProblemError> {
+///         let (low, high) = problem.bounds()[0];
+///         let points = (0..=100).map(|i| [low + (high - low) * f64::from(i) / 100.0]);
+///         let values = points.map(|z| (problem.value_at(&z), z));
+///         let (value, z) = values.min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are 101");
+///         let evaluations = Evaluations { values: 101, derivatives: 0 };
+///         let (x, end, start) = (problem.point(&z), problem.assess(&z, None), start.to_vec());
+///         Ok(Fit { optimiser: self.name(), start, x, value, end, iterations: 1, evaluations })
+///     }
+/// }
+/// # struct Parabola;
+/// # impl Cost for Parabola {
+/// #     fn value(&self, x: &[f64]) -> f64 { (x[0] - 2.0).powi(2) }
+/// # }
+///
+/// // The cost is `(x − 2)²`, without derivatives.
+/// let problem = Problem::new(&Parabola, vec![Variable::linear("x", 1.0, 0.0, 5.0)])?;
+/// let fit = Grid.minimise(&problem, &[1.0], &Budget::default())?;
+/// assert_eq!((fit.x[0], fit.end), (2.0, End::Unchecked)); // point 40 of the grid is exact
+/// # Ok::<(), ProblemError>(())
+/// ```
 pub trait Minimiser {
     /// Name of the solver, as it appears in reports.
     fn name(&self) -> String;

@@ -15,6 +15,26 @@ pub struct MultiStart {
 impl MultiStart {
     /// Minimises `problem` from each of `starts`.
     ///
+    /// ```
+    /// use twinlag_optimise::{Budget, Cost, MultiStart, Optimiser, Problem, Variable};
+    ///
+    /// /// Minima near −1 and 1, of which the left one is lower.
+    /// struct TwoWells;
+    ///
+    /// impl Cost for TwoWells {
+    ///     fn value(&self, x: &[f64]) -> f64 {
+    ///         (x[0] * x[0] - 1.0).powi(2) + 0.2 * x[0]
+    ///     }
+    /// }
+    ///
+    /// let problem = Problem::new(&TwoWells, vec![Variable::linear("x", 1.0, -3.0, 3.0)])?;
+    /// let solver = Optimiser::by_name("nelder-mead")?;
+    /// let ends = MultiStart::run(&problem, &solver, &[vec![2.0], vec![-2.0]], &Budget::default())?;
+    /// assert_eq!(ends.best().start, [-2.0]);
+    /// assert!(ends.fits()[0].x[0] < 0.0 && ends.fits()[1].x[0] > 0.0); // each start found the well on its side
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ProblemError::NoStart`], or [`ProblemError::Start`] for a start that fits no variable.
     pub fn run(

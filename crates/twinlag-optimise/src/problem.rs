@@ -213,6 +213,20 @@ impl<'a> Problem<'a> {
 
     /// `x`, moved inside the bounds, as coordinates of the free variables.
     ///
+    /// ```
+    /// # use twinlag_optimise::{Cost, Problem, Variable};
+    /// # struct Flat;
+    /// # impl Cost for Flat {
+    /// #     fn value(&self, _: &[f64]) -> f64 { 0.0 }
+    /// # }
+    /// let tau = Variable::logarithmic("tau", 1e-3, 10.0);
+    /// let problem = Problem::new(&Flat, vec![tau, Variable::linear("offset", 0.5, -5.0, 5.0)])?;
+    /// let z = problem.coordinates(&[1.0, 7.0])?;
+    /// assert_eq!(z, [0.0, 10.0]); // ln 1, and 7 moved to its bound of 5, over 0.5
+    /// assert_eq!(problem.point(&z), [1.0, 5.0]);
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`ProblemError::Start`] unless `x` has one finite value for each variable.
     pub fn coordinates(&self, x: &[f64]) -> Result<Vec<f64>, ProblemError> {

@@ -22,6 +22,25 @@ pub enum End {
 
 impl End {
     /// Whether the point may be reported as an estimate.
+    ///
+    /// ```
+    /// use twinlag_optimise::{Budget, Cost, End, Minimiser, Optimiser, Problem, Variable};
+    ///
+    /// /// Falls to the left without end.
+    /// struct Slope;
+    ///
+    /// impl Cost for Slope {
+    ///     fn value(&self, x: &[f64]) -> f64 {
+    ///         x[0]
+    ///     }
+    /// }
+    ///
+    /// let problem = Problem::new(&Slope, vec![Variable::linear("x", 1.0, 2.0, 5.0)])?;
+    /// let fit = Optimiser::by_name("brent")?.minimise(&problem, &[3.0], &Budget::default())?;
+    /// assert_eq!(fit.end, End::OnBound(vec![0]));
+    /// assert!(!fit.end.is_usable()); // 2 is where the search had to end, not an estimate
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
     pub fn is_usable(&self) -> bool {
         matches!(self, Self::Converged | Self::Unchecked)
     }
@@ -37,6 +56,26 @@ pub struct Evaluations {
 }
 
 /// How much work a fit may do.
+///
+/// ```
+/// use twinlag_optimise::{Budget, Cost, End, Minimiser, Optimiser, Problem, Variable};
+///
+/// /// Rosenbrock's valley, which takes a simplex hundreds of evaluations.
+/// struct Valley;
+///
+/// impl Cost for Valley {
+///     fn value(&self, x: &[f64]) -> f64 {
+///         (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2)
+///     }
+/// }
+///
+/// let variables = ["x", "y"].map(|name| Variable::linear(name, 1.0, -5.0, 5.0)).to_vec();
+/// let small = Budget { evaluations: 40, ..Budget::default() };
+/// let fit = Optimiser::by_name("nelder-mead")?.minimise(&Problem::new(&Valley, variables)?, &[-1.2, 1.0], &small)?;
+/// assert_eq!(fit.end, End::LimitReached);
+/// assert!(fit.evaluations.values <= 40 && fit.value < 24.2); // the best point so far; the start has 24.2
+/// # Ok::<(), twinlag_optimise::ProblemError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Budget {
     /// Solver iterations.
