@@ -40,3 +40,10 @@ pub use hybrid::Hybrid;
 pub use levels::{COARSE_STEP_NOISE_RATIO, NoiseLevel, estimate_noise};
 pub use moments::{JointLevels, NoiseMoments};
 pub use noise_gain::Noise;
+
+/// Costs and noise may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Compensated<'static>, Hybrid<'static>, JointLevels, Noise, NoiseError, NoiseLevel)>();
+    is_send_and_sync::<(NoiseMoments, Normalised<'static>)>();
+};

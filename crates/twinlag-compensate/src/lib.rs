@@ -87,3 +87,11 @@ pub use spectrum::power_spectrum;
 pub use stream::{Filtered, Stream};
 #[cfg(feature = "std")]
 pub use tracker::{Tracker, TrackerFn, TrackerState, tracker};
+
+/// Readings, filters and what they give may go to any thread, and be read by several.
+#[cfg(feature = "std")]
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(CompensateError, Filtered, Form, Gas, Learned, Prior, Readings, Rig, Sensor, Stream<4>)>();
+    is_send_and_sync::<(Tracker<4>, TrackerFn, TrackerState)>();
+};

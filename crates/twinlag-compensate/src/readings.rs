@@ -25,6 +25,19 @@ impl Readings {
 
     /// Readings at `time_s`, of which those marked in `missing` are ignored, whatever their value.
     ///
+    /// ```
+    /// use twinlag_compensate::{CompensateError, Readings};
+    ///
+    /// let time_s = vec![0.0, 0.1, 0.2];
+    /// let reading_c = [vec![20.0, f64::NAN, 21.0], vec![20.0, 20.1, 20.2]];
+    /// // A reading that is no number has to be marked.
+    /// let unmarked = Readings::new(time_s.clone(), reading_c.clone());
+    /// assert!(matches!(unmarked, Err(CompensateError::Reading { channel: 1, sample: 1, .. })));
+    /// let readings = Readings::with_missing(time_s, reading_c, [vec![false, true, false], vec![false; 3]])?;
+    /// assert_eq!((readings.reading_c(0, 1), readings.reading_c(1, 1)), (None, Some(20.1)));
+    /// # Ok::<(), CompensateError>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`Readings::new`].
     pub fn with_missing(

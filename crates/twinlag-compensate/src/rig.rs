@@ -61,6 +61,17 @@ impl Sensor {
     }
 
     /// Frequency response of the sensor at `frequency_hz`, without losses.
+    ///
+    /// ```
+    /// use twinlag_compensate::Sensor;
+    ///
+    /// let sensor = Sensor::new(0.1, 0.2);
+    /// let corner_hz = 1.0 / (std::f64::consts::TAU * 0.1);
+    /// assert!((sensor.response(corner_hz).norm_sqr() - 0.5).abs() < 1e-12); // half of the power, to rounding
+    /// // A second lag in series takes more away.
+    /// let second = Sensor { second_tau_s: Some(0.02), ..sensor };
+    /// assert!(second.response(corner_hz).norm() < sensor.response(corner_hz).norm());
+    /// ```
     #[cfg(feature = "std")]
     pub fn response(&self, frequency_hz: f64) -> Complex64 {
         let s = |tau_s: f64| Complex64::new(0.0, core::f64::consts::TAU * frequency_hz * tau_s);

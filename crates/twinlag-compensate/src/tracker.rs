@@ -122,6 +122,30 @@ pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send + Sy
 
 /// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more
 /// than the largest.
+///
+/// ```
+/// use twinlag_compensate::{Prior, Rig, Sensor, Term, tracker};
+/// use twinlag_signal::{Gas, Noise, Plunge, Record, Rig as Simulation, Sensor as Simulated, Signal};
+///
+/// // The sensors are slower by 40 % than they were when they were characterised.
+/// let sensor = |name: &str, tau_s: f64| {
+///     let mut sensor = Simulated::new(name, 1.4 * tau_s);
+///     sensor.noise = Some(Noise::white(0.1));
+///     sensor
+/// };
+/// let signal = Signal::Plunge(Plunge { amplitude_k: 20.0, dwell_s: 0.3, rise_s: 0.02 });
+/// let sensors = [sensor("fine", 0.024), sensor("coarse", 0.117)];
+/// let record = Simulation::new(1, Record::new(1000, 0.004), Gas::new(300.0, signal), sensors)?.simulate()?;
+///
+/// let rig = Rig::new([Sensor::new(0.024, 0.1), Sensor::new(0.117, 0.1)]);
+/// let prior = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 10.0, corner_hz: 1.0 }] };
+/// let mut push = tracker(&rig, &prior, 0.004, 0.05).expect("few states and no delay");
+/// let states = record.t1_c.iter().zip(&record.t2_c).map(|(t1, t2)| push([Some(*t1), Some(*t2)]));
+/// let last = states.last().expect("there are readings");
+/// // Within four standard deviations of its logarithm, which the readings have made narrow.
+/// assert!((last.log_factor - 1.4_f64.ln()).abs() < 4.0 * last.log_variance.sqrt() && last.log_variance < 0.01);
+/// # Ok::<(), twinlag_signal::SignalError>(())
+/// ```
 pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
     fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
         let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;

@@ -60,3 +60,10 @@ pub use residual::{ResidualTest, residual_tests};
 pub use sandwich::sandwich;
 pub use synthetic::synthetic_filter;
 pub use whitened::{Form, Whitened};
+
+/// Readings and the costs of them may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(CostError, CrossRelation<'static>, DifferenceEquationEstimator, FreeGains<'static>)>();
+    is_send_and_sync::<(InferredInputs, Readings, ResidualTest, Segment, Whitened<'static>)>();
+};

@@ -10,6 +10,20 @@ use crate::moves::{Proposal, State};
 
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
 ///
+/// ```
+/// use std::ops::ControlFlow;
+/// use twinlag_diagnose::{DiagnoseError, Observations, Settings, Stretch, diagnose};
+/// # let time_s: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
+/// # let reading_c = [0.1, 0.3].map(|late| time_s.iter().map(|t| (4.0 * (t - late)).sin() + (17.0 * (t - late)).cos()).collect());
+///
+/// // `time_s` and `reading_c` are a record; whoever asked for its diagnosis has gone away.
+/// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.02))?;
+/// let watch = |_: &str, _, _| ControlFlow::Break(());
+/// let answer = diagnose(&observations, &Settings::default(), &watch);
+/// assert_eq!(answer.err(), Some(DiagnoseError::Cancelled));
+/// # Ok::<(), DiagnoseError>(())
+/// ```
+///
 /// # Errors
 /// [`DiagnoseError`] for a record that is too short, or in which a channel never changes, for a
 /// policy that means nothing, and for a run that `watch` cancels.

@@ -147,6 +147,15 @@ pub struct Limit<Channel = usize> {
 
 impl Limit {
     /// This limit with the name of its channel.
+    ///
+    /// ```
+    /// use twinlag_diagnose::{Identifier, Limit};
+    ///
+    /// let limit = Limit { effect: Identifier::DRIFT, channel: Some(1), parameter: "slope".into(), size: 0.02, unit: "K/s".into() };
+    /// let named = limit.named(&["bare".into(), "sheathed".into()]);
+    /// assert_eq!(named.channel.as_deref(), Some("sheathed"));
+    /// assert_eq!((named.size, named.unit), (0.02, limit.unit));
+    /// ```
     pub fn named(&self, channels: &[String; 2]) -> Limit<String> {
         Limit {
             effect: self.effect,

@@ -55,3 +55,10 @@ pub use twinlag_model::{
     ModelFit, Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with,
     track,
 };
+
+/// A diagnosis may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(BeforeAfter<f64>, Diagnosis, ErrorBudget, Evidence, Found, Limit, Move, Remark)>();
+    is_send_and_sync::<(Unexplained, Verdict)>();
+};

@@ -7,6 +7,16 @@ use twinlag_model::Identifier;
 
 /// Something to know before using the numbers of a diagnosis. Its [`Display`](fmt::Display) is a
 /// sentence for the reader.
+///
+/// ```
+/// use twinlag_diagnose::{Identifier, Remark};
+///
+/// let remark = Remark::Widened { effects: vec![Identifier::DELAY, Identifier::SECOND_ORDER] };
+/// assert!(remark.to_string().contains("(delay, second-order)"));
+/// // The name that scripts use.
+/// assert_eq!(serde_json::to_value(&remark)?["remark"], "widened");
+/// # Ok::<(), serde_json::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "remark", rename_all = "kebab-case")]
 #[non_exhaustive]

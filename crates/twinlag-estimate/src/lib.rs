@@ -79,3 +79,10 @@ pub use vocabulary::{
     Bootstrap, Estimator, Hold, IntervalBasis, Intervals, Known, NoiseColour, NoiseKnowledge, NoiseSource,
 };
 pub use whitened::{ENERGY_THAT_OUTWEIGHS_NOISE, WhitenedFit};
+
+/// Questions and answers may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(EstimateError, Estimator, Hold, Intervals, Known, Levels, NoiseKnowledge, Outcome)>();
+    is_send_and_sync::<(Solved<2>, TauIntervals)>();
+};

@@ -160,6 +160,25 @@ pub struct Bench {
 impl Plan {
     /// Reads a plan.
     ///
+    /// ```
+    /// use twinlag_experiment::Plan;
+    ///
+    /// let text = r#"
+    ///     name = "example"
+    ///     title = "Nothing but a start"
+    ///     seed = 1
+    ///     trials = 10
+    ///     noise_percent = [5]
+    ///     gases = [{ name = "sine", gas = { kind = "sine", amplitude_k = 10.0, frequency_hz = 2.0 } }]
+    ///     methods = [{ name = "whitened", estimator = "whitened" }]
+    /// "#;
+    /// let plan = Plan::from_toml(text)?;
+    /// assert_eq!((plan.samples, plan.sample_period_s), (vec![2500], vec![0.002])); // where nothing is said
+    /// let error = Plan::from_toml(&text.replace("trials = 10", "trials = 0")).expect_err("nothing to run");
+    /// assert_eq!(error.to_string(), "the plan: trials and block must be positive");
+    /// # Ok::<(), twinlag_experiment::ExperimentError>(())
+    /// ```
+    ///
     /// # Errors
     /// For text that is not a plan, with the line at fault, and for a plan that cannot run.
     pub fn from_toml(text: &str) -> Result<Self, ExperimentError> {
@@ -221,6 +240,27 @@ impl Plan {
     }
 
     /// All cells, in order.
+    ///
+    /// ```
+    /// # use twinlag_experiment::Plan;
+    /// # let plan = Plan::from_toml(r#"
+    /// #     name = "grid"
+    /// #     title = "Six cells"
+    /// #     seed = 2
+    /// #     trials = 1
+    /// #     samples = [500, 1000]
+    /// #     noise_percent = [1, 3, 10]
+    /// #     gases = [{ name = "slow", gas = { kind = "broadband", std_k = 9.0, corner_hz = 1.0 } }]
+    /// #     methods = [{ name = "ls", estimator = "difference-equation-ls" }]
+    /// # "#)?;
+    /// // A plan with `samples = [500, 1000]` and `noise_percent = [1, 3, 10]`.
+    /// let cells = plan.cells();
+    /// assert_eq!(cells.len(), 6);
+    /// // What stands last in the plan changes first.
+    /// let of: Vec<_> = cells.iter().map(|cell| (cell.samples, cell.noise_percent)).collect();
+    /// assert_eq!(of[..4], [(500, 1.0), (500, 3.0), (500, 10.0), (1000, 1.0)]);
+    /// # Ok::<(), twinlag_experiment::ExperimentError>(())
+    /// ```
     pub fn cells(&self) -> Vec<Cell> {
         let mut out = Vec::new();
         for gas in 0..self.gases.len() {

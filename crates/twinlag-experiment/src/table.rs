@@ -98,6 +98,32 @@ impl Table {
     }
 
     /// Where this table and `other` first differ, in words; `None` if they agree to the byte.
+    ///
+    /// ```
+    /// use std::ops::ControlFlow;
+    /// use twinlag_experiment::{Experiment, Plan, Table};
+    /// use twinlag_study::{Options, run};
+    /// # let plan = |seed: u64| Plan::from_toml(&format!(r#"
+    /// #     name = "repeat"
+    /// #     title = "Three trials"
+    /// #     seed = {seed}
+    /// #     trials = 3
+    /// #     samples = [300]
+    /// #     noise_percent = [2]
+    /// #     gases = [{{ name = "tone", gas = {{ kind = "sine", amplitude_k = 9.0, frequency_hz = 6.0 }} }}]
+    /// #     methods = [{{ name = "gtls", estimator = "difference-equation-gtls" }}]
+    /// # "#));
+    ///
+    /// // `plan` makes a plan of three trials from a seed.
+    /// let table = |seed| -> Result<Table, twinlag_experiment::ExperimentError> {
+    ///     let plan = plan(seed)?;
+    ///     let results = run(&Experiment::new(&plan)?, &Options::default(), |_| ControlFlow::Continue(()))?.into_results()?;
+    ///     Table::new(&plan, &results)
+    /// };
+    /// assert_eq!(table(1)?.first_difference(&table(1)?), None); // to the last digit
+    /// assert_eq!(table(1)?.first_difference(&table(2)?).as_deref(), Some("the plans differ"));
+    /// # Ok::<(), twinlag_experiment::ExperimentError>(())
+    /// ```
     pub fn first_difference(&self, other: &Self) -> Option<String> {
         if self.plan.decisive() != other.plan.decisive() {
             return Some("the plans differ".into());

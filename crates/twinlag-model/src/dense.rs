@@ -34,6 +34,17 @@ pub fn gram(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 
 /// Inverse of a symmetric matrix that should be positive definite, scaled to unit diagonal first; rows and columns without
 /// any weight stay zero. `None` where it is singular.
+///
+/// ```
+/// use twinlag_model::dense::{inverse, product};
+///
+/// // Scales may be far apart: it is the shape that decides.
+/// let matrix = vec![vec![4e12, 1e6], vec![1e6, 1.0]];
+/// let back = product(&matrix, &inverse(&matrix).expect("positive definite"));
+/// // The unit matrix, each row in its own units: rounding only.
+/// assert!((back[0][0] - 1.0).abs() < 1e-12 && (back[1][1] - 1.0).abs() < 1e-12);
+/// assert_eq!(inverse(&[vec![1.0, 1.0], vec![1.0, 1.0]]), None);
+/// ```
 pub fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = matrix.len();
     let used: Vec<usize> = (0..n).filter(|&i| matrix[i][i] > 0.0).collect();

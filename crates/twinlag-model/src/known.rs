@@ -14,6 +14,29 @@ use crate::summary::summarise;
 /// parameters that belong to a record, which are fitted again; defects of the data are dealt with
 /// as in a diagnosis.
 ///
+/// ```
+/// use twinlag_model::{Identifier, KnownEffect, Observations, Settings, Stretch, fit_with};
+/// use twinlag_signal::{Broadband, Gas, Noise, Record, Rig, Sensor, Signal};
+///
+/// let mut sensors = [Sensor::new("fine", 0.12), Sensor::new("coarse", 0.45)];
+/// sensors.iter_mut().for_each(|s| s.noise = Some(Noise::white(0.1)));
+/// sensors[1].offset_k = 2.0;
+/// let mut gas = Gas::new(300.0, Signal::Broadband(Broadband { std_k: 15.0, corner_hz: 0.5 }));
+/// gas.hold = twinlag_signal::Hold::ZeroOrder;
+/// let record = Rig::new(1, Record::new(500, 0.05), gas, sensors)?.simulate()?;
+/// let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+/// let observations = Observations::new(vec![stretch], Some(0.05))?;
+///
+/// // That the second channel reads 2 K too hot is known from another record.
+/// let offset = KnownEffect { effect: Identifier::CALIBRATION, channel: Some(1), parameters: vec![("offset".into(), 2.0)] };
+/// let known = fit_with(&observations, &Settings::default(), &[offset])?;
+/// for (tau, truth_s) in known.fit.time_constants.iter().zip([0.12, 0.45]) {
+///     let (value_s, error_s) = (tau.value_s.expect("determined"), tau.standard_error_s.expect("determined"));
+///     assert!((value_s - truth_s).abs() < 4.0 * error_s, "{value_s} ± {error_s}");
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`DiagnoseError`] as of a diagnosis; [`DiagnoseError::Model`] for an effect whose `restore` gives none, or
 /// has other parameters.

@@ -63,3 +63,11 @@ pub use summary::{Z_975, covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};
 pub use twinlag_optimise::Variable;
 pub use weighting::Weighting;
+
+/// Models, with their effects, and records may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Bands, Context, DiagnoseError, Evaluation, Extended, Fitted, Flow, Identifier)>();
+    is_send_and_sync::<(KnownEffect, KnownFit, Levels, Linearised, Model, ModelFit, Observations, Parameter)>();
+    is_send_and_sync::<(Plant, Policy, Prepared, Selection, Settings, Spline, Stretch, Track, Weighting)>();
+};

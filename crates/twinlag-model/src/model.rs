@@ -57,6 +57,24 @@ impl Model {
     }
 
     /// This model and one more effect.
+    ///
+    /// ```
+    /// use twinlag_model::{Identifier, Model, Observations, Prepared, Settings, Stretch, candidates};
+    /// # let time_s: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+    /// # let reading_c = [0.0, 0.4].map(|late| time_s.iter().map(|t| 300.0 + (9.0 * (t - late)).sin() + (31.0 * t).sin().powi(3)).collect());
+    ///
+    /// // `time_s` and `reading_c` are a record; what can be added to the model is made for it.
+    /// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01))?;
+    /// let prepared = Prepared::new(&observations, &Settings::default())?;
+    /// let offset = candidates(&[Identifier::CALIBRATION], &prepared.context).remove(0);
+    /// let two_lags = Model::new(&[], [0.1, 0.1]);
+    /// let model = two_lags.with(offset);
+    /// assert_eq!((two_lags.parameter_count(), model.parameter_count()), (2, 3));
+    /// assert_eq!(model.range(0), 2..3); // its parameter comes after both time constants
+    /// assert_eq!(model.parameters().map(|p| p.name).collect::<Vec<_>>(), ["offset"]);
+    /// assert_eq!(model.without(0).parameter_count(), 2);
+    /// # Ok::<(), twinlag_model::DiagnoseError>(())
+    /// ```
     #[must_use]
     pub fn with(&self, effect: Shared) -> Self {
         let mut out = self.clone();
@@ -86,6 +104,15 @@ impl Model {
     }
 
     /// This model with the time constant of a sensor held.
+    ///
+    /// ```
+    /// use twinlag_model::Model;
+    ///
+    /// let model = Model::new(&[], [0.1, 0.2]).holding(1, 0.45);
+    /// assert!(model.knows(1) && !model.knows(0));
+    /// assert_eq!((model.parameter_count(), model.free_count()), (2, 1));
+    /// assert!(format!("{model:?}").contains("value_s: 0.45"));
+    /// ```
     #[must_use]
     pub fn holding(mut self, sensor: usize, value_s: f64) -> Self {
         self.known.retain(|k| k.sensor != sensor);

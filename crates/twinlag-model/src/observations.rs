@@ -70,6 +70,25 @@ impl Observations {
     /// - `stretches`: in order of time; those of fewer than 8 samples are left out
     /// - `period_s`: the sample period where samples are evenly spaced within each stretch, s
     ///
+    /// ```
+    /// use twinlag_model::{DiagnoseError, Observations, Stretch};
+    ///
+    /// let stretch = |samples: i32, from_s: f64| {
+    ///     let time_s: Vec<f64> = (0..samples).map(|k| from_s + 0.5 * f64::from(k)).collect();
+    ///     let reading_c = [1.0, 3.0].map(|k| time_s.iter().map(|t| 20.0 + k * t.sin()).collect());
+    ///     Stretch::new(time_s, reading_c)
+    /// };
+    /// // The second of three stretches is too short to be of use.
+    /// let all = vec![stretch(40, 0.0), stretch(5, 30.0), stretch(30, 40.0)];
+    /// let observations = Observations::new(all, Some(0.5))?;
+    /// assert_eq!((observations.stretches.len(), observations.samples()), (2, 70));
+    /// assert_eq!(observations.ends_s(), [0.0, 54.5]); // halves are exact in binary
+    /// assert_eq!(observations.swing_k(), observations.mean_and_std(1)[1]); // the livelier channel's
+    /// let few = Observations::new(vec![stretch(40, 0.0)], Some(0.5));
+    /// assert_eq!(few, Err(DiagnoseError::TooShort { samples: 40, needed: 60 }));
+    /// # Ok::<(), DiagnoseError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`]; [`DiagnoseError::Flow`] for a flow that is
     /// not positive everywhere, or of another length.

@@ -199,6 +199,18 @@ policy! {
 impl Policy {
     /// The p-value below which a test of a residual rejects the model: all of them together do so
     /// in [`Policy::record_rejection_probability`] of the right models at most (Bonferroni).
+    ///
+    /// ```
+    /// use twinlag_model::Policy;
+    ///
+    /// let strict = Policy::default().with("record_rejection_probability", 1e-5).expect("a number of the policy");
+    /// assert!((strict.rejection_p_value() / 1e-6 - 1.0).abs() < 1e-15); // each of ten tests has a tenth
+    /// strict.check()?;
+    /// // A probability of 2 means nothing, and the message says which number it is.
+    /// let wrong = strict.with("screening_probability", 2.0).expect("a number of the policy");
+    /// assert!(wrong.check().expect_err("refused").to_string().contains("screening_probability = 2"));
+    /// # Ok::<(), twinlag_model::DiagnoseError>(())
+    /// ```
     pub fn rejection_p_value(&self) -> f64 {
         self.record_rejection_probability / RESIDUAL_TESTS
     }

@@ -68,6 +68,14 @@ pub struct KnownEffect {
 
 impl KnownEffect {
     /// The value of a parameter, by its name.
+    ///
+    /// ```
+    /// use twinlag_model::{Identifier, KnownEffect};
+    ///
+    /// let parameters = vec![("gain".to_owned(), 1.02), ("offset".to_owned(), -0.4)];
+    /// let known = KnownEffect { effect: Identifier::CALIBRATION, channel: Some(1), parameters };
+    /// assert_eq!((known.parameter("offset"), known.parameter("curvature")), (Some(-0.4), None));
+    /// ```
     pub fn parameter(&self, name: &str) -> Option<f64> {
         self.parameters.iter().find(|(n, _)| n == name).map(|(_, value)| *value)
     }
@@ -78,6 +86,21 @@ impl KnownEffect {
 pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
 
 /// Reports progress to `watch`.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use std::sync::atomic::{AtomicUsize, Ordering};
+/// use twinlag_model::{DiagnoseError, report};
+///
+/// // A watch that cancels at its third call.
+/// let calls = AtomicUsize::new(0);
+/// let watch = |_: &str, _, _| match calls.fetch_add(1, Ordering::Relaxed) {
+///     0 | 1 => ControlFlow::Continue(()),
+///     _ => ControlFlow::Break(()),
+/// };
+/// let ends: Vec<_> = (0..3).map(|done| report(&watch, "work", done, 3)).collect();
+/// assert_eq!(ends, [Ok(()), Ok(()), Err(DiagnoseError::Cancelled)]);
+/// ```
 ///
 /// # Errors
 /// [`DiagnoseError::Cancelled`] if that is its answer.

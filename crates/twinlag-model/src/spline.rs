@@ -44,6 +44,21 @@ impl Spline {
     }
 
     /// Its value at an instant.
+    ///
+    /// ```
+    /// use twinlag_model::{Number, Spline};
+    ///
+    /// // Even steps from knot to knot: a straight line of mean zero. The first knot's coefficient is −0.2, minus the sum.
+    /// let line = Spline::new(0.0, 10.0, &[-0.1, 0.0, 0.1, 0.2].map(Number::from));
+    /// assert!((line.at(10.0).re - line.at(0.0).re - 0.4).abs() < 1e-12 && line.at(5.0).re.abs() < 1e-12); // rounding
+    /// // With the derivative by the last coefficient, which the coefficients carry along.
+    /// let mut free = [-0.1, 0.0, 0.1, 0.2].map(Number::from);
+    /// free[3] = free[3].derivative();
+    /// let (now, step) = (Spline::new(0.0, 10.0, &free).at(8.0), 1e-3);
+    /// free[3] = Number::from(0.2 + step);
+    /// let moved = Spline::new(0.0, 10.0, &free).at(8.0);
+    /// assert!((now.eps - (moved.re - now.re) / step).abs() < 1e-10); // it is linear in each of them
+    /// ```
     pub fn at(&self, time_s: f64) -> Number {
         let pieces = (self.coefficients.len() - 3) as f64;
         let x = ((time_s - self.from_s) / (self.to_s - self.from_s)).clamp(0.0, 1.0) * pieces;

@@ -58,3 +58,9 @@ pub use multi_start::MultiStart;
 pub use optimiser::Optimiser;
 pub use problem::{Cost, Derivatives, Problem, ProblemError, Scale, Variable};
 pub use report::{Budget, End, Evaluations, Fit, Progress};
+
+/// What a solver is asked and what it reports may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Budget, Derivatives, End, Fit, MultiStart, Optimiser, ProblemError, Progress, Variable)>();
+};

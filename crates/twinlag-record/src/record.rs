@@ -198,6 +198,25 @@ impl Record {
 
     /// Makes a record of vectors, checked in the same way as a file.
     ///
+    /// ```
+    /// use twinlag_record::{Channels, Record, SamplingChoice};
+    ///
+    /// let mut t1_c: Vec<f64> = (0..20).map(|k| 20.0 + (0.5 * f64::from(k)).sin()).collect();
+    /// t1_c[12] = f64::NAN; // a reading that is missing
+    /// let channels = Channels {
+    ///     source: "a test bench".into(),
+    ///     names: ["bare".into(), "sheathed".into()],
+    ///     time_s: (0..20).map(|k| 0.25 * f64::from(k)).collect(),
+    ///     t2_c: (0..20).map(|k| 20.0 + (0.5 * f64::from(k) - 1.0).sin()).collect(),
+    ///     t1_c,
+    ///     reference_c: None,
+    /// };
+    /// let record = Record::from_channels(channels, SamplingChoice::Auto)?;
+    /// assert_eq!((record.sampling.period_s, record.missing), (0.25, 1)); // a quarter is exact in binary
+    /// assert_eq!(record.segments, [0..12, 13..20]);
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    ///
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`],
     /// [`RecordError::TimeNotIncreasing`], [`RecordError::OutOfRange`], [`RecordError::NoValues`],

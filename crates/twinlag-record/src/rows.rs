@@ -51,6 +51,20 @@ struct Channel {
 impl RowReader {
     /// For lines that come after those of `table`, of which `selection` chose the columns.
     ///
+    /// ```
+    /// use twinlag_record::{RowReader, Selection, Table};
+    ///
+    /// let start = "time_ms;T1_K;T2_K\n1000;293,15;293,15\n1010;294,15;293,40\n1020;294,65;293,65\n";
+    /// let table = Table::read(start.as_bytes(), "logger")?;
+    /// let rows = RowReader::after(&table, &Selection::default())?;
+    /// // Semicolons, decimal commas, milliseconds and kelvin are those of the first lines.
+    /// let row = rows.read("1030;295,15;---\n", 5)?.expect("not a comment");
+    /// assert_eq!(row.time_s, Some(0.03));
+    /// assert!((row.reading_c[0].expect("there is one") - 22.0).abs() < 1e-9); // 295.15 is not exact in binary
+    /// assert_eq!(row.reading_c[1], None);
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`crate::Record::from_table`] on columns that cannot be identified.
     pub fn after(table: &Table, selection: &Selection) -> Result<Self, RecordError> {

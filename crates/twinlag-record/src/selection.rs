@@ -49,6 +49,24 @@ pub enum SamplingChoice {
 
 /// What to read from a table. What is `None` is guessed from the header, and the guess is noted;
 /// the reference is never guessed.
+///
+/// ```
+/// use twinlag_record::{ColumnRef, Record, Selection, Table};
+///
+/// let text = "t (s),inlet,bare,sheathed\n0,20,20,20\n1,25,22,21\n2,25,24,22\n3,20,22,22\n4,22,21,21.5\n5,24,23,22\n6,21,22.5,22\n7,20,21,21.5\n";
+/// let table = Table::read(text.as_bytes(), "three.csv")?;
+/// // A column by its name, and one by its place, from 1.
+/// let selection = Selection {
+///     t1: Some("bare".parse().expect("any text names a column")),
+///     t2: Some(ColumnRef::Number(4)),
+///     reference: Some(ColumnRef::Name("inlet".into())),
+///     ..Selection::default()
+/// };
+/// let record = Record::from_table(&table, &selection)?;
+/// assert_eq!(record.channels, ["bare", "sheathed"]);
+/// assert_eq!(record.reference_c.expect("it was chosen")[..3], [20.0, 25.0, 25.0]);
+/// # Ok::<(), twinlag_record::RecordError>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Selection {
     /// The time column.

@@ -59,6 +59,15 @@ impl Unit {
 
     /// Splits a header into the name and its unit. Where a known unit is not set off by brackets it
     /// must follow `_`, `/`, `,`, ` in ` or a blank; brackets always hold a unit, known or not.
+    ///
+    /// ```
+    /// use twinlag_record::Unit;
+    ///
+    /// assert_eq!(Unit::split_header("T1 [°F]"), ("T1".to_owned(), Unit::Fahrenheit));
+    /// assert_eq!(Unit::split_header("gas_K"), ("gas".to_owned(), Unit::Kelvin));
+    /// assert_eq!(Unit::split_header("T2 deg C"), ("T2".to_owned(), Unit::Celsius));
+    /// assert_eq!(Unit::split_header("inlet"), ("inlet".to_owned(), Unit::Unstated));
+    /// ```
     pub fn split_header(header: &str) -> (String, Self) {
         let header = header.trim();
         for (open, close) in [('[', ']'), ('(', ')'), ('{', '}')] {

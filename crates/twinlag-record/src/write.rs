@@ -20,6 +20,17 @@ pub enum Decimals {
 ///
 /// - `columns`: name and values, `[n]` each
 ///
+/// ```
+/// use twinlag_record::{Decimals, write_csv};
+///
+/// let mut out = Vec::new();
+/// let columns: [(&str, &[f64]); 2] = [("time_s", &[0.0, 0.5]), ("T1, bare", &[20.0625, f64::NAN])];
+/// write_csv(&mut out, &columns, Decimals::Fixed(2))?;
+/// // A name with a comma is quoted, and what is missing stays empty.
+/// assert_eq!(String::from_utf8(out)?, "time_s,\"T1, bare\"\n0.00,20.06\n0.50,\n");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`RecordError::LengthMismatch`], [`RecordError::CannotWrite`].
 pub fn write_csv(out: &mut impl Write, columns: &[(&str, &[f64])], decimals: Decimals) -> Result<(), RecordError> {

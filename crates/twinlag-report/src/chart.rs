@@ -59,12 +59,35 @@ impl Series {
 
     /// Bars, one for each category of [`Axis::categories`], in its order. Several such series stand
     /// side by side.
+    ///
+    /// ```
+    /// use twinlag_report::{Axis, Chart, Figure, Series};
+    ///
+    /// let methods = Axis::categories("", ["plain", "compensated", "whitened"]);
+    /// let chart = Chart::new("Bias", methods, Axis::linear("bias of τ₁ (%)"))
+    ///     .series(Series::bars("5 % noise", [-3.1, 0.4, 0.1]))
+    ///     .series(Series::bars("10 % noise", [-9.8, 0.9, 0.2]));
+    /// let svg = Figure::new("").panel(chart).to_svg()?;
+    /// assert!(svg.contains("compensated") && svg.contains("10 % noise"));
+    /// # Ok::<(), twinlag_report::ReportError>(())
+    /// ```
     pub fn bars(name: impl Into<String>, y: impl Into<Vec<f64>>) -> Self {
         let y = y.into();
         Self::new(name, (0..y.len()).map(|i| i as f64).collect(), y, Shape::Bars)
     }
 
     /// Error bars from `y − error` to `y + error`, `[n]`.
+    ///
+    /// ```
+    /// use twinlag_report::{Axis, Chart, Figure, ReportError, Series};
+    ///
+    /// let bias = Series::points("bias", [1.0, 2.0, 3.0], [0.1, 0.3, 0.2]);
+    /// let chart = |series| Chart::new("", Axis::linear("noise (%)"), Axis::linear("bias (%)")).series(series);
+    /// assert!(Figure::new("").panel(chart(bias.clone().errors([0.05, 0.1, 0.05]))).to_svg().is_ok());
+    /// // Two errors for three points are a mistake, which the figure reports.
+    /// let wrong = Figure::new("").panel(chart(bias.errors([0.05, 0.1]))).to_svg();
+    /// assert!(matches!(wrong, Err(ReportError::LengthMismatch { expected: 3, got: 2, .. })));
+    /// ```
     #[must_use]
     pub fn errors(self, error: impl Into<Vec<f64>>) -> Self {
         let error = error.into();

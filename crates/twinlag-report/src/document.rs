@@ -48,6 +48,16 @@ enum Block {
 }
 
 /// A table with a row of headers. Its first column names the rows.
+///
+/// ```
+/// use twinlag_report::{Document, Table};
+///
+/// let table = Table::new(["sensor", "τ (ms)"]).row(["bare", "23.8"]).caption("Time constants");
+/// assert!(!table.is_empty());
+/// let page = Document::new("Run 7").table(table).to_html();
+/// assert!(page.contains("<tr><th scope=\"row\">bare</th><td>23.8</td></tr>"));
+/// assert!(page.contains("<caption>Time constants</caption>"));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
     header: Vec<String>,

@@ -69,6 +69,16 @@ impl Figure {
 
     /// Width and height of a panel, labels included; 440 by 330 px unless set. Text has a fixed
     /// size in pixels.
+    ///
+    /// ```
+    /// use twinlag_report::{Axis, Chart, Figure, Series};
+    ///
+    /// let chart = Chart::new("", Axis::linear("x"), Axis::linear("y")).series(Series::line("", [0.0, 1.0], [0.0, 1.0]));
+    /// let two = |columns| Figure::new("").columns(columns).panel_size(300.0, 200.0).panel(chart.clone()).panel(chart.clone());
+    /// let (beside, below) = (two(2).to_svg()?, two(1).to_svg()?);
+    /// assert!(beside.contains("width=\"600\"") && below.contains("width=\"300\""));
+    /// # Ok::<(), twinlag_report::ReportError>(())
+    /// ```
     #[must_use]
     pub fn panel_size(self, width_px: f64, height_px: f64) -> Self {
         Self { panel_px: (width_px, height_px), ..self }

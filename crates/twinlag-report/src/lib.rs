@@ -57,3 +57,10 @@ pub use figure::{Figure, Panel};
 pub use number::{between, plus_minus, probability, rounded};
 pub use palette::Colour;
 pub use surface::{Mark, Surface};
+
+/// Figures and documents may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Axis, Chart, Colour, Document, Figure, Mark, Panel, Reference, ReportError, Series)>();
+    is_send_and_sync::<(Surface, Table)>();
+};

@@ -46,6 +46,21 @@ impl Surface {
     /// - `x`, `y`: the axes; `value`: that of the colour bar
     /// - `xs`, `ys`: the grid, `[nx]` and `[ny]`, increasing
     /// - `z`: the values, `[nx·ny]`; at `(xs[i], ys[j])` it is `z[j·nx + i]`
+    ///
+    /// ```
+    /// use twinlag_report::{Axis, Figure, Mark, ReportError, Surface};
+    ///
+    /// // `x² + y²` on three columns and two rows, row by row.
+    /// let axes = ["x", "y", "x² + y²"].map(Axis::linear);
+    /// let bowl = Surface::new("", axes.clone(), [0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0, 4.0, 1.0, 2.0, 5.0]);
+    /// let svg = Figure::new("").panel(bowl.levels([1.0, 3.0]).mark(Mark::dot("minimum", 0.0, 0.0))).to_svg()?;
+    /// assert!(svg.contains("minimum"));
+    /// // A value too few is a mistake, which the figure reports.
+    /// let short = Surface::new("", axes, [0.0, 1.0, 2.0], [0.0, 1.0], [0.0; 5]);
+    /// let error = Figure::new("").panel(short).to_svg();
+    /// assert_eq!(error, Err(ReportError::GridSize { surface: String::new(), expected: 6, got: 5 }));
+    /// # Ok::<(), ReportError>(())
+    /// ```
     pub fn new(
         title: impl Into<String>,
         [x, y, value]: [Axis; 3],

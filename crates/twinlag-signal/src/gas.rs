@@ -84,6 +84,22 @@ pub enum Signal {
 
 impl Gas {
     /// A continuous gas with one signal for all trials.
+    ///
+    /// ```
+    /// use twinlag_signal::{Gas, Record, Rig, Sensor, Signal, Tone};
+    ///
+    /// let tone = Tone { amplitude_k: 5.0, frequency_hz: 2.0, phase_rad: 0.0 };
+    /// let gas = Gas::new(300.0, Signal::Sine(tone));
+    /// let rig = Rig::new(1, Record::new(51, 0.01), gas, [Sensor::new("fine", 0.02), Sensor::new("coarse", 0.1)])?;
+    /// let clean = rig.clean(0)?;
+    /// // Zero at the first sample, and a whole period later; instants are rounded.
+    /// assert!((clean.gas_c[0] - 300.0).abs() < 1e-9 && (clean.gas_c[50] - 300.0).abs() < 1e-9);
+    /// // No sensor swings as far as the gas, the slower one least.
+    /// let highest = |values: &[f64]| values.iter().copied().fold(f64::MIN, f64::max);
+    /// assert!(highest(&clean.readings_c[1]) < highest(&clean.readings_c[0]));
+    /// assert!(highest(&clean.readings_c[0]) < highest(&clean.gas_c));
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
     pub fn new(mean_c: f64, signal: Signal) -> Self {
         Self { mean_c, hold: Hold::Continuous, per_trial: false, signal }
     }

@@ -96,3 +96,10 @@ pub use record::Record;
 pub use rig::Rig;
 pub use sensor::{Sensor, SlowMode};
 pub use simulated::{Clean, Simulated};
+
+/// Rigs and what they give may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Clean, Flow, Gas, Record, Rig, Sensor, Signal, SignalError, Simulated)>();
+    is_send_and_sync::<(undeclared::Undeclared,)>();
+};

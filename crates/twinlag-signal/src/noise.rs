@@ -23,6 +23,16 @@ pub struct Noise {
 
 impl Noise {
     /// White noise of standard deviation `std_k`.
+    ///
+    /// ```
+    /// use twinlag_signal::Noise;
+    ///
+    /// let white = Noise::white(0.3);
+    /// // As in a rig file, where the correlation may be left out.
+    /// assert_eq!(toml::from_str::<Noise>("std_k = 0.3"), Ok(white));
+    /// assert_eq!(Noise { ar1: 0.5, ..white }, toml::from_str("std_k = 0.3\nar1 = 0.5")?);
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
     pub fn white(std_k: f64) -> Self {
         Self { std_k, ar1: 0.0 }
     }

@@ -60,6 +60,18 @@ impl TryFrom<Unchecked> for Rig {
 impl Rig {
     /// A rig from its parts, with steady flow and one gas for both sensors.
     ///
+    /// ```
+    /// use twinlag_signal::{Broadband, Gas, Record, Rig, Sensor, Signal, SignalError};
+    ///
+    /// let rig = |names: [&str; 2]| {
+    ///     let signal = Signal::Broadband(Broadband { std_k: 5.0, corner_hz: 1.0 });
+    ///     Rig::new(7, Record::new(100, 0.01), Gas::new(20.0, signal), names.map(|name| Sensor::new(name, 0.1)))
+    /// };
+    /// assert_eq!(rig(["T1", "T2"])?.simulate()?.t1_c.len(), 100);
+    /// assert_eq!(rig(["T1", "T1"]), Err(SignalError::SameChannel { channel: "T1".into() }));
+    /// # Ok::<(), SignalError>(())
+    /// ```
+    ///
     /// # Errors
     /// Any number that is not finite, or not positive where it must be; channel names empty or
     /// equal; an integration step as long as a time constant ([`SignalError::StepTooLong`]) or too
@@ -70,6 +82,23 @@ impl Rig {
     }
 
     /// This rig in a flow that changes both time constants.
+    ///
+    /// ```
+    /// use twinlag_signal::{Flow, FlowStep, Gas, Plunge, Record, Rig, Sensor, Signal};
+    ///
+    /// let signal = Signal::Plunge(Plunge { amplitude_k: 20.0, dwell_s: 0.3, rise_s: 0.02 });
+    /// let sensors = [Sensor::new("fine", 0.024), Sensor::new("coarse", 0.117)];
+    /// let mut record = Record::new(400, 0.005);
+    /// record.settle_s = Some(2.0); // that of slower sensors would be longer, and random gas begins with it
+    /// let steady = Rig::new(1, record, Gas::new(300.0, signal), sensors)?;
+    /// // From 1 s on both time constants are larger by a half.
+    /// let changing = steady.clone().with_flow(Flow::Step(FlowStep::new(1.5, 1.0, 0.05)))?;
+    /// let (before, after) = (steady.clean(0)?, changing.clean(0)?);
+    /// let (before, after) = (&before.readings_c[1], &after.readings_c[1]);
+    /// assert_eq!(before[..200], after[..200]); // bit by bit, until the flow changes
+    /// assert!((220..400).any(|k| (before[k] - after[k]).abs() > 0.1)); // K
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Rig::new`].
@@ -165,6 +194,21 @@ impl Rig {
     ///
     /// For many trials of one gas signal, call [`Rig::clean`] once and [`Clean::with_noise`] for
     /// each: same bytes.
+    ///
+    /// ```
+    /// use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Tone};
+    ///
+    /// let tone = Tone { amplitude_k: 5.0, frequency_hz: 2.0, phase_rad: 0.0 };
+    /// let mut coarse = Sensor::new("coarse", 0.1);
+    /// coarse.noise = Some(Noise::white(0.2));
+    /// let sensors = [Sensor::new("fine", 0.02), coarse];
+    /// let rig = Rig::new(3, Record::new(40, 0.01), Gas::new(300.0, Signal::Sine(tone)), sensors)?;
+    /// let trials = [rig.simulate_trial(0)?, rig.simulate_trial(1)?];
+    /// assert_eq!(trials[0].t1_c, trials[1].t1_c); // one gas, and no noise in this channel
+    /// assert_ne!(trials[0].t2_c, trials[1].t2_c);
+    /// assert_eq!(trials[1], rig.simulate_trial(1)?); // bit by bit
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
     ///
     /// # Errors
     /// As [`Rig::clean`].

@@ -26,3 +26,9 @@ pub use fourier::{Forward, Inverse};
 pub use num_complex::Complex64;
 pub use sine::sine_transform;
 pub use taper::{Tapered, hann, hann_between};
+
+/// Plans may go to any thread, and be read by several.
+const _: () = {
+    const fn is_send_and_sync<T: Send + Sync>() {}
+    is_send_and_sync::<(Forward, Inverse, Tapered)>();
+};

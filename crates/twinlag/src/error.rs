@@ -71,6 +71,15 @@ impl From<DiagnoseError> for Error {
 
 impl Error {
     /// Settings that the error is about: a program can add what it calls them.
+    ///
+    /// ```
+    /// use twinlag::{Options, Setting};
+    ///
+    /// let error = Options::default().free("slope").expect_err("only gain and offset can be fitted");
+    /// assert_eq!(error.settings(), [Setting::Free]);
+    /// assert!(error.is_usage()); // the question is at fault, and no record
+    /// assert!(error.to_string().ends_with("expected gain, offset or gain,offset, got \"slope\""));
+    /// ```
     pub fn settings(&self) -> Vec<Setting> {
         match self {
             Self::Setting { setting, also, .. } => [&[*setting], &also[..]].concat(),

@@ -11,6 +11,17 @@ use crate::error::Error;
 use crate::setting::Setting;
 
 /// Everything that a characterisation depends on besides the record.
+///
+/// ```
+/// use twinlag::{Estimator, Options};
+///
+/// // As a settings file has it: what is left out has its default, and what is misspelt is refused.
+/// let options: Options = toml::from_str("estimator = \"cross-relation\"\nnoise_std_k = [0.1, 0.2]")?;
+/// let noise_std_k = Some([0.1, 0.2]);
+/// assert_eq!(options, Options { estimator: Estimator::CrossRelation, noise_std_k, ..Options::default() });
+/// assert!(toml::from_str::<Options>("noise = [0.1, 0.2]").is_err());
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
@@ -66,6 +77,13 @@ impl Options {
     }
 
     /// Parses `T1`, `T2` or `T1,T2` into [`Options::second_order`].
+    ///
+    /// ```
+    /// let options = twinlag::Options::default().free("gain, offset")?.second_order("T2")?;
+    /// assert!(options.free_gain && options.free_offset);
+    /// assert_eq!(options.second_order, [false, true]);
+    /// # Ok::<(), twinlag::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Setting`] for any other name.

@@ -17,6 +17,18 @@ use crate::error::DiagnoseError;
 ///
 /// Two are equal if their names are. They are ordered by how often they occur. As text they are their names; read back,
 /// a name must be one of [`Identifier::ALL`].
+///
+/// ```
+/// use twinlag_model::Identifier;
+///
+/// let radiation: Identifier = "radiation".parse()?;
+/// assert_eq!(radiation, Identifier::RADIATION);
+/// assert!(radiation.resembles(Identifier::CALIBRATION)); // both are a disagreement at rest
+/// assert!(!radiation.about().advice.is_empty());
+/// let error = "friction".parse::<Identifier>().expect_err("there is none of that name");
+/// assert!(error.to_string().contains("slow-mode"), "{error}"); // it lists those that there are
+/// # Ok::<(), twinlag_model::DiagnoseError>(())
+/// ```
 #[derive(Clone, Copy)]
 pub struct Identifier(&'static About);
 

@@ -77,6 +77,15 @@ pub enum Domain {
 
 impl Domain {
     /// Whether `value` is one of them.
+    ///
+    /// ```
+    /// use twinlag_model::Domain;
+    ///
+    /// assert!(Domain::Share.contains(-0.5) && !Domain::Share.contains(1.0));
+    /// assert!(Domain::NotZero.contains(-2.0) && !Domain::NotZero.contains(0.0));
+    /// assert!(!Domain::Finite.contains(f64::NAN));
+    /// assert_eq!(Domain::Positive.expected(), "a finite number above 0");
+    /// ```
     pub fn contains(self, value: f64) -> bool {
         value.is_finite()
             && match self {

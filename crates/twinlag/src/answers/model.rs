@@ -44,6 +44,16 @@ impl Model {
     pub const SCHEMA: &'static str = "twinlag.model/1";
 
     /// The model of two first-order lags, without an effect.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// // A model is of its channels: on a record of others it is refused.
+    /// let model = Model::of_two_lags(["inlet".into(), "outlet".into()]);
+    /// let error = twinlag::characterise_with(&record, &model, &Options::default()).expect_err("of other channels");
+    /// assert_eq!(error.settings(), [Setting::Channels]);
+    /// assert!(error.to_string().contains("inlet") && error.to_string().contains(&record.channels[0]));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn of_two_lags(channels: [String; 2]) -> Self {
         Self {
             schema: Self::SCHEMA.into(),

@@ -26,6 +26,18 @@ use conclude::Judged;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// // The second channel of this record reads 2 K too hot, so its offset is fitted as well.
+/// let answer = twinlag::characterise(&record, &Options::default().free("offset")?)?;
+/// assert_eq!(answer.status, Status::Ok);
+/// let offset = answer.free.offset_k.expect("fitted");
+/// let error_k = offset.standard_error.expect("determined");
+/// // Noise alone exceeds four standard errors once in 16 000 records.
+/// assert!((offset.value - 2.0).abs() < 4.0 * error_k, "{} ± {error_k} K", offset.value);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// [`Error`] if the question cannot be put: options that contradict each other, an estimator that cannot take the record's
 /// sampling, too few samples to distinguish noise from signal. A fit that ran is never an error: its
@@ -35,6 +47,27 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
 }
 
 /// [`characterise`], with `watch` called for every replicate of a bootstrap.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use std::ops::ControlFlow;
+/// use std::sync::atomic::{AtomicUsize, Ordering};
+///
+/// // Intervals from 500 simulated records, which somebody gives up when five are done.
+/// let intervals = Intervals::Bootstrap(twinlag::estimate::Bootstrap { replicates: 500, seed: 1 });
+/// let options = Options { intervals, ..Options::default() };
+/// let mut calibrated = channels(1)?;
+/// calibrated.t2_c.iter_mut().for_each(|c| *c -= 2.0);
+/// let record = Record::from_channels(calibrated, SamplingChoice::Auto)?;
+/// let most = AtomicUsize::new(0);
+/// let watch = |_: &str, done, _| {
+///     most.fetch_max(done, Ordering::Relaxed);
+///     if done < 5 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+/// };
+/// assert_eq!(twinlag::characterise_watched(&record, &options, &watch), Err(Error::Cancelled));
+/// assert_eq!(most.into_inner(), 5);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// As [`characterise`]; [`Error::Cancelled`].
@@ -61,6 +94,21 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
 ///
 /// The level taken off is the mean, or 0 °C where an offset is known or excluded: it is stated
 /// there.
+///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use twinlag::cross_relation::CrossRelation;
+///
+/// // For a cost of one's own, or for one of this library at a point of one's choice.
+/// let readings = twinlag::readings(&record, &Options::default())?;
+/// assert_eq!((readings.len(), readings.even_period_s()), (record.len(), Some(record.sampling.period_s)));
+/// let cost = CrossRelation::new(&readings, 500)?;
+/// let offset_k = 2.0;
+/// let [with, without] = [offset_k, 0.0].map(|offset_k| cost.evaluate(&[0.12, 0.45, 1.0, offset_k]).value);
+/// // Both lags have unit gain at rest: the offset alone is 2² K² of the cost.
+/// assert!((without - with - 4.0).abs() < 0.1, "{without} {with}");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// [`Error::Cost`] for a record without usable samples, which its constructors do not let through.

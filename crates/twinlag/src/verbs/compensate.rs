@@ -48,6 +48,27 @@ pub fn compensate(record: &Record, options: &CompensateOptions) -> Result<Compen
 
 /// [`compensate`], with `watch` called as it goes on.
 ///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use std::ops::ControlFlow;
+/// use std::sync::Mutex;
+///
+/// // Both channels are calibrated, and known to be two first-order lags: no diagnosis is needed.
+/// let mut calibrated = channels(1)?;
+/// calibrated.t2_c.iter_mut().for_each(|c| *c -= 2.0);
+/// let record = Record::from_channels(calibrated, SamplingChoice::Auto)?;
+/// let model = Some(Model::of_two_lags(record.channels.clone()));
+/// let tasks = Mutex::new(Vec::new());
+/// let watch = |task: &str, _, _| {
+///     tasks.lock().expect("no watch panics").push(task.to_owned());
+///     ControlFlow::Continue(())
+/// };
+/// let answer = twinlag::compensate_watched(&record, &CompensateOptions { model, ..Default::default() }, &watch)?;
+/// assert_eq!((answer.status, answer.verdict), (Status::Ok, None)); // no diagnosis, no verdict
+/// assert_eq!(tasks.into_inner()?[0], "what the gas is like");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`compensate`]; [`Error::Cancelled`].
 pub fn compensate_watched(

@@ -45,6 +45,18 @@ pub fn diagnose(record: &Record, options: &DiagnoseOptions) -> Result<Diagnosis,
 
 /// [`diagnose`], with `watch` called as it goes on.
 ///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use std::ops::ControlFlow;
+///
+/// // A program that is about to end lets the diagnosis go.
+/// let is_ending = true;
+/// let watch = |_: &str, _, _| if is_ending { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+/// let answer = twinlag::diagnose_watched(&record, &DiagnoseOptions::default(), &watch);
+/// assert_eq!(answer.err(), Some(Error::Cancelled));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`diagnose`]; [`Error::Cancelled`].
 pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Diagnosis, Error> {

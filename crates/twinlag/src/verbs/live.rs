@@ -142,6 +142,22 @@ impl Live {
     /// `time_s`; a sample after the last one where that is not said. `None` for a row that is not
     /// later than the last one, or 100 000 samples after it, which is left out. Samples that are
     /// missing in a gap are gone through as such.
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let mut calibrated = channels(1)?;
+    /// calibrated.t2_c.iter_mut().for_each(|c| *c -= 2.0);
+    /// let start = Record::from_channels(calibrated, SamplingChoice::Auto)?;
+    /// let mut live = Live::start(&start, &LiveOptions::default())?;
+    ///
+    /// // Rows go on as they come: without a stamp they are a sample apart.
+    /// let both = live.push(None, [Some(300.0), Some(300.0)]).expect("the first row");
+    /// let one = live.push(None, [Some(300.0), None]).expect("a row with a reading");
+    /// assert!((one.time_s - both.time_s - start.sampling.period_s).abs() < 1e-12); // rounding
+    /// // A row that is not later than the last one is left out.
+    /// assert_eq!(live.push(Some(both.time_s), [Some(300.0), Some(300.0)]), None);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
         let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);

@@ -55,6 +55,24 @@ pub fn track(record: &Record, options: &TrackOptions) -> Result<Track, Error> {
 
 /// [`track`], with `watch` called as it goes on.
 ///
+/// ```
+#[doc = include_str!("../example.txt")]
+/// use std::ops::ControlFlow;
+/// use std::sync::atomic::{AtomicUsize, Ordering};
+///
+/// // Windows of 10 s of a record of 20 s, a quarter of a window apart, the first of them from 0 s on.
+/// let characterise = Options::default().free("offset")?;
+/// let options = TrackOptions { characterise, window_s: Some(10.0), ..TrackOptions::default() };
+/// let windows = AtomicUsize::new(0);
+/// let watch = |_: &str, _, _| {
+///     windows.fetch_add(1, Ordering::Relaxed);
+///     ControlFlow::Continue(())
+/// };
+/// let answer = twinlag::track_watched(&record, &options, &watch)?;
+/// assert_eq!((answer.time_s, windows.into_inner()), (vec![5.0, 7.5, 10.0, 12.5], 4));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
 /// # Errors
 /// As [`track`]; [`Error::Cancelled`].
 pub fn track_watched(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Track, Error> {
