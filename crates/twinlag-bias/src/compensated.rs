@@ -59,7 +59,8 @@ impl<'a> Compensated<'a> {
     /// # let y1: Vec<f64> = (0..300).map(|k| (0.05 * f64::from(k)).sin()).collect();
     /// # let y2: Vec<f64> = (0..300).map(|k| 0.6 * (0.05 * f64::from(k) - 0.4).sin()).collect();
     ///
-    /// // `y1` and `y2` are the channels, and the second is known to be twice as noisy as the first.
+    /// // `y1` and `y2` are the channels, and the second is known to be twice as noisy as the
+    /// // first.
     /// let readings = Readings::even(&y1, &y2, 0.002)?;
     /// let relative = [Noise::white(1.0)?, Noise::white(2.0)?];
     /// let cost = Compensated::new(CrossRelation::new(&readings, 100)?, relative);
@@ -167,7 +168,8 @@ impl<'a> Normalised<'a> {
     ///
     /// let readings = Readings::even(&y1, &y2, 0.002)?;
     /// let cost = CrossRelation::new(&readings, 100)?;
-    /// // At equal noise of `s` K in both channels it is the plain cost over `s² (h(c) + h(a))`, in units of s = 1 K.
+    /// // At equal noise of `s` K in both channels it is the plain cost over `s² (h(c) + h(a))`, in
+    /// // units of s = 1 K.
     /// let (at, gain) = ([0.0238, 0.1168], |tau_s: f64| (0.002 / (2.0 * tau_s)).tanh());
     /// let want = cost.evaluate(&at).value / (gain(at[0]) + gain(at[1]));
     /// let got = Normalised::with_ratio(cost.clone(), 1.0)?.evaluate(&at).value;

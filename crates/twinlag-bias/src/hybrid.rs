@@ -44,7 +44,8 @@ impl<'a> Hybrid<'a> {
     /// use twinlag_cross_relation::{CrossRelation, Readings};
     /// # let (y1, y2): (Vec<f64>, Vec<f64>) = (0..300).map(|k| (0.1 * f64::from(k)).sin_cos()).unzip();
     ///
-    /// // `y1` and `y2` are the channels; at weight 1 this is the compensated cost, at 0 the normalised one less 1.
+    /// // `y1` and `y2` are the channels; at weight 1 this is the compensated cost, at 0 the
+    /// // normalised one less 1.
     /// let readings = Readings::even(&y1, &y2, 0.002)?;
     /// let cost = CrossRelation::new(&readings, 100)?;
     /// let noise = [Noise::white(0.05)?, Noise::white(0.1)?];

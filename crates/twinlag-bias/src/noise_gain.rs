@@ -31,11 +31,12 @@ impl Noise {
     /// ```
     /// use twinlag_bias::Noise;
     ///
-    /// // Both have a variance of 0.04 K²; the second keeps half of its value from sample to sample.
+    /// // Both have a variance of 0.04 K²; the second keeps half of its value from sample to
+    /// // sample.
     /// let white = Noise::white(0.2)?;
     /// let slow = Noise::coloured((0..40).map(|lag| 0.04 * 0.5_f64.powi(lag)).collect())?;
-    /// // A sensor of 24 ms read every 2 ms lets 4 % of white noise through, and nearly three times as much of the other:
-    /// // (1 + φ p)/(1 − φ p) with φ = 1/2 and p = e^(−1/12).
+    /// // A sensor of 24 ms read every 2 ms lets 4 % of white noise through, and nearly three times
+    /// // as much of the other: (1 + φ p)/(1 − φ p) with φ = 1/2 and p = e^(−1/12).
     /// let p = (-1.0_f64 / 12.0).exp();
     /// let ratio = slow.passed(0.024, 0.002)[0] / white.passed(0.024, 0.002)[0];
     /// assert!((ratio - (1.0 + 0.5 * p) / (1.0 - 0.5 * p)).abs() < 1e-11); // the series ends at 2⁻⁴⁰

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 /// use twinlag_compensate::Term;
 ///
 /// let rough = Term::Rough { std_k: 3.0, corner_hz: 2.0 };
-/// // One over the corner in radians later, 1/e of the variance is left; at the corner half of the density at rest.
+/// // One over the corner in radians later, 1/e of the variance is left; at the corner half of the
+/// // density at rest.
 /// let memory_s = 1.0 / (std::f64::consts::TAU * 2.0);
 /// assert!((rough.autocovariance_k2(memory_s) - 9.0 / std::f64::consts::E).abs() < 1e-12);
 /// assert!((rough.density_k2_per_hz(2.0) / rough.density_k2_per_hz(0.0) - 0.5).abs() < 1e-12);

@@ -20,7 +20,8 @@ pub(crate) const MAX_STATES: usize = 24;
 /// ```
 /// use twinlag_compensate::{Form, Prior, Readings, Rig, Sensor, Term, reconstruct};
 ///
-/// // The gas rises from 20 to 30 °C half-way; each sensor follows with its own lag, read every 10 ms.
+/// // The gas rises from 20 to 30 °C half-way; each sensor follows with its own lag, read every 10
+/// // ms.
 /// let time_s: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
 /// let follows = |tau_s: f64| -> Vec<f64> {
 ///     time_s.iter().map(|t| 30.0 - 10.0 * (-(t - 1.0).max(0.0) / tau_s).exp()).collect()
@@ -30,7 +31,8 @@ pub(crate) const MAX_STATES: usize = 24;
 /// let prior = Prior { level_c: 25.0, terms: vec![Term::Rough { std_k: 5.0, corner_hz: 1.0 }] };
 ///
 /// let gas = reconstruct(&readings, &rig, &prior, Form::Smoother)?;
-/// // 30 ms after the step the faster sensor has made 45 % of it; the estimate is within two standard deviations.
+/// // 30 ms after the step the faster sensor has made 45 % of it; the estimate is within two
+/// // standard deviations.
 /// assert!(readings.reading_c(0, 103).expect("not missing") < 25.0);
 /// assert!((gas.gas_c[103] - 30.0).abs() < 2.0 * gas.std_k[103] && gas.std_k[103] < 1.0);
 /// // Later readings make every instant more certain, or leave it as it is: rounding only.
@@ -65,8 +67,10 @@ pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) ->
 /// use twinlag_compensate::{Prior, Rig, Sensor, Term, bandwidth_hz};
 ///
 /// let gas = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 10.0, corner_hz: 2.0 }] };
-/// let with_noise = |std_k: f64| bandwidth_hz(&Rig::new([Sensor::new(0.02, std_k), Sensor::new(0.1, std_k)]), &gas, 0.001);
-/// // Readings ten times as noisy say less of what is fast; with noise of 10 000 K they say nothing at all.
+/// let rig = |std_k: f64| Rig::new([Sensor::new(0.02, std_k), Sensor::new(0.1, std_k)]);
+/// let with_noise = |std_k: f64| bandwidth_hz(&rig(std_k), &gas, 0.001);
+/// // Readings ten times as noisy say less of what is fast; with noise of 10 000 K they say nothing
+/// // at all.
 /// assert!(with_noise(0.1) > with_noise(1.0) && with_noise(1.0).is_some());
 /// assert_eq!(with_noise(1e4), None);
 /// ```

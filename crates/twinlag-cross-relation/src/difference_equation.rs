@@ -49,7 +49,8 @@ impl DifferenceEquationEstimator {
     /// let wrong: Vec<f64> = (0..).zip(&y2).map(|(k, y)| if k % 2 == 0 { y + 0.05 } else { y - 0.05 }).collect();
     /// let readings = Readings::even(&y1, &wrong, 0.002)?;
     ///
-    /// // Errors among the regressors pull least squares to short time constants where sensor 1 is the faster.
+    /// // Errors among the regressors pull least squares to short time constants where sensor 1 is
+    /// // the faster.
     /// let [tau1_s, tau2_s] = DifferenceEquationEstimator::LeastSquares.estimate(&readings)?;
     /// assert!(tau1_s < 0.0238 && tau2_s < 0.1168, "{tau1_s} {tau2_s}");
     /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -36,7 +36,8 @@ impl<'a> FreeGains<'a> {
     /// let cost = FreeGains::new(&readings, 100)?;
     /// let (a, c) = (0.92, 0.98);
     /// let unit = cost.evaluate([a, 1.0 - a, c, 1.0 - c]).value;
-    /// // Both gains doubled leave the relative gain as it is: four times the cost, so it has no minimum of its own.
+    /// // Both gains doubled leave the relative gain as it is: four times the cost, so it has no
+    /// // minimum of its own.
     /// let doubled = cost.evaluate([a, 2.0 * (1.0 - a), c, 2.0 * (1.0 - c)]).value;
     /// assert!((doubled / unit - 4.0).abs() < 1e-12);
     /// # Ok::<(), Box<dyn std::error::Error>>(())

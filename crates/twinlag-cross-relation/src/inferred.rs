@@ -33,7 +33,8 @@ pub struct InferredInputs {
 /// let inputs = inferred_inputs(&readings, Discretisation::ZeroOrderHold, &[0.0238, 0.1168])?;
 /// let [from_first, from_second] = &inputs.segments[0];
 /// for k in 0..from_first.len() {
-///     // Undoing a lag multiplies rounding by twice its time constant in samples, some hundred here.
+///     // Undoing a lag multiplies rounding by twice its time constant in samples, some hundred
+///     // here.
 ///     assert!((from_first[k] - from_second[k]).abs() < 1e-11);
 ///     assert!((from_first[k] + readings.level() - gas[k]).abs() < 1e-11);
 /// }

@@ -63,7 +63,8 @@ impl<'a> CrossRelation<'a> {
     ///
     /// // The offset is stated at the level that was taken off, where the gain adds to it.
     /// let truth = [0.0238, 0.1168, 1.1, 3.0 + 0.1 * readings.level()];
-    /// // The start of the filters has fallen to e⁻²⁰ of the swing after 1200 samples, ten of the slower time constants.
+    /// // The start of the filters has fallen to e⁻²⁰ of the swing after 1200 samples, ten of the
+    /// // slower time constants.
     /// assert!(cost.evaluate(&truth).value < 1e-12);
     /// assert!(cost.evaluate(&[0.0238, 0.1168, 1.0, 0.0]).value > 1.0); // K²
     /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -14,7 +14,8 @@ use crate::moves::{Proposal, State};
 /// use std::ops::ControlFlow;
 /// use twinlag_diagnose::{DiagnoseError, Observations, Settings, Stretch, diagnose};
 /// # let time_s: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
-/// # let reading_c = [0.1, 0.3].map(|late| time_s.iter().map(|t| (4.0 * (t - late)).sin() + (17.0 * (t - late)).cos()).collect());
+/// # let gas_c = |t: f64| (4.0 * t).sin() + (17.0 * t).cos();
+/// # let reading_c = [0.1, 0.3].map(|late| time_s.iter().map(|t| gas_c(t - late)).collect());
 ///
 /// // `time_s` and `reading_c` are a record; whoever asked for its diagnosis has gone away.
 /// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.02))?;

@@ -151,7 +151,8 @@ impl Limit {
     /// ```
     /// use twinlag_diagnose::{Identifier, Limit};
     ///
-    /// let limit = Limit { effect: Identifier::DRIFT, channel: Some(1), parameter: "slope".into(), size: 0.02, unit: "K/s".into() };
+    /// let (parameter, unit) = ("slope".into(), "K/s".into());
+    /// let limit = Limit { effect: Identifier::DRIFT, channel: Some(1), parameter, size: 0.02, unit };
     /// let named = limit.named(&["bare".into(), "sheathed".into()]);
     /// assert_eq!(named.channel.as_deref(), Some("sheathed"));
     /// assert_eq!((named.size, named.unit), (0.02, limit.unit));

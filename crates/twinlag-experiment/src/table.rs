@@ -117,8 +117,8 @@ impl Table {
     /// // `plan` makes a plan of three trials from a seed.
     /// let table = |seed| -> Result<Table, twinlag_experiment::ExperimentError> {
     ///     let plan = plan(seed)?;
-    ///     let results = run(&Experiment::new(&plan)?, &Options::default(), |_| ControlFlow::Continue(()))?.into_results()?;
-    ///     Table::new(&plan, &results)
+    ///     let part = run(&Experiment::new(&plan)?, &Options::default(), |_| ControlFlow::Continue(()))?;
+    ///     Table::new(&plan, &part.into_results()?)
     /// };
     /// assert_eq!(table(1)?.first_difference(&table(1)?), None); // to the last digit
     /// assert_eq!(table(1)?.first_difference(&table(2)?).as_deref(), Some("the plans differ"));

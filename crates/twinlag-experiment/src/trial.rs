@@ -167,14 +167,18 @@ impl<'a> Experiment<'a> {
     /// #     trials = 1
     /// #     samples = [600]
     /// #     noise_percent = [0, 4, 8]
-    /// #     gases = [{ name = "turbulence", gas = { kind = "turbulence", std_k = 9.0, corner_hz = 3.0, cutoff_hz = 200.0 } }]
-    /// #     methods = [{ name = "whitened", estimator = "whitened" }]
+    /// #     [[gases]]
+    /// #     name = "turbulence"
+    /// #     gas = { kind = "turbulence", std_k = 9.0, corner_hz = 3.0, cutoff_hz = 200.0 }
+    /// #     [[methods]]
+    /// #     name = "whitened"
+    /// #     estimator = "whitened"
     /// # "#)?;
     /// // A plan with `noise_percent = [0, 4, 8]`.
     /// let experiment = Experiment::new(&plan)?;
     /// assert_eq!(experiment.bound(0)?, None); // without noise nothing is uncertain
     /// let [quiet, loud] = [experiment.bound(1)?, experiment.bound(2)?].map(|bound| bound.expect("there is noise"));
-    /// // Each cell has a gas of its own, so twice the noise is not twice the bound, but more it is.
+    /// // Each cell has a gas of its own: twice the noise is about twice the bound, not exactly.
     /// assert!(quiet.iter().zip(loud).all(|(quiet, loud)| *quiet < loud));
     /// # Ok::<(), twinlag_experiment::ExperimentError>(())
     /// ```

@@ -28,7 +28,8 @@ use crate::summary::summarise;
 /// let observations = Observations::new(vec![stretch], Some(0.05))?;
 ///
 /// // That the second channel reads 2 K too hot is known from another record.
-/// let offset = KnownEffect { effect: Identifier::CALIBRATION, channel: Some(1), parameters: vec![("offset".into(), 2.0)] };
+/// let parameters = vec![("offset".into(), 2.0)];
+/// let offset = KnownEffect { effect: Identifier::CALIBRATION, channel: Some(1), parameters };
 /// let known = fit_with(&observations, &Settings::default(), &[offset])?;
 /// for (tau, truth_s) in known.fit.time_constants.iter().zip([0.12, 0.45]) {
 ///     let (value_s, error_s) = (tau.value_s.expect("determined"), tau.standard_error_s.expect("determined"));

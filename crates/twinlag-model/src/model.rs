@@ -61,7 +61,8 @@ impl Model {
     /// ```
     /// use twinlag_model::{Identifier, Model, Observations, Prepared, Settings, Stretch, candidates};
     /// # let time_s: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
-    /// # let reading_c = [0.0, 0.4].map(|late| time_s.iter().map(|t| 300.0 + (9.0 * (t - late)).sin() + (31.0 * t).sin().powi(3)).collect());
+    /// # let gas_c = |t: f64| 300.0 + (9.0 * t).sin() + (31.0 * t).sin().powi(3);
+    /// # let reading_c = [0.0, 0.4].map(|late| time_s.iter().map(|t| gas_c(t - late)).collect());
     ///
     /// // `time_s` and `reading_c` are a record; what can be added to the model is made for it.
     /// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01))?;

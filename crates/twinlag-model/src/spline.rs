@@ -48,7 +48,8 @@ impl Spline {
     /// ```
     /// use twinlag_model::{Number, Spline};
     ///
-    /// // Even steps from knot to knot: a straight line of mean zero. The first knot's coefficient is −0.2, minus the sum.
+    /// // Even steps from knot to knot: a straight line of mean zero. The first knot's coefficient
+    /// // is −0.2, minus the sum.
     /// let line = Spline::new(0.0, 10.0, &[-0.1, 0.0, 0.1, 0.2].map(Number::from));
     /// assert!((line.at(10.0).re - line.at(0.0).re - 0.4).abs() < 1e-12 && line.at(5.0).re.abs() < 1e-12); // rounding
     /// // With the derivative by the last coefficient, which the coefficients carry along.

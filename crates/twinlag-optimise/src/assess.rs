@@ -34,7 +34,8 @@ impl Problem<'_> {
     ///     }
     ///
     ///     fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
-    ///         Some(Derivatives { value: self.value(x), gradient: vec![2.0 * (x[0] - 2.0)], curvature: vec![vec![2.0]] })
+    ///         let gradient = vec![2.0 * (x[0] - 2.0)];
+    ///         Some(Derivatives { value: self.value(x), gradient, curvature: vec![vec![2.0]] })
     ///     }
     /// }
     ///

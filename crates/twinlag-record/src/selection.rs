@@ -53,7 +53,17 @@ pub enum SamplingChoice {
 /// ```
 /// use twinlag_record::{ColumnRef, Record, Selection, Table};
 ///
-/// let text = "t (s),inlet,bare,sheathed\n0,20,20,20\n1,25,22,21\n2,25,24,22\n3,20,22,22\n4,22,21,21.5\n5,24,23,22\n6,21,22.5,22\n7,20,21,21.5\n";
+/// let text = "\
+/// t (s),inlet,bare,sheathed
+/// 0,20,20,20
+/// 1,25,22,21
+/// 2,25,24,22
+/// 3,20,22,22
+/// 4,22,21,21.5
+/// 5,24,23,22
+/// 6,21,22.5,22
+/// 7,20,21,21.5
+/// ";
 /// let table = Table::read(text.as_bytes(), "three.csv")?;
 /// // A column by its name, and one by its place, from 1.
 /// let selection = Selection {

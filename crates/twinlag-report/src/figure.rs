@@ -73,9 +73,10 @@ impl Figure {
     /// ```
     /// use twinlag_report::{Axis, Chart, Figure, Series};
     ///
-    /// let chart = Chart::new("", Axis::linear("x"), Axis::linear("y")).series(Series::line("", [0.0, 1.0], [0.0, 1.0]));
-    /// let two = |columns| Figure::new("").columns(columns).panel_size(300.0, 200.0).panel(chart.clone()).panel(chart.clone());
-    /// let (beside, below) = (two(2).to_svg()?, two(1).to_svg()?);
+    /// let line = Series::line("", [0.0, 1.0], [0.0, 1.0]);
+    /// let chart = Chart::new("", Axis::linear("x"), Axis::linear("y")).series(line);
+    /// let two = Figure::new("").panel_size(300.0, 200.0).panel(chart.clone()).panel(chart);
+    /// let (beside, below) = (two.clone().columns(2).to_svg()?, two.columns(1).to_svg()?);
     /// assert!(beside.contains("width=\"600\"") && below.contains("width=\"300\""));
     /// # Ok::<(), twinlag_report::ReportError>(())
     /// ```

@@ -60,7 +60,8 @@ pub fn track(record: &Record, options: &TrackOptions) -> Result<Track, Error> {
 /// use std::ops::ControlFlow;
 /// use std::sync::atomic::{AtomicUsize, Ordering};
 ///
-/// // Windows of 10 s of a record of 20 s, a quarter of a window apart, the first of them from 0 s on.
+/// // Windows of 10 s of a record of 20 s, a quarter of a window apart, the first of them from 0 s
+/// // on.
 /// let characterise = Options::default().free("offset")?;
 /// let options = TrackOptions { characterise, window_s: Some(10.0), ..TrackOptions::default() };
 /// let windows = AtomicUsize::new(0);
