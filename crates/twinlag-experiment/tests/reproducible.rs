@@ -148,7 +148,7 @@ fn a_plan_that_cannot_run_says_why() {
         let of_plan = Plan::from_toml(&text);
         let error: ExperimentError = match &of_plan {
             Err(_) => of_plan.expect_err("just seen"),
-            Ok(plan) => Experiment::new(plan).err().expect("refused one way or the other"),
+            Ok(plan) => Experiment::new(plan).expect_err("refused one way or the other"),
         };
         error.to_string()
     };

@@ -531,7 +531,7 @@ fn a_solver_that_does_not_exist_is_named_with_those_that_do() {
 #[test]
 fn impossible_problems_are_refused_by_name() {
     let cost = rosenbrock();
-    let refuse = |variables: Vec<Variable>| Problem::new(&cost, variables).err().expect("refused").to_string();
+    let refuse = |variables: Vec<Variable>| Problem::new(&cost, variables).expect_err("refused").to_string();
     assert!(refuse(vec![Variable::linear("width", 1.0, 2.0, 1.0)]).contains("width"));
     assert!(refuse(vec![Variable::logarithmic("tau", 0.0, 1.0)]).contains("tau"));
     assert!(refuse(vec![Variable::linear("gain", 0.0, 0.0, 1.0)]).contains("gain"));
