@@ -295,7 +295,7 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
         let error = |c: &Characterisation| {
             c.sensors[i].standard_error_s.map_or("-".into(), |t| format!("± {} s", digits(t, 2)))
         };
-        row("", &error(&answer.base), &error(&answer.last));
+        row("  its standard error", &error(&answer.base), &error(&answer.last));
     }
     for i in 0..2 {
         let noise = |c: &Characterisation| format!("{} K", digits(c.sensors[i].noise_std_k, 3));

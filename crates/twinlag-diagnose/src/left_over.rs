@@ -1,5 +1,7 @@
 //! What a model leaves over that is not noise: where in frequency and in time.
 
+use std::ops::Range;
+
 use twinlag_cross_relation::ResidualTest;
 use twinlag_model::{ModelFit, Policy};
 
@@ -34,18 +36,48 @@ pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplaine
     };
     Some(Unexplained {
         description: format!("the residual is not noise ({}){where_most}", names.join(", ")),
-        band_hz: Some([hz / HALF_BAND, hz * HALF_BAND]),
+        band_hz: Some(band_hz(fit, hz)),
         energy_ratio: ratio,
         worst_s: worst_part(fit),
     })
 }
 
+/// Ends of the band around `hz`; of the lowest one, up to the next.
+fn band_hz(fit: &ModelFit, hz: f64) -> [f64; 2] {
+    if hz > 0.0 {
+        return [hz / HALF_BAND, hz * HALF_BAND];
+    }
+    let others = fit.trace.bands.iter().map(|band| band[0]).filter(|other| *other > 0.0);
+    [0.0, others.reduce(f64::min).unwrap_or(0.0)]
+}
+
 /// Ends of the part of the record with most of it, s.
 fn worst_part(fit: &ModelFit) -> Option<[f64; 2]> {
-    let part = (fit.trace.residual.len() / PARTS).max(1);
-    let energy = |chunk: &[f64]| chunk.iter().map(|r| r * r).sum::<f64>() / chunk.len().max(1) as f64;
-    let chunks = fit.trace.residual.chunks(part).enumerate();
-    let (index, chunk) = chunks.max_by(|a, b| energy(a.1).total_cmp(&energy(b.1)))?;
-    let first = index * part;
-    Some([fit.trace.time_s[first], fit.trace.time_s[first + chunk.len() - 1]])
+    let (time_s, residual) = (&fit.trace.time_s, &fit.trace.residual);
+    let range = worst_range(residual)?;
+    Some([time_s[range.start], time_s[range.end - 1]])
+}
+
+/// The one of [`PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
+fn worst_range(residual: &[f64]) -> Option<Range<usize>> {
+    let n = residual.len();
+    let parts = (0..PARTS).map(|i| i * n / PARTS..(i + 1) * n / PARTS).filter(|part| !part.is_empty());
+    let energy = |part: &Range<usize>| residual[part.clone()].iter().map(|r| r * r).sum::<f64>() / part.len() as f64;
+    parts.max_by(|a, b| energy(a).total_cmp(&energy(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts are tenths whatever the length: the last few values are no part of their own.
+    #[test]
+    fn the_worst_part_is_a_tenth() {
+        let mut residual = vec![1.0; 1009];
+        residual[1008] = 3.0;
+        residual[300..400].fill(2.0);
+        assert_eq!(worst_range(&residual), Some(302..403));
+        assert_eq!(worst_range(&[1.0, 2.0]).map(|part| part.len()), Some(1));
+        assert_eq!(worst_range(&[]), None);
+    }
 }
