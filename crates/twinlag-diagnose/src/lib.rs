@@ -38,6 +38,7 @@ mod candidates;
 mod conclude;
 mod diagnose;
 mod diagnosis;
+mod evidence;
 mod excitation;
 mod left_over;
 mod limits;
@@ -47,7 +48,8 @@ mod rank;
 mod remark;
 
 pub use diagnose::diagnose;
-pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Evidence, Found, Limit, Unexplained, Verdict};
+pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Unexplained, Verdict};
+pub use evidence::Evidence;
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{

@@ -6,7 +6,7 @@ use twinlag_model::{DiagnoseError, Effort, Fitted, Identifier, Prepared, Setting
 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
-use crate::diagnosis::Evidence;
+use crate::evidence::Evidence;
 use crate::rank::{LookAlike, successor, worth};
 use crate::remark::Remark;
 

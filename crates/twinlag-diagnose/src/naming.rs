@@ -5,7 +5,8 @@ use twinlag_model::{
 };
 use twinlag_optimise::Scale;
 
-use crate::diagnosis::{Evidence, Found};
+use crate::diagnosis::Found;
+use crate::evidence::Evidence;
 use crate::moves::Taken;
 use crate::remark::Remark;
 

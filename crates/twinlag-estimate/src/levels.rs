@@ -14,11 +14,11 @@ use twinlag_cross_relation::{Readings, inferred_inputs};
 use twinlag_sensor::Discretisation;
 
 use crate::error::EstimateError;
-use crate::task::Task;
+use crate::task::{RunAtRest, Task};
 use crate::vocabulary::{NoiseColour, NoiseKnowledge, NoiseSource};
 
 use at_rest::LineScatter;
-pub use at_rest::{MIN_DEGREES_OF_FREEDOM_AT_REST, RunAtRest};
+pub use at_rest::MIN_DEGREES_OF_FREEDOM_AT_REST;
 use coloured::{MAX_AR1, coloured};
 
 /// A level from the moments is taken where it lies this many standard errors below that of the

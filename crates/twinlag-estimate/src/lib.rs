@@ -68,13 +68,13 @@ pub use error::EstimateError;
 pub use estimate::Estimate;
 pub use hold::other_hold;
 pub use intervals::TauIntervals;
-pub use levels::{Levels, MIN_DEGREES_OF_FREEDOM_AT_REST, RunAtRest};
+pub use levels::{Levels, MIN_DEGREES_OF_FREEDOM_AT_REST};
 pub use objective::Prior;
 pub use outcome::{Outcome, Solved};
 pub use profile::{Ridge, Z_975};
 pub use residual::REJECTION_P_VALUE;
 pub use second_lag::Unseen;
-pub use task::Task;
+pub use task::{RunAtRest, Task};
 pub use vocabulary::{
     Bootstrap, Estimator, Hold, IntervalBasis, Intervals, Known, NoiseColour, NoiseKnowledge, NoiseSource,
 };

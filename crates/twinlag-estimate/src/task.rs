@@ -4,7 +4,6 @@ use twinlag_cross_relation::{Parameter, Readings, Segment};
 use twinlag_optimise::{Minimiser, Optimiser, Variable};
 use twinlag_sensor::Discretisation;
 
-use crate::levels::RunAtRest;
 use crate::objective::Prior;
 use crate::starts::hold_known;
 use crate::vocabulary::{Known, NoiseColour, NoiseKnowledge};
@@ -33,6 +32,15 @@ const MAX_OFFSET_SWINGS: f64 = 10.0;
 const KNOWN_WITHIN: f64 = 10.0;
 /// A second lag starts at this share of the first where starts are given without one.
 const SECOND_START_SHARE: f64 = 0.2;
+
+/// An unbroken run of samples in which the gas is at rest.
+#[derive(Clone, Copy, Debug)]
+pub struct RunAtRest<'a> {
+    /// When they were taken, s, `[n]`.
+    pub time_s: &'a [f64],
+    /// Both channels, °C, `[n]` each.
+    pub readings: [&'a [f64]; 2],
+}
 
 /// What an estimator is given.
 /// ```

@@ -24,6 +24,7 @@ pub(crate) mod varying;
 mod about;
 mod context;
 mod identifier;
+mod known;
 mod parameter;
 
 use std::sync::Arc;
@@ -31,11 +32,11 @@ use std::sync::Arc;
 pub use about::About;
 pub use context::Context;
 pub use identifier::Identifier;
+pub use known::KnownEffect;
 pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
 
 use crate::number::Number;
 use crate::plant::Plant;
-use crate::settings::KnownEffect;
 
 /// Where an effect sits, and the numbers that describe it.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! Effects that are known already, put into the model.
 
+use crate::effect::KnownEffect;
 use crate::effect::{Identifier, Parameter};
 use crate::error::DiagnoseError;
 use crate::fit::Fitted;
@@ -7,7 +8,7 @@ use crate::fitted::KnownFit;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::prepare::{GRID_STARTS, Prepared};
-use crate::settings::{KnownEffect, Settings};
+use crate::settings::Settings;
 use crate::summary::summarise;
 
 /// Both time constants of `observations` with `effects` held as they are in the model, except

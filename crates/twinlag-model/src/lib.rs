@@ -37,8 +37,8 @@ mod whitening;
 pub use cost::Linearised;
 pub use defects::{Levels, levels, line_channel, lines};
 pub use effect::{
-    About, Context, Derived, Domain, Effect, Freedom, Identifier, OfParameters, Parameter, Seat, Shared, candidates,
-    described_by,
+    About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
+    candidates, described_by,
 };
 pub use error::DiagnoseError;
 pub use extended::Extended;
@@ -56,7 +56,7 @@ pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
 pub use policy::Policy;
 pub use prepare::Prepared;
 pub use selection::Selection;
-pub use settings::{KnownEffect, Settings, Watch, report};
+pub use settings::{Settings, Watch, report};
 pub use spectrum::{Bands, deviance_at_free_level, fit_noise, runs};
 pub use spline::Spline;
 pub use summary::{Z_975, covariance, is_unresolved, summarise};

@@ -36,14 +36,14 @@ impl Settings {
         let is_positive = |x: f64| x.is_finite() && x > 0.0;
         let wrong = |what, got| Err(DiagnoseError::Setting { what, got });
         self.policy.check()?;
-        for std_k in self.noise_std_k.into_iter().flatten().filter(|s| !is_positive(*s)) {
+        if let Some(std_k) = self.noise_std_k.into_iter().flatten().find(|s| !is_positive(*s)) {
             return wrong("a noise level that is positive", std_k);
         }
         for known in &self.known {
             if known.sensor > 1 {
                 return wrong("sensor 0 or 1", known.sensor as f64);
             }
-            for value_s in [known.value_s].into_iter().chain(known.std_s).filter(|s| !is_positive(*s)) {
+            if let Some(value_s) = [known.value_s].into_iter().chain(known.std_s).find(|s| !is_positive(*s)) {
                 return wrong("a time constant and a standard deviation that are positive", value_s);
             }
         }
@@ -52,32 +52,6 @@ impl Settings {
             return wrong("at most one time constant that is held", 2.0);
         }
         Ok(())
-    }
-}
-
-/// An effect as it was found in another record.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KnownEffect {
-    /// The effect.
-    pub effect: Identifier,
-    /// Channel, 0 or 1; `None` if the effect is of both, or relative.
-    pub channel: Option<usize>,
-    /// Its parameters by name.
-    pub parameters: Vec<(String, f64)>,
-}
-
-impl KnownEffect {
-    /// The value of a parameter, by its name.
-    ///
-    /// ```
-    /// use twinlag_model::{Identifier, KnownEffect};
-    ///
-    /// let parameters = vec![("gain".to_owned(), 1.02), ("offset".to_owned(), -0.4)];
-    /// let known = KnownEffect { effect: Identifier::CALIBRATION, channel: Some(1), parameters };
-    /// assert_eq!((known.parameter("offset"), known.parameter("curvature")), (Some(-0.4), None));
-    /// ```
-    pub fn parameter(&self, name: &str) -> Option<f64> {
-        self.parameters.iter().find(|(n, _)| n == name).map(|(_, value)| *value)
     }
 }
 

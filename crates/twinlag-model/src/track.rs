@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::dense;
+use crate::effect::KnownEffect;
 use crate::effect::{Context, Shared, varying};
 use crate::error::DiagnoseError;
 use crate::fit::{Effort, Fitted};
@@ -12,7 +13,7 @@ use crate::known::Known;
 use crate::observations::Observations;
 use crate::prepare::Prepared;
 use crate::selection::Selection;
-use crate::settings::{KnownEffect, Settings, Watch, report};
+use crate::settings::{Settings, Watch, report};
 use crate::summary::summarise;
 
 /// Fewest coefficients of the shared change.

@@ -7,12 +7,12 @@ mod numbers;
 mod series;
 mod verdict;
 
-use twinlag::diagnosis::{Diagnosis as Core, ModelFit};
+use twinlag::diagnosis::Diagnosis as Core;
 use twinlag::record::Record;
 use twinlag::{Characterisation, Diagnosis};
 use twinlag_report::{Colour, Document, ReportError};
 
-use crate::figures::frequency_figure;
+use crate::figures::{Model, frequency_figure};
 
 const BEFORE: &str = "two first-order lags";
 const AFTER: &str = "with the effects";
@@ -68,13 +68,6 @@ struct Column<'a> {
     name: &'static str,
     column: &'static str,
     answer: &'a Characterisation,
-}
-
-/// A model with its name in pictures.
-pub(crate) struct Model<'a> {
-    pub(crate) name: &'static str,
-    pub(crate) fit: &'a ModelFit,
-    pub(crate) colour: Colour,
 }
 
 /// The models to be shown in pictures: one, if no effect was added; none of an answer without

@@ -1,9 +1,8 @@
 //! Pictures of the residual before and after.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use twinlag::diagnosis::ModelFit;
 use twinlag_report::{Axis, Chart, Colour, Figure, Series};
-
-use crate::diagnosis::Model;
 
 const NOISE: &str = "95 % of white noise";
 pub(crate) const WIDTH_PX: f64 = 900.0;
@@ -11,6 +10,13 @@ pub(crate) const WIDTH_PX: f64 = 900.0;
 const PARTS: usize = 100;
 /// A step longer than this multiple of the usual one is a gap.
 const GAP: f64 = 10.0;
+
+/// A model with its name in pictures.
+pub(crate) struct Model<'a> {
+    pub(crate) name: &'static str,
+    pub(crate) fit: &'a ModelFit,
+    pub(crate) colour: Colour,
+}
 
 /// A chart of the series that are there; `None` without any.
 pub(crate) fn chart(

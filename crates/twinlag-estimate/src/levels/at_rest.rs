@@ -5,15 +5,6 @@
 /// good to `1/√(2·8)`, a quarter.
 pub const MIN_DEGREES_OF_FREEDOM_AT_REST: usize = 8;
 
-/// An unbroken run of samples in which the gas is at rest.
-#[derive(Clone, Copy, Debug)]
-pub struct RunAtRest<'a> {
-    /// When they were taken, s, `[n]`.
-    pub time_s: &'a [f64],
-    /// Both channels, °C, `[n]` each.
-    pub readings: [&'a [f64]; 2],
-}
-
 /// Sums of squares about a straight line, and of products of neighbours.
 #[derive(Default)]
 pub(super) struct LineScatter {

@@ -1,8 +1,8 @@
 //! What is known of a kind of effect before any record.
 
 use super::{Context, Shared, described_by};
+use crate::effect::KnownEffect;
 use crate::error::DiagnoseError;
-use crate::settings::KnownEffect;
 
 /// What is known of a kind of effect before any record, as data: the search asks nothing else of it.
 ///

@@ -6,13 +6,13 @@ use std::sync::Arc;
 use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by,
 };
 use crate::error::DiagnoseError;
 use crate::number::{Curve, Number};
 use crate::plant::Plant;
-use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     .in_words(

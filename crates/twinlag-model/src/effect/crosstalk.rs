@@ -10,11 +10,11 @@ use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::DiagnoseError;
 use crate::number::Number;
 use crate::plant::Plant;
-use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("crosstalk", 8, candidates)
     .in_words(

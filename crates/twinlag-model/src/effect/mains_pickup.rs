@@ -6,11 +6,11 @@ use std::sync::Arc;
 use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::DiagnoseError;
 use crate::number::Number;
 use crate::plant::Plant;
-use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("mains-pickup", 3, candidates)
     .in_words(

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::DiagnoseError;
 use crate::number::Number;
 use crate::plant::{Plant, ZERO_CELSIUS_K};
-use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("radiation", 11, candidates)
     .in_words(

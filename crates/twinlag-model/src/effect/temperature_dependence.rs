@@ -6,11 +6,11 @@ use std::sync::Arc;
 use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::DiagnoseError;
 use crate::number::{Curve, Number};
 use crate::plant::{Plant, ZERO_CELSIUS_K};
-use crate::settings::KnownEffect;
 
 pub(crate) static ABOUT: About = About::new("temperature-dependent-time-constant", 10, candidates)
     .in_words(

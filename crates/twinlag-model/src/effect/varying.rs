@@ -7,12 +7,12 @@ use std::sync::Arc;
 use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
+use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::DiagnoseError;
 use crate::flow::Flow;
 use crate::number::{Number, TimeFunction};
 use crate::plant::Plant;
-use crate::settings::KnownEffect;
 use crate::spline::{Spline, on_knots};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
