@@ -3,42 +3,8 @@
 
 mod common;
 
-use common::{Bench, interval, number};
+use common::{Bench, RIG, interval, number};
 use serde_json::Value;
-
-/// Two thermocouples in turbulence, the second read 2 K too hot, 3000 samples.
-const RIG: &str = r#"
-seed = 5
-
-[record]
-samples = 3000
-sample_period_s = 0.01
-
-[gas]
-kind = "turbulence"
-mean_c = 300.0
-std_k = 15.0
-corner_hz = 0.5
-cutoff_hz = 45.0
-
-[[sensors]]
-channel = "T1"
-time_constant_s = 0.12
-noise = { std_k = 0.1 }
-
-[[sensors]]
-channel = "T2"
-time_constant_s = 0.45
-offset_k = 2.0
-noise = { std_k = 0.1 }
-"#;
-
-fn simulated(test: &str, rig: &str) -> Bench {
-    let bench = Bench::with(test, "rig.toml", rig);
-    let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);
-    assert_eq!(answer.code, 0, "{answer:#?}");
-    bench
-}
 
 /// Columns of a table that the program wrote.
 fn columns(bench: &Bench, file: &str, header: &str) -> Vec<Vec<f64>> {
@@ -60,7 +26,7 @@ fn gas(bench: &Bench, further: &[&str]) -> Value {
 /// of which some 30 a second are independent, 95 ± 2.5 %, and four of those.
 #[test]
 fn the_gas_temperature_is_that_of_the_rig() {
-    let bench = simulated("gas", RIG);
+    let bench = Bench::simulated("gas", RIG);
     let value = gas(&bench, &["--reference", "Tref"]);
     assert_eq!(value["schema"], "twinlag.compensation/1");
     assert_eq!(value["status"], "ok");
@@ -78,7 +44,7 @@ fn the_gas_temperature_is_that_of_the_rig() {
 /// The offset is that of the second channel: whoever trusts it has the gas 2 K hotter.
 #[test]
 fn the_trusted_channel_sets_the_level() {
-    let bench = simulated("trust", RIG);
+    let bench = Bench::simulated("trust", RIG);
     gas(&bench, &[]);
     let first = columns(&bench, "gas.csv", "time_s,gas_C,gas_std_K");
     gas(&bench, &["--trust", "T2", "--force"]);
@@ -89,7 +55,7 @@ fn the_trusted_channel_sets_the_level() {
 
 #[test]
 fn a_saved_model_compensates_without_a_diagnosis() {
-    let bench = simulated("saved", RIG);
+    let bench = Bench::simulated("saved", RIG);
     assert_eq!(bench.run(&["diagnose", "run.csv", "--save", "model.json", "--quiet"]).code, 0);
     let value = gas(&bench, &["--model", "model.json", "--reference", "Tref", "--form", "lag:20"]);
     assert_eq!(value["verdict"], Value::Null);
@@ -101,7 +67,7 @@ fn a_saved_model_compensates_without_a_diagnosis() {
 /// A row that is missing is bridged: it is there, and less certain than its neighbours.
 #[test]
 fn missing_rows_are_bridged_with_wider_bands() {
-    let bench = simulated("bridged", RIG);
+    let bench = Bench::simulated("bridged", RIG);
     let text = String::from_utf8(bench.read("run.csv")).expect("text");
     let kept: Vec<&str> = text.lines().enumerate().filter(|(k, _)| !(1001..1011).contains(k)).map(|l| l.1).collect();
     bench.write("run.csv", kept.join("\n"));
@@ -113,7 +79,7 @@ fn missing_rows_are_bridged_with_wider_bands() {
 
 #[test]
 fn outputs_are_never_lost_and_never_mixed() {
-    let bench = simulated("outputs", RIG);
+    let bench = Bench::simulated("outputs", RIG);
     bench.write("gas.csv", "precious");
     bench.refuses(2, &["compensate", "run.csv", "--out", "gas.csv"], &["gas.csv exists", "--force"]);
     bench.refuses(2, &["track", "run.csv", "--out", "run.csv"], &["the record itself"]);
@@ -131,7 +97,7 @@ fn outputs_are_never_lost_and_never_mixed() {
 /// Equal sensors tell no time constant: exit code 4, the JSON all the same, and no table.
 #[test]
 fn equal_sensors_have_no_gas_temperature() {
-    let bench = simulated("equal", &RIG.replace("0.45", "0.12").replace("offset_k = 2.0\n", ""));
+    let bench = Bench::simulated("equal", &RIG.replace("0.45", "0.12").replace("offset_k = 2.0\n", ""));
     for command in ["compensate", "track"] {
         let answer = bench.run(&[command, "run.csv", "--out", "out.csv", "--json", "--quiet"]);
         assert_eq!(answer.code, 4, "{answer:#?}");
@@ -146,7 +112,7 @@ const HEADER: &str = "time_s,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau
 #[test]
 fn a_swinging_flow_is_followed() {
     let flow = "\n[flow]\nkind = \"sine\"\ndepth = 0.3\nperiod_s = 15.0\n";
-    let bench = simulated("swing", &(RIG.replace("offset_k = 2.0\n", "") + flow));
+    let bench = Bench::simulated("swing", &(RIG.replace("offset_k = 2.0\n", "") + flow));
     let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--json", "--quiet"]);
     assert_eq!(answer.code, 0, "{answer:#?}");
     let value = answer.json();
@@ -165,7 +131,7 @@ fn a_swinging_flow_is_followed() {
 #[test]
 fn a_step_of_the_flow_is_located() {
     let flow = "\n[flow]\nkind = \"step\"\nfactor = 1.4\nat_s = 18.0\nover_s = 0.05\n";
-    let bench = simulated("step", &(RIG.replace("offset_k = 2.0\n", "") + flow));
+    let bench = Bench::simulated("step", &(RIG.replace("offset_k = 2.0\n", "") + flow));
     let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--json", "--quiet"]);
     let value = answer.json();
     assert_eq!(value["change"], "step", "{value:#}");
@@ -176,7 +142,7 @@ fn a_step_of_the_flow_is_located() {
 
 #[test]
 fn windows_are_the_published_way() {
-    let bench = simulated("windows", &RIG.replace("offset_k = 2.0\n", ""));
+    let bench = Bench::simulated("windows", &RIG.replace("offset_k = 2.0\n", ""));
     let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--window", "6", "--json", "--quiet"]);
     assert_eq!(answer.code, 0, "{answer:#?}");
     assert_eq!(answer.json()["change"], "windows");

@@ -43,9 +43,7 @@ noise = { std_k = 0.1 }
 const LIVE: [&str; 6] = ["track", "-", "--live", "1500", "--out", "-"];
 
 fn record(test: &str) -> (Bench, String) {
-    let bench = Bench::with(test, "rig.toml", RIG);
-    let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);
-    assert_eq!(answer.code, 0, "{answer:#?}");
+    let bench = Bench::simulated(test, RIG);
     let text = String::from_utf8(bench.read("run.csv")).expect("text");
     (bench, text)
 }

@@ -22,6 +22,9 @@ impl Search<'_> {
     /// is left, smaller ones where those do not help, as long as each is better.
     pub(crate) fn resized(&self, current: &Fitted, chosen: Candidate) -> Candidate {
         let mut sizes = chosen.effect.sizes();
+        if sizes.is_empty() {
+            return chosen;
+        }
         sizes.sort_by_key(|effect| effect.parameters().len());
         let smaller = sizes.partition_point(|effect| effect.parameters().len() < chosen.added);
         let larger = sizes.split_off(smaller);

@@ -93,7 +93,7 @@ impl Candidate {
 
     /// Whether its fit says anything: it has ended well, and keeps most residuals. A time constant
     /// that is too short to be seen may lie on its bound, which says nothing against the effect.
-    pub(crate) fn is_sound(&self, current: &Fitted, policy: &Policy) -> bool {
+    fn is_sound(&self, current: &Fitted, policy: &Policy) -> bool {
         let has_ended = match &self.fitted.end {
             End::OnBound(which) => which.iter().all(|i| *i < 2),
             end => end.is_usable() || *end == End::LimitReached,

@@ -11,6 +11,33 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+/// Two thermocouples in turbulence, the second read 2 K too hot, 3000 samples.
+pub(crate) const RIG: &str = r#"
+seed = 5
+
+[record]
+samples = 3000
+sample_period_s = 0.01
+
+[gas]
+kind = "turbulence"
+mean_c = 300.0
+std_k = 15.0
+corner_hz = 0.5
+cutoff_hz = 45.0
+
+[[sensors]]
+channel = "T1"
+time_constant_s = 0.12
+noise = { std_k = 0.1 }
+
+[[sensors]]
+channel = "T2"
+time_constant_s = 0.45
+offset_k = 2.0
+noise = { std_k = 0.1 }
+"#;
+
 /// An empty directory for the files of one test; the program runs inside it, so that messages hold bare file names.
 pub(crate) struct Bench {
     dir: PathBuf,
@@ -28,6 +55,14 @@ impl Bench {
     pub(crate) fn with(test: &str, file: &str, content: impl AsRef<[u8]>) -> Self {
         let bench = Self::new(test);
         bench.write(file, content);
+        bench
+    }
+
+    /// With the record of `rig` in `run.csv`.
+    pub(crate) fn simulated(test: &str, rig: &str) -> Self {
+        let bench = Self::with(test, "rig.toml", rig);
+        let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);
+        assert_eq!(answer.code, 0, "{answer:#?}");
         bench
     }
 
