@@ -3,7 +3,7 @@
 use std::io::{Read, stdin};
 use std::path::Path;
 
-use twinlag::diagnosis::DiagnoseError;
+use twinlag::diagnosis::ModelError;
 use twinlag::record::{Record, Selection, Table};
 use twinlag::{Characterisation, Model, Options, Status};
 
@@ -24,7 +24,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
                 | twinlag::Error::Diagnose(
-                    DiagnoseError::Model { .. } | DiagnoseError::Parameter { .. } | DiagnoseError::Absurd,
+                    ModelError::Model { .. } | ModelError::Parameter { .. } | ModelError::Absurd,
                 ) => Failure::File(format!("{}: {}", path.display(), explained(&e))),
                 e => e.into(),
             })?

@@ -1,7 +1,7 @@
 //! Other forms of an effect that has been chosen: another size, one parameter more, a look-alike in
 //! its place.
 
-use twinlag_model::{DiagnoseError, Effort, Fitted, Shared, held_out_gain, is_unresolved};
+use twinlag_model::{Effort, Fitted, ModelError, Shared, held_out_gain, is_unresolved};
 
 use crate::candidates::{Candidate, Search, accepts, white_gain};
 use crate::rank::worth;
@@ -87,7 +87,7 @@ impl Search<'_> {
         current: &Fitted,
         index: usize,
         taken: &Candidate,
-    ) -> Result<Vec<Replacement>, DiagnoseError> {
+    ) -> Result<Vec<Replacement>, ModelError> {
         let effect = &taken.effect;
         let (id, rest) = (effect.identifier(), current.model.without(index));
         if effect.is_noise() {

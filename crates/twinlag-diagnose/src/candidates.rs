@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Context, DiagnoseError, Effort, Fitted, Identifier, Linearised, Model, Observations, Parameter, Place,
-    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, deviance_at_free_level, fit_noise,
-    line_channel, lines, report, runs,
+    Bands, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
+    Prepared, Selection, Settings, Shared, Watch, candidates, dense, deviance_at_free_level, fit_noise, line_channel,
+    lines, report, runs,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -178,12 +178,12 @@ impl<'a> Search<'a> {
     /// What `work` makes of each of the items, in their order.
     ///
     /// # Errors
-    /// [`DiagnoseError::Cancelled`] if the watch says so.
+    /// [`ModelError::Cancelled`] if the watch says so.
     pub(crate) fn each<T: Sync, R: Send>(
         &self,
         items: &[T],
         work: impl Fn(&T) -> R + Sync,
-    ) -> Result<Vec<R>, DiagnoseError> {
+    ) -> Result<Vec<R>, ModelError> {
         let done = AtomicUsize::new(0);
         let one = |item| {
             let out = work(item);
@@ -221,7 +221,7 @@ impl<'a> Search<'a> {
 
     /// Every candidate that may be added to `current`: those that may explain something are fitted,
     /// the best few to the end.
-    pub(crate) fn fitted(&self, current: &Fitted) -> Result<Vec<Candidate>, DiagnoseError> {
+    pub(crate) fn fitted(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
         let promising = self.screened(current)?;
         let robust_before = self.robust(current);
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
@@ -274,7 +274,7 @@ impl<'a> Search<'a> {
     /// The candidates that are worth a fit, the most promising first: all of them where the model
     /// is far off, and its score there says little; else noise, lines, and those that would gain
     /// more than chance if the residual were linear.
-    fn screened(&self, current: &Fitted) -> Result<Vec<Promising>, DiagnoseError> {
+    fn screened(&self, current: &Fitted) -> Result<Vec<Promising>, ModelError> {
         let all = self.candidates(&current.model);
         let is_far_off = self.is_far_off(current);
         let now = (!is_far_off).then(|| current.model.linearised(&current.theta, self.observations, self.selection));

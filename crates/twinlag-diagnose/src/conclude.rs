@@ -1,7 +1,7 @@
 //! From the last state of the loop to the answer.
 
 use twinlag_model::{
-    DiagnoseError, Effort, Fitted, Identifier, ModelFit, Observations, Policy, Settings, Weighting, summarise,
+    Effort, Fitted, Identifier, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise,
 };
 
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
@@ -21,12 +21,8 @@ const MOST_SMOOTHED_SAMPLES: f64 = 50.0;
 /// - `tones`: of the gas, where its power is in tones
 ///
 /// # Errors
-/// [`DiagnoseError::Cancelled`] if the watch says so.
-pub(crate) fn conclude(
-    state: State<'_>,
-    settings: &Settings,
-    tones: Option<usize>,
-) -> Result<Diagnosis, DiagnoseError> {
+/// [`ModelError::Cancelled`] if the watch says so.
+pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usize>) -> Result<Diagnosis, ModelError> {
     let policy = &settings.policy;
     let limits = state.search().limits(&state.current)?;
     // Before is before everything: with the defects of the data in it.

@@ -1,7 +1,7 @@
 //! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by
 //! what has seen none of it.
 
-use twinlag_model::{DiagnoseError, Observations, Prepared, Settings, Watch, is_unresolved, report};
+use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unresolved, report};
 
 use crate::conclude::conclude;
 use crate::diagnosis::Diagnosis;
@@ -12,7 +12,7 @@ use crate::moves::{Proposal, State};
 ///
 /// ```
 /// use std::ops::ControlFlow;
-/// use twinlag_diagnose::{DiagnoseError, Observations, Settings, Stretch, diagnose};
+/// use twinlag_diagnose::{ModelError, Observations, Settings, Stretch, diagnose};
 /// # let time_s: Vec<f64> = (0..200).map(|k| 0.02 * f64::from(k)).collect();
 /// # let gas_c = |t: f64| (4.0 * t).sin() + (17.0 * t).cos();
 /// # let reading_c = [0.1, 0.3].map(|late| time_s.iter().map(|t| gas_c(t - late)).collect());
@@ -21,18 +21,14 @@ use crate::moves::{Proposal, State};
 /// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.02))?;
 /// let watch = |_: &str, _, _| ControlFlow::Break(());
 /// let answer = diagnose(&observations, &Settings::default(), &watch);
-/// assert_eq!(answer.err(), Some(DiagnoseError::Cancelled));
-/// # Ok::<(), DiagnoseError>(())
+/// assert_eq!(answer.err(), Some(ModelError::Cancelled));
+/// # Ok::<(), ModelError>(())
 /// ```
 ///
 /// # Errors
-/// [`DiagnoseError`] for a record that is too short, or in which a channel never changes, for a
+/// [`ModelError`] for a record that is too short, or in which a channel never changes, for a
 /// policy that means nothing, and for a run that `watch` cancels.
-pub fn diagnose(
-    observations: &Observations,
-    settings: &Settings,
-    watch: Watch<'_>,
-) -> Result<Diagnosis, DiagnoseError> {
+pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'_>) -> Result<Diagnosis, ModelError> {
     let prepared = Prepared::new(observations, settings)?;
     report(watch, "two lags", 0, 1)?;
     let tones = tones(observations, &settings.policy);
@@ -44,7 +40,7 @@ pub fn diagnose(
 
 /// The next move: an effect, reviewed with all others; where there is none, the noise; where that
 /// is right, the weights. Whether there was one.
-fn advance(state: &mut State<'_>, settings: &Settings) -> Result<bool, DiagnoseError> {
+fn advance(state: &mut State<'_>, settings: &Settings) -> Result<bool, ModelError> {
     if let Some(addition) = state.add()? {
         state.apply(addition);
         let is_blind =
@@ -62,7 +58,7 @@ fn advance(state: &mut State<'_>, settings: &Settings) -> Result<bool, DiagnoseE
 }
 
 /// Looks at every effect again, now that one more is known.
-fn review(state: &mut State<'_>) -> Result<(), DiagnoseError> {
+fn review(state: &mut State<'_>) -> Result<(), ModelError> {
     tidy(state);
     for index in 0..state.taken.len() {
         if state.taken.len() < 2 {

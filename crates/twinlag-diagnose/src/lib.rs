@@ -53,9 +53,8 @@ pub use evidence::Evidence;
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{
-    About, Change, ChangePoint, DiagnoseError, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant,
-    ModelFit, Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with,
-    track,
+    About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, ModelError, ModelFit,
+    Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
 };
 
 /// A diagnosis may go to any thread, and be read by several.

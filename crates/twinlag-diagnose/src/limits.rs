@@ -1,6 +1,6 @@
 //! What a search would have seen, and what no search can.
 
-use twinlag_model::{DiagnoseError, Fitted, Linearised, Observations, Policy, Shared, dense};
+use twinlag_model::{Fitted, Linearised, ModelError, Observations, Policy, Shared, dense};
 
 use crate::candidates::Search;
 use crate::diagnosis::Limit;
@@ -12,8 +12,8 @@ impl Search<'_> {
     /// have.
     ///
     /// # Errors
-    /// [`DiagnoseError::Cancelled`] if the watch says so.
-    pub(crate) fn limits(&self, current: &Fitted) -> Result<Vec<Limit>, DiagnoseError> {
+    /// [`ModelError::Cancelled`] if the watch says so.
+    pub(crate) fn limits(&self, current: &Fitted) -> Result<Vec<Limit>, ModelError> {
         let mut all = self.candidates(&current.model);
         let probability = self.policy.round_false_alarm_probability / all.len().max(1) as f64;
         all.retain(|c| !c.is_noise() && c.main().is_some());

@@ -2,7 +2,7 @@
 //! place ([`State::apply`]), and kept in the answer.
 
 use serde::{Deserialize, Serialize};
-use twinlag_model::{DiagnoseError, Effort, Fitted, Identifier, Prepared, Settings, Watch};
+use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, Watch};
 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
@@ -184,7 +184,7 @@ impl<'a> State<'a> {
     }
 
     /// Adds the effect that explains best what is left over.
-    pub(crate) fn add(&self) -> Result<Option<Proposal>, DiagnoseError> {
+    pub(crate) fn add(&self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
         let candidates = search.fitted(&self.current)?;
         let Some((candidate, ties)) = search.accepted(&self.current, &candidates) else { return Ok(None) };
@@ -245,7 +245,7 @@ impl<'a> State<'a> {
 
     /// Puts a look-alike in the place of effect `index`, now that more is known, if one is better.
     /// Those that are as good become its ties.
-    pub(crate) fn exchange(&mut self, index: usize) -> Result<Option<Proposal>, DiagnoseError> {
+    pub(crate) fn exchange(&mut self, index: usize) -> Result<Option<Proposal>, ModelError> {
         let search = self.search();
         let taken = &self.taken[index];
         let mut alike = search.look_alikes(&self.current, index, &taken.candidate)?;

@@ -3,11 +3,11 @@
 mod common;
 
 use common::{NOISE_K, PERIOD_S, SAMPLES, SEED, TAU_S, found, recovers, told, turbulence};
-use twinlag_diagnose::{DiagnoseError, Identifier, KnownEffect, Observations, Settings, Stretch, Verdict, fit_with};
+use twinlag_diagnose::{Identifier, KnownEffect, ModelError, Observations, Settings, Stretch, Verdict, fit_with};
 use twinlag_signal::{Flow, FlowSine, Gas, Noise, Record, Rig, Sensor};
 
 /// A rig whose time constants fall with the root of the velocity, from 0.7 to 1.3 times those at rest, in 1.7 periods.
-fn record(column: impl Fn(f64) -> f64) -> Result<Observations, DiagnoseError> {
+fn record(column: impl Fn(f64) -> f64) -> Result<Observations, ModelError> {
     let sensors = [Sensor::new("T1", TAU_S[0]), Sensor::new("T2", TAU_S[1])].map(|mut s| {
         s.noise = Some(Noise::white(NOISE_K));
         s
@@ -70,6 +70,6 @@ fn a_column_that_does_not_matter_is_not_used() {
 #[test]
 fn a_flow_that_stands_still_backwards_or_is_missing_is_refused() {
     for bad in [0.0, -1.0, f64::NAN] {
-        assert_eq!(record(|factor| if factor > 1.2 { bad } else { 1.0 }), Err(DiagnoseError::Flow), "{bad}");
+        assert_eq!(record(|factor| if factor > 1.2 { bad } else { 1.0 }), Err(ModelError::Flow), "{bad}");
     }
 }

@@ -9,7 +9,7 @@ use common::{
 use std::ops::ControlFlow;
 
 use twinlag_diagnose::{
-    DiagnoseError, Diagnosis, Identifier, Observations, Remark, Settings, Stretch, Verdict, diagnose, fit_with,
+    Diagnosis, Identifier, ModelError, Observations, Remark, Settings, Stretch, Verdict, diagnose, fit_with,
 };
 use twinlag_signal::{MultiTone, Noise, Sensor, Signal, Tone, Turbulence};
 
@@ -22,7 +22,7 @@ fn plain() -> [Vec<f64>; 2] {
     [simulated.t1_c, simulated.t2_c]
 }
 
-fn asked(observations: &Observations) -> Result<Diagnosis, DiagnoseError> {
+fn asked(observations: &Observations) -> Result<Diagnosis, ModelError> {
     diagnose(observations, &Settings::default(), &|_, _, _| ControlFlow::Continue(()))
 }
 
@@ -110,8 +110,8 @@ fn the_order_of_the_channels_does_not_matter() {
 fn a_record_that_is_too_short_is_refused() {
     let [t1_c, t2_c] = plain();
     let part = |n: usize| even(t1_c[..n].to_vec(), t2_c[..n].to_vec());
-    assert_eq!(part(59), Err(DiagnoseError::TooShort { samples: 59, needed: 60 }));
-    assert_eq!(part(0), Err(DiagnoseError::TooShort { samples: 0, needed: 60 }));
+    assert_eq!(part(59), Err(ModelError::TooShort { samples: 59, needed: 60 }));
+    assert_eq!(part(0), Err(ModelError::TooShort { samples: 0, needed: 60 }));
     // Enough to try: whatever comes is no panic, and no confident name for 60 samples of two lags.
     if let Ok(d) = asked(&part(60).expect("as many as are needed")) {
         assert!(d.verdict != Verdict::Explained, "{}", told(&d));
@@ -130,7 +130,7 @@ fn stretches_that_are_too_short_do_not_add_up() {
         })
         .collect();
     let got = Observations::new(stretches, Some(PERIOD_S));
-    assert_eq!(got, Err(DiagnoseError::TooShort { samples: 0, needed: 60 }));
+    assert_eq!(got, Err(ModelError::TooShort { samples: 0, needed: 60 }));
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn a_reading_that_is_no_number_is_refused() {
             let mut readings = plain();
             readings[channel][SAMPLES / 2] = wrong;
             let [t1_c, t2_c] = readings;
-            assert_eq!(even(t1_c, t2_c), Err(DiagnoseError::NotFinite), "{wrong} in channel {channel}");
+            assert_eq!(even(t1_c, t2_c), Err(ModelError::NotFinite), "{wrong} in channel {channel}");
         }
     }
 }
@@ -150,7 +150,7 @@ fn a_time_that_is_no_number_is_refused() {
     let mut time_s: Vec<f64> = (0..SAMPLES).map(|k| k as f64 * PERIOD_S).collect();
     time_s[SAMPLES / 2] = f64::NAN;
     let got = Observations::new(vec![Stretch::new(time_s, plain())], None);
-    assert_eq!(got, Err(DiagnoseError::NotFinite));
+    assert_eq!(got, Err(ModelError::NotFinite));
 }
 
 fn is_constant(level_c: f64, channel: usize) {
@@ -159,7 +159,7 @@ fn is_constant(level_c: f64, channel: usize) {
     let [t1_c, t2_c] = readings;
     let observations = even(t1_c, t2_c).expect("finite and long");
     let got = asked(&observations).map(|d| told(&d));
-    assert_eq!(got, Err(DiagnoseError::Constant { channel }), "{level_c} °C in channel {channel}");
+    assert_eq!(got, Err(ModelError::Constant { channel }), "{level_c} °C in channel {channel}");
 }
 
 #[test]
@@ -179,7 +179,7 @@ fn a_channel_that_never_changes_is_refused_at_any_level() {
 fn a_channel_that_never_changes_is_refused_with_known_effects_too() {
     let [t1_c, _] = plain();
     let got = fit_with(&even(t1_c, vec![300.0; SAMPLES]).expect("finite and long"), &Settings::default(), &[]);
-    assert_eq!(got, Err(DiagnoseError::Constant { channel: 2 }));
+    assert_eq!(got, Err(ModelError::Constant { channel: 2 }));
 }
 
 /// The same readings twice agree with any two time constants that are equal: there is no telling which, nor is there an effect.

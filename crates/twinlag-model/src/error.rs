@@ -1,13 +1,13 @@
-//! What can go wrong before a diagnosis starts.
+//! What can go wrong before a record is modelled.
 
 use thiserror::Error;
 use twinlag_compensate::CompensateError;
 
-/// Why a record cannot be diagnosed.
+/// Why a record cannot be modelled or diagnosed.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
 #[non_exhaustive]
-pub enum DiagnoseError {
+pub enum ModelError {
     #[error(
         "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record \
          for longer, or ask for the time constants alone (`characterise`)"

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use twinlag_compensate::{Coloured, Readings, Rig, Sensor, SensorAt, SlowPath};
 
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::fit::Fitted;
 use crate::model::Model;
 use crate::number::Number;
@@ -67,8 +67,8 @@ impl Extended {
     /// own coloured noise.
     ///
     /// # Errors
-    /// [`DiagnoseError::Compensate`] for parameters with which there is no rig.
-    pub fn rig(&self, parameters: &[f64]) -> Result<(Readings, Rig), DiagnoseError> {
+    /// [`ModelError::Compensate`] for parameters with which there is no rig.
+    pub fn rig(&self, parameters: &[f64]) -> Result<(Readings, Rig), ModelError> {
         let plant = self.model.plant(parameters, &self.observations);
         let mut time_s = Vec::new();
         let mut temperature_c: [Vec<f64>; 2] = Default::default();

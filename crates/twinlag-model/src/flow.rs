@@ -1,6 +1,6 @@
 //! A measured flow velocity or density along the record.
 
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 
 /// Its logarithm over that of its geometric mean.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,13 +15,13 @@ impl Flow {
     /// - `stretches`: instants, s, and values of each
     ///
     /// # Errors
-    /// [`DiagnoseError::Flow`] for values that are not positive, or not as many as instants.
-    pub fn new(stretches: &[(&[f64], &[f64])]) -> Result<Self, DiagnoseError> {
+    /// [`ModelError::Flow`] for values that are not positive, or not as many as instants.
+    pub fn new(stretches: &[(&[f64], &[f64])]) -> Result<Self, ModelError> {
         let is_sound = |(time_s, values): &(&[f64], &[f64])| {
             time_s.len() == values.len() && values.iter().all(|v| v.is_finite() && *v > 0.0)
         };
         if !stretches.iter().all(is_sound) {
-            return Err(DiagnoseError::Flow);
+            return Err(ModelError::Flow);
         }
         let time_s: Vec<f64> = stretches.iter().flat_map(|s| s.0.iter().copied()).collect();
         let logs: Vec<f64> = stretches.iter().flat_map(|s| s.1.iter().map(|v| v.ln())).collect();

@@ -2,7 +2,7 @@
 
 use crate::effect::KnownEffect;
 use crate::effect::{Identifier, Parameter};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::fit::Fitted;
 use crate::fitted::KnownFit;
 use crate::model::Model;
@@ -40,13 +40,13 @@ use crate::summary::summarise;
 /// ```
 ///
 /// # Errors
-/// [`DiagnoseError`] as of a diagnosis; [`DiagnoseError::Model`] for an effect whose `restore` gives none, or
+/// [`ModelError`] as of a diagnosis; [`ModelError::Model`] for an effect whose `restore` gives none, or
 /// has other parameters.
 pub fn fit_with(
     observations: &Observations,
     settings: &Settings,
     effects: &[KnownEffect],
-) -> Result<KnownFit, DiagnoseError> {
+) -> Result<KnownFit, ModelError> {
     let Known { prepared, fitted, fitted_again } = Known::of(observations, settings, effects)?;
     let fit = summarise(&fitted, &prepared.observations, &prepared.everything, &prepared.levels, &prepared.policy);
     Ok(KnownFit { fit, fitted_again })
@@ -64,14 +64,14 @@ impl Known {
         observations: &Observations,
         settings: &Settings,
         effects: &[KnownEffect],
-    ) -> Result<Self, DiagnoseError> {
+    ) -> Result<Self, ModelError> {
         let mut prepared = Prepared::new(observations, settings)?;
         let mut model = Model::new(&settings.known, prepared.levels.std_k);
         model.is_frozen = true;
         let (mut rest, mut fitted_again) = (Vec::new(), Vec::new());
         for known in effects.iter().filter(|k| !k.effect.about().is_defect) {
             let effect = (known.effect.about().restore)(known, &prepared.context)?;
-            let effect = effect.ok_or_else(|| DiagnoseError::Model { effect: known.effect.name() })?;
+            let effect = effect.ok_or_else(|| ModelError::Model { effect: known.effect.name() })?;
             for parameter in effect.parameters() {
                 check(known, parameter)?;
             }
@@ -98,18 +98,18 @@ impl Known {
             fitted = prepared.refit(&fitted);
         }
         if !fitted.chi2.is_finite() {
-            return Err(DiagnoseError::Absurd);
+            return Err(ModelError::Absurd);
         }
         Ok(Self { prepared, fitted, fitted_again })
     }
 }
 
 /// A parameter of a model that comes from outside must be one that its kind can have.
-fn check(known: &KnownEffect, parameter: &Parameter) -> Result<(), DiagnoseError> {
+fn check(known: &KnownEffect, parameter: &Parameter) -> Result<(), ModelError> {
     let got = known.parameter(parameter.name).unwrap_or(f64::NAN);
     if parameter.domain.contains(got) {
         return Ok(());
     }
     let (effect, name, expected) = (known.effect.name(), parameter.name, parameter.domain.expected());
-    Err(DiagnoseError::Parameter { effect, name, got, expected })
+    Err(ModelError::Parameter { effect, name, got, expected })
 }

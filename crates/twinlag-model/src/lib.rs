@@ -40,7 +40,7 @@ pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
     candidates, described_by,
 };
-pub use error::DiagnoseError;
+pub use error::ModelError;
 pub use extended::Extended;
 pub use fit::{Effort, Fitted};
 pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Trace, Value};
@@ -67,7 +67,7 @@ pub use weighting::Weighting;
 /// Models, with their effects, and records may go to any thread, and be read by several.
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
-    is_send_and_sync::<(Bands, Context, DiagnoseError, Evaluation, Extended, Fitted, Flow, Identifier)>();
+    is_send_and_sync::<(Bands, Context, ModelError, Evaluation, Extended, Fitted, Flow, Identifier)>();
     is_send_and_sync::<(KnownEffect, KnownFit, Levels, Linearised, Model, ModelFit, Observations, Parameter)>();
     is_send_and_sync::<(Plant, Policy, Prepared, Selection, Settings, Spline, Stretch, Track, Weighting)>();
 };

@@ -74,7 +74,7 @@ impl Model {
     /// assert_eq!(model.range(0), 2..3); // its parameter comes after both time constants
     /// assert_eq!(model.parameters().map(|p| p.name).collect::<Vec<_>>(), ["offset"]);
     /// assert_eq!(model.without(0).parameter_count(), 2);
-    /// # Ok::<(), twinlag_model::DiagnoseError>(())
+    /// # Ok::<(), twinlag_model::ModelError>(())
     /// ```
     #[must_use]
     pub fn with(&self, effect: Shared) -> Self {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::flow::Flow;
 
 /// Fewest samples of a stretch that is used.
@@ -71,7 +71,7 @@ impl Observations {
     /// - `period_s`: the sample period where samples are evenly spaced within each stretch, s
     ///
     /// ```
-    /// use twinlag_model::{DiagnoseError, Observations, Stretch};
+    /// use twinlag_model::{ModelError, Observations, Stretch};
     ///
     /// let stretch = |samples: i32, from_s: f64| {
     ///     let time_s: Vec<f64> = (0..samples).map(|k| from_s + 0.5 * f64::from(k)).collect();
@@ -85,22 +85,22 @@ impl Observations {
     /// assert_eq!(observations.ends_s(), [0.0, 54.5]); // halves are exact in binary
     /// assert_eq!(observations.swing_k(), observations.mean_and_std(1)[1]); // the livelier channel's
     /// let few = Observations::new(vec![stretch(40, 0.0)], Some(0.5));
-    /// assert_eq!(few, Err(DiagnoseError::TooShort { samples: 40, needed: 60 }));
-    /// # Ok::<(), DiagnoseError>(())
+    /// assert_eq!(few, Err(ModelError::TooShort { samples: 40, needed: 60 }));
+    /// # Ok::<(), ModelError>(())
     /// ```
     ///
     /// # Errors
-    /// [`DiagnoseError::TooShort`] for fewer than 60 samples; [`DiagnoseError::NotFinite`]; [`DiagnoseError::Flow`] for a flow that is
+    /// [`ModelError::TooShort`] for fewer than 60 samples; [`ModelError::NotFinite`]; [`ModelError::Flow`] for a flow that is
     /// not positive everywhere, or of another length.
-    pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, DiagnoseError> {
+    pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, ModelError> {
         stretches.retain(|s| s.len() >= SHORTEST);
         let samples: usize = stretches.iter().map(Stretch::len).sum();
         if samples < FEWEST {
-            return Err(DiagnoseError::TooShort { samples, needed: FEWEST });
+            return Err(ModelError::TooShort { samples, needed: FEWEST });
         }
         let is_sound = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
         if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {
-            return Err(DiagnoseError::NotFinite);
+            return Err(ModelError::NotFinite);
         }
         let flows: Option<Vec<(&[f64], &[f64])>> =
             stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s[..], &flow[..]))).collect();

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 
 /// Tests of a residual at most: three of its energy and whiteness, seven of what it goes with.
 const RESIDUAL_TESTS: f64 = 10.0;
@@ -209,7 +209,7 @@ impl Policy {
     /// // A probability of 2 means nothing, and the message says which number it is.
     /// let wrong = strict.with("screening_probability", 2.0).expect("a number of the policy");
     /// assert!(wrong.check().expect_err("refused").to_string().contains("screening_probability = 2"));
-    /// # Ok::<(), twinlag_model::DiagnoseError>(())
+    /// # Ok::<(), twinlag_model::ModelError>(())
     /// ```
     pub fn rejection_p_value(&self) -> f64 {
         self.record_rejection_probability / RESIDUAL_TESTS
@@ -225,12 +225,12 @@ impl Policy {
     /// That every number is positive, and that shares and probabilities are no more than 1.
     ///
     /// # Errors
-    /// [`DiagnoseError::Policy`] names the first that is not.
-    pub fn check(&self) -> Result<(), DiagnoseError> {
+    /// [`ModelError::Policy`] names the first that is not.
+    pub fn check(&self) -> Result<(), ModelError> {
         for (name, got) in self.numbers() {
             let is_share = name.ends_with("_share") || name.ends_with("_probability");
             if !got.is_finite() || got <= 0.0 || (is_share && got > 1.0) {
-                return Err(DiagnoseError::Policy { name, got });
+                return Err(ModelError::Policy { name, got });
             }
         }
         Ok(())

@@ -3,7 +3,7 @@
 use crate::blocks;
 use crate::defects::{self, Levels};
 use crate::effect::{Context, Identifier};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::Defect;
 use crate::model::Model;
@@ -50,21 +50,21 @@ impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     ///
     /// # Errors
-    /// [`DiagnoseError`] for settings that mean nothing, a channel that never changes, and a record too fragmented for
+    /// [`ModelError`] for settings that mean nothing, a channel that never changes, and a record too fragmented for
     /// noise levels.
-    pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, DiagnoseError> {
+    pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, ModelError> {
         settings.check()?;
         let policy = settings.policy.clone();
         for i in 0..2 {
             let first = observations.channel(i).next();
             if observations.channel(i).all(|y| Some(y) == first) {
-                return Err(DiagnoseError::Constant { channel: i + 1 });
+                return Err(ModelError::Constant { channel: i + 1 });
             }
         }
         let mut observations = observations.clone();
         let samples = observations.samples();
         let mut levels =
-            defects::levels(&observations).ok_or(DiagnoseError::InShreds { samples, needed: defects::SHORTEST })?;
+            defects::levels(&observations).ok_or(ModelError::InShreds { samples, needed: defects::SHORTEST })?;
         if let Some(std_k) = settings.noise_std_k {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use crate::effect::Identifier;
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::model::KnownTimeConstant;
 use crate::policy::Policy;
 
@@ -31,10 +31,10 @@ impl Settings {
     /// left to find.
     ///
     /// # Errors
-    /// [`DiagnoseError::Setting`], [`DiagnoseError::Policy`].
-    pub fn check(&self) -> Result<(), DiagnoseError> {
+    /// [`ModelError::Setting`], [`ModelError::Policy`].
+    pub fn check(&self) -> Result<(), ModelError> {
         let is_positive = |x: f64| x.is_finite() && x > 0.0;
-        let wrong = |what, got| Err(DiagnoseError::Setting { what, got });
+        let wrong = |what, got| Err(ModelError::Setting { what, got });
         self.policy.check()?;
         if let Some(std_k) = self.noise_std_k.into_iter().flatten().find(|s| !is_positive(*s)) {
             return wrong("a noise level that is positive", std_k);
@@ -56,7 +56,7 @@ impl Settings {
 }
 
 /// Progress of a run: called with the task, how much of it is done, and of how much.
-/// [`ControlFlow::Break`] cancels the run, which then returns [`DiagnoseError::Cancelled`].
+/// [`ControlFlow::Break`] cancels the run, which then returns [`ModelError::Cancelled`].
 pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
 
 /// Reports progress to `watch`.
@@ -64,7 +64,7 @@ pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
 /// ```
 /// use std::ops::ControlFlow;
 /// use std::sync::atomic::{AtomicUsize, Ordering};
-/// use twinlag_model::{DiagnoseError, report};
+/// use twinlag_model::{ModelError, report};
 ///
 /// // A watch that cancels at its third call.
 /// let calls = AtomicUsize::new(0);
@@ -73,15 +73,15 @@ pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
 ///     _ => ControlFlow::Break(()),
 /// };
 /// let ends: Vec<_> = (0..3).map(|done| report(&watch, "work", done, 3)).collect();
-/// assert_eq!(ends, [Ok(()), Ok(()), Err(DiagnoseError::Cancelled)]);
+/// assert_eq!(ends, [Ok(()), Ok(()), Err(ModelError::Cancelled)]);
 /// ```
 ///
 /// # Errors
-/// [`DiagnoseError::Cancelled`] if that is its answer.
-pub fn report(watch: Watch<'_>, task: &str, done: usize, of: usize) -> Result<(), DiagnoseError> {
+/// [`ModelError::Cancelled`] if that is its answer.
+pub fn report(watch: Watch<'_>, task: &str, done: usize, of: usize) -> Result<(), ModelError> {
     match watch(task, done, of) {
         ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(DiagnoseError::Cancelled),
+        ControlFlow::Break(()) => Err(ModelError::Cancelled),
     }
 }
 

@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::dense;
 use crate::effect::KnownEffect;
 use crate::effect::{Context, Shared, varying};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::ModelFit;
 use crate::known::Known;
@@ -105,7 +105,7 @@ pub fn track(
     settings: &Settings,
     effects: &[KnownEffect],
     watch: Watch<'_>,
-) -> Result<Track, DiagnoseError> {
+) -> Result<Track, ModelError> {
     let others: Vec<KnownEffect> =
         effects.iter().filter(|e| !e.effect.about().changes_time_constants).cloned().collect();
     let Known { prepared, fitted: constant, .. } = Known::of(observations, settings, &others)?;
@@ -188,7 +188,7 @@ impl Tracker<'_> {
     }
 
     /// The smooth change under which the record is most likely, and its effective number of coefficients.
-    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(f64, Fitted)>, DiagnoseError> {
+    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(f64, Fitted)>, ModelError> {
         let Context { ends_s, samples, .. } = self.prepared.context;
         let size = varying::MAX_COEFFICIENTS.min(samples / varying::SAMPLES_PER_COEFFICIENT);
         if size < LEAST_COEFFICIENTS {
@@ -236,7 +236,7 @@ impl Tracker<'_> {
     }
 
     /// The step that takes most off, and the fit with it.
-    fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, DiagnoseError> {
+    fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, ModelError> {
         let [first_s, last_s] = self.prepared.observations.ends_s();
         let span_s = last_s - first_s;
         let mut from_s = first_s + MARGIN * span_s;

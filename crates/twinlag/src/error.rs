@@ -2,7 +2,7 @@ use thiserror::Error;
 use twinlag_bias::NoiseError;
 use twinlag_compensate::CompensateError;
 use twinlag_cross_relation::CostError;
-use twinlag_diagnose::DiagnoseError;
+use twinlag_diagnose::ModelError;
 use twinlag_estimate::EstimateError;
 use twinlag_optimise::ProblemError;
 use twinlag_record::RecordError;
@@ -23,7 +23,7 @@ pub enum Error {
     #[error(transparent)]
     Cost(#[from] CostError),
     #[error(transparent)]
-    Diagnose(DiagnoseError),
+    Diagnose(ModelError),
     #[error(transparent)]
     Estimate(#[from] EstimateError),
     #[error(transparent)]
@@ -63,9 +63,9 @@ pub enum Error {
     ModelNumber { what: String, got: f64 },
 }
 
-impl From<DiagnoseError> for Error {
-    fn from(error: DiagnoseError) -> Self {
-        if error == DiagnoseError::Cancelled { Self::Cancelled } else { Self::Diagnose(error) }
+impl From<ModelError> for Error {
+    fn from(error: ModelError) -> Self {
+        if error == ModelError::Cancelled { Self::Cancelled } else { Self::Diagnose(error) }
     }
 }
 
@@ -88,7 +88,7 @@ impl Error {
             }
             Self::QuietSegment { .. } => vec![Setting::QuietSegment],
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
-            Self::Diagnose(DiagnoseError::NeedsFlow) => vec![Setting::Flow],
+            Self::Diagnose(ModelError::NeedsFlow) => vec![Setting::Flow],
             Self::ModelChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],

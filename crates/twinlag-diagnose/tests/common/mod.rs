@@ -5,7 +5,7 @@
 use std::ops::ControlFlow;
 
 use twinlag_diagnose::{
-    DiagnoseError, Diagnosis, Identifier, ModelFit, Observations, Settings, Stretch, TimeConstant, diagnose,
+    Diagnosis, Identifier, ModelError, ModelFit, Observations, Settings, Stretch, TimeConstant, diagnose,
 };
 use twinlag_signal::{Adc, Gas, Noise, Record, Rig, Sensor, Series, Signal, Simulated, Turbulence};
 
@@ -43,7 +43,7 @@ pub(crate) fn readings(seed: u64, signal: Signal, change: impl FnOnce(&mut [Sens
 }
 
 /// An unbroken record of evenly spaced samples.
-pub(crate) fn even(t1_c: Vec<f64>, t2_c: Vec<f64>) -> Result<Observations, DiagnoseError> {
+pub(crate) fn even(t1_c: Vec<f64>, t2_c: Vec<f64>) -> Result<Observations, ModelError> {
     let time_s = (0..t1_c.len()).map(|k| k as f64 * PERIOD_S).collect();
     Observations::new(vec![Stretch::new(time_s, [t1_c, t2_c])], Some(PERIOD_S))
 }

@@ -2,7 +2,7 @@
 
 use super::{Context, Shared, described_by};
 use crate::effect::KnownEffect;
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 
 /// What is known of a kind of effect before any record, as data: the search asks nothing else of it.
 ///
@@ -46,7 +46,7 @@ pub struct About {
     /// Every form in which it may be added to a model of a record.
     pub candidates: fn(&Context) -> Vec<Shared>,
     /// The effect with the parameters that it was found with in another record.
-    pub restore: fn(&KnownEffect, &Context) -> Result<Option<Shared>, DiagnoseError>,
+    pub restore: fn(&KnownEffect, &Context) -> Result<Option<Shared>, ModelError>,
 }
 
 impl About {
@@ -157,7 +157,7 @@ impl About {
     #[must_use]
     pub const fn restored_by(
         mut self,
-        restore: fn(&KnownEffect, &Context) -> Result<Option<Shared>, DiagnoseError>,
+        restore: fn(&KnownEffect, &Context) -> Result<Option<Shared>, ModelError>,
     ) -> Self {
         self.restore = restore;
         self

@@ -10,7 +10,7 @@ use crate::effect::KnownEffect;
 use crate::effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by,
 };
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::number::{Curve, Number};
 use crate::plant::Plant;
 
@@ -70,7 +70,7 @@ fn of_kind(kind: Kind, context: &Context) -> Shared {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     // A curvature is meant about the temperatures of the record that it was found in.
     let names = ["curvature_about", "curvature_variance", "curvature_skew"];
     let moments = [0, 1, 2].map(|i| known.parameter(names[i]).unwrap_or(context.moments[i]));

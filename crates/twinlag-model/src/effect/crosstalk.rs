@@ -12,7 +12,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::Plant;
 
@@ -48,7 +48,7 @@ fn about(channel: usize, about_c: f64) -> Shared {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let neutral_c = |channel: usize| known.parameter("neutral_temperature").unwrap_or(context.mean_c[1 - channel]);
     Ok(described_by(known, (0..2).map(|channel| about(channel, neutral_c(channel))).collect()))
 }

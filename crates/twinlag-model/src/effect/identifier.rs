@@ -11,7 +11,7 @@ use super::{
     About, calibration, coloured_noise, crosstalk, delay, drift, input_mismatch, mains_pickup, quantisation, radiation,
     saturation, second_order, slow_mode, spikes, temperature_dependence, varying,
 };
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 
 /// An effect by its name, with what is known of it before any record.
 ///
@@ -27,7 +27,7 @@ use crate::error::DiagnoseError;
 /// assert!(!radiation.about().advice.is_empty());
 /// let error = "friction".parse::<Identifier>().expect_err("there is none of that name");
 /// assert!(error.to_string().contains("slow-mode"), "{error}"); // it lists those that there are
-/// # Ok::<(), twinlag_model::DiagnoseError>(())
+/// # Ok::<(), twinlag_model::ModelError>(())
 /// ```
 #[derive(Clone, Copy)]
 pub struct Identifier(&'static About);
@@ -158,13 +158,13 @@ impl fmt::Display for Identifier {
 }
 
 impl FromStr for Identifier {
-    type Err = DiagnoseError;
+    type Err = ModelError;
 
-    fn from_str(text: &str) -> Result<Self, DiagnoseError> {
-        Self::ALL.into_iter().find(|e| e.name() == text).ok_or_else(|| DiagnoseError::UnknownEffect {
-            name: text.into(),
-            known: Self::ALL.map(Self::name).join(", "),
-        })
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        Self::ALL
+            .into_iter()
+            .find(|e| e.name() == text)
+            .ok_or_else(|| ModelError::UnknownEffect { name: text.into(), known: Self::ALL.map(Self::name).join(", ") })
     }
 }
 

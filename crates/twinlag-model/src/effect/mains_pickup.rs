@@ -8,7 +8,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::Plant;
 
@@ -32,7 +32,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let lines: Vec<(f64, usize)> = known.parameter("frequency").into_iter().flat_map(|hz| [(hz, 0), (hz, 1)]).collect();
     Ok(described_by(known, at_lines(lines.iter(), context)))
 }

@@ -6,7 +6,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::{Plant, ZERO_CELSIUS_K};
 
@@ -32,7 +32,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let mean_c = known.parameter("mean_temperature").map_or(context.mean_c, |mean_c| [mean_c; 2]);
     Ok(described_by(known, about(mean_c, context)))
 }

@@ -8,7 +8,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::number::{Curve, Number};
 use crate::plant::{Plant, ZERO_CELSIUS_K};
 
@@ -38,7 +38,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let here_c = 0.5 * (context.mean_c[0] + context.mean_c[1]);
     Ok(described_by(known, about(known.parameter("mean_temperature").unwrap_or(here_c), context)))
 }

@@ -9,7 +9,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared, described_by};
-use crate::error::DiagnoseError;
+use crate::error::ModelError;
 use crate::flow::Flow;
 use crate::number::{Number, TimeFunction};
 use crate::plant::Plant;
@@ -108,9 +108,9 @@ fn candidates(context: &Context) -> Vec<Shared> {
     of_size(FIRST_SIZE, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
 
-fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, DiagnoseError> {
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     if known.parameter("exponent").is_some() && context.flow.is_none() {
-        return Err(DiagnoseError::NeedsFlow);
+        return Err(ModelError::NeedsFlow);
     }
     Ok(described_by(known, candidates(context)))
 }
