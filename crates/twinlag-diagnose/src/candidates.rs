@@ -6,8 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 use twinlag_model::{
     Bands, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
-    Prepared, Selection, Settings, Shared, Watch, candidates, dense, deviance_at_free_level, fit_noise, line_channel,
-    lines, report, runs,
+    Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report, runs,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -43,6 +42,9 @@ pub(crate) struct Candidate {
     /// `−2 ln L` saved with a free noise level in every band: what noise of any colour does not
     /// explain.
     pub(crate) robust_gain: f64,
+    /// `−2 ln L` saved with levels as free as those beside a noise: what its gain is to be held
+    /// against. Of candidates of a round with noise among them.
+    pub(crate) free_level_gain: f64,
     /// Nats that it saves on blocks that were left out.
     pub(crate) held_out_nats: f64,
     /// What its gains count beside those of the others.
@@ -85,8 +87,7 @@ impl Candidate {
             white_gain: self.white_gain,
             robust_gain: self.robust_gain,
             share: self.share,
-            saved_deviance: self.fitted.count
-                * (deviance_at_free_level(current.mean_energy()) - deviance_at_free_level(self.fitted.mean_energy())),
+            free_level_gain: self.free_level_gain,
             energy: self.fitted.mean_energy(),
         }
     }
@@ -203,6 +204,12 @@ impl<'a> Search<'a> {
         self.bands(fitted).robust(|omega| self.selection.weighting.at(omega))
     }
 
+    /// `−2 ln L` of white noise whose levels are as free as those beside a noise of another colour.
+    fn at_free_levels(&self, fitted: &Fitted) -> f64 {
+        let plant = fitted.model.plant(&fitted.theta, self.observations);
+        fit_noise(&plant, self.observations, &self.bands(fitted), None, &[], self.context.is_coarse).likelihood
+    }
+
     /// Both gains of a candidate, white and robust. A line has its own frequency, and is judged
     /// there: with no weight over frequency, and no free level in a band that is wider than it.
     fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> [f64; 2] {
@@ -255,6 +262,12 @@ impl<'a> Search<'a> {
             finished.push(best);
         }
         finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
+        if !noise.is_empty() {
+            let before = self.at_free_levels(current);
+            for candidate in &mut finished {
+                candidate.free_level_gain = before - self.at_free_levels(&candidate.fitted);
+            }
+        }
         Ok(finished.into_iter().chain(noise.into_iter().map(|(_, c)| c)).collect())
     }
 
@@ -356,7 +369,16 @@ impl<'a> Search<'a> {
     fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
         let share = if effect.about().is_narrow { self.selection.weighting.mean() } else { 1.0 };
         let added = effect.parameters().len();
-        Candidate { effect: effect.clone(), fitted, added, white_gain, robust_gain, held_out_nats: 0.0, share }
+        Candidate {
+            effect: effect.clone(),
+            fitted,
+            added,
+            white_gain,
+            robust_gain,
+            free_level_gain: 0.0,
+            held_out_nats: 0.0,
+            share,
+        }
     }
 
     /// The best fit to an excerpt from a grid of time constants.

@@ -57,7 +57,7 @@ pub use policy::Policy;
 pub use prepare::Prepared;
 pub use selection::Selection;
 pub use settings::{Settings, Watch, report};
-pub use spectrum::{Bands, deviance_at_free_level, fit_noise, runs};
+pub use spectrum::{Bands, fit_noise, runs};
 pub use spline::Spline;
 pub use summary::{Z_975, covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};

@@ -232,14 +232,6 @@ impl Cost for NoiseCost<'_> {
     }
 }
 
-/// Deviance per residual of white noise whose mean energy is `energy`, its level as free as that of a fitted noise: `ln
-/// f + energy/f` with the best `f`.
-pub fn deviance_at_free_level(energy: f64) -> f64 {
-    let most = MAX_LEVEL_FACTOR * MAX_LEVEL_FACTOR;
-    let variance_factor = energy.clamp(1.0 / most, most);
-    variance_factor.ln() + energy / variance_factor
-}
-
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
 /// - `is_coarse`: channels whose levels third differences do not determine
