@@ -26,6 +26,7 @@ pub enum Verdict {
 
 /// An effect that was found; `Channel` is the place of a channel, 0 or 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Found<Channel = usize> {
     /// The effect.
     pub effect: Identifier,
@@ -57,6 +58,7 @@ pub struct BeforeAfter<T> {
 /// Errors before and after adding the effects. All but `chi2_per_dof` are computed on blocks used
 /// neither to choose effects nor to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorBudget {
     /// Energy of the whitened residual per degree of freedom, on the whole record.
     pub chi2_per_dof: BeforeAfter<f64>,
@@ -70,6 +72,7 @@ pub struct ErrorBudget {
 
 /// The part of the residual that no effect explains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Unexplained {
     /// Description of the residual in words.
     pub description: String,
@@ -101,6 +104,7 @@ impl Found {
 /// The detection limit of an effect that was not found; `Channel` is the place of a channel, 0 or
 /// 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Limit<Channel = usize> {
     /// The effect.
     pub effect: Identifier,
@@ -116,16 +120,6 @@ pub struct Limit<Channel = usize> {
 
 impl Limit {
     /// This limit with the name of its channel.
-    ///
-    /// ```
-    /// use twinlag_diagnose::{Identifier, Limit};
-    ///
-    /// let (parameter, unit) = ("slope".into(), "K/s".into());
-    /// let limit = Limit { effect: Identifier::DRIFT, channel: Some(1), parameter, size: 0.02, unit };
-    /// let named = limit.named(&["bare".into(), "sheathed".into()]);
-    /// assert_eq!(named.channel.as_deref(), Some("sheathed"));
-    /// assert_eq!((named.size, named.unit), (0.02, limit.unit));
-    /// ```
     pub fn named(&self, channels: &[String; 2]) -> Limit<String> {
         Limit {
             effect: self.effect,
@@ -139,6 +133,7 @@ impl Limit {
 
 /// The result of a diagnosis.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Diagnosis {
     /// The verdict.
     pub verdict: Verdict,
@@ -162,4 +157,18 @@ pub struct Diagnosis {
     pub moves: Vec<Move>,
     /// The numbers that decided.
     pub policy: Policy,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_keeps_its_numbers_with_the_name_of_its_channel() {
+        let (parameter, unit) = ("slope".to_owned(), "K/s".to_owned());
+        let limit = Limit { effect: Identifier::DRIFT, channel: Some(1), parameter, size: 0.02, unit };
+        let named = limit.named(&["bare".into(), "sheathed".into()]);
+        assert_eq!(named.channel.as_deref(), Some("sheathed"));
+        assert_eq!((named.size, named.unit), (0.02, limit.unit));
+    }
 }

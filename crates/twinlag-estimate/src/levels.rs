@@ -34,6 +34,7 @@ const NOISELESS_STD_PER_SWING: f64 = 1e-5;
 
 /// Noise levels and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Levels {
     /// Standard deviations, K.
     pub std_k: [f64; 2],

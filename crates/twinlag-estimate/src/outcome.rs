@@ -33,6 +33,7 @@ pub struct Outcome {
 
 /// Where an estimator of `P` parameters ended, for whoever wants more of it than an [`Outcome`].
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Solved<const P: usize> {
     /// The parameters, in the order of [`twinlag_cross_relation::Parameter::ALL`].
     pub theta: [f64; P],

@@ -38,6 +38,7 @@ const SHARE_OF_BOUND_THAT_IS_NONE: f64 = 1e-3;
 
 /// Intervals over all values of the undetermined time constant that the record allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Ridge {
     /// `τ2 − τ1` where the fit ended, and its interval, s.
     pub difference: (f64, [f64; 2]),

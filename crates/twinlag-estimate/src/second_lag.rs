@@ -32,6 +32,7 @@ const LIMIT_HALVINGS: usize = 6;
 
 /// The largest second lag that a record allows where it shows none.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Unseen<const P: usize> {
     /// Upper end of the one-sided 95 % interval, s; `None` where the record allows one as large as
     /// the first lag, or where [`WhitenedFit::bound_unseen_lags`] has not been asked.

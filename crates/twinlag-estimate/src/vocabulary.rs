@@ -266,6 +266,7 @@ impl Default for NoiseKnowledge {
 /// What 95 % intervals rest on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum IntervalBasis {
     /// Standard errors, in the logarithm of the time constant.
     StandardError,

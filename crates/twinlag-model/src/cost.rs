@@ -170,6 +170,7 @@ impl Cost for ResidualCost<'_> {
 
 /// A whitened residual with its derivatives.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Linearised {
     /// Samples of the residuals; prior knowledge comes after them in both of the others.
     pub samples: Vec<usize>,

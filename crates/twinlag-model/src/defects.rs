@@ -17,6 +17,7 @@ const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
 
 /// Noise of the channels as third differences show it.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Levels {
     /// White noise, K.
     pub std_k: [f64; 2],

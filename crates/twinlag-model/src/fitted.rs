@@ -24,6 +24,7 @@ pub struct Value {
 
 /// A time constant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TimeConstant {
     /// The estimate, s; `None` where the record does not determine it.
     pub value_s: Option<f64>,
@@ -35,6 +36,7 @@ pub struct TimeConstant {
 
 /// A fit as a picture needs it.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Trace {
     /// Instants, s.
     pub time_s: Vec<f64>,
@@ -54,6 +56,7 @@ pub struct Trace {
 
 /// One model of the record.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ModelFit {
     /// Both time constants.
     pub time_constants: [TimeConstant; 2],
@@ -90,6 +93,7 @@ impl ModelFit {
 
 /// A fit with effects that were known beforehand.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct KnownFit {
     /// The fit.
     pub fit: ModelFit,
@@ -99,6 +103,7 @@ pub struct KnownFit {
 
 /// A defect of the data, which is seen directly and not inferred.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Defect {
     /// The effect.
     pub effect: Identifier,

@@ -17,6 +17,7 @@ const PATH_SAMPLES: usize = 16;
 
 /// The whitened disagreement of a whole record, and what it is made of.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Evaluation {
     /// Whitened residual.
     pub residual: Vec<f64>,

@@ -19,6 +19,7 @@ const FEWEST_BLOCKS: usize = 8;
 
 /// One band: its frequency in radians per sample, and power and degrees of freedom in the blocks of either half.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Band {
     pub omega: f64,
     /// Sum of powers over the bins of either half.
@@ -177,6 +178,7 @@ impl Paths {
 
 /// Levels of the channels' white noise, and with them one more source of noise if there is one.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct NoiseFit {
     /// White noise, K.
     pub noise_std_k: [f64; 2],

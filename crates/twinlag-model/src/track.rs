@@ -51,6 +51,7 @@ pub enum Change {
 
 /// A step of both time constants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ChangePoint {
     /// When, s.
     pub at_s: f64,
@@ -64,6 +65,7 @@ pub struct ChangePoint {
 
 /// Whether the ratio of the time constants stays while they change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct RatioTest {
     /// Reduction of `−2 ln L` by a changing ratio.
     pub statistic: f64,
@@ -75,6 +77,7 @@ pub struct RatioTest {
 
 /// Time constants along a record.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Track {
     /// How they change.
     pub change: Change,

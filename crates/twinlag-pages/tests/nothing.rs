@@ -1,13 +1,14 @@
 //! A page of an answer of which nothing is determined: every section is there, and no number that is
 //! none.
 
+use std::ops::ControlFlow;
+
 use serde_json::json;
 use twinlag::Diagnosis;
 use twinlag::diagnosis::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Identifier, ModelFit, TimeConstant, Trace,
-    Unexplained, Value, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Found, Observations, Settings, Stretch, Trace, Unexplained, Verdict,
+    diagnose,
 };
-use twinlag::optimise::{End, Evaluations, Fit};
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag_pages::diagnosis_report;
 
@@ -37,49 +38,36 @@ fn record() -> Record {
     Record::from_channels(channels, SamplingChoice::Auto).expect("a record")
 }
 
-/// What the loop says where it determines nothing.
-fn core(verdict: Verdict, trace: Trace) -> Core {
-    let none = TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None };
-    let fit = ModelFit {
-        rejection_p_value: 1e-4,
-        time_constants: [none; 2],
-        difference: none,
-        fit: Fit {
-            optimiser: "none".into(),
-            start: Vec::new(),
-            x: Vec::new(),
-            value: f64::NAN,
-            end: End::LimitReached,
-            iterations: 0,
-            evaluations: Evaluations::default(),
-        },
-        noise_std_k: [f64::NAN; 2],
-        is_noise_of_residual: false,
-        tests: Vec::new(),
-        chi2_per_dof: f64::NAN,
-        is_weighted_by_residual: false,
-        covariance: None,
-        extended: None,
-        trace,
-    };
-    Core {
-        verdict,
-        effects: Vec::new(),
-        base: fit.clone(),
-        last: fit,
-        error: budget(),
-        unexplained: None,
-        not_testable: Vec::new(),
-        limits: Vec::new(),
-        remarks: Vec::new(),
-        moves: Vec::new(),
-        policy: twinlag::diagnosis::Policy::default(),
+/// What the loop says where it determines nothing: the answer to some record, emptied.
+fn core() -> Core {
+    let time_s: Vec<f64> = (0..200).map(f64::from).collect();
+    let reading_c = [0.0, 1.0].map(|late_s| time_s.iter().map(|t| (0.3 * (t - late_s)).sin()).collect());
+    let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(1.0)).expect("finite and long");
+    let settings = Settings { effects: Vec::new(), ..Settings::default() };
+    let mut core = diagnose(&observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("an answer");
+    for fit in [&mut core.base, &mut core.last] {
+        for tau in fit.time_constants.iter_mut().chain([&mut fit.difference]) {
+            (tau.value_s, tau.standard_error_s, tau.interval_95_s) = (None, None, None);
+        }
+        (fit.noise_std_k, fit.chi2_per_dof) = ([f64::NAN; 2], f64::NAN);
+        (fit.covariance, fit.extended) = (None, None);
+        fit.tests.clear();
+        fit.trace = Trace::default();
     }
+    core.error = budget();
+    core.unexplained = None;
+    (core.remarks, core.moves) = (Vec::new(), Vec::new());
+    core
 }
 
 fn budget() -> ErrorBudget {
-    let pair = BeforeAfter { before: f64::NAN, after: f64::INFINITY };
-    ErrorBudget { chi2_per_dof: pair, held_out_normalised_rms: pair, held_out_input_difference_k: pair }
+    let pair = json!({"before": 0.0, "after": 0.0});
+    let budget = json!({"chi2_per_dof": pair, "held_out_normalised_rms": pair, "held_out_input_difference_K": pair});
+    let mut budget: ErrorBudget = serde_json::from_value(budget).expect("the schema");
+    let nothing = BeforeAfter { before: f64::NAN, after: f64::INFINITY };
+    (budget.chi2_per_dof, budget.held_out_normalised_rms) = (nothing, nothing);
+    budget.held_out_input_difference_k = nothing;
+    budget
 }
 
 fn nothing(verdict: Verdict, record: &Record) -> Diagnosis {
@@ -121,27 +109,24 @@ fn nothing(verdict: Verdict, record: &Record) -> Diagnosis {
 }
 
 fn found() -> Found<String> {
-    Found {
-        effect: Identifier::DELAY,
-        channel: Some("T2 & more".into()),
-        fitted_in: Some("T2 & more".into()),
-        parameters: vec![Value {
-            name: "delay".into(),
-            value: f64::NAN,
-            standard_error: Some(f64::NAN),
-            interval_95: None,
-            unit: "s".into(),
-        }],
-        evidence: Some(Evidence {
-            statistic: f64::INFINITY,
-            dof: 1,
-            p_value: 0.0,
-            held_out_gain_nats: f64::NAN,
-            robust_statistic: None,
-        }),
-        alternatives: vec![Identifier::SECOND_ORDER],
-        seen: None,
-    }
+    let found = json!({
+        "effect": "delay", "channel": "T2 & more", "fitted_in": "T2 & more",
+        "parameters": [{"name": "delay", "value": 0.0, "standard_error": 0.0, "interval_95": null, "unit": "s"}],
+        "evidence": {"statistic": 0.0, "dof": 1, "p_value": 0.0, "held_out_gain_nats": 0.0, "robust_statistic": null},
+        "alternatives": ["second-order"], "seen": null
+    });
+    let mut found: Found<String> = serde_json::from_value(found).expect("the schema");
+    (found.parameters[0].value, found.parameters[0].standard_error) = (f64::NAN, Some(f64::NAN));
+    let evidence = found.evidence.as_mut().expect("given");
+    (evidence.statistic, evidence.held_out_gain_nats) = (f64::INFINITY, f64::NAN);
+    found
+}
+
+fn left() -> Unexplained {
+    let left = json!({"description": "something", "band_Hz": null, "energy_ratio": 0.0, "worst_s": null});
+    let mut left: Unexplained = serde_json::from_value(left).expect("the schema");
+    left.energy_ratio = f64::NAN;
+    left
 }
 
 fn has_every_section(page: &str) {
@@ -157,16 +142,20 @@ fn has_every_section(page: &str) {
 #[test]
 fn a_report_on_nothing_has_every_section_and_no_nan() {
     let record = record();
-    let left = Unexplained { description: "something".into(), band_hz: None, energy_ratio: f64::NAN, worst_s: None };
-    let gaps = Trace { time_s: record.time_s.clone(), gas_c: vec![f64::NAN; 200], ..Trace::default() };
+    let nowhere = core();
+    let mut gaps = nowhere.clone();
+    for fit in [&mut gaps.base, &mut gaps.last] {
+        (fit.trace.time_s, fit.trace.gas_c) = (record.time_s.clone(), vec![f64::NAN; 200]);
+    }
     for verdict in
         [Verdict::Adequate, Verdict::Explained, Verdict::PartlyExplained, Verdict::Unexplained, Verdict::Refused]
     {
-        for (effects, unexplained) in [(vec![], None), (vec![found()], Some(left.clone()))] {
-            for core in [None, Some(core(verdict, Trace::default())), Some(core(verdict, gaps.clone()))] {
+        for (effects, unexplained) in [(vec![], None), (vec![found()], Some(left()))] {
+            for core in [None, Some(nowhere.clone()), Some(gaps.clone())] {
                 let mut answer = nothing(verdict, &record);
                 (answer.effects, answer.unexplained) = (effects.clone(), unexplained.clone());
                 answer.core = core.map(Box::new);
+                answer.core.iter_mut().for_each(|core| core.verdict = verdict);
                 has_every_section(&diagnosis_report(&record, &answer, "twinlag diagnose 'a <b>.csv'").expect("a page"));
             }
         }

@@ -76,7 +76,7 @@ impl Fitted<'_> {
     }
 
     fn sensor(&self, i: usize) -> SensorEstimate {
-        let TimeConstant { value_s, standard_error_s, interval_95_s } = self.fit.time_constants[i];
+        let TimeConstant { value_s, standard_error_s, interval_95_s, .. } = self.fit.time_constants[i];
         SensorEstimate {
             channel: self.record.channels[i].clone(),
             time_constant_s: value_s,

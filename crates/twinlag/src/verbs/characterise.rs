@@ -292,7 +292,8 @@ impl Asked<'_> {
                 let end = End::Stalled(why.into());
                 let mut solved = fit.solved(None);
                 solved.fit = solved.fit.map(|fit| Fit { optimiser: "closed-form".into(), end: end.clone(), ..fit });
-                return Ok(Solved { end, ..solved });
+                solved.end = end;
+                return Ok(solved);
             }
             solved => solved?,
         };
