@@ -64,10 +64,13 @@ fn review(state: &mut State<'_>) -> Result<(), ModelError> {
         if state.taken.len() < 2 {
             break;
         }
-        if let Some(exchange) = state.exchange(index)? {
-            state.apply(exchange);
-            tidy(state);
-            break;
+        if let Some(proposal) = state.exchange(index)? {
+            let is_exchange = proposal.is_exchange();
+            state.apply(proposal);
+            if is_exchange {
+                tidy(state);
+                break;
+            }
         }
     }
     if let Some(removal) = state.remove_explained_noise() {
@@ -91,5 +94,73 @@ fn at_each<'a>(state: &mut State<'a>, propose: impl Fn(&State<'a>, usize) -> Opt
             Some(proposal) => state.apply(proposal),
             None => index += 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use twinlag_model::{Identifier, Stretch};
+    use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+    use super::*;
+    use crate::moves::Move;
+
+    type Taken = (Identifier, Option<usize>, Vec<Identifier>);
+
+    /// Effects with their channels and ties, from what `moves` say alone.
+    fn replayed(moves: &[Move]) -> Vec<Taken> {
+        let mut taken: Vec<Taken> = Vec::new();
+        let at = |taken: &[Taken], effect, channel| {
+            taken.iter().position(|t| (t.0, t.1) == (effect, channel)).expect("an effect that was there")
+        };
+        for step in moves.iter().cloned() {
+            match step {
+                Move::Add { effect, channel, ties, .. } => taken.push((effect, channel, ties)),
+                Move::Keep { effect, channel, ties } => {
+                    let place = at(&taken, effect, channel);
+                    taken[place].2 = ties;
+                }
+                Move::Exchange { before, before_channel, effect, channel, .. } => {
+                    let place = at(&taken, before, before_channel);
+                    taken[place] = (effect, channel, Vec::new());
+                }
+                Move::Remove { effect, channel, .. } => {
+                    let place = at(&taken, effect, channel);
+                    taken.remove(place);
+                }
+                Move::Extend { .. } | Move::LowerNoise { .. } | Move::Reweigh { .. } => {}
+            }
+        }
+        taken
+    }
+
+    /// Failed: ties were replaced by those of a later comparison, of which no move said anything.
+    #[test]
+    fn the_moves_replayed_give_the_effects_and_their_ties() {
+        let mut sensors = [0.012, 0.06].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+        sensors.iter_mut().for_each(|s| s.noise = Some(Noise::white(0.1)));
+        (sensors[1].offset_k, sensors[1].delay_s) = (1.0, 0.003);
+        let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 }));
+        let rig = Rig::new(20, Record::new(1500, 0.001), gas, sensors).expect("a valid rig");
+        let record = rig.simulate().expect("finite numbers");
+        let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+        let observations = Observations::new(vec![stretch], Some(0.001)).expect("a record");
+        let (settings, watch) = (Settings::default(), |_: &str, _, _| ControlFlow::Continue(()));
+        let prepared = Prepared::new(&observations, &settings).expect("a record");
+        let mut state = State::new(prepared, &settings, &watch);
+        while advance(&mut state, &settings).expect("not cancelled") {}
+        let taken: Vec<Taken> = state
+            .taken
+            .iter()
+            .map(|t| {
+                let ties = t.ties.iter().map(|tie| tie.effect.identifier()).collect();
+                (t.candidate.effect.identifier(), t.candidate.effect.channel(), ties)
+            })
+            .collect();
+        let compared = state.moves.iter().filter(|m| matches!(m, Move::Keep { .. })).count();
+        assert!(taken.len() >= 2 && compared >= 2, "two effects, each compared again: {:?}", state.moves);
+        assert_eq!(replayed(&state.moves), taken, "{:?}", state.moves);
     }
 }

@@ -48,6 +48,15 @@ pub enum Move {
         /// Deviance by which it is better, its parameters counted.
         advantage: f64,
     },
+    /// An effect was compared with its look-alikes again, and stays.
+    Keep {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// Effects that explain the record as well, now that more is known.
+        ties: Vec<Identifier>,
+    },
     /// An effect was taken out.
     Remove {
         /// The effect.
@@ -78,7 +87,7 @@ impl Move {
             Self::Exchange { before, effect, .. } => Some(Remark::Replaced { before: *before, after: *effect }),
             Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
-            Self::Add { .. } | Self::Extend { .. } | Self::Reweigh { .. } => None,
+            Self::Add { .. } | Self::Extend { .. } | Self::Keep { .. } | Self::Reweigh { .. } => None,
         }
     }
 }
@@ -89,10 +98,19 @@ pub(crate) struct Proposal {
     change: Change,
 }
 
+impl Proposal {
+    /// Whether one effect takes the place of another.
+    pub(crate) fn is_exchange(&self) -> bool {
+        matches!(self.entry, Move::Exchange { .. })
+    }
+}
+
 enum Change {
     Append(Box<Taken>),
     /// Another form of an effect, or another effect, in the place of one.
     Put(usize, Box<Taken>),
+    /// Other ties of an effect.
+    Ties(usize, Vec<Candidate>),
     /// Without an effect, fitted again.
     Drop(usize, Box<Fitted>),
     Levels,
@@ -114,6 +132,10 @@ impl Taken {
     fn is_noise(&self) -> bool {
         self.candidate.effect.is_noise()
     }
+}
+
+fn identifiers(candidates: &[Candidate]) -> Vec<Identifier> {
+    candidates.iter().map(|c| c.effect.identifier()).collect()
 }
 
 /// How far the loop has come.
@@ -162,6 +184,7 @@ impl<'a> State<'a> {
                 self.current = taken.candidate.fitted.clone().in_order();
                 self.taken[index] = *taken;
             }
+            Change::Ties(index, ties) => self.taken[index].ties = ties,
             Change::Drop(index, fitted) => {
                 self.current = *fitted;
                 self.taken.remove(index);
@@ -192,7 +215,7 @@ impl<'a> State<'a> {
             effect: candidate.effect.identifier(),
             channel: candidate.effect.channel(),
             evidence: Evidence::of(&candidate),
-            ties: ties.iter().map(|t| t.effect.identifier()).collect(),
+            ties: identifiers(&ties),
         };
         Ok(Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) }))
     }
@@ -243,11 +266,14 @@ impl<'a> State<'a> {
         Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
-    /// Puts a look-alike in the place of effect `index`, now that more is known, if one is better.
-    /// Those that are as good become its ties.
-    pub(crate) fn exchange(&mut self, index: usize) -> Result<Option<Proposal>, ModelError> {
+    /// Puts a look-alike in the place of effect `index`, now that more is known, if one is better;
+    /// otherwise those that are as good become its ties.
+    pub(crate) fn exchange(&self, index: usize) -> Result<Option<Proposal>, ModelError> {
         let search = self.search();
         let taken = &self.taken[index];
+        if taken.is_noise() {
+            return Ok(None);
+        }
         let mut alike = search.look_alikes(&self.current, index, &taken.candidate)?;
         let value = |Replacement { candidate, advantage }: &Replacement| LookAlike {
             kind: kind(&candidate.effect),
@@ -256,17 +282,17 @@ impl<'a> State<'a> {
         };
         let values: Vec<LookAlike> = alike.iter().map(value).collect();
         let policy = &self.settings.policy;
+        let (effect, channel) = (taken.effect(), taken.candidate.effect.channel());
         let Some(at) = successor(kind(&taken.candidate.effect), &values, policy) else {
-            if !taken.is_noise() {
-                let tied = alike.into_iter().zip(values).filter(|(_, value)| value.is_tied(policy));
-                self.taken[index].ties = tied.map(|(replacement, _)| replacement.candidate).collect();
-            }
-            return Ok(None);
+            let tied = alike.into_iter().zip(values).filter(|(_, value)| value.is_tied(policy));
+            let ties: Vec<Candidate> = tied.map(|(replacement, _)| replacement.candidate).collect();
+            let entry = Move::Keep { effect, channel, ties: identifiers(&ties) };
+            return Ok(Some(Proposal { entry, change: Change::Ties(index, ties) }));
         };
         let replacement = alike.swap_remove(at);
         let entry = Move::Exchange {
-            before: taken.effect(),
-            before_channel: taken.candidate.effect.channel(),
+            before: effect,
+            before_channel: channel,
             effect: replacement.candidate.effect.identifier(),
             channel: replacement.candidate.effect.channel(),
             advantage: replacement.advantage,

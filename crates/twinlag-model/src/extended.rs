@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use twinlag_compensate::{Coloured, Readings, Rig, Sensor, SensorAt, SlowPath};
 
+use crate::effect::{Identifier, Shared};
 use crate::error::ModelError;
 use crate::fit::Fitted;
 use crate::model::Model;
@@ -28,9 +29,14 @@ impl fmt::Debug for Extended {
     }
 }
 
+/// Two are equal if they have the same effects in the same places, with the same parameters, and make the same sensors
+/// of the same record. What an effect holds beside its parameters counts as far as the sensors depend on it.
 impl PartialEq for Extended {
     fn eq(&self, other: &Self) -> bool {
-        self.theta == other.theta && self.observations == other.observations
+        self.theta == other.theta
+            && self.observations == other.observations
+            && self.seats().eq(other.seats())
+            && self.rig(&self.theta) == other.rig(&other.theta)
     }
 }
 
@@ -39,6 +45,12 @@ impl Extended {
     pub fn new(fitted: &Fitted, observations: &Observations) -> Self {
         let observations = Arc::new(observations.clone());
         Self { model: fitted.model.clone(), theta: fitted.theta.clone(), observations }
+    }
+
+    /// Each effect with its channel and the names of its parameters.
+    fn seats(&self) -> impl Iterator<Item = (Identifier, Option<usize>, Vec<&str>)> {
+        let names = |e: &Shared| e.parameters().iter().map(|p| p.name).collect();
+        self.model.effects.iter().map(move |e| (e.identifier(), e.channel(), names(e)))
     }
 
     /// The parameters, time constants first, as [`crate::ModelFit::covariance`] has them.
@@ -124,4 +136,38 @@ fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Optio
             each.collect()
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::candidates;
+    use crate::observations::Stretch;
+    use crate::prepare::Prepared;
+    use crate::settings::Settings;
+
+    /// Failed: two models with the same numbers for different effects were equal.
+    #[test]
+    fn models_of_the_same_numbers_are_equal_if_their_effects_are() {
+        let time_s: Vec<f64> = (0..200).map(|k| 0.01 * f64::from(k)).collect();
+        let gas_c = |t: f64| 300.0 + (9.0 * t).sin() + (31.0 * t).sin().powi(3);
+        let reading_c = [0.0, 0.4].map(|late_s| time_s.iter().map(|t| gas_c(t - late_s)).collect());
+        let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01)).expect("a record");
+        let context = Prepared::new(&observations, &Settings::default()).expect("a record").context;
+        let with = |effect: Identifier, place: usize| {
+            let model = Model::new(&[], [0.1, 0.1]).with(candidates(&[effect], &context).remove(place));
+            let theta = vec![0.1, 0.3, 0.02];
+            Extended { model, theta, observations: Arc::new(observations.clone()) }
+        };
+        let offset = with(Identifier::CALIBRATION, 0);
+        assert_eq!(offset, with(Identifier::CALIBRATION, 0), "made twice");
+        assert_ne!(offset, with(Identifier::DELAY, 0), "another effect");
+        let crosstalk = with(Identifier::CROSSTALK, 0);
+        assert_ne!(crosstalk, with(Identifier::CROSSTALK, 1), "another channel");
+        let mut other = offset.clone();
+        other.theta[2] = 0.03;
+        assert_ne!(offset, other, "another offset");
+        let louder = Model::new(&[], [0.2, 0.1]).with(offset.model.effects[0].clone());
+        assert_ne!(offset, Extended { model: louder, ..offset.clone() }, "other noise");
+    }
 }
