@@ -12,6 +12,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use rayon::prelude::*;
 use twinlag_cross_relation::{CostError, InferredInputs, Readings, Segment, Steps, inferred_inputs};
 use twinlag_transform::{Complex64, Forward, Inverse};
 
@@ -48,8 +49,12 @@ impl Bootstrap {
     /// 95 % intervals of both time constants, s, for what `estimator` made of `task`; `None` where
     /// more than a tenth of the replicates cannot be answered.
     ///
+    /// Replicates are answered on several threads; what comes out does not depend on their number. To watch or end it,
+    /// hand over an estimator that counts what it is asked and returns [`EstimateError::Cancelled`].
+    ///
     /// # Errors
-    /// [`EstimateError::Unexpected`] for too few replicates; what the estimator says of `task` itself, such as uneven sampling.
+    /// [`EstimateError::Unexpected`] for too few replicates; what the estimator says of `task` itself, such as uneven
+    /// sampling, or [`EstimateError::Cancelled`].
     /// ```
     #[doc = include_str!("../doc/readings.txt")]
     /// use twinlag_estimate::{Bootstrap, Estimate, Estimator, Task};
@@ -73,20 +78,17 @@ impl Bootstrap {
         let Some(levels_k) = outcome.noise_std_k else { return Ok(None) };
         let inputs = inferred_inputs(task.readings, task.hold, &[t1, t2, 1.0, 0.0, s1, s2])?;
         let clean = clean_readings(&inputs, levels_k, outcome.noise_ar1);
-        let mut logs: [Vec<f64>; 2] = [Vec::new(), Vec::new()];
-        for replicate in 0..self.replicates {
+        let one = |replicate: usize| -> Result<Option<[f64; 2]>, EstimateError> {
             let readings = self.replicate(replicate as u64, &clean, task, levels_k, outcome.noise_ar1)?;
             let again = Task { readings: &readings, starts_s: vec![outcome.tau_s], intervals: false, ..*task };
             let found = match estimator.estimate(&again) {
-                Err(EstimateError::Cost(CostError::Singular)) => continue,
+                Err(EstimateError::Cost(CostError::Singular)) => return Ok(None),
                 found => found?,
             };
-            if found.end.is_usable() {
-                for i in 0..2 {
-                    logs[i].push((found.tau_s[i] / outcome.tau_s[i]).ln());
-                }
-            }
-        }
+            Ok(found.end.is_usable().then(|| [0, 1].map(|i| (found.tau_s[i] / outcome.tau_s[i]).ln())))
+        };
+        let found: Vec<Option<[f64; 2]>> = (0..self.replicates).into_par_iter().map(one).collect::<Result<_, _>>()?;
+        let mut logs = [0, 1].map(|i| found.iter().flatten().map(|log| log[i]).collect::<Vec<f64>>());
         let failed = self.replicates - logs[0].len();
         if failed as f64 > MAX_FAILED_SHARE * self.replicates as f64 {
             return Ok(None);

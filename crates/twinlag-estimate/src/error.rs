@@ -23,6 +23,8 @@ pub enum EstimateError {
          use a longer record, discard fewer, or the whitened estimator, which discards none"
     )]
     DiscardsAll { discard: usize, longest: usize },
+    #[error("the run was cancelled")]
+    Cancelled,
 }
 
 impl EstimateError {

@@ -3,7 +3,8 @@
 use crate::problem::{Problem, ProblemError};
 use crate::report::{Budget, Fit, Progress};
 
-/// A local minimiser: from one start to one report. Implement it to bring a solver of your own.
+/// A local minimiser: from one start to one report. Implement it to bring a solver of your own. Several threads may ask
+/// it at once.
 ///
 /// A solver sees the problem in free coordinates of size one: [`Problem::coordinates`] of the
 /// start, [`Problem::bounds`], [`Problem::value_at`] and [`Problem::derivatives_at`];
@@ -42,7 +43,7 @@ use crate::report::{Budget, Fit, Progress};
 /// assert_eq!((fit.x[0], fit.end), (2.0, End::Unchecked)); // point 40 of the grid is exact
 /// # Ok::<(), ProblemError>(())
 /// ```
-pub trait Minimiser {
+pub trait Minimiser: Sync {
     /// Name of the solver, as it appears in reports.
     fn name(&self) -> String;
 

@@ -25,7 +25,7 @@ pub enum Error {
     #[error(transparent)]
     Diagnose(ModelError),
     #[error(transparent)]
-    Estimate(#[from] EstimateError),
+    Estimate(EstimateError),
     #[error(transparent)]
     Noise(#[from] NoiseError),
     #[error(transparent)]
@@ -66,6 +66,12 @@ pub enum Error {
 impl From<ModelError> for Error {
     fn from(error: ModelError) -> Self {
         if error == ModelError::Cancelled { Self::Cancelled } else { Self::Diagnose(error) }
+    }
+}
+
+impl From<EstimateError> for Error {
+    fn from(error: EstimateError) -> Self {
+        if error == EstimateError::Cancelled { Self::Cancelled } else { Self::Estimate(error) }
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use twinlag_cross_relation::CostError;
 use twinlag_estimate::{
     Bootstrap, Estimate, EstimateError, Estimator, IntervalBasis, Intervals, Outcome, Solved, Task, TauIntervals,
     WhitenedFit,
@@ -68,8 +67,7 @@ impl Estimate for Watched<'_> {
 
     fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
         if self.stop.is_wanted() {
-            // The verb ends as cancelled, whatever the replicates that are left say.
-            return Err(CostError::Singular.into());
+            return Err(EstimateError::Cancelled);
         }
         let outcome = self.estimator.estimate(task);
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
