@@ -1,8 +1,7 @@
 //! The effects that were found, in numbers.
 
-use twinlag_model::{
-    Defect, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, Z_975, covariance,
-};
+use twinlag_cross_relation::{Z_975, log_normal_interval_95};
+use twinlag_model::{Defect, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, covariance};
 use twinlag_optimise::Scale;
 
 use crate::diagnosis::Found;
@@ -58,10 +57,7 @@ fn value(parameter: &Parameter, value: f64, variance: Option<f64>) -> Value {
 /// factor either way.
 fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
     match scale {
-        Scale::Logarithmic => {
-            let factor = (Z_975 * error / value).exp();
-            [value / factor, value * factor]
-        }
+        Scale::Logarithmic => log_normal_interval_95(value, error),
         Scale::Linear { .. } => [value - Z_975 * error, value + Z_975 * error],
     }
 }

@@ -1,7 +1,8 @@
 //! Whether a record determines a time constant at all, as far as its standard error or its interval
 //! says.
 
-use crate::profile::Z_975;
+use twinlag_cross_relation::Z_975;
+
 use crate::whitened::WhitenedFit;
 
 /// Standard error of the logarithm of a time constant above which it is not determined: its

@@ -4,12 +4,11 @@
 //! has not risen by what the quadratic form says, within a fifth, the ends are moved to where it
 //! has.
 
-use twinlag_cross_relation::{Whitened, sandwich};
+use twinlag_cross_relation::{Whitened, Z_975, log_normal_interval_95, sandwich};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
 
 use crate::levels::Levels;
 use crate::objective::{EstimatorCost, Objective, Prior};
-use crate::profile::Z_975;
 use crate::vocabulary::IntervalBasis;
 
 /// A profile that has risen by this share more or less than the quadratic form is not described by
@@ -35,15 +34,10 @@ impl TauIntervals {
     pub fn quadratic<const P: usize>(theta: &[f64; P], covariance: &[[f64; P]; P]) -> Self {
         Self {
             standard_error_s: [0, 1].map(|i| covariance[i][i].sqrt()),
-            interval_95_s: [0, 1].map(|i| quadratic(theta[i], covariance[i][i])),
+            interval_95_s: [0, 1].map(|i| log_normal_interval_95(theta[i], covariance[i][i].sqrt())),
             basis: [IntervalBasis::StandardError; 2],
         }
     }
-}
-
-fn quadratic(tau_s: f64, variance_s2: f64) -> [f64; 2] {
-    let factor = (Z_975 * variance_s2.sqrt() / tau_s).exp();
-    [tau_s / factor, tau_s * factor]
 }
 
 /// `covariance` with what the uncertainty of found levels adds: the weights that they give move the
@@ -125,7 +119,7 @@ impl<const P: usize> Minimum<'_, '_, P> {
     /// Interval of the time constant `i` alone, which is free.
     pub(crate) fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
         let Self { theta, free, variables, .. } = self;
-        let ends = quadratic(theta[i], self.covariance[i][i]);
+        let ends = log_normal_interval_95(theta[i], self.covariance[i][i].sqrt());
         let Some(inverse) = inverse(self.whitened, theta, free, self.priors) else {
             return (ends, IntervalBasis::StandardError);
         };

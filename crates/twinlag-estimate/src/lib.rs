@@ -71,7 +71,7 @@ pub use intervals::TauIntervals;
 pub use levels::{Levels, MIN_DEGREES_OF_FREEDOM_AT_REST};
 pub use objective::Prior;
 pub use outcome::{Outcome, Solved};
-pub use profile::{Ridge, Z_975};
+pub use profile::Ridge;
 pub use residual::REJECTION_P_VALUE;
 pub use second_lag::Unseen;
 pub use task::{RunAtRest, Task};

@@ -15,10 +15,10 @@ use crate::policy::Policy;
 /// Bins beside a line that it is held against: beyond the window's main lobe.
 const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
 
-/// Noise of the channels as third differences show it.
+/// Noise of the channels: as third differences show it, or as a model leaves it over.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
-pub struct Levels {
+pub struct ChannelNoise {
     /// White noise, K.
     pub std_k: [f64; 2],
     /// Standard error of the logarithm.
@@ -32,7 +32,7 @@ pub struct Levels {
 /// Rows of a stretch that levels of noise can be found in.
 pub(crate) const SHORTEST: usize = 8;
 
-impl Levels {
+impl ChannelNoise {
     /// Step of each converter where it is coarse beside the noise, K.
     pub fn coarse_step_k(&self) -> [Option<f64>; 2] {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
@@ -71,10 +71,10 @@ pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
 }
 
 /// Levels from third differences.
-pub fn levels(observations: &Observations) -> Option<Levels> {
+pub fn levels(observations: &Observations) -> Option<ChannelNoise> {
     let found = estimate_noise(&readings(observations)?).ok()?;
     let nothing = 1e-5 * observations.swing_k();
-    Some(Levels {
+    Some(ChannelNoise {
         std_k: found.map(|l| l.std_k.max(nothing)),
         log_error: found.map(|l| l.standard_error_k / l.std_k.max(nothing)),
         step_k: found.map(|l| l.quantisation_step_k),

@@ -35,6 +35,7 @@ pub use identifier::Identifier;
 pub use known::KnownEffect;
 pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
 
+use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::Plant;
 
@@ -140,6 +141,49 @@ pub fn candidates(effects: &[Identifier], context: &Context) -> Vec<Shared> {
     effects.iter().flat_map(|e| (e.about().candidates)(context)).collect()
 }
 
+/// That effects of other crates among `effects` have names of their own and return what [`Effect`] promises. Those of
+/// this library are held to it by a test.
+pub(crate) fn check_all(effects: &[Identifier], context: &Context) -> Result<(), ModelError> {
+    for foreign in effects.iter().filter(|e| !e.is_of_this_library()) {
+        let same = effects.iter().filter(|e| *e == foreign).count();
+        if same > 1 {
+            let expected = "a name that no other effect in the settings has";
+            return Err(ModelError::Effect { effect: foreign.name(), expected, got: same as f64 });
+        }
+        candidates(&[*foreign], context).iter().try_for_each(check)?;
+    }
+    Ok(())
+}
+
+/// That an effect returns what [`Effect`] promises, in all its sizes.
+pub(crate) fn check(effect: &Shared) -> Result<(), ModelError> {
+    check_one(effect)?;
+    effect.sizes().iter().try_for_each(check_one)
+}
+
+fn check_one(effect: &Shared) -> Result<(), ModelError> {
+    let wrong = |expected, got| Err(ModelError::Effect { effect: effect.identifier().name(), expected, got });
+    let (parameters, starts) = (effect.parameters(), effect.starts());
+    if let Some(channel) = effect.channel().filter(|channel| *channel > 1) {
+        return wrong("channel 0 or 1, or none", channel as f64);
+    }
+    if let Some(main) = effect.main().filter(|main| *main >= parameters.len()) {
+        return wrong("a main parameter that it has, counted from 0", main as f64);
+    }
+    if starts.is_empty() {
+        return wrong("at least one set of values to start from", 0.0);
+    }
+    if let Some(start) = starts.iter().find(|start| start.len() != parameters.len()) {
+        return wrong("as many values in each start as it has parameters", start.len() as f64);
+    }
+    let is_outside = |(p, x): &(&Parameter, &f64)| !(p.variable.lower..=p.variable.upper).contains(*x);
+    let mut values = starts.iter().flat_map(|start| parameters.iter().zip(start));
+    if let Some((_, value)) = values.find(is_outside) {
+        return wrong("starts that are finite and within the bounds of their parameters", *value);
+    }
+    Ok(())
+}
+
 /// Of `candidates`, in all their sizes, the one that `known` describes: in its channel, with all parameters given, and
 /// with the most of them.
 pub fn described_by(known: &KnownEffect, candidates: Vec<Shared>) -> Option<Shared> {
@@ -147,4 +191,111 @@ pub fn described_by(known: &KnownEffect, candidates: Vec<Shared>) -> Option<Shar
         |e: &Shared| e.channel() == known.channel && e.parameters().iter().all(|p| known.parameter(p.name).is_some());
     let sizes: Vec<Shared> = candidates.iter().flat_map(|e| e.sizes()).collect();
     candidates.into_iter().chain(sizes).filter(is_described).max_by_key(|e| e.parameters().len())
+}
+
+#[cfg(test)]
+mod tests {
+    use twinlag_optimise::Variable;
+
+    use super::*;
+    use crate::observations::{Observations, Stretch};
+    use crate::prepare::Prepared;
+    use crate::settings::Settings;
+
+    static FOREIGN: About = About::new("foreign", 20, |_| vec![Foreign::with(|_| ())]);
+    static LATE: About = About::new("late", 21, late);
+    static DELAY: About = About::new("delay", 20, |_| Vec::new());
+
+    /// An effect that starts outside its bounds.
+    fn late(_: &Context) -> Vec<Shared> {
+        vec![Foreign::with(|f| (f.seat.identifier, f.starts[0][0]) = (Identifier::of(&LATE), 3.0))]
+    }
+
+    /// An effect of one parameter between −1 and 1, which does nothing.
+    struct Foreign {
+        seat: Seat,
+        starts: Vec<Vec<f64>>,
+        main: Option<usize>,
+    }
+
+    impl Foreign {
+        fn with(change: impl Fn(&mut Self)) -> Shared {
+            let parameters = vec![Parameter::new("size", "1", Variable::linear("size", 0.1, -1.0, 1.0))];
+            let seat = Seat::new(Identifier::of(&FOREIGN), Some(1), parameters);
+            let mut out = Self { seat, starts: vec![vec![0.1], vec![-1.0]], main: Some(0) };
+            change(&mut out);
+            Arc::new(out)
+        }
+    }
+
+    impl Effect for Foreign {
+        fn seat(&self) -> &Seat {
+            &self.seat
+        }
+
+        fn starts(&self) -> Vec<Vec<f64>> {
+            self.starts.clone()
+        }
+
+        fn install(&self, _values: &[Number], _plant: &mut Plant) {}
+
+        fn main(&self) -> Option<usize> {
+            self.main
+        }
+    }
+
+    /// Of 2000 samples: in fewer than 400, 20 sample periods, at which the fit of coloured noise starts, are longer than its
+    /// longest correlation, and are moved inside.
+    fn observations() -> Observations {
+        let time_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
+        let gas_c = |t: f64| 300.0 + (9.0 * t).sin() + (31.0 * t).sin().powi(3);
+        let reading_c = [0.0, 0.4].map(|late_s| time_s.iter().map(|t| gas_c(t - late_s)).collect());
+        Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01)).expect("finite and long")
+    }
+
+    #[test]
+    fn an_effect_that_breaks_a_promise_is_refused_with_what_was_expected() {
+        assert_eq!(check(&Foreign::with(|_| ())), Ok(()));
+        assert_eq!(check(&Foreign::with(|f| f.main = None)), Ok(()));
+        let refused = |change: fn(&mut Foreign), expects: &str| {
+            let error = check(&Foreign::with(change)).expect_err(expects).to_string();
+            assert!(error.contains("\"foreign\"") && error.contains(expects), "{error}");
+        };
+        refused(|f| f.starts.clear(), "at least one set");
+        refused(|f| f.starts[1].push(0.1), "as many values");
+        refused(|f| f.starts[1].clear(), "as many values");
+        refused(|f| f.starts[0][0] = 1.1, "within the bounds");
+        refused(|f| f.starts[1][0] = f64::NAN, "finite");
+        refused(|f| f.main = Some(1), "main parameter");
+        refused(|f| f.seat.channel = Some(2), "channel 0 or 1");
+    }
+
+    /// Where a record meets the settings, before any fit.
+    #[test]
+    fn settings_with_such_an_effect_or_with_one_twice_are_refused() {
+        let with = |more: &[&'static About]| {
+            let mut settings = Settings::default();
+            settings.effects.extend(more.iter().map(|about| Identifier::of(about)));
+            Prepared::new(&observations(), &settings).map(|_| ())
+        };
+        assert_eq!(with(&[&FOREIGN]), Ok(()));
+        let named = |result: Result<(), ModelError>| match result.expect_err("refused") {
+            ModelError::Effect { effect, got, .. } => (effect, got),
+            other => panic!("{other}"),
+        };
+        assert_eq!(named(with(&[&FOREIGN, &LATE])), ("late", 3.0));
+        assert_eq!(named(with(&[&FOREIGN, &FOREIGN])), ("foreign", 2.0));
+        assert_eq!(named(with(&[&DELAY])), ("delay", 2.0));
+    }
+
+    #[test]
+    fn the_effects_of_this_library_keep_the_promises() {
+        let prepared = Prepared::new(&observations(), &Settings::default()).expect("a record");
+        let context = Context { lines: vec![(20.0, 0)], ..prepared.context };
+        let made = candidates(&Identifier::ALL, &context);
+        assert!(made.len() > Identifier::ALL.len(), "{}", made.len());
+        for effect in &made {
+            assert_eq!(check(effect), Ok(()));
+        }
+    }
 }

@@ -38,6 +38,8 @@ pub enum ModelError {
     Absurd,
     #[error("the policy has {name} = {got}: expected a positive number, of a share or a probability at most 1")]
     Policy { name: &'static str, got: f64 },
+    #[error("the effect \"{effect}\": expected {expected}, got {got}")]
+    Effect { effect: &'static str, expected: &'static str, got: f64 },
     #[error("expected {what}, got {got}")]
     Setting { what: &'static str, got: f64 },
     #[error("the run was cancelled")]

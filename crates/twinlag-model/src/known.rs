@@ -1,7 +1,6 @@
 //! Effects that are known already, put into the model.
 
-use crate::effect::KnownEffect;
-use crate::effect::{Identifier, Parameter};
+use crate::effect::{self, Identifier, KnownEffect, Parameter};
 use crate::error::ModelError;
 use crate::fit::Fitted;
 use crate::fitted::KnownFit;
@@ -72,6 +71,9 @@ impl Known {
         for known in effects.iter().filter(|k| !k.effect.about().is_defect) {
             let effect = (known.effect.about().restore)(known, &prepared.context)?;
             let effect = effect.ok_or_else(|| ModelError::Model { effect: known.effect.name() })?;
+            if !known.effect.is_of_this_library() {
+                effect::check(&effect)?;
+            }
             for parameter in effect.parameters() {
                 check(known, parameter)?;
             }

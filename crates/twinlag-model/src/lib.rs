@@ -35,7 +35,7 @@ mod weighting;
 mod whitening;
 
 pub use cost::Linearised;
-pub use defects::{Levels, levels, line_channel, lines};
+pub use defects::{ChannelNoise, levels, line_channel, lines};
 pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
     candidates, described_by,
@@ -59,7 +59,7 @@ pub use selection::Selection;
 pub use settings::{Settings, Watch, report};
 pub use spectrum::{Bands, fit_noise, runs};
 pub use spline::Spline;
-pub use summary::{Z_975, covariance, is_unresolved, summarise};
+pub use summary::{covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};
 pub use twinlag_optimise::Variable;
 pub use weighting::Weighting;
@@ -68,6 +68,6 @@ pub use weighting::Weighting;
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
     is_send_and_sync::<(Bands, Context, ModelError, Evaluation, Extended, Fitted, Flow, Identifier)>();
-    is_send_and_sync::<(KnownEffect, KnownFit, Levels, Linearised, Model, ModelFit, Observations, Parameter)>();
+    is_send_and_sync::<(KnownEffect, KnownFit, ChannelNoise, Linearised, Model, ModelFit, Observations, Parameter)>();
     is_send_and_sync::<(Plant, Policy, Prepared, Selection, Settings, Spline, Stretch, Track, Weighting)>();
 };

@@ -1,8 +1,8 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
 use crate::blocks;
-use crate::defects::{self, Levels};
-use crate::effect::{Context, Identifier};
+use crate::defects::{self, ChannelNoise};
+use crate::effect::{self, Context, Identifier};
 use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::Defect;
@@ -29,7 +29,7 @@ pub struct Prepared {
     /// The record, its defects masked.
     pub observations: Observations,
     /// Its noise.
-    pub levels: Levels,
+    pub levels: ChannelNoise,
     /// The numbers that decide.
     pub policy: Policy,
     /// What candidates are made from.
@@ -39,7 +39,7 @@ pub struct Prepared {
     /// Single wrong readings of each channel.
     spikes: [usize; 2],
     /// The record as it came, and its noise.
-    pub raw: (Observations, Levels),
+    pub raw: (Observations, ChannelNoise),
     /// Residuals of the whole record.
     pub everything: Selection,
     /// The samples without the blocks that judge.
@@ -50,7 +50,8 @@ impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     ///
     /// # Errors
-    /// [`ModelError`] for settings that mean nothing, a channel that never changes, and a record too fragmented for
+    /// [`ModelError`] for settings that mean nothing, an effect of another crate that breaks a promise of
+    /// [`crate::Effect`], a channel that never changes, and a record too fragmented for
     /// noise levels.
     pub fn new(observations: &Observations, settings: &Settings) -> Result<Self, ModelError> {
         settings.check()?;
@@ -72,10 +73,12 @@ impl Prepared {
         let raw = (observations.clone(), levels);
         let found = data_defects(&mut observations, &levels, settings);
         let weighting = Weighting::of(&observations, levels.std_k);
+        let context = context(&observations, &levels);
+        effect::check_all(&settings.effects, &context)?;
         Ok(Self {
             everything: selection(&observations, None, &weighting),
             searched: selection(&observations, Some(&policy), &weighting),
-            context: context(&observations, &levels),
+            context,
             observations,
             levels,
             policy,
@@ -141,7 +144,7 @@ impl Prepared {
     pub fn find_levels(&mut self, fitted: &Fitted, settings: &Settings) {
         let found = defects::levels(&fitted.model.without_disturbances(&fitted.theta, &self.observations));
         if let (None, Some(found)) = (settings.noise_std_k, found) {
-            self.levels = Levels { step_k: self.levels.step_k, ..found };
+            self.levels = ChannelNoise { step_k: self.levels.step_k, ..found };
         }
     }
 
@@ -205,7 +208,7 @@ impl Prepared {
 }
 
 /// Saturation and coarse converters, masked and named.
-fn data_defects(observations: &mut Observations, levels: &Levels, settings: &Settings) -> Vec<Defect> {
+fn data_defects(observations: &mut Observations, levels: &ChannelNoise, settings: &Settings) -> Vec<Defect> {
     let allowed = &settings.effects;
     let mut out = Vec::new();
     if allowed.contains(&Identifier::SATURATION) {
@@ -220,7 +223,7 @@ fn data_defects(observations: &mut Observations, levels: &Levels, settings: &Set
     out
 }
 
-fn coarse_steps(levels: &Levels) -> impl Iterator<Item = Defect> {
+fn coarse_steps(levels: &ChannelNoise) -> impl Iterator<Item = Defect> {
     let steps = levels.coarse_step_k().into_iter().enumerate();
     steps.filter_map(|(i, step)| Some(defect(Identifier::QUANTISATION, i, format!("steps of {:.4} K", step?))))
 }
@@ -263,7 +266,7 @@ fn away_from_ends(observations: &Observations, reach: usize, weighting: &Weighti
     Selection { counts, weighting: weighting.clone() }
 }
 
-fn context(observations: &Observations, levels: &Levels) -> Context {
+fn context(observations: &Observations, levels: &ChannelNoise) -> Context {
     let step_s = observations.step_s();
     Context {
         ends_s: observations.ends_s(),

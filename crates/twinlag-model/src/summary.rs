@@ -1,21 +1,20 @@
 //! A fitted model in numbers: time constants with their intervals, tests, and what pictures need.
 
-use twinlag_cross_relation::residual_tests;
+use twinlag_cross_relation::{Z_975, log_normal_interval_95, residual_tests};
 
 use crate::blocks;
-use crate::defects::Levels;
+use crate::defects::ChannelNoise;
 use crate::dense;
 use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant, Trace};
+use crate::implied::Evaluation;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
 
-/// 97.5 % point of the normal distribution.
-pub const Z_975: f64 = 1.959_963_984_540_054;
 /// 95 % point of chi-square with one degree of freedom.
 const CHI2_95: f64 = 3.841_458_820_694_124;
 
@@ -114,7 +113,7 @@ pub fn summarise(
     fitted: &Fitted,
     observations: &Observations,
     selection: &Selection,
-    levels: &Levels,
+    levels: &ChannelNoise,
     policy: &Policy,
 ) -> ModelFit {
     let evaluation = fitted.model.evaluate(&fitted.theta, observations);
@@ -128,52 +127,10 @@ pub fn summarise(
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
     let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
-    let time_constant = |value: f64, variance: Option<f64>, is_log: bool| {
-        let se = variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt);
-        let interval = se.map(|se| {
-            if is_log {
-                let f = (Z_975 * se / value).exp();
-                [value / f, value * f]
-            } else {
-                [value - Z_975 * se, value + Z_975 * se]
-            }
-        });
-        // An interval that spans a factor of seven is no estimate.
-        let known = !is_log || se.is_some_and(|se| se / value < policy.vague_log_std);
-        let held = variance == Some(0.0);
-        TimeConstant {
-            value_s: (known || held).then_some(value),
-            standard_error_s: se.filter(|_| known),
-            interval_95_s: interval.filter(|_| known),
-        }
-    };
-    let theta = &fitted.theta;
-    // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
-    let c = covariance.as_ref();
-    let variance = |i: usize| c.map(|c| c[i][i]);
-    let unresolved =
-        is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
-    // Where the time constants cannot be distinguished from a delay, the total lag of channel 2 is reported.
-    let delay = fitted.model.parameters().position(|p| p.is_lateness);
-    let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
-        Some(index) => vec![(0, -1.0), (1, 1.0), (2 + index, 1.0)],
-        None => vec![(0, -1.0), (1, 1.0)],
-    };
-    let difference_value: f64 = lag.iter().map(|(i, s)| s * theta[*i]).sum();
-    let difference =
-        c.map(|c| lag.iter().map(|(i, s)| lag.iter().map(|(j, t)| s * t * c[*i][*j]).sum::<f64>()).sum::<f64>());
-    let bands = Bands::of(&residual_runs);
-    let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
+    let (time_constants, difference) = time_constants(fitted, observations, selection, covariance.as_deref(), policy);
     ModelFit {
-        time_constants: [0, 1].map(|i| {
-            let out = time_constant(theta[i], variance(i), true);
-            if unresolved && !fitted.model.knows(i) {
-                TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None }
-            } else {
-                out
-            }
-        }),
-        difference: time_constant(difference_value, difference, false),
+        time_constants,
+        difference,
         fit: fitted.report.clone(),
         noise_std_k: fitted.model.noise_std_k(),
         is_noise_of_residual: levels.is_of_residual || fitted.model.noise().is_some(),
@@ -183,18 +140,76 @@ pub fn summarise(
         is_weighted_by_residual: rejects,
         covariance,
         extended: Some(Extended::new(fitted, observations)),
-        trace: Trace {
-            time_s: evaluation.time_s,
-            residual: evaluation.residual,
-            gas_c: crate::residual::estimated_gas(fitted, observations),
-            is_judge: evaluation
-                .sample
-                .iter()
-                .map(|s| selection.holds(*s) && blocks::is_judge(*s, observations.samples(), policy))
-                .collect(),
-            sample: evaluation.sample,
-            disagreement_k: evaluation.disagreement_k,
-            bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
-        },
+        trace: trace(fitted, evaluation, &Bands::of(&residual_runs), observations, selection, policy),
+    }
+}
+
+/// Both time constants, and how much the second is later than the first.
+fn time_constants(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    covariance: Option<&[Vec<f64>]>,
+    policy: &Policy,
+) -> ([TimeConstant; 2], TimeConstant) {
+    let theta = &fitted.theta;
+    let variance = |i: usize| covariance.map(|c| c[i][i]);
+    // A time constant that the samples do not resolve is on its bound, or as good as there; the other is then a guess as well.
+    let unresolved =
+        is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
+    let both = [0, 1].map(|i| {
+        if unresolved && !fitted.model.knows(i) {
+            TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None }
+        } else {
+            time_constant(theta[i], variance(i), policy)
+        }
+    });
+    // Where the time constants cannot be distinguished from a delay, the total lag of channel 2 is reported.
+    let delay = fitted.model.parameters().position(|p| p.is_lateness);
+    let lag: Vec<(usize, f64)> = match delay.filter(|_| unresolved) {
+        Some(index) => vec![(0, -1.0), (1, 1.0), (2 + index, 1.0)],
+        None => vec![(0, -1.0), (1, 1.0)],
+    };
+    let value: f64 = lag.iter().map(|(i, s)| s * theta[*i]).sum();
+    let variance = covariance
+        .map(|c| lag.iter().map(|(i, s)| lag.iter().map(|(j, t)| s * t * c[*i][*j]).sum::<f64>()).sum::<f64>());
+    let standard_error_s = standard_error(variance);
+    let interval_95_s = standard_error_s.map(|se| [value - Z_975 * se, value + Z_975 * se]);
+    (both, TimeConstant { value_s: Some(value), standard_error_s, interval_95_s })
+}
+
+/// A time constant, whose logarithm is normal. An interval that spans a factor of seven is no estimate; one that is held has none.
+fn time_constant(value_s: f64, variance: Option<f64>, policy: &Policy) -> TimeConstant {
+    let error_s = standard_error(variance).filter(|se| se / value_s < policy.vague_log_std);
+    let is_held = variance == Some(0.0);
+    TimeConstant {
+        value_s: (error_s.is_some() || is_held).then_some(value_s),
+        standard_error_s: error_s,
+        interval_95_s: error_s.map(|se| log_normal_interval_95(value_s, se)),
+    }
+}
+
+fn standard_error(variance: Option<f64>) -> Option<f64> {
+    variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt)
+}
+
+fn trace(
+    fitted: &Fitted,
+    evaluation: Evaluation,
+    bands: &Bands,
+    observations: &Observations,
+    selection: &Selection,
+    policy: &Policy,
+) -> Trace {
+    let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
+    let is_judge = |s: &usize| selection.holds(*s) && blocks::is_judge(*s, observations.samples(), policy);
+    Trace {
+        time_s: evaluation.time_s,
+        residual: evaluation.residual,
+        gas_c: crate::residual::estimated_gas(fitted, observations),
+        is_judge: evaluation.sample.iter().map(is_judge).collect(),
+        sample: evaluation.sample,
+        disagreement_k: evaluation.disagreement_k,
+        bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
     }
 }

@@ -1,14 +1,12 @@
 //! Pictures of the gas temperature, and of time constants along a record.
 
 use twinlag::compensation::power_spectrum;
+use twinlag::cross_relation::Z_975;
 use twinlag::record::Record;
 use twinlag_report::{Axis, Chart, Colour, Figure, Reference, ReportError, Series};
 
 use crate::figures::{WIDTH_PX, trace};
 use twinlag::{Compensation, Track};
-
-/// Half width of a 95 % interval of a normal distribution, in standard deviations.
-pub(crate) const Z_975: f64 = 1.959_963_984_540_054;
 
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;

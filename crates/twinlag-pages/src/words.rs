@@ -1,10 +1,9 @@
 //! Words and numbers of the report.
 
+use twinlag::cross_relation::Z_975;
 use twinlag::diagnosis::Identifier;
 use twinlag::{Difference, SensorEstimate};
 use twinlag_report::{between, plus_minus};
-
-use crate::pictures::Z_975;
 
 pub(crate) const ABSENT: &str = "not determined";
 

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Gas, learn_quickly, reconstruct};
+use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{BeforeAfter, Diagnosis as Core, ModelFit};
-use twinlag_estimate::Z_975;
 use twinlag_record::Record;
 
 /// How good the gas temperature is, measured against a trusted one.

@@ -88,6 +88,11 @@ impl Identifier {
         Self(about)
     }
 
+    /// Whether it is one of [`Identifier::ALL`], and not another one of that name.
+    pub(crate) fn is_of_this_library(self) -> bool {
+        Self::ALL.iter().any(|e| std::ptr::eq(e.0, self.0))
+    }
+
     /// What is known of it before any record.
     pub const fn about(self) -> &'static About {
         self.0

@@ -3,8 +3,8 @@
 use std::fmt;
 
 use twinlag_compensate::{TrackerFn, learn, tracker};
+use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::Identifier;
-use twinlag_estimate::Z_975;
 use twinlag_record::{Record, SamplingKind};
 
 use crate::answers::{Characterisation, Model, Status};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{Change, Settings, track as follow};
-use twinlag_estimate::Z_975;
 use twinlag_record::{Channels, Record, SamplingChoice};
 
 use crate::answers::{Along, Fitted, Model, Ratio, Status, Track};

@@ -1,9 +1,7 @@
 //! The numbers of an answer, and what goes with each.
 
-use twinlag_cross_relation::Parameter;
-use twinlag_estimate::{
-    Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals, Z_975,
-};
+use twinlag_cross_relation::{Parameter, Z_975, log_normal_interval_95};
+use twinlag_estimate::{Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals};
 use twinlag_sensor::Discretisation;
 
 use super::conclude::Conclusion;
@@ -169,13 +167,12 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 out.advice.push(Setting::Known);
             } else {
                 let error = covariance[i][i].sqrt();
-                let factor = (Z_975 * error / theta[i]).exp();
                 lag.value = Some(theta[i]);
                 lag.standard_error = Some(error);
                 lag.interval_95 = Some(if self.asked.options.estimator == Estimator::Whitened {
                     self.fit.interval(i, covariance, always)
                 } else {
-                    [theta[i] / factor, theta[i] * factor]
+                    log_normal_interval_95(theta[i], error)
                 });
             }
             out.sensors[sensor].second_time_constant_s = Some(lag);
