@@ -58,7 +58,7 @@ pub use interval_95::{Z_975, log_normal_interval_95};
 pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
-pub use residual::{ResidualTest, residual_tests};
+pub use residual::{ResidualTest, TestName, residual_tests};
 pub use sandwich::sandwich;
 pub use synthetic::synthetic_filter;
 pub use whitened::{Form, Whitened};

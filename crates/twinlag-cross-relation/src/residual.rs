@@ -1,14 +1,70 @@
 //! Whether anything is left in the whitened residual that noise would not leave.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use twinlag_transform::sine_transform;
 
+/// What of a residual is tested; in text its name in kebab case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum TestName {
+    /// Its energy.
+    TotalEnergy,
+    /// Its energy in each band of frequencies.
+    BandEnergy,
+    /// Correlation of values a few samples apart.
+    Whiteness,
+    /// Agreement of both sensors at rest.
+    Calibration,
+    /// Coherence with the gas, at each frequency.
+    Coherence,
+    /// Its mean, by how high the gas temperature is.
+    Level,
+    /// Its energy, by how fast the gas temperature changes.
+    Rate,
+    /// Its energy along the record.
+    Time,
+    /// Its kurtosis.
+    Tails,
+    /// Its largest power at a single frequency.
+    Lines,
+    /// Readings that equal the one before.
+    RepeatedValues,
+}
+
+impl TestName {
+    /// The name that scripts use.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::TotalEnergy => "total-energy",
+            Self::BandEnergy => "band-energy",
+            Self::Whiteness => "whiteness",
+            Self::Calibration => "calibration",
+            Self::Coherence => "coherence",
+            Self::Level => "level",
+            Self::Rate => "rate",
+            Self::Time => "time",
+            Self::Tails => "tails",
+            Self::Lines => "lines",
+            Self::RepeatedValues => "repeated-values",
+        }
+    }
+}
+
+impl fmt::Display for TestName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
 /// One test of the residual against white noise of unit variance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResidualTest {
-    /// What was tested: `total-energy`, `band-energy`, `whiteness`; callers may add their own.
-    pub test: String,
+    /// What was tested.
+    pub test: TestName,
     /// The statistic.
     pub statistic: f64,
     /// Degrees of freedom of the statistic, if it has any.
@@ -30,13 +86,13 @@ pub struct ResidualTest {
 /// statistic of the first 20 autocorrelations, chi-square distributed.
 ///
 /// ```
-/// use twinlag_cross_relation::residual_tests;
+/// use twinlag_cross_relation::{TestName, residual_tests};
 ///
 /// // Unit variance, but up and down from sample to sample: as loud as it should be, and not white.
 /// let residual: Vec<f64> = (0..400).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
 /// let tests = residual_tests(&[residual], 0, 0.0);
-/// assert_eq!((tests[0].test.as_str(), tests[0].p_value), ("total-energy", 1.0));
-/// assert_eq!(tests[2].test, "whiteness");
+/// assert_eq!((tests[0].test, tests[0].p_value), (TestName::TotalEnergy, 1.0));
+/// assert_eq!(tests[2].test, TestName::Whiteness);
 /// assert!(tests[2].p_value < 1e-12); // its statistic is near 20 lags × 400, with 20 degrees of freedom
 /// ```
 ///
@@ -50,7 +106,7 @@ pub fn residual_tests(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> V
         let dof = (count - fitted) as f64;
         let deviate = (energy / dof - 1.0) / (2.0 / dof + level_std * level_std).sqrt();
         tests.push(ResidualTest {
-            test: "total-energy".into(),
+            test: TestName::TotalEnergy,
             statistic: energy / dof,
             degrees_of_freedom: Some(dof),
             p_value: two_sided(deviate),
@@ -104,7 +160,7 @@ fn band_energy(segments: &[Vec<f64>]) -> Option<ResidualTest> {
     let of_one: f64 = two_sided(worst);
     let p_value = -((bands.len() as f64) * (-of_one).ln_1p()).exp_m1();
     Some(ResidualTest {
-        test: "band-energy".into(),
+        test: TestName::BandEnergy,
         statistic: worst,
         degrees_of_freedom: Some(bands.len() as f64),
         p_value,
@@ -129,7 +185,7 @@ fn whiteness(segments: &[Vec<f64>]) -> Option<ResidualTest> {
         .sum();
     let chi2 = ChiSquared::new(lags as f64).expect("there is a lag");
     Some(ResidualTest {
-        test: "whiteness".into(),
+        test: TestName::Whiteness,
         statistic,
         degrees_of_freedom: Some(lags as f64),
         p_value: chi2.sf(statistic),
@@ -177,6 +233,15 @@ mod tests {
         assert!(residual_tests(std::slice::from_ref(&loud), 2, 0.0)[0].p_value < 1e-6);
         // The same excess is nothing if the level was only known to 20 %.
         assert!(residual_tests(&[loud], 2, 0.2)[0].p_value > 0.05);
+    }
+
+    #[test]
+    fn a_test_is_written_by_its_name() {
+        let all = ["total-energy", "band-energy", "whiteness", "calibration", "coherence", "level", "rate", "time"];
+        for name in all.into_iter().chain(["tails", "lines", "repeated-values"]) {
+            let test: TestName = serde_json::from_value(name.into()).expect("the name of a test");
+            assert_eq!((test.name(), serde_json::to_value(test).expect("a string")), (name, name.into()));
+        }
     }
 
     #[test]

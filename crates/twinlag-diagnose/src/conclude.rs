@@ -1,5 +1,6 @@
 //! From the last state of the loop to the answer.
 
+use twinlag_cross_relation::TestName;
 use twinlag_model::{
     Effort, Fitted, Identifier, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise,
 };
@@ -49,7 +50,8 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     if is_refused {
         remarks.push(Remark::SingleTone);
     }
-    let is_coherent = last.tests.iter().any(|t| t.test == "coherence" && t.p_value < policy.rejection_p_value());
+    let is_coherent =
+        last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
     if is_coherent && found.iter().any(|f| f.effect.is_noise()) {
         // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the
         // same.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use twinlag_cross_relation::ResidualTest;
+use twinlag_cross_relation::{ResidualTest, TestName};
 use twinlag_model::{ModelFit, Policy};
 
 use crate::diagnosis::Unexplained;
@@ -15,9 +15,9 @@ const HALF_BAND: f64 = 1.090_871_211_463_571;
 /// What is left, if more than noise is.
 pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplained> {
     // Less than noise is no effect: the level of the noise is overestimated.
-    let is_less = |t: &ResidualTest| t.test == "total-energy" && t.statistic < 1.0;
+    let is_less = |t: &ResidualTest| t.test == TestName::TotalEnergy && t.statistic < 1.0;
     let fails = fit.tests.iter().filter(|t| t.p_value < policy.rejection_p_value() && !is_less(t));
-    let names: Vec<&str> = fails.map(|t| t.test.as_str()).collect();
+    let names: Vec<&str> = fails.map(|t| t.test.name()).collect();
     if names.is_empty() {
         return None;
     }

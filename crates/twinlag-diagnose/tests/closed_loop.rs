@@ -228,7 +228,7 @@ fn a_known_effect_gives_the_time_constants_of_another_record() {
         offset(sensors);
     });
     let with = fit_with(&later, &Settings::default(), &known).expect("a record and effects of this version").fit;
-    let tests: Vec<(&str, f64)> = with.tests.iter().map(|t| (t.test.as_str(), t.p_value)).collect();
+    let tests: Vec<(&str, f64)> = with.tests.iter().map(|t| (t.test.name(), t.p_value)).collect();
     recovers(&with, TAU_S, &format!("{tests:?}"));
     assert!(tests.iter().all(|(_, p)| *p > 1e-4), "only noise is left: {tests:?}");
     let without = fit_with(&later, &Settings::default(), &[]).expect("a record").fit;
@@ -251,7 +251,7 @@ fn a_known_effect_of_spikes_takes_those_of_another_record_out() {
     let known = KnownEffect { effect: Identifier::SPIKES, channel: Some(1), parameters: Vec::new() };
     let later = record(SEED + 1, spikes);
     let fit = fit_with(&later, &Settings::default(), &[known]).expect("a record and an effect of this version").fit;
-    let tests: Vec<(&str, f64)> = fit.tests.iter().map(|t| (t.test.as_str(), t.p_value)).collect();
+    let tests: Vec<(&str, f64)> = fit.tests.iter().map(|t| (t.test.name(), t.p_value)).collect();
     assert!(tests.iter().all(|(_, p)| *p > 1e-4), "only noise is left: {tests:?}");
 }
 

@@ -220,3 +220,61 @@ fn undo(filter: &[f64], f: &[f64]) -> Vec<f64> {
     }
     y
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use rayon::ThreadPoolBuilder;
+    use twinlag_sensor::FirstOrder;
+
+    use super::*;
+    use crate::vocabulary::Estimator;
+
+    /// Ends the run at the eleventh question.
+    struct Impatient(AtomicUsize);
+
+    impl Estimate for Impatient {
+        fn name(&self) -> String {
+            "impatient".into()
+        }
+
+        fn source(&self) -> &'static str {
+            "this test"
+        }
+
+        fn assumes(&self) -> &'static str {
+            "nothing"
+        }
+
+        fn estimate(&self, task: &Task<'_>) -> Result<Outcome, EstimateError> {
+            if self.0.fetch_add(1, Ordering::Relaxed) >= 10 {
+                return Err(EstimateError::Cancelled);
+            }
+            Estimator::DifferenceEquationGtls.estimate(task)
+        }
+    }
+
+    #[test]
+    fn intervals_do_not_depend_on_the_number_of_threads_and_a_run_can_be_cancelled() {
+        let gas: Vec<f64> = (0..1000).map(|k| 300.0 + 20.0 * (0.13 * f64::from(k)).sin()).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let [y1, y2] = [0.02, 0.1].map(|tau_s| {
+            let clean = FirstOrder::new(tau_s, 0.002).expect("positive").respond(&gas);
+            clean.into_iter().map(|y| y + 0.05 * rng.sample::<f64, _>(StandardNormal)).collect::<Vec<f64>>()
+        });
+        let readings = Readings::even(&y1, &y2, 0.002).expect("finite");
+        let task = Task::new(&readings);
+        let estimator = Estimator::DifferenceEquationGtls;
+        let found = estimator.estimate(&task).expect("an estimate");
+        let bootstrap = Bootstrap { replicates: 39, seed: 1 };
+        let with = |threads: usize, estimator: &dyn Estimate| {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| bootstrap.intervals(estimator, &task, &found))
+        };
+        let alone = with(1, &estimator).expect("answered");
+        assert!(alone.is_some());
+        assert_eq!(with(4, &estimator).expect("answered"), alone);
+        assert_eq!(with(4, &Impatient(AtomicUsize::new(0))), Err(EstimateError::Cancelled));
+    }
+}

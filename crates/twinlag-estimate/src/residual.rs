@@ -1,6 +1,6 @@
 //! Whether the fit leaves more than noise.
 
-use twinlag_cross_relation::{ResidualTest, residual_tests};
+use twinlag_cross_relation::{ResidualTest, TestName, residual_tests};
 
 use crate::error::EstimateError;
 use crate::whitened::WhitenedFit;
@@ -40,7 +40,7 @@ impl<const P: usize> WhitenedFit<'_, P> {
         let free = self.free();
         let mut tests = residual_tests(&whitened.residual(theta), free.len(), level_spread);
         if self.levels.are_of_the_residual() {
-            tests.retain(|t| t.test != "total-energy");
+            tests.retain(|t| t.test != TestName::TotalEnergy);
         }
         if tests_calibration && !self.task.calibrates() {
             let second = |i: usize| theta.get(i).copied().unwrap_or(0.0);
@@ -51,7 +51,7 @@ impl<const P: usize> WhitenedFit<'_, P> {
                 whitened.score_test::<4>(&std::array::from_fn(|i| at_rest_alike[i]), &free, &[2, 3])
             };
             tests.extend(statistic.map(|statistic| ResidualTest {
-                test: "calibration".into(),
+                test: TestName::Calibration,
                 statistic,
                 degrees_of_freedom: Some(2.0),
                 // Chi-square with two degrees of freedom.
@@ -64,7 +64,7 @@ impl<const P: usize> WhitenedFit<'_, P> {
     /// Whether `tests` reject the model. Where the levels are from the data, too little energy is
     /// no objection.
     pub fn is_rejected_by(&self, tests: &[ResidualTest]) -> bool {
-        let counts = |t: &&ResidualTest| self.levels.given || t.test != "total-energy" || t.statistic > 1.0;
+        let counts = |t: &&ResidualTest| self.levels.given || t.test != TestName::TotalEnergy || t.statistic > 1.0;
         tests.iter().filter(counts).any(|t| t.p_value < REJECTION_P_VALUE)
     }
 }

@@ -5,7 +5,7 @@
 //! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
-use twinlag_cross_relation::ResidualTest;
+use twinlag_cross_relation::{ResidualTest, TestName};
 use twinlag_transform::{Complex64, Forward, Tapered, hann};
 
 use crate::dense;
@@ -123,8 +123,8 @@ pub(crate) fn tests(
     out
 }
 
-fn test(name: &str, statistic: f64, degrees_of_freedom: Option<f64>, p_value: f64) -> ResidualTest {
-    ResidualTest { test: name.into(), statistic, degrees_of_freedom, p_value: p_value.clamp(0.0, 1.0) }
+fn test(test: TestName, statistic: f64, degrees_of_freedom: Option<f64>, p_value: f64) -> ResidualTest {
+    ResidualTest { test, statistic, degrees_of_freedom, p_value: p_value.clamp(0.0, 1.0) }
 }
 
 fn two_sided(deviate: f64) -> f64 {
@@ -169,7 +169,7 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     let largest = of_gas.iter().copied().reduce(f64::max)?;
     let of_one = (1.0 - largest).max(0.0).powf(independent - 1.0);
     let p = -((of_gas.len() as f64) * (-of_one).ln_1p()).exp_m1();
-    Some(test("coherence", largest, Some(independent), p))
+    Some(test(TestName::Coherence, largest, Some(independent), p))
 }
 
 /// The residual itself against the level of the input, in ten classes of equal size: a static error shows as a mean that differs.
@@ -192,7 +192,7 @@ fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
         })
         .sum();
     let p = ChiSquared::new(CLASSES as f64).ok()?.sf(statistic);
-    Some(test("level", statistic, Some(CLASSES as f64), p))
+    Some(test(TestName::Level, statistic, Some(CLASSES as f64), p))
 }
 
 /// Correlation of the residual's energy with how fast the input changes.
@@ -204,7 +204,7 @@ fn rate(pairs: &Pairs, r: &[f64]) -> ResidualTest {
         .collect();
     let energy: Vec<f64> = r.iter().map(|r| r * r).collect();
     let z = correlation(&energy, &slope) * (r.len() as f64).sqrt();
-    test("rate", z, None, two_sided(z))
+    test(TestName::Rate, z, None, two_sided(z))
 }
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
@@ -233,7 +233,7 @@ fn time(r: &[f64]) -> ResidualTest {
         })
         .sum();
     let dof = (PARTS - 1) as f64;
-    test("time", statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
+    test(TestName::Time, statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
 }
 
 /// Largest power of a single frequency over the mean of its neighbours', in the longest run: among `m` neighbours of the same
@@ -258,7 +258,7 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     let largest = bins.filter(|j| j + 2 + half <= power.len()).map(ratio).fold(0.0, f64::max);
     let of_one = (1.0 + largest / NEIGHBOURS as f64).powi(-(NEIGHBOURS as i32));
     let p = -((count as f64) * (-of_one).ln_1p()).exp_m1();
-    Some(test("lines", largest, Some(NEIGHBOURS as f64), p))
+    Some(test(TestName::Lines, largest, Some(NEIGHBOURS as f64), p))
 }
 
 /// Readings that equal the one before them, more often than noise `σ` on a grid of step `q` makes them, `q/(2 √π σ)`: a logger that
@@ -289,7 +289,7 @@ fn repeated_values(observations: &Observations, noise_std_k: [f64; 2]) -> Option
         Some((equal as f64 / count as f64, p))
     };
     let found = (0..2).filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))?;
-    Some(test("repeated-values", found.0, None, 2.0 * found.1))
+    Some(test(TestName::RepeatedValues, found.0, None, 2.0 * found.1))
 }
 
 /// Kurtosis: Gaussian noise has 3 with standard error `√(24/n)`.
@@ -298,5 +298,5 @@ fn tails(r: &[f64]) -> ResidualTest {
     let second = dense::dot(r, r) / n;
     let fourth = r.iter().map(|r| r.powi(4)).sum::<f64>() / n;
     let z = (fourth / (second * second).max(1e-300) - 3.0) / (24.0 / n).sqrt();
-    test("tails", z, None, two_sided(z))
+    test(TestName::Tails, z, None, two_sided(z))
 }

@@ -1,6 +1,6 @@
 //! Words and numbers of the report.
 
-use twinlag::cross_relation::Z_975;
+use twinlag::cross_relation::{TestName, Z_975};
 use twinlag::diagnosis::Identifier;
 use twinlag::{Difference, SensorEstimate};
 use twinlag_report::{between, plus_minus};
@@ -80,19 +80,19 @@ pub(crate) fn place(channel: Option<&String>) -> String {
     channel.map_or("both, or between them".into(), Clone::clone)
 }
 
-/// What a test asks, by its name.
-pub(crate) fn question(test: &str) -> &'static str {
+/// What a test asks.
+pub(crate) fn question(test: TestName) -> &'static str {
     match test {
-        "total-energy" => "Is its energy that of the noise?",
-        "band-energy" => "Does every frequency band have its share of the energy?",
-        "whiteness" => "Are values a few samples apart unrelated?",
-        "coherence" => "Is it unrelated to the inferred gas temperature, at every frequency?",
-        "level" => "Is it unrelated to how high the gas temperature is?",
-        "rate" => "Is it unrelated to how fast the gas temperature changes?",
-        "time" => "Is its energy the same all along the record?",
-        "tails" => "Are its largest values those of Gaussian noise?",
-        "lines" => "Is no single frequency far above its neighbours?",
-        "repeated-values" => "Do readings equal the one before no more often than noise explains?",
+        TestName::TotalEnergy => "Is its energy that of the noise?",
+        TestName::BandEnergy => "Does every frequency band have its share of the energy?",
+        TestName::Whiteness => "Are values a few samples apart unrelated?",
+        TestName::Coherence => "Is it unrelated to the inferred gas temperature, at every frequency?",
+        TestName::Level => "Is it unrelated to how high the gas temperature is?",
+        TestName::Rate => "Is it unrelated to how fast the gas temperature changes?",
+        TestName::Time => "Is its energy the same all along the record?",
+        TestName::Tails => "Are its largest values those of Gaussian noise?",
+        TestName::Lines => "Is no single frequency far above its neighbours?",
+        TestName::RepeatedValues => "Do readings equal the one before no more often than noise explains?",
         _ => "",
     }
 }

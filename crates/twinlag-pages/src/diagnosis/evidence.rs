@@ -1,5 +1,6 @@
 //! Why effects were added, and what the tests say before and after.
 
+use twinlag::cross_relation::TestName;
 use twinlag_report::{Document, Table, between, plus_minus, probability, rounded};
 
 use super::Page;
@@ -78,10 +79,10 @@ impl Page<'_> {
 
     pub(super) fn tests(&self, document: Document) -> Document {
         let models = self.columns();
-        let mut names: Vec<&str> = Vec::new();
+        let mut names: Vec<TestName> = Vec::new();
         for test in models.iter().flat_map(|m| &m.answer.residual.tests) {
-            if !names.contains(&test.test.as_str()) {
-                names.push(&test.test);
+            if !names.contains(&test.test) {
+                names.push(test.test);
             }
         }
         let document = document.heading("Tests of what is left over");
@@ -101,7 +102,7 @@ impl Page<'_> {
                     },
                 )
             });
-            table = table.row([words_of(name), question(name).into()].into_iter().chain(cells));
+            table = table.row([words_of(name.name()), question(name).into()].into_iter().chain(cells));
         }
         document
             .paragraph(

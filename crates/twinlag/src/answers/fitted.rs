@@ -1,6 +1,6 @@
 //! A fit of the model of a rig as a characterisation.
 
-use twinlag_cross_relation::Parameter;
+use twinlag_cross_relation::{Parameter, TestName};
 use twinlag_diagnose::{Identifier, ModelFit, TimeConstant, Value};
 use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_record::Record;
@@ -55,7 +55,7 @@ impl Fitted<'_> {
                 white: fit
                     .tests
                     .iter()
-                    .find(|t| t.test == "whiteness")
+                    .find(|t| t.test == TestName::Whiteness)
                     .is_none_or(|t| t.p_value >= fit.rejection_p_value),
                 tests: fit.tests.clone(),
             },

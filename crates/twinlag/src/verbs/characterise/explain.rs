@@ -1,5 +1,6 @@
 //! The words of an answer: why a number is missing, and what to do about a model that is rejected.
 
+use twinlag_cross_relation::TestName;
 use twinlag_estimate::{Known, NoiseColour, REJECTION_P_VALUE, Ridge, spans_too_much};
 use twinlag_optimise::End;
 
@@ -123,9 +124,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
 
     /// What to do about a rejected model.
     fn advise(&self, out: &mut Characterisation) {
-        let failed: Vec<&str> =
-            out.residual.tests.iter().filter(|t| t.p_value < REJECTION_P_VALUE).map(|t| t.test.as_str()).collect();
-        if self.levels.given && failed == ["total-energy"] {
+        let failed: Vec<TestName> =
+            out.residual.tests.iter().filter(|t| t.p_value < REJECTION_P_VALUE).map(|t| t.test).collect();
+        let names = failed.iter().map(|test| test.name()).collect::<Vec<_>>().join(", ");
+        if self.levels.given && failed == [TestName::TotalEnergy] {
             let energy = out.residual.chi2_per_dof.unwrap_or(1.0);
             let (noise, levels) = if self.asked.options.noise_std_k.is_some() {
                 ("the given noise", "the noise levels given")
@@ -141,9 +143,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         }
         if self.judged.whitened_is_accepted {
             out.warnings.push(format!(
-                "with this estimate the residual is not noise (tests that fail: {}), but with the \
-                     whitened one it is, so the estimator is at fault and not the model",
-                failed.join(", ")
+                "with this estimate the residual is not noise (tests that fail: {names}), but with the \
+                     whitened one it is, so the estimator is at fault and not the model"
             ));
             return;
         }
@@ -154,7 +155,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let is_white_assumed =
             self.asked.options.noise_colour == NoiseColour::White && self.asked.options.noise_std_k.is_none();
         let may_be_coloured =
-            failed.contains(&"whiteness") && is_white_assumed && self.fit.readings().even_period_s().is_some();
+            failed.contains(&TestName::Whiteness) && is_white_assumed && self.fit.readings().even_period_s().is_some();
         let colour = if may_be_coloured {
             "the noise is not white: try autoregressive noise"
         } else {
@@ -166,7 +167,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             "two first-order lags"
         };
         let is_unhelpful = !coarse.is_empty() || self.levels.energy_as_found.is_some();
-        if !is_unhelpful && (failed.contains(&"calibration") || !self.asked.options.calibrates()) {
+        if !is_unhelpful && (failed.contains(&TestName::Calibration) || !self.asked.options.calibrates()) {
             out.advice.push(Setting::Free);
         }
         if !is_unhelpful && may_be_coloured {
@@ -176,11 +177,11 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             format!("{}, coarser than its noise, which alone may explain the residual", coarse.join(", "))
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
-        } else if self.levels.outliers != [0, 0] && failed.contains(&"total-energy") {
+        } else if self.levels.outliers != [0, 0] && failed.contains(&TestName::TotalEnergy) {
             "some samples are too far off for noise (see below): correct or empty these cells \
                      first"
                 .into()
-        } else if failed.contains(&"calibration") {
+        } else if failed.contains(&TestName::Calibration) {
             let colour = if may_be_coloured { ", and if it does not help autoregressive noise" } else { "" };
             format!("gain and offset of the second channel would explain it better: try to fit them{colour}")
         } else if self.asked.options.calibrates() {
@@ -192,9 +193,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             )
         };
         out.warnings.push(format!(
-            "{model} do not explain this record (tests that fail: {}), so the fitted time \
-                     constants need not be those of the sensors; {hint}",
-            failed.join(", ")
+            "{model} do not explain this record (tests that fail: {names}), so the fitted time \
+                     constants need not be those of the sensors; {hint}"
         ));
     }
 }

@@ -1,6 +1,6 @@
 //! The numbers of an answer, and what goes with each.
 
-use twinlag_cross_relation::{Parameter, Z_975, log_normal_interval_95};
+use twinlag_cross_relation::{Parameter, TestName, Z_975, log_normal_interval_95};
 use twinlag_estimate::{Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals};
 use twinlag_sensor::Discretisation;
 
@@ -22,7 +22,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     /// Everything but the estimates.
     pub(super) fn skeleton(&self, status: Status) -> Characterisation {
         let tests = self.judged.tests.clone();
-        let total = tests.iter().find(|t| t.test == "total-energy").map(|t| t.statistic);
+        let total = tests.iter().find(|t| t.test == TestName::TotalEnergy).map(|t| t.statistic);
         let chi2_per_dof = self.levels.energy_as_found.or(total);
         Characterisation {
             schema: Characterisation::SCHEMA.into(),
@@ -36,7 +36,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             free: FreeParameters::default(),
             residual: Residual {
                 chi2_per_dof,
-                white: tests.iter().all(|t| t.test != "whiteness" || t.p_value >= REJECTION_P_VALUE),
+                white: tests.iter().all(|t| t.test != TestName::Whiteness || t.p_value >= REJECTION_P_VALUE),
                 tests,
             },
             interval_method: IntervalMethod::None,
