@@ -17,6 +17,8 @@ fn record(name: &str) -> Record {
 /// interval, which is then no shorter.
 #[test]
 fn characterise_reports_the_estimator_s_own_numbers() {
+    // Sensors whose time constants, and whose intervals, were compared.
+    let (mut values, mut intervals) = (0, 0);
     for name in ["sine_1pct.csv", "sine_5pct.csv", "broadband_5pct.csv", "broadband_20pct.csv"] {
         let record = record(name);
         for estimator in Estimator::ALL {
@@ -37,6 +39,7 @@ fn characterise_reports_the_estimator_s_own_numbers() {
             let (error_s, interval_s) = (found.standard_error_s.expect("one"), found.interval_95_s.expect("one"));
             for (i, sensor) in answer.sensors.iter().enumerate() {
                 assert_eq!(sensor.time_constant_s, Some(found.tau_s[i]), "{name}, {estimator}");
+                values += 1;
                 let (got_s, [low_s, high_s]) =
                     (sensor.standard_error_s.expect("one"), sensor.interval_95_s.expect("one"));
                 if answer.hold_sensitivity.is_none() && answer.status == Status::Ok {
@@ -44,6 +47,7 @@ fn characterise_reports_the_estimator_s_own_numbers() {
                     let is_close = |got: f64, want: f64| (got / want - 1.0).abs() < 1e-12;
                     let same = is_close(low_s, interval_s[i][0]) && is_close(high_s, interval_s[i][1]);
                     assert!(got_s == error_s[i] && same, "{name}, {estimator}: {got_s} s, {low_s} … {high_s} s");
+                    intervals += 1;
                 } else if answer.status == Status::Ok {
                     assert!(
                         got_s >= error_s[i],
@@ -51,8 +55,10 @@ fn characterise_reports_the_estimator_s_own_numbers() {
                         error_s[i]
                     );
                     assert!(low_s <= interval_s[i][0] && high_s >= interval_s[i][1], "{name}, {estimator}");
+                    intervals += 1;
                 }
             }
         }
     }
+    assert_eq!((values, intervals), (58, 42), "of 64: two sensors, eight estimators, four records");
 }
