@@ -49,7 +49,8 @@ pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
 
 pub(crate) fn characterise(record: &Record, options: &Options, console: Console) -> Result<Characterisation, Failure> {
     let progress = Progress::start(console, format!("characterising {} samples", record.len()));
-    Ok(twinlag::characterise_watched(record, options, &|task, done, total| progress.watch(task, done, total))?)
+    let answer = twinlag::characterise_watched(record, options, &|task, done, total| progress.watch(task, done, total));
+    answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
 /// The exit code: 0 for an answer, 4 if the data were read but do not give one.

@@ -28,7 +28,8 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));
-        twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))?
+        twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
+            .map_err(|error| Failure::in_file(error, &record.source))?
     };
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =

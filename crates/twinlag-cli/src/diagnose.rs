@@ -1,8 +1,7 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
-use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
-use twinlag::{DiagnoseOptions, Diagnosis};
+use twinlag::{DiagnoseOptions, Diagnosis, Status};
 use twinlag_pages::diagnosis_report;
 
 use crate::arguments::Diagnose;
@@ -39,10 +38,11 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
     let progress = Progress::start(console, format!("diagnosing {} samples", record.len()));
-    Ok(twinlag::diagnose_watched(record, options, &|task, done, total| progress.watch(task, done, total))?)
+    let answer = twinlag::diagnose_watched(record, options, &|task, done, total| progress.watch(task, done, total));
+    answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// The exit code: 0 for an answer, 4 if the data were read but do not give one.
+/// The exit code: 0 for an answer, 4 if the data were read but do not determine both time constants.
 pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
-    u8::from(answer.verdict == Verdict::Refused) * 4
+    u8::from(answer.last.status == Status::NotIdentifiable) * 4
 }

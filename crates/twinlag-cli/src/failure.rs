@@ -31,6 +31,18 @@ impl Failure {
     }
 }
 
+impl Failure {
+    /// Of what is in `file`, which the message names.
+    pub(crate) fn in_file(error: twinlag::Error, file: &str) -> Self {
+        use twinlag::Error::{Compensate, Cost, Diagnose, Estimate, Noise};
+        let is_of_readings = matches!(error, Compensate(_) | Cost(_) | Diagnose(_) | Estimate(_) | Noise(_));
+        match error.into() {
+            Self::File(text) if is_of_readings => Self::File(format!("{file}: {text}")),
+            other => other,
+        }
+    }
+}
+
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -79,7 +79,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
                 format!(
                     "warning: at {} s the time constants may have left the range that is tracked, 0.4 to 2.5 times their \
                      values at the start: restart from there",
-                    now.time_s
+                    print::digits(now.time_s, 6)
                 )
             });
         }
@@ -88,8 +88,9 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
             console.note(|| {
                 format!(
                     "warning: at {} s the readings deviate from their predictions {:.1} times as far as expected: the gas \
-                     or a sensor has changed since the start; the bands are widened while this lasts",
-                    now.time_s, now.widened_by
+                     or a sensor has changed since the start; while this lasts the bands are widened, and time constants \
+                     that are no longer determined are left empty",
+                    print::digits(now.time_s, 6), now.widened_by
                 )
             });
         }
@@ -198,10 +199,14 @@ impl Out {
 
     fn answer(&mut self, answer: Option<LiveAnswer>) -> Result<bool, Failure> {
         let Some(now) = answer else { return Ok(true) };
-        let [[low1, high1], [low2, high2]] = now.tau_95_s;
-        let [tau1, tau2] = now.tau_s;
-        let numbers = [now.time_s, now.gas_c, now.gas_std_k, tau1, low1, high1, tau2, low2, high2];
-        self.line(&numbers.map(|v| v.to_string()).join(","))
+        let gas = [now.time_s, now.gas_c, now.gas_std_k].map(Some);
+        let tau = [0, 1].into_iter().flat_map(|i| {
+            let [low, high] = now.tau_95_s[i].map_or([None; 2], |band| band.map(Some));
+            [now.tau_s[i], low, high]
+        });
+        let cells: Vec<String> =
+            gas.into_iter().chain(tau).map(|v| v.map_or(String::new(), |v| v.to_string())).collect();
+        self.line(&cells.join(","))
     }
 
     fn done(&self, written: std::io::Result<()>) -> Result<bool, Failure> {

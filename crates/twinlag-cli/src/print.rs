@@ -12,6 +12,8 @@ use twinlag::{
     Status, Track,
 };
 
+use twinlag_pages::parameter_in_words;
+
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::settings::usage;
@@ -54,8 +56,15 @@ fn text(answer: &Characterisation) -> String {
         lines.push(format!("  {:width$}  noise {}", "", noise(sensor)));
     }
     let difference = &answer.time_constant_difference_s;
+    let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
+    // Of limits on both sides of zero a warning says that nothing is determined.
+    if let (None, Some([low, high])) = (difference.value, difference.interval_95_s)
+        && low * high > 0.0
+    {
+        let (how, [least, most]) = if high < 0.0 { ("faster", [-high, -low]) } else { ("slower", [low, high]) };
+        lines.push(format!("  {a} {how} than {b} by {} to {} s", digits(least, 3), digits(most, 3)));
+    }
     if let Some(value) = difference.value {
-        let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
         let (how, size) = if value < 0.0 { ("faster", -value) } else { ("slower", value) };
         let by = match difference.interval_95_s {
             Some([low, high]) if value < 0.0 => interval(size, -high, -low, " s"),
@@ -191,11 +200,13 @@ fn track_text(answer: &Track, out: &Path) -> String {
     });
     for (i, sensor) in answer.last.sensors.iter().enumerate() {
         let range = answer.range_s.map(|r| format!(", from {} to {} s", digits(r[i][0], 4), digits(r[i][1], 4)));
+        let (of, place) =
+            if answer.change == "windows" { (" of the whole record", " in the windows") } else { ("", "") };
         lines.push(format!(
-            "  {}: time constant {}{}",
+            "  {}: time constant{of} {}{}",
             sensor.channel,
             time_constant(sensor),
-            range.unwrap_or_default()
+            range.map_or(String::new(), |range| range + place)
         ));
     }
     if let Some(ratio) = &answer.ratio {
@@ -257,7 +268,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
             Some([low, high]) => interval(p.value, low, high, &unit),
             None => format!("{}{unit}", digits(p.value, 4)),
         };
-        lines.push(format!("    {} {number}", p.name.replace('_', " ")));
+        lines.push(format!("    {} {number}", parameter_in_words(&p.name)));
     }
     if effect.parameters.len() > MAX_PARAMETERS {
         lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
@@ -311,6 +322,11 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     if let Some(r) = answer.error.reference_rmse_k {
         row("rms gas error against reference", &k(r.before), &k(r.after));
     }
+    let sources = [&answer.base, &answer.last].map(|c| c.sensors[0].noise_from.map(noise_source));
+    lines.push(match sources {
+        [Some(before), Some(after)] if before != after => format!("  noise levels: {before}; with effects: {after}"),
+        [_, after] => format!("  noise levels: {}", after.unwrap_or("unknown source")),
+    });
     lines
 }
 
@@ -384,7 +400,7 @@ fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
 }
 
 /// `value` to `significant` digits, without an exponent.
-fn digits(value: f64, significant: i32) -> String {
+pub(crate) fn digits(value: f64, significant: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }

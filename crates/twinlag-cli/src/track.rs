@@ -27,7 +27,8 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));
-        twinlag::track_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))?
+        twinlag::track_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
+            .map_err(|error| Failure::in_file(error, &record.source))?
     };
     let is_answered = !answer.time_s.is_empty();
     if is_answered {

@@ -151,3 +151,13 @@ fn windows_are_the_published_way() {
     assert!(text.lines().count() > 10, "{text}");
     bench.refuses(2, &["track", "run.csv", "--out", "o.csv", "--window", "0.5"], &["--window", "200 samples"]);
 }
+
+/// The second channel reads 2 K too hot, which two lags contradict in each window. Failed: the status was `ok`.
+#[test]
+fn windows_that_contradict_the_model_say_so() {
+    let bench = Bench::simulated("rejected", RIG);
+    let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--window", "6", "--json", "--quiet"]);
+    let value = answer.json();
+    assert_eq!(value["status"], "model-rejected", "{value:#}");
+    assert!(value["warnings"].to_string().contains("windows the residual is more than noise"), "{value:#}");
+}

@@ -157,6 +157,15 @@ fn a_record_of_two_lags_is_adequate() {
     recovers(&value["final"], Trace::GOOD.tau_s);
 }
 
+/// Failed: the exit code said that there was an answer.
+#[test]
+fn a_record_that_determines_no_time_constant_ends_with_4_whatever_the_verdict() {
+    let bench = Bench::with("equal", "run.csv", Trace { tau_s: [0.05, 0.05], ..Trace::GOOD }.csv());
+    let (value, answer) = diagnosis(&bench, &[], 4);
+    assert_eq!(value["verdict"], "adequate", "{answer:#?}");
+    assert_eq!(value["final"]["status"], "not-identifiable", "{answer:#?}");
+}
+
 #[test]
 fn a_single_sine_is_refused_with_its_json() {
     let bench = Bench::with("sine", "run.csv", Trace { gas: Gas::Sine, ..Trace::GOOD }.csv());

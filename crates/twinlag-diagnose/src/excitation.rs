@@ -10,6 +10,12 @@ const TONE_BINS: usize = 12;
 /// Power of a tone's side lobes beside its own: less than that is no tone.
 const LEAST_SHARE: f64 = 1e-9;
 
+/// Whether the gas is a single tone, as far as `observations` show: its amplitude and phase are two
+/// equations, and the two time constants take both.
+pub fn is_single_tone(observations: &Observations, policy: &Policy) -> bool {
+    tones(observations, policy) == Some(SINGLE)
+}
+
 /// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples
 /// are uneven or the power is spread. Each tone gives two equations, and two time constants take
 /// two.
@@ -40,7 +46,7 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
     if strongest < policy.tone_fewest_periods {
         return None;
     }
-    let (mut tones, mut bin) = (0, 0);
+    let (mut tones, mut bin, mut held) = (0, 0, 0.0);
     while bin < power.len() {
         if power[bin] <= least {
             bin += 1;
@@ -48,9 +54,11 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
         }
         let from = bin;
         while bin < power.len() && power[bin] > least {
+            held += power[bin];
             bin += 1;
         }
         tones += 1 + (bin - from) / TONE_BINS;
     }
-    Some(tones)
+    // A gas that is rough from sample to sample is taken for noise, of which its largest bin then sticks out.
+    (2.0 * held > power.iter().sum()).then_some(tones)
 }

@@ -50,6 +50,7 @@ mod remark;
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Unexplained, Verdict};
 pub use evidence::Evidence;
+pub use excitation::is_single_tone;
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{

@@ -5,7 +5,7 @@ use twinlag_report::{Document, Figure, ReportError, Table, between, plus_minus, 
 
 use crate::figures::WIDTH_PX;
 use crate::pictures::{spectra, temperature_figure, track_picture};
-use crate::words::{ABSENT, listed, sentence, with_unit, words};
+use crate::words::{ABSENT, interval_of, listed, sentence, with_unit, words};
 use twinlag::{Characterisation, Compensation, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
@@ -114,11 +114,10 @@ fn numbers(document: Document, last: &Characterisation) -> Document {
     let mut table = Table::new(["channel", "time constant", "95 % interval", "noise"]);
     for sensor in &last.sensors {
         let value = sensor.time_constant_s.map(|v| with_unit(&plus_minus(v, sensor.standard_error_s), "s"));
-        let interval = sensor.interval_95_s.map(|ends| with_unit(&between(ends), "s"));
         table = table.row([
             sensor.channel.clone(),
             value.unwrap_or(ABSENT.into()),
-            interval.unwrap_or(ABSENT.into()),
+            interval_of(sensor),
             with_unit(&rounded(sensor.noise_std_k, 3), "K"),
         ]);
     }

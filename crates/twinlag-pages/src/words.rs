@@ -40,6 +40,16 @@ pub(crate) fn sentence(text: &str) -> String {
     if text.is_empty() || text.ends_with(['.', '!', '?']) { capital(text) } else { format!("{}.", capital(text)) }
 }
 
+/// A parameter's name as words.
+pub fn parameter_in_words(name: &str) -> String {
+    match name {
+        "curvature_about" => "mean temperature of the record".into(),
+        "curvature_variance" => "variance of its temperatures".into(),
+        "curvature_skew" => "third moment of its temperatures over the variance".into(),
+        _ => name.replace('_', " "),
+    }
+}
+
 /// A name that does not fill a legend.
 pub(crate) fn short(name: &str) -> String {
     const MOST: usize = 28;
@@ -57,7 +67,7 @@ pub(crate) fn with_unit(number: &str, of: &str) -> String {
 
 pub(crate) fn parameter(value: &twinlag::diagnosis::Value) -> String {
     let number = plus_minus(value.value, value.standard_error);
-    format!("{} {}", value.name.replace('_', " "), with_unit(&number, &value.unit))
+    format!("{} {}", parameter_in_words(&value.name), with_unit(&number, &value.unit))
 }
 
 /// A time constant with its standard error.
@@ -73,6 +83,11 @@ pub(crate) fn apart(of: &Difference) -> String {
 
 pub(crate) fn interval(ends_s: Option<[f64; 2]>) -> String {
     ends_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
+}
+
+/// The interval of a time constant; one that was given has none.
+pub(crate) fn interval_of(of: &SensorEstimate) -> String {
+    if of.known { "given".into() } else { interval(of.interval_95_s) }
 }
 
 /// Where an effect sits.

@@ -6,7 +6,7 @@ use std::fmt;
 use crate::Place;
 use crate::sampling::{Sampling, SamplingKind};
 use crate::sign::{Decimal, Delimiter};
-use crate::wording::{Counted, brief};
+use crate::wording::{Counted, brief, three};
 
 /// Stamps closer to even spacing than this part of the period are called uniform without further
 /// numbers.
@@ -187,10 +187,14 @@ impl fmt::Display for Note {
                     SamplingKind::Irregular => "irregular, steps used as stamped",
                 };
                 let who = if *chosen { " (as chosen)" } else { "" };
-                write!(f, "sampling {what}{who}: period {} s", brief(*period_s))?;
+                let period = if *kind == SamplingKind::Irregular { "median step" } else { "period" };
+                write!(f, "sampling {what}{who}: {period} {} s", brief(*period_s))?;
                 if *largest_departure_s >= EXACT_PERIODS * period_s {
-                    write!(f, ", stamps depart from even spacing by {jitter_s:.3e} s rms and ")?;
-                    write!(f, "{largest_departure_s:.3e} s at most")?;
+                    let [rms, most] = [jitter_s, largest_departure_s].map(|s| three(*s));
+                    write!(f, ", stamps depart from even spacing by {rms} s rms and {most} s at most")?;
+                    if largest_departure_s > period_s && *kind != SamplingKind::Irregular {
+                        write!(f, " (more than a period: the clock wanders)")?;
+                    }
                     if let Some(resolution_s) = stamp_resolution_s {
                         write!(f, ", stamp resolution {} s", brief(*resolution_s))?;
                     }

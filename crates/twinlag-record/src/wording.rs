@@ -31,6 +31,11 @@ pub(crate) fn brief(value: f64) -> String {
     plain(if (six - value).abs() <= 1e-9 * value.abs() { six } else { rounded(9) })
 }
 
+/// A number to three significant digits.
+pub(crate) fn three(value: f64) -> String {
+    plain(format!("{value:.2e}").parse().unwrap_or(value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -15,8 +15,9 @@
 //! it has come and can be cancelled. This crate is the one to take for whole records; each layer is
 //! re-exported as a module and can be taken alone: [`sensor`] (models), [`signal`] (simulated
 //! records), [`cross_relation`] (the costs), [`bias`] (noise in the published cost), [`estimate`]
-//! (estimators), [`optimise`] (solvers), [`diagnosis`] (the loop), [`compensation`] (filter and
-//! smoother), [`record`] (logger files). Answers as pages are in `twinlag-pages`.
+//! (estimators), [`optimise`] (solvers), [`model`] (two lags with physical effects, where an
+//! [`Effect`](model::Effect) of one's own comes in), [`diagnosis`] (the loop), [`compensation`]
+//! (filter and smoother), [`record`] (logger files). Answers as pages are in `twinlag-pages`.
 //!
 //! ```
 //! use twinlag::record::{Channels, Record, SamplingChoice};
@@ -103,6 +104,7 @@ pub use twinlag_cross_relation as cross_relation;
 pub use twinlag_diagnose as diagnosis;
 pub use twinlag_estimate as estimate;
 pub use twinlag_estimate::{Estimator, Hold, Intervals, Known, NoiseColour, NoiseSource};
+pub use twinlag_model as model;
 pub use twinlag_optimise as optimise;
 pub use twinlag_record as record;
 pub use twinlag_sensor as sensor;

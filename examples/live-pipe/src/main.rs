@@ -40,8 +40,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         let Some(row) = reader.read(&line?, 2 + START + k).unwrap_or(None) else { continue };
         let Some(now) = live.push(row.time_s, row.reading_c) else { continue };
         if k % EVERY == 0 {
-            let tau =
-                |i: usize| format!("{:.3} ({:.3} to {:.3})", now.tau_s[i], now.tau_95_s[i][0], now.tau_95_s[i][1]);
+            let tau = |i: usize| match (now.tau_s[i], now.tau_95_s[i]) {
+                (Some(tau_s), Some([low_s, high_s])) => format!("{tau_s:.3} ({low_s:.3} to {high_s:.3})"),
+                _ => "not determined".into(),
+            };
             println!("{:8.2}    {:6.1} ± {:.1}    {}    {}", now.time_s, now.gas_c, now.gas_std_k, tau(0), tau(1));
         }
     }

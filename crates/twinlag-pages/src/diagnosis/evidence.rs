@@ -4,7 +4,7 @@ use twinlag::cross_relation::TestName;
 use twinlag_report::{Document, Table, between, plus_minus, probability, rounded};
 
 use super::Page;
-use crate::words::{ABSENT, identifiers, place, question, unit, words, words_of};
+use crate::words::{ABSENT, identifiers, parameter_in_words, place, question, unit, words, words_of};
 
 impl Page<'_> {
     pub(super) fn evidence(&self, document: Document) -> Document {
@@ -53,9 +53,9 @@ impl Page<'_> {
                 let error = value.standard_error;
                 sizes = sizes.row([
                     words(found.effect),
-                    value.name.replace('_', " "),
+                    parameter_in_words(&value.name),
                     plus_minus(value.value, error),
-                    value.interval_95.map_or(ABSENT.into(), between),
+                    value.interval_95.map_or_else(absent, between),
                     unit(&value.unit).to_owned(),
                 ]);
             }

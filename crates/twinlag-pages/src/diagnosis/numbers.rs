@@ -5,7 +5,7 @@ use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table,
 
 use super::{Column, Page};
 use crate::figures::{WIDTH_PX, chart};
-use crate::words::{ABSENT, apart, estimate, interval, short, with_unit};
+use crate::words::{ABSENT, apart, estimate, interval, interval_of, short, with_unit};
 
 impl Page<'_> {
     pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
@@ -14,7 +14,7 @@ impl Page<'_> {
         let header = columns.iter().flat_map(|m| [m.column.to_owned(), interval_95()]);
         let mut table = Table::new([String::new()].into_iter().chain(header));
         for (k, channel) in self.channels().iter().enumerate() {
-            let of = |m: &Column<'_>| [estimate(&m.answer.sensors[k]), interval(m.answer.sensors[k].interval_95_s)];
+            let of = |m: &Column<'_>| [estimate(&m.answer.sensors[k]), interval_of(&m.answer.sensors[k])];
             table = table.row([format!("time constant of {channel}")].into_iter().chain(columns.iter().flat_map(of)));
         }
         let of = |m: &Column<'_>| {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
 use twinlag_estimate::{IntervalBasis, NoiseSource};
-use twinlag_optimise::Fit;
+use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, Sampling, SamplingKind};
 
 use crate::options::Options;
@@ -142,9 +142,9 @@ pub struct FreeParameters {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Difference {
-    /// `τ2 − τ1`, s.
+    /// `τ2 − τ1`, s; `None` where it is not determined, and where the best fit lies on a bound.
     pub value: Option<f64>,
-    /// Its 95 % interval, s.
+    /// Its 95 % interval, s. Without a value it says how large the difference may be.
     pub interval_95_s: Option<[f64; 2]>,
 }
 
@@ -250,4 +250,17 @@ pub struct Characterisation {
 impl Characterisation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.characterisation/1";
+
+    /// Takes the difference out where the best fit lies on a bound of a time constant.
+    pub(crate) fn drop_difference_on_bound(&mut self) {
+        if matches!(&self.fit.end, End::OnBound(which) if which.iter().any(|&i| i < 2)) {
+            self.time_constant_difference_s = Difference { value: None, interval_95_s: None };
+            self.not_identifiable.push("time_constant_difference_s".into());
+            self.warnings.push(
+                "the best fit lies on a bound of a time constant, so neither it nor the difference of the time constants \
+                 is an estimate"
+                    .into(),
+            );
+        }
+    }
 }

@@ -9,11 +9,11 @@ use crate::answers::{Characterisation, Status};
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Along {
-    /// Time constant, s; NaN where a window does not determine it.
+    /// Time constant, s; NaN where the readings do not determine it.
     pub tau_s: Vec<f64>,
-    /// Lower ends of the pointwise 95 % band, s; NaN where a window does not determine it.
+    /// Lower ends of the pointwise 95 % band, s; NaN where the readings do not determine it.
     pub low_s: Vec<f64>,
-    /// Upper ends of the pointwise 95 % band, s; NaN where a window does not determine it.
+    /// Upper ends of the pointwise 95 % band, s; NaN where the readings do not determine it.
     pub high_s: Vec<f64>,
 }
 
@@ -34,8 +34,8 @@ pub struct Ratio {
 pub struct Track {
     /// `twinlag.track/1`.
     pub schema: String,
-    /// `ok`, `model-rejected` where something is left over, `not-identifiable` where the record
-    /// does not determine time constants.
+    /// `ok`, `model-rejected` where something is left over (of windows, in more than one of a
+    /// hundred), `not-identifiable` where the record determines time constants nowhere.
     pub status: Status,
     /// `constant`, `smooth`, `step` or `windows`.
     pub change: String,

@@ -9,6 +9,7 @@ mod explain;
 mod fill;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
+use twinlag_diagnose::{Policy, Remark, is_single_tone};
 use twinlag_estimate::{
     ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, Intervals, NoiseColour, NoiseKnowledge, RunAtRest,
     Solved, Task, WhitenedFit, other_hold,
@@ -20,6 +21,7 @@ use crate::answers::Characterisation;
 use crate::error::Error;
 use crate::options::Options;
 use crate::quiet;
+use crate::rows::Rows;
 use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
@@ -87,7 +89,11 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         _ => answer::<2>(&asked, &task),
     };
     stop.check()?;
-    answer
+    let mut answer = answer?;
+    if Rows::of(record).is_ok_and(|rows| is_single_tone(&rows.observations, &Policy::default())) {
+        answer.warnings.push(Remark::SingleTone.to_string());
+    }
+    Ok(answer)
 }
 
 /// The channels of a record as the costs take them, cut where samples are missing.

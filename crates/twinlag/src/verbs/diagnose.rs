@@ -1,7 +1,7 @@
 //! The closed loop on a record.
 
 use twinlag_cross_relation::Parameter;
-use twinlag_diagnose::{Diagnosis as Core, Identifier, Policy, Settings, Verdict, diagnose as close_the_loop};
+use twinlag_diagnose::{Diagnosis as Core, Identifier, Policy, Remark, Settings, Verdict, diagnose as close_the_loop};
 use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
@@ -126,6 +126,7 @@ fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) ->
     } else if status == Status::NotIdentifiable {
         out.warnings.push("two first-order lags: this record does not determine both time constants".into());
     }
+    out.drop_difference_on_bound();
     out
 }
 
@@ -140,6 +141,10 @@ pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Ro
     let mut out = fitted.characterisation(status);
     out.free = FreeParameters::among(&core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
     out.warnings = core.remarks.iter().map(ToString::to_string).collect();
+    // The total delay is the same wherever on its valley the fit ends.
+    if !core.remarks.contains(&Remark::LagAlone) {
+        out.drop_difference_on_bound();
+    }
     out
 }
 

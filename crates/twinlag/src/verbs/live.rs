@@ -5,6 +5,7 @@ use std::fmt;
 use twinlag_compensate::{TrackerFn, learn, tracker};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::Identifier;
+use twinlag_estimate::spans_too_much;
 use twinlag_record::{Record, SamplingKind};
 
 use crate::answers::{Characterisation, Model, Status};
@@ -48,10 +49,10 @@ pub struct LiveAnswer {
     pub gas_c: f64,
     /// Its standard deviation, K.
     pub gas_std_k: f64,
-    /// Both time constants, s.
-    pub tau_s: [f64; 2],
-    /// Ends of their 95 % bands, s.
-    pub tau_95_s: [[f64; 2]; 2],
+    /// Both time constants, s; `None` while the readings of late do not determine them.
+    pub tau_s: [Option<f64>; 2],
+    /// Ends of their 95 % bands, s; `None` where the time constant is.
+    pub tau_95_s: [Option<[f64; 2]>; 2],
     /// Whether the time constants may have left the range that is tracked.
     pub is_beyond: bool,
     /// What the bands were multiplied by, since readings of late are farther from what was expected
@@ -182,13 +183,13 @@ impl Live {
         let tau_s = self.tau_s.map(|tau_s| tau_s * factor);
         let tau_95_s = [0, 1].map(|i| {
             let half = widened_by * Z_975 * (now.log_variance + self.log_variance[i]).sqrt();
-            [-half, half].map(|by| tau_s[i] * by.exp())
+            Some([-half, half].map(|by| tau_s[i] * by.exp())).filter(|band| !spans_too_much(*band))
         });
         Some(LiveAnswer {
             time_s,
             gas_c: now.gas_c,
             gas_std_k: widened_by * now.variance_k2.sqrt(),
-            tau_s,
+            tau_s: [0, 1].map(|i| tau_95_s[i].map(|_| tau_s[i])),
             tau_95_s,
             is_beyond: now.chance_beyond > LIKELY,
             widened_by,

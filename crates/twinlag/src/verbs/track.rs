@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{Change, Settings, track as follow};
+use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
 
 use crate::answers::{Along, Fitted, Model, Ratio, Status, Track};
@@ -18,6 +19,9 @@ use crate::watch::{UNWATCHED, Watch};
 const RATIO_CHANGES: f64 = 1e-3;
 /// Windows of a sliding estimate that overlap.
 const OVERLAP: f64 = 4.0;
+/// Share of windows whose residual is more than noise, above which the model is rejected: ten times
+/// as many as of a correct model.
+const REJECTED_WINDOWS: f64 = 0.01;
 /// Fewest samples of a window.
 const SHORTEST_WINDOW: usize = 200;
 
@@ -96,7 +100,9 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     };
     let found = follow(&observations, &settings, &effects, watch)?;
     let is_left = found.fit.is_contradicted();
-    let status = match (&found.log_error, is_left) {
+    let sensors = found.log_error.as_ref().map(|errors| [0, 1].map(|i| along(&found.tau_s[i], &errors[i])));
+    let sensors = sensors.filter(is_any);
+    let status = match (&sensors, is_left) {
         (None, _) => Status::NotIdentifiable,
         (Some(_), true) => Status::ModelRejected,
         (Some(_), false) => Status::Ok,
@@ -125,7 +131,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
                 .into(),
         );
     }
-    let sensors = found.log_error.as_ref().map(|errors| [0, 1].map(|i| along(&found.tau_s[i], &errors[i])));
+    warnings.extend(sensors.as_ref().and_then(|sensors| undetermined(sensors, "instants")));
     let (change, coefficients) = match found.change {
         Change::Smooth(size) => ("smooth", Some(size)),
         Change::Step => ("step", None),
@@ -146,10 +152,23 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     })
 }
 
-/// A time constant with its band, whose logarithm is normal.
+/// A time constant with its band, whose logarithm is normal; NaN where it is not determined.
 fn along(tau_s: &[f64], log_error: &[f64]) -> Along {
-    let by = |sign: f64| tau_s.iter().zip(log_error).map(|(tau, e)| tau * (sign * Z_975 * e).exp()).collect();
-    Along { tau_s: tau_s.to_vec(), low_s: by(-1.0), high_s: by(1.0) }
+    let known = |e: f64| if e <= MAX_LOG_STANDARD_ERROR { e } else { f64::NAN };
+    let by = |sign: f64| tau_s.iter().zip(log_error).map(|(tau, e)| tau * (sign * Z_975 * known(*e)).exp()).collect();
+    Along { tau_s: by(0.0), low_s: by(-1.0), high_s: by(1.0) }
+}
+
+/// Whether both time constants are determined anywhere.
+fn is_any(sensors: &[Along; 2]) -> bool {
+    sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()))
+}
+
+/// How many instants of how many determine not both time constants, where some do not.
+fn undetermined(sensors: &[Along; 2], what: &str) -> Option<String> {
+    let pairs = || sensors[0].tau_s.iter().zip(&sensors[1].tau_s);
+    let empty = pairs().filter(|(a, b)| a.is_nan() || b.is_nan()).count();
+    (empty > 0).then(|| format!("{empty} of {} {what} do not determine both time constants", pairs().count()))
 }
 
 fn range(sensors: &[Along; 2]) -> [[f64; 2]; 2] {
@@ -197,23 +216,34 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
         let from_s = record.time_s[0] + k as f64 * hop_s;
         let rows =
             record.time_s.partition_point(|t| *t < from_s)..record.time_s.partition_point(|t| *t <= from_s + window_s);
-        let Ok(answer) = part(record, rows).and_then(|part| characterise(&part, &options.characterise)) else {
-            continue;
-        };
-        rejected += usize::from(answer.status == Status::ModelRejected);
+        // Of too few samples, or of a sensor that is dead, there is nothing to say.
+        let answer = part(record, rows).and_then(|part| characterise(&part, &options.characterise)).ok();
+        rejected += usize::from(answer.as_ref().is_some_and(|a| a.status == Status::ModelRejected));
         time_s.push(from_s + 0.5 * window_s);
-        for (along, sensor) in sensors.iter_mut().zip(&answer.sensors) {
-            let [low, high] = sensor.interval_95_s.unwrap_or([f64::NAN; 2]);
-            along.tau_s.push(sensor.time_constant_s.unwrap_or(f64::NAN));
+        for (i, along) in sensors.iter_mut().enumerate() {
+            let sensor = answer.as_ref().map(|a| &a.sensors[i]);
+            let [low, high] = sensor.and_then(|s| s.interval_95_s).unwrap_or([f64::NAN; 2]);
+            along.tau_s.push(sensor.and_then(|s| s.time_constant_s).unwrap_or(f64::NAN));
             along.low_s.push(low);
             along.high_s.push(high);
         }
     }
-    let warnings = of_windows(&sensors, rejected, time_s.len());
-    let is_any = sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()));
+    let mut warnings: Vec<String> = undetermined(&sensors, "windows").into_iter().collect();
+    if rejected > 0 {
+        warnings.push(format!(
+            "in {rejected} of {count} windows the residual is more than noise: their numbers are the best fit of a model \
+             that they contradict. A diagnosis looks for what is missing"
+        ));
+    }
+    let is_any = is_any(&sensors);
+    let status = match (is_any, rejected as f64 > REJECTED_WINDOWS * count as f64) {
+        (false, _) => Status::NotIdentifiable,
+        (true, true) => Status::ModelRejected,
+        (true, false) => Status::Ok,
+    };
     Ok(Track {
         schema: Track::SCHEMA.into(),
-        status: if is_any { Status::Ok } else { Status::NotIdentifiable },
+        status,
         change: "windows".into(),
         coefficients: None,
         range_s: is_any.then(|| range(&sensors)),
@@ -224,16 +254,4 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
         last,
         warnings,
     })
-}
-
-fn of_windows(sensors: &[Along; 2], rejected: usize, count: usize) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let empty = sensors[0].tau_s.iter().filter(|t| !t.is_finite()).count();
-    if empty > 0 {
-        warnings.push(format!("{empty} of {count} windows do not determine both time constants"));
-    }
-    if rejected > 0 {
-        warnings.push(format!("in {rejected} of {count} windows the residual is more than noise"));
-    }
-    warnings
 }

@@ -45,7 +45,9 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         };
         out.interval_method = IntervalMethod::Profile;
         let (value, [low, high]) = ridge.difference;
-        out.time_constant_difference_s = Difference { value: Some(value), interval_95_s: Some([low, high]) };
+        // The interval is that of the walk, which knows the bound; the value is where the fit ran into it.
+        let value = Some(value).filter(|_| !matches!(self.best.end, End::OnBound(_)));
+        out.time_constant_difference_s = Difference { value, interval_95_s: Some([low, high]) };
         if low <= 0.0 && high >= 0.0 {
             out.not_identifiable.push("time_constant_difference_s".into());
             self.warnings
@@ -62,11 +64,11 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             sensor.interval_95_s = Some(ridge.other);
             out.not_identifiable.retain(|name| name != Known::NAMES[other]);
         } else {
-            self.warnings.push(
-                "this record does not determine the time constants themselves; it determines their \
-                     difference, over every time constant that it allows"
-                    .into(),
-            );
+            let what = if value.is_some() { "it determines their difference" } else { "it limits their difference" };
+            self.warnings.push(format!(
+                "this record does not determine the time constants themselves; {what}, over every time constant that it \
+                 allows"
+            ));
         }
     }
 
@@ -113,8 +115,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         for (channel, outliers) in self.asked.record.channels.iter().zip(self.levels.outliers) {
             if outliers > 0 {
                 out.warnings.push(format!(
-                    "{channel}: {outliers} third differences are too large for noise and were left out of its level: spikes, \
-                     dropouts or sharp steps of the gas"
+                    "{channel}: {outliers} third differences, each of four neighbouring readings, are too large for noise and \
+                     were left out of its level: spikes, dropouts or sharp steps of the gas. A diagnosis looks for spikes"
                 ));
             }
         }
@@ -178,7 +180,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
         } else if self.levels.outliers != [0, 0] && failed.contains(&TestName::TotalEnergy) {
-            "some samples are too far off for noise (see below): correct or empty these cells \
+            "some samples are too far off for noise (counted in the next warnings): correct or empty these cells \
                      first"
                 .into()
         } else if failed.contains(&TestName::Calibration) {
