@@ -185,6 +185,7 @@ changes. Schwarz's criterion (BIC) chooses among a smooth change with as many co
 step, and no change. Whether the ratio of the two stays constant is tested.
 
 With --window each window is characterised separately, as in published work: the bands are wider, and nothing is shared.
+Cells are empty where the readings do not determine a time constant.
 
 With --live rows are processed as they arrive, from a pipe that need not end: logger | twinlag track - --live 2000 --out -
 The program first collects that many rows and estimates sensors, noise and gas from them. It then writes for each row, using
@@ -205,7 +206,8 @@ pub(crate) struct Track {
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
-    /// Use a model written by `twinlag diagnose --save`; its other effects stay fixed.
+    /// Use a model written by `twinlag diagnose --save`; its effects stay fixed, except a change of
+    /// the time constants, which is what is tracked.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
     /// Characterise sliding windows of this length instead.

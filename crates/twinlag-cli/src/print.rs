@@ -285,7 +285,8 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     }
     if !effect.alternatives.is_empty() {
         let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
-        lines.push(format!("    equally well explained by: {}", names.join(", ")));
+        let (names, own) = (names.join(", "), effect.effect);
+        lines.push(format!("    equally well explained by: {names}; the numbers above hold if it is {own}"));
     }
     lines.push(format!("    at the rig: {}", about.advice));
     lines

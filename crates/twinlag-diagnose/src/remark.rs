@@ -83,8 +83,8 @@ impl fmt::Display for Remark {
                 )
             }
             Self::LagAlone => f.write_str(
-                "this record does not distinguish time constants from a delay: the difference is the \
-                 total delay of channel 2, τ2 − τ1 + delay",
+                "this record does not distinguish time constants from a delay, so the size of the delay holds only \
+                 if it is one: the difference is the total delay of channel 2, τ2 − τ1 + delay",
             ),
             Self::SingleTone => f.write_str(
                 "the gas is a single tone. Its amplitude and phase are two equations for two time \
