@@ -41,6 +41,10 @@ const NAMES: [&str; 32] = [
 ];
 const RATIO_NAMES: [&str; RATIO_SIZE] = ["ratio1", "ratio2", "ratio3", "ratio4"];
 
+/// A typical change, by which steps of a fit are measured: with the tenth of it, the longest step that a fit takes
+/// is short beside the changes that there are, and forty of them do not reach the end.
+const TYPICAL_CHANGE: f64 = 0.5;
+
 /// What `m` is a function of.
 enum Of {
     /// Time: a spline between the ends of the record, s, which has so many samples.
@@ -67,7 +71,8 @@ struct Varying {
 impl Varying {
     fn shared(of: Of, names: &[&'static str], largest: f64) -> Shared {
         let channel = matches!(of, Of::Ratio { .. }).then_some(1);
-        let share = |name: &&'static str| Parameter::new(name, "1", Variable::linear(*name, 0.05, -0.9, largest));
+        let share =
+            |name: &&'static str| Parameter::new(name, "1", Variable::linear(*name, TYPICAL_CHANGE, -0.9, largest));
         let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, channel, names.iter().map(share).collect());
         Arc::new(Self { of, seat })
     }

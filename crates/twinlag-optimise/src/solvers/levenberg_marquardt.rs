@@ -36,6 +36,8 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     let mut system = System { free: Vec::with_capacity(n), matrix: vec![0.0; n * n], rhs: vec![0.0; n] };
     let (mut new, mut step) = (vec![0.0; n], vec![0.0; n]);
     let (mut damping, mut raise) = (DAMPING, 2.0);
+    // Where steps are refused, the value says so at a fraction of the price of the derivatives.
+    let mut is_wary = false;
     while !ledger.is_spent() {
         ledger.count_iteration();
         // Whether the gradient presses a coordinate against a bound.
@@ -63,8 +65,9 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
                     ledger.report();
                     return Stop::BySolver;
                 }
-                match ledger.derivatives(&new) {
-                    Ok(there) if there.value <= here.value => {
+                let is_higher = is_wary && ledger.value(&new).is_ok_and(|value| value > here.value || value.is_nan());
+                match (!is_higher).then(|| ledger.derivatives(&new)) {
+                    Some(Ok(there)) if there.value <= here.value => {
                         let predicted: f64 = -(0..n)
                             .map(|i| {
                                 let bend: f64 = (0..n).map(|j| here.curvature[i][j] * step[j]).sum();
@@ -73,12 +76,13 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
                             .sum::<f64>();
                         let ratio = (here.value - there.value) / predicted.max(f64::MIN_POSITIVE);
                         damping *= (1.0 - (2.0 * ratio.min(1.0) - 1.0).powi(3)).max(1.0 / 10.0);
+                        is_wary = raise > 2.0;
                         raise = 2.0;
                         here = there;
                         std::mem::swap(&mut z, &mut new);
                         break;
                     }
-                    Err(Refusal::Exhausted(_)) => {
+                    Some(Err(Refusal::Exhausted(_))) => {
                         ledger.report();
                         return Stop::Exhausted;
                     }
@@ -88,6 +92,7 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
             }
             damping = damping.max(1e-12) * raise;
             raise *= 2.0;
+            is_wary = true;
             if damping > DAMPING_LIMIT {
                 ledger.report();
                 return Stop::BySolver;
