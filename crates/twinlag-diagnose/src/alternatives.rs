@@ -6,10 +6,6 @@ use twinlag_model::{Effort, Fitted, ModelError, Shared, held_out_gain, is_unreso
 use crate::candidates::{Candidate, Search, accepts, white_gain};
 use crate::rank::worth;
 
-/// Deviance per residual by which a look-alike may be worse at first sight and still be fitted to
-/// the end: a tenth more energy, which the last iterations of a fit do not take off.
-const MAX_LOOK_DEFICIT_SHARE: f64 = 0.1;
-
 /// A look-alike in the place of an effect.
 pub(crate) struct Replacement {
     pub(crate) candidate: Candidate,
@@ -123,7 +119,7 @@ impl Search<'_> {
             model.fit(&theta, self.observations, self.selection, Effort::Look)
         };
         let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        if white_gain(current, &best) < -MAX_LOOK_DEFICIT_SHARE * best.count {
+        if white_gain(current, &best) < -self.policy.look_alike_deficit_share * best.count {
             return None;
         }
         let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);

@@ -23,10 +23,6 @@ const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
-/// Part of the logarithm of the energy that the best candidate takes off in an excerpt, below which
-/// another one is no rival of it where that one leaves but noise: half of it leaves the square root
-/// of an energy that is far off.
-const RIVAL_SHARE: f64 = 0.5;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -166,7 +162,7 @@ impl<'a> Search<'a> {
     pub(crate) fn beside(mut self, current: &Fitted) -> Self {
         self.context.tau_s = [current.theta[0], current.theta[1]];
         let evaluation = current.model.evaluate(&current.theta, self.observations);
-        let found = lines(self.observations, &evaluation, |s| self.selection.holds(s));
+        let found = lines(self.observations, &evaluation, |s| self.selection.holds(s), self.policy);
         self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
         self
     }
@@ -257,7 +253,7 @@ impl<'a> Search<'a> {
             let best = self.finished(current, &looked, robust_before);
             // Where this one leaves but noise, those that explain far less are not fitted to the end.
             if best.fitted.mean_energy() < self.policy.incomplete_energy {
-                mean.retain(|(_, c)| c.white_gain > RIVAL_SHARE * looked.white_gain);
+                mean.retain(|(_, c)| c.white_gain > self.policy.rival_share * looked.white_gain);
             }
             finished.push(best);
         }

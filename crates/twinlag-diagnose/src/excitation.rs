@@ -60,5 +60,5 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
         tones += 1 + (bin - from) / TONE_BINS;
     }
     // A gas that is rough from sample to sample is taken for noise, of which its largest bin then sticks out.
-    (2.0 * held > power.iter().sum()).then_some(tones)
+    (held > policy.tone_power_share * power.iter().sum::<f64>()).then_some(tones)
 }

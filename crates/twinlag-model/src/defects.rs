@@ -168,7 +168,8 @@ pub(crate) fn spikes(
                 let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
                 // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
                 let is_far = (scores[k].abs() > far && sticks_out > far)
-                    || (scores[k].abs() > 0.5 * far && sticks_out > policy.spike_neighbour_factor * far);
+                    || (scores[k].abs() > policy.spike_residual_share * far
+                        && sticks_out > policy.spike_neighbour_factor * far);
                 if is_peak && is_far && !stretch.masked[channel][k] {
                     found.push(part.before + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
@@ -177,7 +178,10 @@ pub(crate) fn spikes(
         }
         let m = found.len() as f64;
         let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
-        if found.len() >= 2 && m < policy.most_spikes_share * observations.samples() as f64 && related < 3.5 {
+        if found.len() >= 2
+            && m < policy.most_spikes_share * observations.samples() as f64
+            && related < policy.most_spike_rank_standard_errors
+        {
             out[channel] = found;
         }
     }
@@ -231,7 +235,12 @@ fn tone(values: impl Iterator<Item = (usize, f64)>, omega: f64) -> Complex64 {
 }
 
 /// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
-pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<f64> {
+pub fn lines(
+    observations: &Observations,
+    evaluation: &Evaluation,
+    holds: impl Fn(usize) -> bool,
+    policy: &Policy,
+) -> Vec<f64> {
     let Some(period_s) = observations.period_s else { return Vec::new() };
     // What does not count is zero; twice the length, so that no frequency is far from a bin.
     let Some(last) = evaluation.sample.iter().max() else { return Vec::new() };
@@ -261,24 +270,26 @@ pub fn lines(observations: &Observations, evaluation: &Evaluation, holds: impl F
         let level = median(around.collect()) / std::f64::consts::LN_2;
         if level > 0.0 {
             let ratio = power[bin] / level;
-            // Of exponentially distributed powers the largest of all exceeds this once in a thousand records.
-            if ratio > (power.len() as f64 / 1e-3).ln() + 3.0 {
+            // What the largest of as many exponentially distributed powers exceeds with that probability, and room for
+            // the scatter of the level.
+            if ratio > (power.len() as f64 / policy.round_false_alarm_probability).ln() + 3.0 {
                 found.insert(bin, ratio);
             }
         }
     }
+    let ratio = |bin: usize| gas_line_ratio(evaluation, TAU * bin as f64 / n as f64);
     let mut out: Vec<(usize, f64)> =
-        found.into_iter().filter(|(bin, _)| !is_in_the_gas(evaluation, TAU * *bin as f64 / n as f64)).collect();
+        found.into_iter().filter(|(bin, _)| ratio(*bin) >= policy.most_gas_line_ratio).collect();
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
     out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
 }
 
-/// Whether both sensors see a line at `omega` radians per sample, as they do of the gas: what one of them alone sees is as large
-/// in their difference as in their mean.
-fn is_in_the_gas(evaluation: &Evaluation, omega: f64) -> bool {
+/// Amplitude of a line at `omega` radians per sample in the difference of both inferred inputs, over that in their mean: 2 where
+/// one sensor alone sees it, and hardly anything where it is in the gas.
+fn gas_line_ratio(evaluation: &Evaluation, omega: f64) -> f64 {
     let amplitude = |values: &[f64]| -> f64 {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         tone(evaluation.sample.iter().copied().zip(values.iter().map(|v| v - mean)), omega).norm()
     };
-    amplitude(&evaluation.disagreement_k) < 0.7 * amplitude(&evaluation.gas_c)
+    amplitude(&evaluation.disagreement_k) / amplitude(&evaluation.gas_c)
 }

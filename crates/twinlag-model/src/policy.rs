@@ -125,6 +125,13 @@ policy! {
     /// once in 700 right models.
     resize_standard_errors: f64 = 3.0,
 
+    /// Part of the logarithm of the energy that the best candidate takes off in an excerpt, below which another one is not
+    /// fitted to the end where the best leaves but noise: half of it leaves the square root of an energy that is far off.
+    rival_share: f64 = 0.5,
+    /// Deviance per residual by which a look-alike may be worse at first sight and still be fitted to the end: a tenth
+    /// more energy, which the last iterations of a fit do not take off.
+    look_alike_deficit_share: f64 = 0.1,
+
     /// Effects that are added at most: twice as many as can usually be distinguished, so that a
     /// record in which they cannot is seen as one. Chosen.
     most_effects: usize = 4,
@@ -179,6 +186,11 @@ policy! {
     /// Factor by which a reading that the residual hardly shows must stick out farther from its
     /// neighbours: chosen.
     spike_neighbour_factor: f64 = 1.7,
+    /// Part of those standard deviations that the residual has to show of a reading that sticks out so: chosen.
+    spike_residual_share: f64 = 0.5,
+    /// Standard errors up to which the other channel may move faster at the readings that stick out than elsewhere, or it
+    /// is the gas that they have in common: once in 4000 channels with spikes.
+    most_spike_rank_standard_errors: f64 = 3.5,
     /// Part of a channel's readings beyond which these are not isolated: chosen.
     most_spikes_share: f64 = 0.05,
     /// Readings at one extreme value from which on the converter is taken to end there, if half of
@@ -188,6 +200,11 @@ policy! {
     /// Power of a tone over that of the noise from which on it counts: a bin of noise is beyond it
     /// once in 10¹³.
     tone_power_ratio: f64 = 30.0,
+    /// Part of the power of the gas that its tones must have, or it is no gas of tones: the larger half.
+    tone_power_share: f64 = 0.5,
+    /// Amplitude of a line in the difference of both inferred inputs, over that in their mean, below which both sensors see
+    /// it and it is the gas's: what one of them alone sees has 2. Chosen.
+    most_gas_line_ratio: f64 = 0.7,
     /// Samples below which tones are not counted: chosen.
     tone_fewest_samples: usize = 200,
     /// Periods of a tone in a record below which it is not seen to come back: chosen.

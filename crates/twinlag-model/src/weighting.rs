@@ -16,6 +16,10 @@ use crate::observations::Observations;
 const POINTS: usize = 256;
 /// No frequency has less weight: a line that is not in the gas is seen there.
 const LEAST: f64 = 0.02;
+/// Segments of that many points of which a spectrum is the mean; fewer leave it too uncertain to weigh by.
+const FEWEST_SEGMENTS: usize = 8;
+/// Gain above which all frequencies count alike: a filter would cost the residuals at either end, and gain a tenth.
+const FLAT_GAIN: f64 = 0.9;
 /// Taps on either side of the filter's middle.
 const HALF: usize = 24;
 /// Most coefficients of the autoregressive model of a residual.
@@ -52,7 +56,7 @@ impl Weighting {
     }
 
     fn by(observations: &Observations, noise_std_k: [f64; 2], gain: impl Fn([f64; 2]) -> f64) -> Self {
-        if observations.period_s.is_none() || observations.samples() < 8 * POINTS {
+        if observations.period_s.is_none() || observations.samples() < FEWEST_SEGMENTS * POINTS {
             return Self::default();
         }
         let snr = [0, 1].map(|i| {
@@ -68,7 +72,7 @@ impl Weighting {
                 gain([0, 1].map(|i| around.clone().map(|k| snr[i][k]).sum::<f64>() / n))
             })
             .collect();
-        if gain.iter().all(|g| *g > 0.9) {
+        if gain.iter().all(|g| *g > FLAT_GAIN) {
             return Self::default();
         }
         let response = Inverse::of(POINTS).transform(gain.iter().map(|g| Complex64::new(*g, 0.0)).collect());
