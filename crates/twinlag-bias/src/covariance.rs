@@ -34,7 +34,8 @@ pub(crate) fn covariance<const P: usize>(
     pull: &[f64; P],
 ) -> Option<[[f64; P]; P]> {
     let n = cost.counted() as f64;
-    let models = [0, 1].map(|i| Model::of(theta[i], theta.get(4 + i).copied().unwrap_or(0.0), cost.period_s()));
+    let models =
+        [0, 1].map(|i| SyntheticFilter::of(theta[i], theta.get(4 + i).copied().unwrap_or(0.0), cost.period_s()));
     let gain = theta.get(2).copied().unwrap_or(1.0);
     let variance = [noise_std[0].powi(2), (noise_std[1] / gain).powi(2)];
 
@@ -62,13 +63,13 @@ pub(crate) fn covariance<const P: usize>(
 
 /// A synthetic filter `(n1 z⁻¹ + n2 z⁻²)/(1 + d1 z⁻¹ + d2 z⁻²)`, its coefficients' derivatives by
 /// its two time constants, and its slowest pole.
-struct Model {
+struct SyntheticFilter {
     feed: [(f64, [f64; 2]); 2],
     back: [(f64, [f64; 2]); 2],
     slowest: f64,
 }
 
-impl Model {
+impl SyntheticFilter {
     fn of(tau_s: f64, second_tau_s: f64, period_s: f64) -> Self {
         let filter = synthetic_filter(tau_s, second_tau_s, period_s);
         let parts = |c: usize| (filter.numerator[c], filter.denominator[c]);
@@ -107,7 +108,7 @@ impl Model {
 
 /// Mean over frequency of `Re(κ_i κ_j)`.
 fn noise_in_common<const P: usize>(
-    models: &[Model; 2],
+    models: &[SyntheticFilter; 2],
     gain: f64,
     variance: [f64; 2],
     pull: &[f64; P],

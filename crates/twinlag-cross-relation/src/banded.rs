@@ -10,7 +10,7 @@
 use num_dual::{DualNum, DualSVec64};
 
 use crate::inverse::{Row, row};
-use crate::noise_model::Model;
+use crate::noise_model::HoldAndNoise;
 use crate::parameters::{Pair, parts};
 use crate::polynomial::MAX_COEFFICIENTS;
 use crate::readings::{Segment, Steps};
@@ -23,7 +23,7 @@ const SETTLED_ROWS: usize = MAX_COEFFICIENTS;
 /// Calls `visit` with each whitened residual of `segment`, in order of time.
 pub(crate) fn sweep<const P: usize>(
     segment: &Segment,
-    model: &Model,
+    model: &HoldAndNoise,
     pair: &Pair<DualSVec64<P>>,
     mut visit: impl FnMut(DualSVec64<P>),
 ) {

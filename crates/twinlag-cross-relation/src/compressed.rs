@@ -17,7 +17,7 @@
 use num_dual::DualSVec64;
 
 use crate::bands::NODES_PER_BAND;
-use crate::noise_model::Model;
+use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
 use crate::spectral::{Sloped, Sums, Weights};
 use crate::transform::Transformed;
@@ -52,7 +52,7 @@ impl Compressed {
     pub(crate) fn accumulate<const P: usize>(
         &self,
         segment: &Transformed,
-        model: &Model,
+        model: &HoldAndNoise,
         pair: &Pair<DualSVec64<P>>,
         sums: &mut Sums<P>,
     ) {
@@ -89,7 +89,7 @@ impl Compressed {
     pub(crate) fn gradient_error<const P: usize>(
         &self,
         segment: &Transformed,
-        model: &Model,
+        model: &HoldAndNoise,
         pair: &Pair<DualSVec64<P>>,
         out: &mut [f64; P],
     ) {

@@ -6,7 +6,7 @@ use twinlag_sensor::Discretisation;
 
 use crate::error::CostError;
 use crate::inverse::{has_inverse, row};
-use crate::noise_model::Model;
+use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
 use crate::readings::{Readings, Steps};
 
@@ -57,7 +57,7 @@ pub fn inferred_inputs<const P: usize>(
     };
     readings.even_period_s().ok_or(CostError::UnevenSampling)?;
     let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
-    let row = row(&Model::white(hold, [1.0; 2]), &pair, period_s);
+    let row = row(&HoldAndNoise::white(hold, [1.0; 2]), &pair, period_s);
     let filters = row.data.map(|c| c.as_slice().iter().map(|v| v.re).collect::<Vec<f64>>());
     let offset = pair.offset.re;
     let through = |y: &[f64], filter: &[f64], offset: f64| -> Vec<f64> {

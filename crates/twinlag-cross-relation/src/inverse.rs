@@ -15,7 +15,7 @@
 use num_dual::{DualNum, DualSVec64};
 use twinlag_sensor::Discretisation;
 
-use crate::noise_model::Model;
+use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
 use crate::polynomial::Polynomial;
 
@@ -35,14 +35,14 @@ pub(crate) fn has_inverse(hold: Discretisation) -> bool {
 
 /// Whether each `u[k]` takes but two neighbouring samples of each channel, and noise is white: what
 /// uneven steps and the sine transform need.
-pub(crate) fn is_one_step<D>(model: &Model, pair: &Pair<D>) -> bool {
+pub(crate) fn is_one_step<D>(model: &HoldAndNoise, pair: &Pair<D>) -> bool {
     matches!(model.hold, Discretisation::ZeroOrderHold | Discretisation::Bilinear)
         && pair.second_tau_s.iter().all(Option::is_none)
         && model.is_white()
 }
 
 /// The filters for samples `step_s` apart. The hold must have a difference equation.
-pub(crate) fn row<const P: usize>(model: &Model, pair: &Pair<DualSVec64<P>>, step_s: f64) -> Row<DualSVec64<P>> {
+pub(crate) fn row<const P: usize>(model: &HoldAndNoise, pair: &Pair<DualSVec64<P>>, step_s: f64) -> Row<DualSVec64<P>> {
     let sensors = [0, 1].map(|i| Sensor::new(model.hold, pair.tau_s[i], pair.second_tau_s[i], step_s));
     let [s1, s2] = sensors;
     // A bilinear second-order sensor has one factor 1 + z⁻¹ more than one of first order.

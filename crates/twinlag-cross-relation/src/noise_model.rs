@@ -7,7 +7,7 @@ use crate::error::CostError;
 
 /// What is taken for granted: hold and noise.
 #[derive(Clone, Debug)]
-pub(crate) struct Model {
+pub(crate) struct HoldAndNoise {
     pub(crate) hold: Discretisation,
     /// Standard deviations of `n`, K.
     pub(crate) noise_std: [f64; 2],
@@ -15,7 +15,7 @@ pub(crate) struct Model {
     pub(crate) autoregression: [Vec<f64>; 2],
 }
 
-impl Model {
+impl HoldAndNoise {
     pub(crate) fn white(hold: Discretisation, noise_std: [f64; 2]) -> Self {
         Self { hold, noise_std, autoregression: [Vec::new(), Vec::new()] }
     }

@@ -11,7 +11,7 @@
 use num_dual::{DualNum, DualSVec64};
 
 use crate::inverse::row;
-use crate::noise_model::Model;
+use crate::noise_model::HoldAndNoise;
 use crate::parameters::{Pair, parts};
 use crate::transform::Transformed;
 
@@ -51,7 +51,7 @@ pub(crate) struct Weights<const P: usize> {
 
 impl<const P: usize> Weights<P> {
     /// The pair must be of one step.
-    pub(crate) fn new(model: &Model, pair: &Pair<DualSVec64<P>>, period_s: f64) -> Self {
+    pub(crate) fn new(model: &HoldAndNoise, pair: &Pair<DualSVec64<P>>, period_s: f64) -> Self {
         let row = row(model, pair, period_s);
         let [c1, c2] = [0, 1].map(|i| row.data[i].as_slice());
         let variance = model.white_variance();
@@ -70,7 +70,11 @@ impl<const P: usize> Weights<P> {
 }
 
 /// The whitened residual of every bin, `U_j/√λ_j`, from slow to fast.
-pub(crate) fn residuals<const P: usize>(segment: &Transformed, model: &Model, pair: &Pair<DualSVec64<P>>) -> Vec<f64> {
+pub(crate) fn residuals<const P: usize>(
+    segment: &Transformed,
+    model: &HoldAndNoise,
+    pair: &Pair<DualSVec64<P>>,
+) -> Vec<f64> {
     let weights = Weights::new(model, pair, segment.period_s);
     let series = segment.parts();
     let cosines = &segment.plan.cosines;
@@ -85,7 +89,7 @@ pub(crate) fn residuals<const P: usize>(segment: &Transformed, model: &Model, pa
 /// Adds the bins of `segment` to `sums`.
 pub(crate) fn accumulate<const P: usize>(
     segment: &Transformed,
-    model: &Model,
+    model: &HoldAndNoise,
     pair: &Pair<DualSVec64<P>>,
     sums: &mut Sums<P>,
 ) {

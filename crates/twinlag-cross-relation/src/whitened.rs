@@ -14,7 +14,7 @@ use crate::banded;
 use crate::compressed::Compressed;
 use crate::error::CostError;
 use crate::inverse::{has_inverse, is_one_step, row};
-use crate::noise_model::{Model, check_autoregression, check_noise};
+use crate::noise_model::{HoldAndNoise, check_autoregression, check_noise};
 use crate::parameters::{CostValue, Pair, parts};
 use crate::readings::{Readings, Steps};
 use crate::sandwich::inverse;
@@ -38,7 +38,7 @@ pub enum Form {
 #[derive(Clone, Debug)]
 pub struct Whitened<'a> {
     readings: &'a Readings,
-    model: Model,
+    model: HoldAndNoise,
     /// Present in the spectral and compressed forms: one entry for each segment.
     transformed: Option<Vec<Transformed>>,
     /// Present in the compressed form.
@@ -88,7 +88,7 @@ impl<'a> Whitened<'a> {
                 Some(each.ok_or(CostError::NoSpectralForm)?)
             }
         };
-        let model = Model::white(hold, noise_std);
+        let model = HoldAndNoise::white(hold, noise_std);
         let out = Self { readings, model, transformed, compressed: None };
         Ok(if form == Form::Compressed { out.compressed(false) } else { out })
     }
@@ -307,7 +307,7 @@ impl<'a> Whitened<'a> {
         out
     }
 
-    pub(crate) fn model(&self) -> &Model {
+    pub(crate) fn model(&self) -> &HoldAndNoise {
         &self.model
     }
 }

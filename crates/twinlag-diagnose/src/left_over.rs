@@ -8,9 +8,9 @@ use twinlag_model::{ModelFit, Policy};
 use crate::diagnosis::Unexplained;
 
 /// Parts of the record of which the one with most of it is named.
-const PARTS: usize = 10;
+const RECORD_PARTS: usize = 10;
 /// Half the width of a band as a factor of its frequency: an eighth of an octave.
-const HALF_BAND: f64 = 1.090_871_211_463_571;
+const HALF_BAND_FACTOR: f64 = 1.090_871_211_463_571;
 
 /// What is left, if more than noise is.
 pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplained> {
@@ -45,7 +45,7 @@ pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplaine
 /// Ends of the band around `hz`; of the lowest one, up to the next.
 fn band_hz(fit: &ModelFit, hz: f64) -> [f64; 2] {
     if hz > 0.0 {
-        return [hz / HALF_BAND, hz * HALF_BAND];
+        return [hz / HALF_BAND_FACTOR, hz * HALF_BAND_FACTOR];
     }
     let others = fit.trace.bands.iter().map(|band| band[0]).filter(|other| *other > 0.0);
     [0.0, others.reduce(f64::min).unwrap_or(0.0)]
@@ -58,10 +58,11 @@ fn worst_part(fit: &ModelFit) -> Option<[f64; 2]> {
     Some([time_s[range.start], time_s[range.end - 1]])
 }
 
-/// The one of [`PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
+/// The one of [`RECORD_PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
 fn worst_range(residual: &[f64]) -> Option<Range<usize>> {
     let n = residual.len();
-    let parts = (0..PARTS).map(|i| i * n / PARTS..(i + 1) * n / PARTS).filter(|part| !part.is_empty());
+    let parts =
+        (0..RECORD_PARTS).map(|i| i * n / RECORD_PARTS..(i + 1) * n / RECORD_PARTS).filter(|part| !part.is_empty());
     let energy = |part: &Range<usize>| residual[part.clone()].iter().map(|r| r * r).sum::<f64>() / part.len() as f64;
     parts.max_by(|a, b| energy(a).total_cmp(&energy(b)))
 }

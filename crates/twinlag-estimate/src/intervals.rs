@@ -7,7 +7,7 @@
 use twinlag_cross_relation::{Whitened, Z_975, log_normal_interval_95, sandwich};
 use twinlag_optimise::{Budget, End, Minimiser, Problem, Variable};
 
-use crate::levels::Levels;
+use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::vocabulary::IntervalBasis;
 
@@ -48,7 +48,7 @@ pub(crate) fn with_level_uncertainty<const P: usize>(
     theta: &[f64; P],
     free: &[usize],
     covariance: &[[f64; P]; P],
-    levels: &Levels,
+    levels: &NoiseLevels,
     priors: &[Prior],
 ) -> [[f64; P]; P] {
     let mut out = *covariance;

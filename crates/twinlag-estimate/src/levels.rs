@@ -35,7 +35,7 @@ const NOISELESS_STD_PER_SWING: f64 = 1e-5;
 /// Noise levels and how well they are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Levels {
+pub struct NoiseLevels {
     /// Standard deviations, K.
     pub std_k: [f64; 2],
     /// Where each comes from.
@@ -56,7 +56,7 @@ pub struct Levels {
     least_k: [f64; 2],
 }
 
-impl Levels {
+impl NoiseLevels {
     /// What `task` says of the noise, before any fit: levels that are given; those of runs in which
     /// the gas is at rest; a ratio, with the size of channel 1's third differences until a fit says
     /// better; third differences.
@@ -65,9 +65,9 @@ impl Levels {
     /// [`EstimateError::Noise`] for too few samples where levels have to be found.
     /// ```
     #[doc = include_str!("../doc/readings.txt")]
-    /// use twinlag_estimate::{Levels, NoiseKnowledge, NoiseSource, Task};
+    /// use twinlag_estimate::{NoiseLevels, NoiseKnowledge, NoiseSource, Task};
     ///
-    /// let found = Levels::of(&Task::new(&readings))?;
+    /// let found = NoiseLevels::of(&Task::new(&readings))?;
     /// assert_eq!(found.source, [NoiseSource::ThirdDifferences; 2]);
     /// let error_k = found.standard_error_k()[0].expect("found");
     /// assert!((found.std_k[0] - 0.05).abs() < 4.0 * error_k);

@@ -68,7 +68,7 @@ pub use error::EstimateError;
 pub use estimate::Estimate;
 pub use hold::other_hold;
 pub use intervals::TauIntervals;
-pub use levels::{Levels, MIN_DEGREES_OF_FREEDOM_AT_REST};
+pub use levels::{MIN_DEGREES_OF_FREEDOM_AT_REST, NoiseLevels};
 pub use objective::Prior;
 pub use outcome::{Outcome, Solved};
 pub use profile::Ridge;
@@ -83,6 +83,6 @@ pub use whitened::{ENERGY_THAT_OUTWEIGHS_NOISE, WhitenedFit};
 /// Questions and answers may go to any thread, and be read by several.
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
-    is_send_and_sync::<(EstimateError, Estimator, Hold, Intervals, Known, Levels, NoiseKnowledge, Outcome)>();
+    is_send_and_sync::<(EstimateError, Estimator, Hold, Intervals, Known, NoiseLevels, NoiseKnowledge, Outcome)>();
     is_send_and_sync::<(Solved<2>, TauIntervals)>();
 };

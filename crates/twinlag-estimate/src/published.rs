@@ -10,7 +10,7 @@ use twinlag_optimise::{Budget, End, Evaluations, Fit, MultiStart, Problem, Varia
 
 use crate::error::EstimateError;
 use crate::fitting::{add, free, sum};
-use crate::levels::Levels;
+use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective};
 use crate::outcome::Solved;
 use crate::starts::starts as own_starts;
@@ -59,7 +59,7 @@ pub(crate) fn solve<const P: usize>(
     let (variables, std_k, ar1) = if let Some(fit) = whitened {
         (fit.variables.clone(), fit.whitened.noise_std(), fit.levels.ar1)
     } else {
-        let levels = Levels::of(task)?;
+        let levels = NoiseLevels::of(task)?;
         (task.variables::<P>(levels.std_k[1]), levels.std_k, levels.ar1)
     };
     let starts = match whitened {

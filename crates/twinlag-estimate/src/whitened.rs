@@ -14,7 +14,7 @@ use twinlag_sensor::Discretisation;
 use crate::error::EstimateError;
 use crate::fitting::{add, free, minimise_whitened, polish};
 use crate::intervals::{Minimum, TauIntervals, with_level_uncertainty};
-use crate::levels::Levels;
+use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::outcome::Solved;
 use crate::second_lag::Unseen;
@@ -46,7 +46,7 @@ pub struct WhitenedFit<'a, const P: usize> {
     pub(crate) task: Task<'a>,
     /// In its exact form, at the size of the noise that the estimate rests on.
     pub(crate) whitened: Whitened<'a>,
-    pub(crate) levels: Levels,
+    pub(crate) levels: NoiseLevels,
     pub(crate) variables: Vec<Variable>,
     pub(crate) priors: Vec<Prior>,
     pub(crate) fit: Fit,
@@ -86,7 +86,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     /// # Errors
     /// [`EstimateError`] where the question cannot be put. A fit that ran is never an error.
     pub fn find(task: &Task<'a>) -> Result<Self, EstimateError> {
-        let first = Levels::of(task)?;
+        let first = NoiseLevels::of(task)?;
         let mut found = Self::search(task, first)?;
         found.leave_out_unseen_lags()?;
         found.settle_levels(&first)?;
@@ -100,7 +100,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     }
 
     /// The lowest minimum from all starts, for noise of `levels`.
-    fn search(task: &Task<'a>, levels: Levels) -> Result<Self, EstimateError> {
+    fn search(task: &Task<'a>, levels: NoiseLevels) -> Result<Self, EstimateError> {
         let variables = task.variables::<P>(levels.std_k[1]);
         let priors = task.priors();
         let ended = minimise::<P>(task, &variables, &priors, &levels, task.hold, levels.std_k, None)?;
@@ -136,7 +136,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
 
     /// Levels in the light of the fit, and the fit again in the light of the levels. `first` are
     /// the levels before any fit.
-    fn settle_levels(&mut self, first: &Levels) -> Result<(), EstimateError> {
+    fn settle_levels(&mut self, first: &NoiseLevels) -> Result<(), EstimateError> {
         let Some(colour) = self.task.colour_to_find() else { return Ok(()) };
         for _ in 0..max_rounds(colour) {
             // A second lag on its bound is none, and is no objection to the rest.
@@ -147,7 +147,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
             if !is_reliable {
                 break;
             }
-            let refined = Levels::refined(first, self.task.readings, self.task.hold, &self.theta(), colour);
+            let refined = NoiseLevels::refined(first, self.task.readings, self.task.hold, &self.theta(), colour);
             if refined.agrees_with(&self.levels, colour) {
                 break;
             }
@@ -232,7 +232,7 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     }
 
     /// What is known of the noise: levels as given or found, where from, how well.
-    pub fn levels(&self) -> &Levels {
+    pub fn levels(&self) -> &NoiseLevels {
         &self.levels
     }
 
@@ -384,7 +384,7 @@ fn minimise<'a, const P: usize>(
     task: &Task<'a>,
     variables: &[Variable],
     priors: &[Prior],
-    levels: &Levels,
+    levels: &NoiseLevels,
     hold: Discretisation,
     noise_std: [f64; 2],
     from: Option<&[f64]>,
@@ -436,7 +436,7 @@ fn larger_first<const P: usize>(x: &[f64], variables: &[Variable], priors: &[Pri
 /// the time constants: one found from a single start may be missed.
 fn second_order_starts<const P: usize>(
     task: &Task<'_>,
-    levels: &Levels,
+    levels: &NoiseLevels,
     hold: Discretisation,
     variables: &[Variable],
     evaluations: &mut Evaluations,
@@ -467,7 +467,7 @@ fn second_order_starts<const P: usize>(
 /// Where the fits at first order end, the lowest first.
 fn first_order_ends<const Q: usize>(
     task: &Task<'_>,
-    levels: &Levels,
+    levels: &NoiseLevels,
     hold: Discretisation,
     evaluations: &mut Evaluations,
 ) -> Result<Vec<Vec<f64>>, EstimateError> {

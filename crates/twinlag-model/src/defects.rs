@@ -30,7 +30,7 @@ pub struct ChannelNoise {
 }
 
 /// Rows of a stretch that levels of noise can be found in.
-pub(crate) const SHORTEST: usize = 8;
+pub(crate) const MIN_LEVEL_ROWS: usize = 8;
 
 impl ChannelNoise {
     /// Step of each converter where it is coarse beside the noise, K.
@@ -56,7 +56,7 @@ pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
             if k < s.len() && !is_masked(k) {
                 continue;
             }
-            if k >= from + SHORTEST {
+            if k >= from + MIN_LEVEL_ROWS {
                 let steps = match observations.period_s {
                     Some(period_s) => Steps::Even(period_s),
                     None => Steps::Uneven(s.time_s[from..k].windows(2).map(|t| t[1] - t[0]).collect()),

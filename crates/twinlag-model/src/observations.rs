@@ -6,9 +6,9 @@ use crate::error::ModelError;
 use crate::flow::Flow;
 
 /// Fewest samples of a stretch that is used.
-const SHORTEST: usize = 8;
+const MIN_STRETCH_SAMPLES: usize = 8;
 /// Fewest samples of a record that can be diagnosed: fewer leave no blocks to be held out.
-const FEWEST: usize = 60;
+const MIN_RECORD_SAMPLES: usize = 60;
 
 /// An unbroken stretch of both channels.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,10 +93,10 @@ impl Observations {
     /// [`ModelError::TooShort`] for fewer than 60 samples; [`ModelError::NotFinite`]; [`ModelError::Flow`] for a flow that is
     /// not positive everywhere, or of another length.
     pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, ModelError> {
-        stretches.retain(|s| s.len() >= SHORTEST);
+        stretches.retain(|s| s.len() >= MIN_STRETCH_SAMPLES);
         let samples: usize = stretches.iter().map(Stretch::len).sum();
-        if samples < FEWEST {
-            return Err(ModelError::TooShort { samples, needed: FEWEST });
+        if samples < MIN_RECORD_SAMPLES {
+            return Err(ModelError::TooShort { samples, needed: MIN_RECORD_SAMPLES });
         }
         let is_sound = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
         if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {

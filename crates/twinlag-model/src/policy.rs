@@ -12,12 +12,12 @@ use crate::error::ModelError;
 const RESIDUAL_TESTS: f64 = 10.0;
 
 /// A number of a policy: a quantity, or a count.
-trait Number: Copy {
+trait PolicyNumber: Copy {
     fn to_f64(self) -> f64;
     fn of_f64(value: f64) -> Self;
 }
 
-impl Number for f64 {
+impl PolicyNumber for f64 {
     fn to_f64(self) -> f64 {
         self
     }
@@ -27,7 +27,7 @@ impl Number for f64 {
     }
 }
 
-impl Number for usize {
+impl PolicyNumber for usize {
     fn to_f64(self) -> f64 {
         self as f64
     }
@@ -62,7 +62,7 @@ macro_rules! policy {
 
             /// Every number with its name.
             pub fn numbers(&self) -> Vec<(&'static str, f64)> {
-                vec![$((stringify!($name), Number::to_f64(self.$name)),)+]
+                vec![$((stringify!($name), PolicyNumber::to_f64(self.$name)),)+]
             }
 
             /// The policy with another `value` of the number `name`, counts rounded and at least 1;
@@ -71,7 +71,7 @@ macro_rules! policy {
             pub fn with(&self, name: &str, value: f64) -> Option<Self> {
                 let mut out = self.clone();
                 match name {
-                    $(stringify!($name) => out.$name = Number::of_f64(value),)+
+                    $(stringify!($name) => out.$name = PolicyNumber::of_f64(value),)+
                     _ => return None,
                 }
                 Some(out)

@@ -16,8 +16,8 @@ use crate::spectrum::runs;
 use crate::weighting::Weighting;
 
 /// Samples of a record that is looked at through excerpts first, and of each of these.
-const LONG: usize = 7000;
-const EXCERPT: usize = 500;
+const MIN_EXCERPTED_SAMPLES: usize = 7000;
+const EXCERPT_SAMPLES: usize = 500;
 /// Starts of the two-lag fit that the best points of a grid of time constants give.
 pub(crate) const GRID_STARTS: usize = 3;
 /// Times that spikes are looked for.
@@ -65,7 +65,7 @@ impl Prepared {
         let mut observations = observations.clone();
         let samples = observations.samples();
         let mut levels =
-            defects::levels(&observations).ok_or(ModelError::InShreds { samples, needed: defects::SHORTEST })?;
+            defects::levels(&observations).ok_or(ModelError::InShreds { samples, needed: defects::MIN_LEVEL_ROWS })?;
         if let Some(std_k) = settings.noise_std_k {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];
@@ -186,12 +186,12 @@ impl Prepared {
     /// Pieces of a long record, for a quick look, and what counts of them; all of a short one.
     pub fn excerpt(&self) -> (Observations, Selection) {
         let samples = self.observations.samples();
-        if samples < LONG {
+        if samples < MIN_EXCERPTED_SAMPLES {
             return (self.observations.clone(), self.searched.clone());
         }
         // After each block that judges.
         let starts = blocks::after_judges(samples, &self.policy);
-        let excerpt = self.observations.excerpt(starts, EXCERPT);
+        let excerpt = self.observations.excerpt(starts, EXCERPT_SAMPLES);
         let whole = selection(&excerpt, None, &self.searched.weighting);
         (excerpt, whole)
     }

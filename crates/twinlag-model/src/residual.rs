@@ -16,11 +16,11 @@ use crate::selection::Selection;
 use crate::weighting::Weighting;
 
 /// Points of a segment for the coherence.
-const SEGMENT: usize = 256;
+const COHERENCE_SAMPLES: usize = 256;
 /// Power over that of the noise from which on a frequency is the gas's.
-const STANDS_OUT: f64 = 3.0;
+const GAS_POWER_RATIO: f64 = 3.0;
 /// Parts of the record whose energies are compared.
-const PARTS: usize = 20;
+const ENERGY_PARTS: usize = 20;
 
 /// Residual and estimated input where they count, in unbroken runs.
 struct Pairs {
@@ -135,8 +135,8 @@ fn two_sided(deviate: f64) -> f64 {
 /// segments exceeds `c` with probability `(1 − c)^(L − 1)`. Elsewhere the estimated input is noise, and a level that is a little off
 /// leaves some of the residual's in it.
 fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
-    let tapered = Tapered::new(hann(SEGMENT));
-    let bins = SEGMENT / 2 - 2;
+    let tapered = Tapered::new(hann(COHERENCE_SAMPLES));
+    let bins = COHERENCE_SAMPLES / 2 - 2;
     let mut cross = vec![Complex64::default(); bins];
     let (mut of_r, mut of_x) = (vec![0.0; bins], vec![0.0; bins]);
     let mut count = 0.0_f64;
@@ -144,9 +144,9 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
         for (r, x) in tapered.halves(r).zip(tapered.halves(x)) {
             let transform = |v: &[f64]| {
                 // Both ends on a straight line: a slope would leak into every bin.
-                let (a, b) = (v[0], v[SEGMENT - 1]);
-                let mean = v.iter().sum::<f64>() / SEGMENT as f64;
-                let line = |k: usize| (b - a) * (k as f64 / (SEGMENT - 1) as f64 - 0.5);
+                let (a, b) = (v[0], v[COHERENCE_SAMPLES - 1]);
+                let mean = v.iter().sum::<f64>() / COHERENCE_SAMPLES as f64;
+                let line = |k: usize| (b - a) * (k as f64 / (COHERENCE_SAMPLES - 1) as f64 - 0.5);
                 tapered.transform(v.iter().enumerate().map(|(k, v)| v - mean - line(k)))
             };
             let (fr, fx) = (transform(r), transform(x));
@@ -163,7 +163,7 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     if independent < 4.0 {
         return None;
     }
-    let noise = STANDS_OUT * pairs.noise_std_k.powi(2) * tapered.energy() * count;
+    let noise = GAS_POWER_RATIO * pairs.noise_std_k.powi(2) * tapered.energy() * count;
     let coherence = |j: usize| cross[j].norm_sqr() / (of_r[j] * of_x[j]).max(1e-300);
     let of_gas: Vec<f64> = (0..bins).filter(|j| of_x[*j] > noise).map(coherence).collect();
     let largest = of_gas.iter().copied().reduce(f64::max)?;
@@ -221,18 +221,18 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
 
 /// Energies of twenty parts of the record against each other.
 fn time(r: &[f64]) -> ResidualTest {
-    let size = r.len() / PARTS;
+    let size = r.len() / ENERGY_PARTS;
     let mean = dense::dot(r, r) / r.len() as f64;
     let statistic: f64 = r
         .chunks(size)
-        .take(PARTS)
+        .take(ENERGY_PARTS)
         .map(|part| {
             let n = part.len() as f64;
             let z = (dense::dot(part, part) / (n * mean) - 1.0) * (0.5 * n).sqrt();
             z * z
         })
         .sum();
-    let dof = (PARTS - 1) as f64;
+    let dof = (ENERGY_PARTS - 1) as f64;
     test(TestName::Time, statistic, Some(dof), ChiSquared::new(dof).map_or(1.0, |c| c.sf(statistic)))
 }
 

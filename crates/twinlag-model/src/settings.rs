@@ -56,7 +56,9 @@ impl Settings {
 }
 
 /// Progress of a run: called with the task, how much of it is done, and of how much.
-/// [`ControlFlow::Break`] cancels the run, which then returns [`ModelError::Cancelled`].
+/// [`ControlFlow::Break`] cancels the run, which then returns [`ModelError::Cancelled`] at its next step.
+///
+/// It is called from several threads at once, often, and while they wait: it should return soon.
 pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
 
 /// Reports progress to `watch`.

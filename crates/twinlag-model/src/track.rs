@@ -19,20 +19,20 @@ use crate::summary::summarise;
 /// Fewest coefficients of the shared change.
 const LEAST_COEFFICIENTS: usize = 3;
 /// Strengths of its curvature that are tried: the least lets it change by a tenth along the record, each is twice the one before.
-const CURVATURE: f64 = 0.25;
-const STRENGTHS: i32 = 12;
+const LEAST_CURVATURE: f64 = 0.25;
+const CURVATURES: i32 = 12;
 /// A strength this much less likely than the best, in `−2 ln L`, ends the search.
-const HOPELESS: f64 = 20.0;
+const HOPELESS_DEVIANCE: f64 = 20.0;
 /// Instants at which a step is looked for, and times that the best is looked around.
-const INSTANTS: usize = 40;
-const ROUNDS: usize = 4;
+const STEP_INSTANTS: usize = 40;
+const STEP_ROUNDS: usize = 4;
 /// Halvings by which the ends of its interval are found.
-const HALVINGS: usize = 5;
+const INTERVAL_HALVINGS: usize = 5;
 /// Share of the record at either end in which a step is not distinguished from a slope of the
 /// start.
-const MARGIN: f64 = 0.05;
+const STEP_MARGIN_SHARE: f64 = 0.05;
 /// Part of a standard error by which a parameter is moved for derivatives.
-const SMALL: f64 = 0.01;
+const DERIVATIVE_STEP_SE: f64 = 0.01;
 /// 95 % point of the evidence against the true instant of a step, `(1 − exp(−x/2))² = 0.95`: the likelihood of instants is a random walk
 /// with a drift away from it on either side, and no parabola (Yao 1987, Hansen 2000).
 const INSTANT_95: f64 = 7.352_277;
@@ -153,7 +153,7 @@ fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
     let covariance = fit.covariance.as_ref().unwrap_or(&nothing);
     let slopes: Vec<[Vec<f64>; 2]> = (0..theta.len())
         .map(|a| {
-            let by = SMALL * covariance[a][a].max(0.0).sqrt().max(1e-6 * theta[a].abs()).max(1e-9);
+            let by = DERIVATIVE_STEP_SE * covariance[a][a].max(0.0).sqrt().max(1e-6 * theta[a].abs()).max(1e-9);
             let mut moved = theta.to_vec();
             moved[a] += by;
             let other = extended.time_constants_s(&moved, time_s);
@@ -199,15 +199,15 @@ impl Tracker<'_> {
         }
         let mut start = vec![0.0; size];
         let mut best: Option<(f64, f64, Fitted)> = None;
-        for done in 0..STRENGTHS {
-            report(watch, "smooth changes", done as usize, STRENGTHS as usize)?;
-            let curvature = CURVATURE * 2.0_f64.powi(done);
+        for done in 0..CURVATURES {
+            report(watch, "smooth changes", done as usize, CURVATURES as usize)?;
+            let curvature = LEAST_CURVATURE * 2.0_f64.powi(done);
             let Some(effect) = varying::smooth(size, ends_s, samples, curvature) else { return Ok(None) };
             let fitted = self.fit(constant, effect, &start, Effort::Finish);
             start = fitted.theta[constant.theta.len()..].to_vec();
             let Some((evidence, coefficients)) = self.evidence(&fitted, size, curvature) else { break };
             let so_far = best.as_ref().map_or(f64::INFINITY, |b| b.0);
-            if evidence > so_far + HOPELESS {
+            if evidence > so_far + HOPELESS_DEVIANCE {
                 break;
             }
             if evidence < so_far && fitted.end.is_usable() {
@@ -242,19 +242,19 @@ impl Tracker<'_> {
     fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, ModelError> {
         let [first_s, last_s] = self.prepared.observations.ends_s();
         let span_s = last_s - first_s;
-        let mut from_s = first_s + MARGIN * span_s;
-        let mut apart_s = (1.0 - 2.0 * MARGIN) * span_s / (INSTANTS - 1) as f64;
+        let mut from_s = first_s + STEP_MARGIN_SHARE * span_s;
+        let mut apart_s = (1.0 - 2.0 * STEP_MARGIN_SHARE) * span_s / (STEP_INSTANTS - 1) as f64;
         let mut tried: Vec<(f64, Fitted)> = Vec::new();
-        for round in 0..ROUNDS {
-            report(watch, "steps", round, ROUNDS)?;
-            let instants: Vec<f64> = (0..INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
+        for round in 0..STEP_ROUNDS {
+            report(watch, "steps", round, STEP_ROUNDS)?;
+            let instants: Vec<f64> = (0..STEP_INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
             for at_s in instants.into_iter().filter(|t| *t > first_s && *t < last_s) {
                 tried.push((at_s, self.fit(constant, varying::step(at_s), &[0.0], Effort::Look)));
             }
             let Some(best) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2)) else { return Ok(None) };
             let best_s = best.0;
             from_s = best_s - apart_s;
-            apart_s *= 2.0 / (INSTANTS - 1) as f64;
+            apart_s *= 2.0 / (STEP_INSTANTS - 1) as f64;
             if apart_s < 0.25 * self.prepared.context.step_s {
                 break;
             }
@@ -292,7 +292,7 @@ impl Tracker<'_> {
             inside_s = outside_s;
             outside_s *= 2.0;
         }
-        for _ in 0..HALVINGS {
+        for _ in 0..INTERVAL_HALVINGS {
             let middle_s = 0.5 * (inside_s + outside_s);
             if is_within(at_s + sign * middle_s) { inside_s = middle_s } else { outside_s = middle_s }
         }

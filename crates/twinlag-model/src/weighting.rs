@@ -13,17 +13,17 @@ use crate::dense;
 use crate::observations::Observations;
 
 /// Points of the spectra.
-const POINTS: usize = 256;
+const SPECTRUM_POINTS: usize = 256;
 /// No frequency has less weight: a line that is not in the gas is seen there.
-const LEAST: f64 = 0.02;
+const MIN_WEIGHT: f64 = 0.02;
 /// Segments of that many points of which a spectrum is the mean; fewer leave it too uncertain to weigh by.
-const FEWEST_SEGMENTS: usize = 8;
+const MIN_SEGMENTS: usize = 8;
 /// Gain above which all frequencies count alike: a filter would cost the residuals at either end, and gain a tenth.
 const FLAT_GAIN: f64 = 0.9;
 /// Taps on either side of the filter's middle.
-const HALF: usize = 24;
+const TAPS_EACH_SIDE: usize = 24;
 /// Most coefficients of the autoregressive model of a residual.
-const ORDER: usize = 8;
+const MAX_AUTOREGRESSIVE_ORDER: usize = 8;
 
 /// A filter of zero phase for the whitened residual, its squared gain the weight; or none.
 #[derive(Clone, Debug, Default)]
@@ -38,7 +38,7 @@ impl Weighting {
     pub fn of(observations: &Observations, noise_std_k: [f64; 2]) -> Self {
         Self::by(observations, noise_std_k, |[a, b]| {
             let snr = if a + b > 0.0 { a * b / (a + b) } else { 0.0 };
-            (snr / (1.0 + snr)).max(LEAST).sqrt()
+            (snr / (1.0 + snr)).max(MIN_WEIGHT).sqrt()
         })
     }
 
@@ -56,7 +56,7 @@ impl Weighting {
     }
 
     fn by(observations: &Observations, noise_std_k: [f64; 2], gain: impl Fn([f64; 2]) -> f64) -> Self {
-        if observations.period_s.is_none() || observations.samples() < FEWEST_SEGMENTS * POINTS {
+        if observations.period_s.is_none() || observations.samples() < MIN_SEGMENTS * SPECTRUM_POINTS {
             return Self::default();
         }
         let snr = [0, 1].map(|i| {
@@ -75,12 +75,12 @@ impl Weighting {
         if gain.iter().all(|g| *g > FLAT_GAIN) {
             return Self::default();
         }
-        let response = Inverse::of(POINTS).transform(gain.iter().map(|g| Complex64::new(*g, 0.0)).collect());
-        let taps = (0..=2 * HALF)
+        let response = Inverse::of(SPECTRUM_POINTS).transform(gain.iter().map(|g| Complex64::new(*g, 0.0)).collect());
+        let taps = (0..=2 * TAPS_EACH_SIDE)
             .map(|j| {
-                let lag = j.abs_diff(HALF);
-                let window = 0.5 + 0.5 * (std::f64::consts::PI * lag as f64 / (HALF + 1) as f64).cos();
-                response[lag] / POINTS as f64 * window
+                let lag = j.abs_diff(TAPS_EACH_SIDE);
+                let window = 0.5 + 0.5 * (std::f64::consts::PI * lag as f64 / (TAPS_EACH_SIDE + 1) as f64).cos();
+                response[lag] / SPECTRUM_POINTS as f64 * window
             })
             .collect();
         Self { taps, prediction: Vec::new() }
@@ -96,7 +96,7 @@ impl Weighting {
     pub fn by_residual(&self, runs: &[Vec<f64>]) -> Self {
         let filtered: Vec<Vec<f64>> = runs.iter().map(|run| self.apply(run)).collect();
         let count: usize = filtered.iter().map(Vec::len).sum();
-        let order = ORDER.min(count / 50);
+        let order = MAX_AUTOREGRESSIVE_ORDER.min(count / 50);
         let correlation: Vec<f64> = (0..=order)
             .map(|lag| {
                 let products = filtered.iter().map(|run| dense::dot(&run[lag.min(run.len())..], run));
@@ -216,15 +216,15 @@ impl Weighting {
     }
 }
 
-/// Mean power of a channel, white noise of unit variance having 1, in `POINTS/2 + 1` bins: Hann's window.
+/// Mean power of a channel, white noise of unit variance having 1, in `SPECTRUM_POINTS/2 + 1` bins: Hann's window.
 fn spectrum(observations: &Observations, channel: usize) -> Vec<f64> {
-    let tapered = Tapered::new(hann(POINTS));
+    let tapered = Tapered::new(hann(SPECTRUM_POINTS));
     let scale = tapered.energy();
-    let mut sum = vec![0.0; POINTS / 2 + 1];
+    let mut sum = vec![0.0; SPECTRUM_POINTS / 2 + 1];
     let mut count = 0.0_f64;
     for stretch in &observations.stretches {
         for piece in tapered.halves(&stretch.reading_c[channel]) {
-            let mean = piece.iter().sum::<f64>() / POINTS as f64;
+            let mean = piece.iter().sum::<f64>() / SPECTRUM_POINTS as f64;
             let spectrum = tapered.transform(piece.iter().map(|y| y - mean));
             sum.iter_mut().zip(&spectrum).for_each(|(s, x)| *s += x.norm_sqr() / scale);
             count += 1.0;

@@ -12,7 +12,7 @@ use twinlag::record::Record;
 use twinlag::{Characterisation, Diagnosis};
 use twinlag_report::{Colour, Document, ReportError};
 
-use crate::figures::{Model, frequency_figure};
+use crate::figures::{PlottedModel, frequency_figure};
 
 const BEFORE: &str = "two first-order lags";
 const AFTER: &str = "with the effects";
@@ -72,10 +72,10 @@ struct Column<'a> {
 
 /// The models to be shown in pictures: one, if no effect was added; none of an answer without
 /// series.
-fn models(answer: &Diagnosis) -> Vec<Model<'_>> {
+fn models(answer: &Diagnosis) -> Vec<PlottedModel<'_>> {
     let Some(core) = answer.core.as_deref() else { return Vec::new() };
-    let before = Model { name: BEFORE, fit: &core.base, colour: Colour::Vermilion };
-    let after = Model { name: AFTER, fit: &core.last, colour: Colour::Blue };
+    let before = PlottedModel { name: BEFORE, fit: &core.base, colour: Colour::Vermilion };
+    let after = PlottedModel { name: AFTER, fit: &core.last, colour: Colour::Blue };
     if has_two_models(answer) { vec![before, after] } else { vec![before] }
 }
 
@@ -88,7 +88,7 @@ impl Page<'_> {
         self.answer.core.as_deref()
     }
 
-    fn models(&self) -> Vec<Model<'_>> {
+    fn models(&self) -> Vec<PlottedModel<'_>> {
         models(self.answer)
     }
 

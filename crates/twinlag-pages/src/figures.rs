@@ -7,12 +7,12 @@ use twinlag_report::{Axis, Chart, Colour, Figure, Series};
 const NOISE: &str = "95 % of white noise";
 pub(crate) const WIDTH_PX: f64 = 900.0;
 /// Parts of the record whose mean energies are shown.
-const PARTS: usize = 100;
+const TIME_FIGURE_PARTS: usize = 100;
 /// A step longer than this multiple of the usual one is a gap.
-const GAP: f64 = 10.0;
+const GAP_STEPS: f64 = 10.0;
 
 /// A model with its name in pictures.
-pub(crate) struct Model<'a> {
+pub(crate) struct PlottedModel<'a> {
     pub(crate) name: &'static str,
     pub(crate) fit: &'a ModelFit,
     pub(crate) colour: Colour,
@@ -34,7 +34,8 @@ pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
     let drawn = x.iter().zip(y).any(|(x, y)| x.is_finite() && y.is_finite());
     let mut steps: Vec<f64> = x.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
-    let longest = if steps.is_empty() { 0.0 } else { GAP * *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let longest =
+        if steps.is_empty() { 0.0 } else { GAP_STEPS * *steps.select_nth_unstable_by(middle, f64::total_cmp).1 };
     let (mut at, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
     for (k, (x_k, y_k)) in x.iter().zip(y).enumerate() {
         if k > 0 && x_k - x[k - 1] > longest {
@@ -48,7 +49,7 @@ pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
 }
 
 /// The residual of each model along the record, and its root mean square in parts of the record.
-pub(crate) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
+pub(crate) fn time_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
     let largest: Vec<f64> = models
         .iter()
         .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
@@ -61,7 +62,7 @@ pub(crate) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
     let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
     let mut fewest = usize::MAX;
     let mut any = false;
-    for (Model { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
+    for (PlottedModel { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
         let trace = &fit.trace;
         let limit = 1.08 * if common { widest } else { *largest };
         let axis = Axis::linear("residual");
@@ -71,7 +72,7 @@ pub(crate) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
             figure = figure.panel(chart);
             any = true;
         }
-        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(PARTS).max(1);
+        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(TIME_FIGURE_PARTS).max(1);
         let (mut x, mut y) = (Vec::new(), Vec::new());
         for (times, values) in trace.time_s.chunks(size).zip(trace.residual.chunks(size)) {
             // A short last part would be outside the range of the others.
@@ -108,7 +109,7 @@ pub(crate) fn time_figure(models: &[Model<'_>]) -> Option<Figure> {
 }
 
 /// Power of the residual of each model against frequency.
-pub(crate) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
+pub(crate) fn frequency_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
     let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
     let mut series = Vec::new();
     let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
@@ -124,7 +125,7 @@ pub(crate) fn frequency_figure(models: &[Model<'_>]) -> Option<Figure> {
         let ones = vec![1.0; x.len()];
         series.push(Some(Series::trace(NOISE, x, ones).band(low, high).colour(Colour::Grey)));
     }
-    for Model { name, fit, colour, .. } in models {
+    for PlottedModel { name, fit, colour, .. } in models {
         let (x, y): (Vec<f64>, Vec<f64>) = fit.trace.bands.iter().filter(shown).map(|b| (b[0], b[1])).unzip();
         series.push((!x.is_empty()).then(|| Series::line(*name, x, y).colour(*colour)));
     }

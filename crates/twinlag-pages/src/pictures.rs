@@ -11,7 +11,7 @@ use twinlag::{Compensation, Track};
 /// Part of the record that is shown large.
 const EXCERPT: usize = 20;
 /// A step longer than this multiple of the period is a gap.
-const GAP: f64 = 2.5;
+const GAP_STEPS: f64 = 2.5;
 
 /// Readings and gas temperature with its band, over the record and where it moves most, and the
 /// spectra before and after with the frequency up to which the readings decide: one SVG.
@@ -46,7 +46,7 @@ fn temperatures(record: &Record, answer: &Compensation, title: &str, shown: std:
     let time_s = &answer.time_s[shown.clone()];
     // Nothing is drawn across a gap: the instants at its ends have none between them.
     let is_apart =
-        |k: usize| k > shown.start && answer.time_s[k] - answer.time_s[k - 1] > GAP * record.sampling.period_s;
+        |k: usize| k > shown.start && answer.time_s[k] - answer.time_s[k - 1] > GAP_STEPS * record.sampling.period_s;
     let ends = [time_s.first().copied().unwrap_or(0.0), time_s.last().copied().unwrap_or(0.0)];
     let rows = record.time_s.partition_point(|t| *t < ends[0])..record.time_s.partition_point(|t| *t <= ends[1]);
     let broken = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {

@@ -8,12 +8,12 @@ mod model;
 mod track;
 
 pub use characterisation::{
-    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
-    SensorEstimate, Status,
+    Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    SecondLag, SensorEstimate, Status,
 };
 pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, ErrorBeforeAfter, NamedEffect, NamedLimit};
 pub use model::{Model, ModelEffect};
 pub use track::{Along, Ratio, Track};
 
-pub(crate) use fitted::Fitted;
+pub(crate) use fitted::FittedAnswer;

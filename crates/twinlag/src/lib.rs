@@ -83,7 +83,7 @@ mod verbs;
 mod watch;
 
 pub use answers::{
-    Along, Characterisation, Compensation, Diagnosis, Difference, ErrorBeforeAfter, Estimate, FreeParameters,
+    Along, Characterisation, Compensation, Diagnosis, Difference, ErrorBeforeAfter, Estimated, FreeParameters,
     IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio, RecordSummary, Residual,
     SecondLag, SensorEstimate, Status, Track,
 };

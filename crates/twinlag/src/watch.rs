@@ -5,11 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
 
-/// Progress callback: `(task, done, total)`. [`ControlFlow::Break`] cancels the verb, which then
-/// returns [`Error::Cancelled`] at its next step.
-///
-/// It is called from several threads at once, often, and while they wait: it should return soon.
-pub type Watch<'a> = &'a (dyn Fn(&str, usize, usize) -> ControlFlow<()> + Sync);
+pub use twinlag_model::Watch;
 
 /// Nobody watches, and nothing is cancelled.
 pub(crate) const UNWATCHED: Watch<'static> = &|_, _, _| ControlFlow::Continue(());

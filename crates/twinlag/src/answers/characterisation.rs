@@ -29,7 +29,7 @@ pub enum Status {
 /// A number with its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Estimate {
+pub struct Estimated {
     /// The estimate.
     pub value: f64,
     /// Standard error of the estimate; `None` if the interval has no single width.
@@ -132,10 +132,10 @@ pub struct SecondLag {
 #[non_exhaustive]
 pub struct FreeParameters {
     /// Gain of channel 2 relative to channel 1.
-    pub gain: Option<Estimate>,
+    pub gain: Option<Estimated>,
     /// Offset of channel 2 relative to channel 1 at 0 °C, K.
     #[serde(rename = "offset_K")]
-    pub offset_k: Option<Estimate>,
+    pub offset_k: Option<Estimated>,
 }
 
 /// `time_constant_difference_s` of the schema.

@@ -6,7 +6,7 @@ use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
     SensorEstimate, Status,
 };
 use crate::options::Options;
@@ -16,7 +16,7 @@ use crate::options::Options;
 const ESTIMATOR: &str = "whitened";
 
 /// A fit of the model of a rig, and what it is of.
-pub(crate) struct Fitted<'a> {
+pub(crate) struct FittedAnswer<'a> {
     pub(crate) record: &'a Record,
     pub(crate) fit: &'a ModelFit,
     pub(crate) options: &'a Options,
@@ -26,7 +26,7 @@ pub(crate) struct Fitted<'a> {
     pub(crate) is_noise_given: bool,
 }
 
-impl Fitted<'_> {
+impl FittedAnswer<'_> {
     /// Whether both time constants are determined.
     pub(crate) fn is_determined(&self) -> bool {
         self.fit.time_constants.iter().all(|t| t.value_s.is_some())
@@ -104,7 +104,7 @@ impl FreeParameters {
             let of_calibration = effects.clone().filter(|(effect, _)| *effect == Identifier::CALIBRATION);
             of_calibration.flat_map(|(_, parameters)| parameters).find(|p| p.name == name).and_then(|p| {
                 let interval_95 = p.interval_95?;
-                Some(Estimate { value: p.value, standard_error: p.standard_error, interval_95 })
+                Some(Estimated { value: p.value, standard_error: p.standard_error, interval_95 })
             })
         };
         Self { gain: free("gain"), offset_k: free("offset") }

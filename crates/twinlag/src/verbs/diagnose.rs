@@ -5,7 +5,7 @@ use twinlag_diagnose::{Diagnosis as Core, Identifier, Policy, Remark, Settings, 
 use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, Diagnosis, ErrorBeforeAfter, Fitted, FreeParameters, Status};
+use crate::answers::{Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FreeParameters, Status};
 use crate::error::Error;
 use crate::options::Options;
 use crate::reference::Reference;
@@ -153,9 +153,9 @@ fn fitted<'a>(
     options: &'a DiagnoseOptions,
     rows: &Rows,
     fit: &'a twinlag_diagnose::ModelFit,
-) -> Fitted<'a> {
+) -> FittedAnswer<'a> {
     let options = &options.characterise;
-    Fitted { record, fit, options, is_even: rows.is_even, is_noise_given: options.noise_std_k.is_some() }
+    FittedAnswer { record, fit, options, is_even: rows.is_even, is_noise_given: options.noise_std_k.is_some() }
 }
 
 fn remark_on_reference(error: &ErrorBeforeAfter) -> Option<String> {

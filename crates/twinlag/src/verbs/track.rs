@@ -7,7 +7,7 @@ use twinlag_diagnose::{Change, Settings, track as follow};
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
 
-use crate::answers::{Along, Fitted, Model, Ratio, Status, Track};
+use crate::answers::{Along, FittedAnswer, Model, Ratio, Status, Track};
 use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, known_time_constants};
@@ -107,7 +107,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         (Some(_), true) => Status::ModelRejected,
         (Some(_), false) => Status::Ok,
     };
-    let fitted = Fitted {
+    let fitted = FittedAnswer {
         record,
         fit: &found.fit,
         options: &options.characterise,

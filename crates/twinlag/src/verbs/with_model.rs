@@ -3,7 +3,7 @@
 use twinlag_diagnose::{Identifier, ModelFit, Settings, fit_with};
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, Fitted, Model, Status};
+use crate::answers::{Characterisation, FittedAnswer, Model, Status};
 use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, known_time_constants};
@@ -49,7 +49,7 @@ pub(crate) fn with_model(
     let settings = Settings { noise_std_k, known: known_time_constants(options), ..Settings::default() };
     let effects = model.map(Model::known_effects).unwrap_or_default();
     let known = fit_with(&observations, &settings, &effects)?;
-    let fitted = Fitted { record, fit: &known.fit, options, is_even, is_noise_given: noise_std_k.is_some() };
+    let fitted = FittedAnswer { record, fit: &known.fit, options, is_even, is_noise_given: noise_std_k.is_some() };
     let status = match (fitted.is_determined(), known.fit.is_contradicted()) {
         (false, _) => Status::NotIdentifiable,
         (true, true) => Status::ModelRejected,

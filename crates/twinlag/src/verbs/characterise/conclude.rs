@@ -2,7 +2,7 @@
 //! the reason.
 
 use twinlag_cross_relation::{ResidualTest, ScoreVariance};
-use twinlag_estimate::{Estimator, Hold, Intervals, Levels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
+use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
 use twinlag_optimise::{End, Fit};
 
 use super::{Asked, bootstrap};
@@ -30,7 +30,7 @@ pub(super) struct Conclusion<'q, 'a, const P: usize> {
     pub(super) solved: Solved<P>,
     /// Its fit, or what stands for one in closed form.
     pub(super) best: Fit,
-    pub(super) levels: Levels,
+    pub(super) levels: NoiseLevels,
     pub(super) judged: Judged,
     pub(super) hold_sensitivity: Option<[f64; 2]>,
     pub(super) warnings: Vec<String>,

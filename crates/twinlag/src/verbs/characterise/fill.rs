@@ -6,8 +6,8 @@ use twinlag_sensor::Discretisation;
 
 use super::conclude::Conclusion;
 use crate::answers::{
-    Characterisation, Difference, Estimate, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual, SecondLag,
-    SensorEstimate, Status,
+    Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
+    SecondLag, SensorEstimate, Status,
 };
 use crate::setting::Setting;
 
@@ -114,7 +114,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         if P > 2 {
             let estimate = |value: f64, variance: f64| {
                 let error = variance.sqrt();
-                Estimate {
+                Estimated {
                     value,
                     standard_error: Some(error),
                     interval_95: [value - Z_975 * error, value + Z_975 * error],
