@@ -112,8 +112,8 @@ An effect is named if it explains the residual whatever the colour of the noise,
 left out of the fit. The errors before and after are measured on other blocks, used neither to choose effects nor to fit.
 Other effects that explain the record equally well are named as alternatives.
 
-Exit codes: 0 diagnosed, 4 the record does not determine both time constants, 2 wrong usage, 3 the file cannot be used,
-1 any other error.")]
+Exit codes: 0 diagnosed, 4 the record was refused or does not determine both time constants, 2 wrong usage, 3 the file
+cannot be used, 1 any other error.")]
 pub(crate) struct Diagnose {
     #[command(flatten)]
     pub(crate) input: Input,
@@ -478,7 +478,7 @@ pub(crate) struct Simulate {
 /// Simulate a built-in rig and diagnose it.
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Exit codes: 0 diagnosed, 4 the record does not determine both time constants, 1 any other error."
+    after_help = "Exit codes: 0 diagnosed, 4 the record was refused or does not determine both time constants, 1 any other error."
 )]
 pub(crate) struct Demo {
     /// Seed for all random numbers, in place of the one in the rig.

@@ -23,10 +23,10 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
             twinlag::characterise_with(&record, &model(path)?, &options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
-                | twinlag::Error::Diagnose(
+                | twinlag::Error::Model(
                     ModelError::Model { .. } | ModelError::Parameter { .. } | ModelError::Absurd,
                 ) => Failure::File(format!("{}: {}", path.display(), explained(&e))),
-                e => e.into(),
+                e => Failure::in_file(e, &record.source),
             })?
         }
         None => characterise(&record, &options, console)?,

@@ -42,7 +42,7 @@ pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Cons
     answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// The exit code: 0 for an answer, 4 if the data were read but do not determine both time constants.
+/// The exit code: 0 for an answer, 4 if the record was refused, or does not determine both time constants.
 pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
     u8::from(answer.last.status == Status::NotIdentifiable) * 4
 }

@@ -29,13 +29,11 @@ impl Failure {
             Self::NotYet(_) => 75,
         }
     }
-}
 
-impl Failure {
-    /// Of what is in `file`, which the message names.
+    /// The failure of a verb on the record in `file`; a message about its readings begins with that name.
     pub(crate) fn in_file(error: twinlag::Error, file: &str) -> Self {
-        use twinlag::Error::{Compensate, Cost, Diagnose, Estimate, Noise};
-        let is_of_readings = matches!(error, Compensate(_) | Cost(_) | Diagnose(_) | Estimate(_) | Noise(_));
+        use twinlag::Error::{Compensate, Cost, Estimate, Model, Noise};
+        let is_of_readings = matches!(error, Compensate(_) | Cost(_) | Estimate(_) | Model(_) | Noise(_));
         match error.into() {
             Self::File(text) if is_of_readings => Self::File(format!("{file}: {text}")),
             other => other,

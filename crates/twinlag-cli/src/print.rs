@@ -11,7 +11,6 @@ use twinlag::{
     Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag, SensorEstimate,
     Status, Track,
 };
-
 use twinlag_pages::parameter_in_words;
 
 use crate::console::Console;
@@ -286,7 +285,9 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     if !effect.alternatives.is_empty() {
         let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
         let (names, own) = (names.join(", "), effect.effect);
-        lines.push(format!("    equally well explained by: {names}; the numbers above hold if it is {own}"));
+        lines.push(format!(
+            "    equally well explained by: {names}; the numbers above are right only if the cause is {own}"
+        ));
     }
     lines.push(format!("    at the rig: {}", about.advice));
     lines
@@ -296,7 +297,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
 fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     let mut lines = vec![String::new()];
     let mut row = |name: &str, before: &str, after: &str| {
-        lines.push(format!("  {name:34} {before:>12}  {after:>12}"));
+        lines.push(format!("  {name:34} {before:>24}  {after:>24}"));
     };
     row("", "two lags", "with effects");
     let number = |x: f64| digits(x, 4);
@@ -304,10 +305,9 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
         let tau =
             |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
         row(&format!("time constant {}", answer.base.sensors[i].channel), &tau(&answer.base), &tau(&answer.last));
-        let error = |c: &Characterisation| {
-            c.sensors[i].standard_error_s.map_or("-".into(), |t| format!("± {} s", digits(t, 2)))
-        };
-        row("  its standard error", &error(&answer.base), &error(&answer.last));
+        let interval =
+            |c: &Characterisation| c.sensors[i].interval_95_s.map_or("-".into(), |ends| format!("{} s", between(ends)));
+        row("  its 95 % interval", &interval(&answer.base), &interval(&answer.last));
     }
     for i in 0..2 {
         let noise = |c: &Characterisation| format!("{} K", digits(c.sensors[i].noise_std_k, 3));
@@ -326,7 +326,7 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     let sources = [&answer.base, &answer.last].map(|c| c.sensors[0].noise_from.map(noise_source));
     lines.push(match sources {
         [Some(before), Some(after)] if before != after => format!("  noise levels: {before}; with effects: {after}"),
-        [_, after] => format!("  noise levels: {}", after.unwrap_or("unknown source")),
+        [before, after] => format!("  noise levels: {}", after.or(before).unwrap_or("not stated")),
     });
     lines
 }
@@ -394,10 +394,19 @@ fn noise_source(from: NoiseSource) -> &'static str {
 }
 
 fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
-    // Two digits more than the width of the interval has.
-    let width = (high - low).abs();
-    let decimals = if width > 0.0 { (2.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 };
+    let decimals = decimals_of([low, high]);
     format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}]")
+}
+
+fn between([low, high]: [f64; 2]) -> String {
+    let decimals = decimals_of([low, high]);
+    format!("{low:.decimals$} to {high:.decimals$}")
+}
+
+/// Decimals of the ends of an interval: two digits more than its width has.
+fn decimals_of([low, high]: [f64; 2]) -> usize {
+    let width = (high - low).abs();
+    if width > 0.0 { (2.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 }
 }
 
 /// `value` to `significant` digits, without an exponent.

@@ -30,7 +30,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         twinlag::track_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
             .map_err(|error| Failure::in_file(error, &record.source))?
     };
-    let is_answered = !answer.time_s.is_empty();
+    let is_answered = answer.status != Status::NotIdentifiable;
     if is_answered {
         let [one, two] = &answer.sensors;
         let columns: [(&str, &[f64]); 7] = [

@@ -61,9 +61,11 @@ impl Said {
         for (i, channel) in ["T1", "T2"].into_iter().enumerate() {
             let of = |name: &str| -> Vec<f64> { columns.iter().map(|c| number(&c["sensors"][i][name])).collect() };
             let (tau_s, error_s, noise_k) = (of("time_constant_s"), of("standard_error_s"), of("noise_std_K"));
-            let [values, errors] = self.in_text(&format!("time constant {channel}"));
+            let ends = columns.iter().flat_map(|c| [0, 1].map(|end| number(&c["sensors"][i]["interval_95_s"][end])));
+            let [values, intervals] = self.in_text(&format!("time constant {channel}"));
             holds("text", &values, &tau_s);
-            holds("text", &errors, &error_s);
+            // The name of the row has a number as well.
+            holds("text", &intervals[1..], &ends.collect::<Vec<_>>());
             holds("text", &self.in_text(&format!("noise {channel}"))[0], &noise_k);
             let cells = self.in_page(&format!("time constant of {channel}"));
             let noise = self.in_page(&format!("noise of {channel}"));

@@ -550,9 +550,15 @@ fn the_fewest_samples_that_are_read_give_no_confident_answer() {
 #[test]
 fn a_record_too_short_for_an_answer_is_named() {
     let bench = Bench::with("nine", "run.csv", Trace { samples: 9, ..Trace::GOOD }.csv());
-    for command in ["characterise", "diagnose"] {
-        bench.refuses(3, &[command, "run.csv"], &["run.csv: ", "got 9"]);
+    for command in
+        [&["characterise", "run.csv"][..], &["diagnose", "run.csv"], &["track", "run.csv", "--out", "out.csv"]]
+    {
+        bench.refuses(3, command, &["run.csv: ", "got 9"]);
     }
+    // Failed: with a model the file was not named.
+    bench.write("good.csv", Trace::GOOD.csv());
+    assert_eq!(bench.run(&["diagnose", "good.csv", "--save", "model.json"]).code, 0);
+    bench.refuses(3, &["characterise", "run.csv", "--model", "model.json"], &["run.csv: ", "got 9"]);
 }
 
 /// The likelihood does not know which channel comes first, so the numbers are the same but for the order in which sums
@@ -587,6 +593,18 @@ fn equal_time_constants_are_not_determined_and_their_difference_is_about_zero() 
         }
     }
     assert!(missed < 4, "{missed} of 12 intervals of the difference exclude zero, which is the truth");
+}
+
+/// Failed: windows of which none is determined were counted as an answer, a table of empty cells was written, and a report
+/// of them could not be drawn (exit code 3).
+#[test]
+fn windows_that_determine_nothing_are_no_track() {
+    let bench = Bench::with("equal_windows", "run.csv", Trace { tau_s: [0.05, 0.05], ..Trace::GOOD }.csv());
+    let answer =
+        bench.run(&["track", "run.csv", "--window", "2.5", "--out", "out.csv", "--report", "out.html", "--json"]);
+    assert_eq!(answer.code, 4, "{answer:#?}");
+    assert_eq!(answer.json()["status"], "not-identifiable");
+    assert!(!bench.has("out.csv") && bench.has("out.html"));
 }
 
 /// One sine gives two numbers, the ratio of the amplitudes and the phase between them: enough for two time constants.
@@ -682,6 +700,20 @@ fn a_sensor_far_faster_than_the_sampling_is_not_determined() {
         // Failed: a fit on a bound is no estimate, but its difference was given as one.
         let is_on_bound = !value["fit"]["end"]["on-bound"].is_null();
         assert!(!is_on_bound || value["time_constant_difference_s"]["value"].is_null(), "{value:#}");
+    }
+}
+
+/// Failed: `characterise` and `diagnose` gave no difference of a fit on a bound, but the same fit of a given model did.
+#[test]
+fn a_difference_on_a_bound_is_given_by_no_command() {
+    let rig = common::RIG.replacen("time_constant_s = 0.12", "time_constant_s = 0.0006", 1);
+    let bench = Bench::simulated("bound", &rig.replacen("offset_k = 2.0", "offset_k = 0.0", 1));
+    let diagnosis = bench.run(&["diagnose", "run.csv", "--json", "--save", "model.json"]).json();
+    let with_model = bench.run(&["characterise", "run.csv", "--json", "--model", "model.json"]).json();
+    for fit in [&bench.characterise("run.csv", &[]).json(), &diagnosis["final"], &with_model] {
+        assert!(!fit["fit"]["end"]["on-bound"].is_null(), "{fit:#}");
+        assert!(fit["time_constant_difference_s"]["value"].is_null(), "{fit:#}");
+        assert!(fit["not_identifiable"].to_string().contains("T1.time_constant_s"), "{fit:#}");
     }
 }
 

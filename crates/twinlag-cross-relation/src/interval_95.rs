@@ -3,6 +3,9 @@
 /// 97.5 % point of the standard normal distribution: half width of a 95 % interval, in standard errors.
 pub const Z_975: f64 = 1.959_963_984_540_054;
 
+/// 95 % point of chi-squared with one degree of freedom: the square of [`Z_975`].
+pub const CHI2_95: f64 = 3.841_458_820_694_124;
+
 /// The 95 % interval of a positive number whose logarithm is normal: a factor `exp(1.96 s/v)` either way of the value `v`
 /// with the standard error `s`.
 ///

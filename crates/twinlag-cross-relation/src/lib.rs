@@ -54,7 +54,7 @@ pub use error::CostError;
 pub use free_gains::FreeGains;
 pub use inferred::{InferredInputs, inferred_inputs};
 pub use information::ScoreVariance;
-pub use interval_95::{Z_975, log_normal_interval_95};
+pub use interval_95::{CHI2_95, Z_975, log_normal_interval_95};
 pub use parameters::{CostValue, Parameter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};

@@ -11,25 +11,25 @@ use twinlag_transform::sine_transform;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TestName {
-    /// Its energy.
+    /// The energy of the residual.
     TotalEnergy,
-    /// Its energy in each band of frequencies.
+    /// The energy of the residual in each band of frequencies.
     BandEnergy,
-    /// Correlation of values a few samples apart.
+    /// Correlation of residuals a few samples apart.
     Whiteness,
     /// Agreement of both sensors at rest.
     Calibration,
-    /// Coherence with the gas, at each frequency.
+    /// Coherence of the residual with the gas, at each frequency.
     Coherence,
-    /// Its mean, by how high the gas temperature is.
+    /// The mean of the residual, by how high the gas temperature is.
     Level,
-    /// Its energy, by how fast the gas temperature changes.
+    /// The energy of the residual, by how fast the gas temperature changes.
     Rate,
-    /// Its energy along the record.
+    /// The energy of the residual along the record.
     Time,
-    /// Its kurtosis.
+    /// The kurtosis of the residual.
     Tails,
-    /// Its largest power at a single frequency.
+    /// The largest power of the residual at a single frequency.
     Lines,
     /// Readings that equal the one before.
     RepeatedValues,

@@ -39,8 +39,8 @@ pub(crate) struct Candidate {
     /// explain.
     pub(crate) robust_gain: f64,
     /// `−2 ln L` saved with levels as free as those beside a noise: what its gain is to be held
-    /// against. Of candidates of a round with noise among them.
-    pub(crate) free_level_gain: f64,
+    /// against. `None` in a round without noise among the candidates.
+    pub(crate) free_level_gain: Option<f64>,
     /// Nats that it saves on blocks that were left out.
     pub(crate) held_out_nats: f64,
     /// What its gains count beside those of the others.
@@ -260,8 +260,9 @@ impl<'a> Search<'a> {
         finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
         if !noise.is_empty() {
             let before = self.at_free_levels(current);
-            for candidate in &mut finished {
-                candidate.free_level_gain = before - self.at_free_levels(&candidate.fitted);
+            let after = self.each(&finished, |candidate| self.at_free_levels(&candidate.fitted))?;
+            for (candidate, after) in finished.iter_mut().zip(after) {
+                candidate.free_level_gain = Some(before - after);
             }
         }
         Ok(finished.into_iter().chain(noise.into_iter().map(|(_, c)| c)).collect())
@@ -371,7 +372,7 @@ impl<'a> Search<'a> {
             added,
             white_gain,
             robust_gain,
-            free_level_gain: 0.0,
+            free_level_gain: None,
             held_out_nats: 0.0,
             share,
         }

@@ -64,7 +64,7 @@ fn review(state: &mut State<'_>) -> Result<(), ModelError> {
         if state.taken.len() < 2 {
             break;
         }
-        if let Some(proposal) = state.exchange(index)? {
+        if let Some(proposal) = state.compare(index)? {
             let is_exchange = proposal.is_exchange();
             state.apply(proposal);
             if is_exchange {

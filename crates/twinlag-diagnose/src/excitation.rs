@@ -60,5 +60,41 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
         tones += 1 + (bin - from) / TONE_BINS;
     }
     // A gas that is rough from sample to sample is taken for noise, of which its largest bin then sticks out.
-    (held > policy.tone_power_share * power.iter().sum::<f64>()).then_some(tones)
+    let above_noise = power.iter().sum::<f64>() - power.len() as f64 * noise_k * noise_k;
+    (held > policy.tone_power_share * above_noise.max(held)).then_some(tones)
+}
+
+#[cfg(test)]
+mod tests {
+    use twinlag_model::Stretch;
+
+    use super::*;
+
+    /// Uniform noise by a congruential generator.
+    fn noise(std_k: f64, samples: usize, mut seed: u64) -> Vec<f64> {
+        let mut next = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..samples).map(|_| 12.0_f64.sqrt() * std_k * (next() - 0.5)).collect()
+    }
+
+    fn is_single(amplitude_k: f64, noise_std_k: f64) -> bool {
+        const SAMPLES: usize = 20_000;
+        let time_s: Vec<f64> = (0..SAMPLES).map(|k| 0.01 * k as f64).collect();
+        let reading_c = [1, 2].map(|seed| {
+            let tone = time_s.iter().map(|t| 300.0 + amplitude_k * (std::f64::consts::TAU * t).sin());
+            tone.zip(noise(noise_std_k, SAMPLES, seed)).map(|(gas, noise)| gas + noise).collect()
+        });
+        let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01)).expect("a record");
+        is_single_tone(&observations, &Policy::default())
+    }
+
+    /// A tone is one however loud the noise, as long as it can be seen; noise alone is none.
+    #[test]
+    fn a_tone_below_the_noise_is_a_single_tone() {
+        assert!(is_single(1.0, 0.01));
+        assert!(is_single(1.0, 0.8));
+        assert!(!is_single(0.0, 0.8));
+    }
 }

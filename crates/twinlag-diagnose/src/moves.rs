@@ -48,7 +48,7 @@ pub enum Move {
         /// Deviance by which it is better, its parameters counted.
         advantage: f64,
     },
-    /// An effect was compared with its look-alikes again, and stays.
+    /// An effect was compared with its look-alikes again, and stays, with the ties that it now has.
     Keep {
         /// The effect.
         effect: Identifier,
@@ -266,9 +266,9 @@ impl<'a> State<'a> {
         Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
-    /// Puts a look-alike in the place of effect `index`, now that more is known, if one is better;
-    /// otherwise those that are as good become its ties.
-    pub(crate) fn exchange(&self, index: usize) -> Result<Option<Proposal>, ModelError> {
+    /// Proposes a look-alike in the place of effect `index`, now that more is known, if one is better;
+    /// otherwise the ties that the effect now has, if it has or had any. `None` of a noise.
+    pub(crate) fn compare(&self, index: usize) -> Result<Option<Proposal>, ModelError> {
         let search = self.search();
         let taken = &self.taken[index];
         if taken.is_noise() {
@@ -287,6 +287,9 @@ impl<'a> State<'a> {
             let tied = alike.into_iter().zip(values).filter(|(_, value)| value.is_tied(policy));
             let ties: Vec<Candidate> = tied.map(|(replacement, _)| replacement.candidate).collect();
             let entry = Move::Keep { effect, channel, ties: identifiers(&ties) };
+            if ties.is_empty() && taken.ties.is_empty() {
+                return Ok(None);
+            }
             return Ok(Some(Proposal { entry, change: Change::Ties(index, ties) }));
         };
         let replacement = alike.swap_remove(at);

@@ -41,8 +41,8 @@ pub(crate) struct Score {
     /// frequencies, whatever weight these have.
     pub(crate) share: f64,
     /// Deviance that it saves with levels as free as those beside a noise: that of the same spectrum
-    /// as the gain of the noise that it is held against.
-    pub(crate) free_level_gain: f64,
+    /// as the gain of the noise that it is held against. `None` without noise among the candidates.
+    pub(crate) free_level_gain: Option<f64>,
     /// Energy per residual that it leaves.
     pub(crate) energy: f64,
 }
@@ -99,7 +99,7 @@ pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<
     let loudest = noise.first().map_or(0.0, |i| scores[*i].white_gain);
     let is_beside_noise = |s: &Score| {
         s.robust_gain > policy.beside_noise_share * loudest
-            || s.free_level_gain > policy.instead_of_noise_share * loudest
+            || s.free_level_gain.is_some_and(|gain| gain > policy.instead_of_noise_share * loudest)
     };
     let effects = best_first(scores, Score::robust, |s| {
         !s.is_noise() && s.is_sound && is_worth(s, s.robust_gain) && is_beside_noise(s)

@@ -7,15 +7,13 @@
 //! unions over all that is allowed. Where the cost owes its shape to noise rather than to the
 //! signal it is not chi-square distributed, and far more is allowed.
 
-use twinlag_cross_relation::{ScoreVariance, Z_975};
+use twinlag_cross_relation::{CHI2_95, ScoreVariance, Z_975};
 use twinlag_optimise::{Budget, End, Problem};
 
 use crate::error::EstimateError;
 use crate::objective::{EstimatorCost, Objective};
 use crate::whitened::WhitenedFit;
 
-/// 95 % point of chi-square with one degree of freedom.
-const CHI2_95: f64 = 3.841_458_820_694_124;
 /// From one held time constant to the next: small enough that the rest, a start for the next,
 /// follows.
 const WALK_FACTOR: f64 = 1.25;

@@ -4,7 +4,7 @@
 //! fit. What remains is how large it may be: the profile of the cost, upwards. The time constants
 //! then hold for every second lag that the record allows.
 
-use twinlag_cross_relation::ScoreVariance;
+use twinlag_cross_relation::{CHI2_95, ScoreVariance};
 use twinlag_optimise::{Budget, End, Problem, Variable};
 
 use crate::error::EstimateError;
@@ -16,9 +16,6 @@ use crate::whitened::{Ended, WhitenedFit};
 
 /// 95 % point of chi-square with one degree of freedom, one-sided: a second lag is not negative.
 const CHI2_95_ONE_SIDED: f64 = 2.705_543_454_095_404;
-/// 95 % point of chi-square with one degree of freedom: a second lag that lowers the cost by less
-/// may be none.
-const CHI2_95: f64 = 3.841_458_820_694_124;
 /// 95 % point of chi-square with two degrees of freedom, for both second lags.
 const CHI2_95_OF_TWO: f64 = 5.991_464_547_107_98;
 /// A second lag of this share of its lower bound, 5e-5 sample periods, counts as none: its pole is

@@ -271,7 +271,7 @@ pub fn lines(
         if level > 0.0 {
             let ratio = power[bin] / level;
             // What the largest of as many exponentially distributed powers exceeds with that probability, and room for
-            // the scatter of the level.
+            // the scatter of the level (chosen).
             if ratio > (power.len() as f64 / policy.round_false_alarm_probability).ln() + 3.0 {
                 found.insert(bin, ratio);
             }

@@ -66,13 +66,15 @@ pub trait Effect: Send + Sync {
     /// Where it sits, and its parameters.
     fn seat(&self) -> &Seat;
 
-    /// Values that fits start from, at least one set. With a single one even an obvious effect can be missed.
+    /// Values that fits start from, at least one set, each with as many values as there are parameters, finite and within
+    /// their bounds. With a single set even an obvious effect can be missed.
     fn starts(&self) -> Vec<Vec<f64>>;
 
     /// Puts the effect into the model. Derivatives of the cost come from the arithmetic with `values`.
     fn install(&self, values: &[Number], plant: &mut Plant);
 
-    /// The parameter whose size is the effect's; `None` where none is, as in a function of time.
+    /// Which of [`Self::parameters`] is the size of the effect, counted from 0; `None` where none is, as in a function of
+    /// time.
     fn main(&self) -> Option<usize> {
         Some(0)
     }
@@ -147,8 +149,7 @@ pub(crate) fn check_all(effects: &[Identifier], context: &Context) -> Result<(),
     for foreign in effects.iter().filter(|e| !e.is_of_this_library()) {
         let same = effects.iter().filter(|e| *e == foreign).count();
         if same > 1 {
-            let expected = "a name that no other effect in the settings has";
-            return Err(ModelError::Effect { effect: foreign.name(), expected, got: same as f64 });
+            return Err(ModelError::EffectTwice { effect: foreign.name() });
         }
         candidates(&[*foreign], context).iter().try_for_each(check)?;
     }
@@ -244,10 +245,8 @@ mod tests {
         }
     }
 
-    /// Of 2000 samples: in fewer than 400, 20 sample periods, at which the fit of coloured noise starts, are longer than its
-    /// longest correlation, and are moved inside.
-    fn observations() -> Observations {
-        let time_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
+    fn observations(samples: u32) -> Observations {
+        let time_s: Vec<f64> = (0..samples).map(|k| 0.01 * f64::from(k)).collect();
         let gas_c = |t: f64| 300.0 + (9.0 * t).sin() + (31.0 * t).sin().powi(3);
         let reading_c = [0.0, 0.4].map(|late_s| time_s.iter().map(|t| gas_c(t - late_s)).collect());
         Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01)).expect("finite and long")
@@ -276,11 +275,12 @@ mod tests {
         let with = |more: &[&'static About]| {
             let mut settings = Settings::default();
             settings.effects.extend(more.iter().map(|about| Identifier::of(about)));
-            Prepared::new(&observations(), &settings).map(|_| ())
+            Prepared::new(&observations(2000), &settings).map(|_| ())
         };
         assert_eq!(with(&[&FOREIGN]), Ok(()));
         let named = |result: Result<(), ModelError>| match result.expect_err("refused") {
             ModelError::Effect { effect, got, .. } => (effect, got),
+            ModelError::EffectTwice { effect } => (effect, 2.0),
             other => panic!("{other}"),
         };
         assert_eq!(named(with(&[&FOREIGN, &LATE])), ("late", 3.0));
@@ -290,12 +290,14 @@ mod tests {
 
     #[test]
     fn the_effects_of_this_library_keep_the_promises() {
-        let prepared = Prepared::new(&observations(), &Settings::default()).expect("a record");
-        let context = Context { lines: vec![(20.0, 0)], ..prepared.context };
-        let made = candidates(&Identifier::ALL, &context);
-        assert!(made.len() > Identifier::ALL.len(), "{}", made.len());
-        for effect in &made {
-            assert_eq!(check(effect), Ok(()));
+        for samples in [60, 200, 2000] {
+            let prepared = Prepared::new(&observations(samples), &Settings::default()).expect("a record");
+            let context = Context { lines: vec![(20.0, 0)], ..prepared.context };
+            let made = candidates(&Identifier::ALL, &context);
+            assert!(made.len() > 10, "{}", made.len());
+            for effect in &made {
+                assert_eq!(check(effect), Ok(()), "{samples} samples");
+            }
         }
     }
 }

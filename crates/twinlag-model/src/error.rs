@@ -9,12 +9,12 @@ use twinlag_compensate::CompensateError;
 #[non_exhaustive]
 pub enum ModelError {
     #[error(
-        "a diagnosis needs at least {needed} samples without gaps longer than a few, got {samples}: record \
+        "a model of the rig needs at least {needed} samples without gaps longer than a few, got {samples}: record \
          for longer, or ask for the time constants alone (`characterise`)"
     )]
     TooShort { samples: usize, needed: usize },
     #[error(
-        "a diagnosis needs stretches of at least {needed} rows without a missing reading, and of the \
+        "a model of the rig needs stretches of at least {needed} rows without a missing reading, and of the \
          {samples} rows of this record too few lie in any: find out why readings are missing, or ask for the \
          time constants alone (`characterise`)"
     )]
@@ -32,6 +32,8 @@ pub enum ModelError {
         version?"
     )]
     Model { effect: &'static str },
+    #[error("the settings have the effect \"{effect}\" twice")]
+    EffectTwice { effect: &'static str },
     #[error("the model has {effect} with {name} = {got}: expected {expected}")]
     Parameter { effect: &'static str, name: &'static str, got: f64, expected: &'static str },
     #[error("the numbers of the model give no finite result for this record: was the model changed by hand?")]

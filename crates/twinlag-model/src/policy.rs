@@ -81,7 +81,7 @@ macro_rules! policy {
 }
 
 policy! {
-    /// Probability that one round adds an effect that is not there, all candidates together: the
+    /// Probability that one round adds an effect, or sees a line, that is not there, all candidates together: the
     /// rate that is promised. Experiment `false-alarms` measures what becomes of it.
     round_false_alarm_probability: f64 = 1e-3,
     /// Probability that noise alone lets one candidate be fitted: a screen that costs time alone,
@@ -125,12 +125,12 @@ policy! {
     /// once in 700 right models.
     resize_standard_errors: f64 = 3.0,
 
-    /// Part of the logarithm of the energy that the best candidate takes off in an excerpt, below which another one is not
-    /// fitted to the end where the best leaves but noise: half of it leaves the square root of an energy that is far off.
+    /// Where the best candidate leaves only noise, one whose gain in an excerpt is less than this part of the best one's is
+    /// not fitted to the end. Chosen: half of the gain leaves the square root of the excess energy.
     rival_share: f64 = 0.5,
     /// Deviance per residual by which a look-alike may be worse at first sight and still be fitted to the end: a tenth
     /// more energy, which the last iterations of a fit do not take off.
-    look_alike_deficit_share: f64 = 0.1,
+    look_alike_deviance_per_residual: f64 = 0.1,
 
     /// Effects that are added at most: twice as many as can usually be distinguished, so that a
     /// record in which they cannot is seen as one. Chosen.
@@ -148,7 +148,7 @@ policy! {
     /// bound. Chosen.
     longest_resolved_share: f64 = 0.9,
     /// Standard error of a time constant's logarithm beyond which it is not printed: its 95 %
-    /// interval spans a factor of seven, `exp(4 × 0.5)`.
+    /// interval spans a factor of seven, `exp(2 × 1.96 × 0.5)`.
     vague_log_std: f64 = 0.5,
     /// Standard error of a time constant's logarithm up to which the curvature is believed, and no
     /// other minimum is looked for. Chosen.
@@ -186,10 +186,11 @@ policy! {
     /// Factor by which a reading that the residual hardly shows must stick out farther from its
     /// neighbours: chosen.
     spike_neighbour_factor: f64 = 1.7,
-    /// Part of those standard deviations that the residual has to show of a reading that sticks out so: chosen.
+    /// Part of the standard deviations of [`Policy::spike_standard_deviations`] that the residual must reach at a reading
+    /// that stands out from its neighbours by [`Policy::spike_neighbour_factor`]: chosen.
     spike_residual_share: f64 = 0.5,
-    /// Standard errors up to which the other channel may move faster at the readings that stick out than elsewhere, or it
-    /// is the gas that they have in common: once in 4000 channels with spikes.
+    /// If the other channel moves faster at the outlying readings than elsewhere by more than this many standard errors of
+    /// its mean rank, they are the gas and not spikes: wrong once in 4000 channels.
     most_spike_rank_standard_errors: f64 = 3.5,
     /// Part of a channel's readings beyond which these are not isolated: chosen.
     most_spikes_share: f64 = 0.05,
@@ -200,7 +201,7 @@ policy! {
     /// Power of a tone over that of the noise from which on it counts: a bin of noise is beyond it
     /// once in 10¹³.
     tone_power_ratio: f64 = 30.0,
-    /// Part of the power of the gas that its tones must have, or it is no gas of tones: the larger half.
+    /// Part of a reading's power above its noise that tones must have for the gas to count as one of tones: the larger half.
     tone_power_share: f64 = 0.5,
     /// Amplitude of a line in the difference of both inferred inputs, over that in their mean, below which both sensors see
     /// it and it is the gas's: what one of them alone sees has 2. Chosen.

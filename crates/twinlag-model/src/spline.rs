@@ -83,9 +83,9 @@ mod tests {
     use super::*;
 
     /// The mean over the record is taken off by a midpoint rule of 320 points, 40 a coefficient, which is wrong by
-    /// `h² (f'(1) − f'(0))/24` of the record's share (Euler and Maclaurin). The coefficients on the six knots are −0.7,
+    /// `h² (f'(1) − f'(0))/24`, with `f` of the share of the record that has passed (Euler and Maclaurin). The coefficients on the six knots are −0.7,
     /// 0.3, −0.2, 0.5, 0.1 and 0: straight at both ends, it begins with a slope of 5 · 1.0 and ends with one of
-    /// −5 · 0.1, so that the mean is 5.5/(24 · 320²) = 2.24e-6 from zero; 2.3e-6 with the rule of the test.
+    /// −5 · 0.1, so that the mean is 5.5/(24 · 320²) = 2.24e-6 from zero. The bound is 3 % above.
     #[test]
     fn the_mean_is_zero_and_a_slope_is_a_straight_line() {
         let spline = Spline::new(2.0, 7.0, &[0.3, -0.2, 0.5, 0.1, 0.0].map(Number::from));

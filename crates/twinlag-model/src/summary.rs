@@ -1,6 +1,6 @@
 //! A fitted model in numbers: time constants with their intervals, tests, and what pictures need.
 
-use twinlag_cross_relation::{Z_975, log_normal_interval_95, residual_tests};
+use twinlag_cross_relation::{CHI2_95, Z_975, log_normal_interval_95, residual_tests};
 
 use crate::blocks;
 use crate::defects::ChannelNoise;
@@ -14,9 +14,6 @@ use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
-
-/// 95 % point of chi-square with one degree of freedom.
-const CHI2_95: f64 = 3.841_458_820_694_124;
 
 /// Whether a time constant is shorter than the samples resolve, or as long as the record.
 pub fn is_unresolved(fitted: &Fitted, observations: &Observations, policy: &Policy) -> bool {

@@ -16,9 +16,10 @@ use crate::observations::Observations;
 const SPECTRUM_POINTS: usize = 256;
 /// No frequency has less weight: a line that is not in the gas is seen there.
 const MIN_WEIGHT: f64 = 0.02;
-/// Segments of that many points of which a spectrum is the mean; fewer leave it too uncertain to weigh by.
+/// Fewest segments of [`SPECTRUM_POINTS`] samples whose mean is a usable spectrum: chosen, its scatter is then 35 %.
 const MIN_SEGMENTS: usize = 8;
-/// Gain above which all frequencies count alike: a filter would cost the residuals at either end, and gain a tenth.
+/// If the gain is above this at every frequency, no filter is used: it would lose the residuals at both ends for a gain of a
+/// tenth at most.
 const FLAT_GAIN: f64 = 0.9;
 /// Taps on either side of the filter's middle.
 const TAPS_EACH_SIDE: usize = 24;

@@ -3,7 +3,7 @@
 use twinlag::cross_relation::{TestName, Z_975};
 use twinlag::diagnosis::Identifier;
 use twinlag::{Difference, SensorEstimate};
-use twinlag_report::{between, plus_minus};
+use twinlag_report::{between, plus_minus, rounded};
 
 pub(crate) const ABSENT: &str = "not determined";
 
@@ -75,6 +75,11 @@ pub(crate) fn estimate(of: &SensorEstimate) -> String {
     of.time_constant_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
 }
 
+/// A time constant to five digits.
+pub(crate) fn seconds(of: &SensorEstimate) -> String {
+    of.time_constant_s.map_or(ABSENT.into(), |value| with_unit(&rounded(value, 5), "s"))
+}
+
 /// A difference with its standard error, that of a normal interval.
 pub(crate) fn apart(of: &Difference) -> String {
     let standard_error_s = of.interval_95_s.map(|[low, high]| (high - low) / (2.0 * Z_975));
@@ -108,6 +113,7 @@ pub(crate) fn question(test: TestName) -> &'static str {
         TestName::Tails => "Are its largest values those of Gaussian noise?",
         TestName::Lines => "Is no single frequency far above its neighbours?",
         TestName::RepeatedValues => "Do readings equal the one before no more often than noise explains?",
+        TestName::Calibration => "Do both sensors agree at rest?",
         _ => "",
     }
 }

@@ -16,4 +16,5 @@ pub use diagnosis::{Diagnosis, ErrorBeforeAfter, NamedEffect, NamedLimit};
 pub use model::{Model, ModelEffect};
 pub use track::{Along, Ratio, Track};
 
+pub(crate) use characterisation::is_on_bound_of_time_constant;
 pub(crate) use fitted::FittedAnswer;

@@ -23,7 +23,7 @@ pub enum Error {
     #[error(transparent)]
     Cost(#[from] CostError),
     #[error(transparent)]
-    Diagnose(ModelError),
+    Model(ModelError),
     #[error(transparent)]
     Estimate(EstimateError),
     #[error(transparent)]
@@ -65,7 +65,7 @@ pub enum Error {
 
 impl From<ModelError> for Error {
     fn from(error: ModelError) -> Self {
-        if error == ModelError::Cancelled { Self::Cancelled } else { Self::Diagnose(error) }
+        if error == ModelError::Cancelled { Self::Cancelled } else { Self::Model(error) }
     }
 }
 
@@ -94,7 +94,7 @@ impl Error {
             }
             Self::QuietSegment { .. } => vec![Setting::QuietSegment],
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
-            Self::Diagnose(ModelError::NeedsFlow) => vec![Setting::Flow],
+            Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
             Self::ModelChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],

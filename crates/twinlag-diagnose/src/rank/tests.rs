@@ -23,7 +23,7 @@ fn score(effect: Identifier, kind: Kind, gain: f64) -> Score {
         white_gain: gain,
         robust_gain: gain,
         share: 1.0,
-        free_level_gain: gain,
+        free_level_gain: Some(gain),
         energy: 1.0,
     }
 }
@@ -45,7 +45,7 @@ fn drift(gain: f64) -> Score {
 }
 
 fn noise(gain: f64) -> Score {
-    Score { robust_gain: 0.0, free_level_gain: 0.0, ..score(Identifier::COLOURED_NOISE, Kind::Noise, gain) }
+    Score { robust_gain: 0.0, free_level_gain: None, ..score(Identifier::COLOURED_NOISE, Kind::Noise, gain) }
 }
 
 fn ranked(scores: &[Score]) -> Vec<usize> {
@@ -108,7 +108,7 @@ fn noise_comes_first_where_it_explains_incomparably_more() {
     let loud = noise(1e5);
     let crumb = policy.beside_noise_share * loud.white_gain;
     let half = policy.instead_of_noise_share * loud.white_gain;
-    let with = |robust_gain, free_level_gain| ranked(&[Score { robust_gain, free_level_gain, ..delay(MUCH) }, loud]);
+    let with = |robust_gain, gain| ranked(&[Score { robust_gain, free_level_gain: Some(gain), ..delay(MUCH) }, loud]);
     assert_eq!(with(crumb + EPSILON, 0.0), [0]);
     assert_eq!(with(crumb - EPSILON, 0.0), [1]);
     assert_eq!(with(crumb - EPSILON, half + EPSILON), [0]);

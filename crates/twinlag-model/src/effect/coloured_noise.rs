@@ -47,6 +47,12 @@ pub(super) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
     ]
 }
 
+/// Values of extra noise within the bounds of its parameters: in a short record the longest correlation is short.
+pub(super) fn inside(parameters: &[Parameter], values: [f64; 2]) -> Vec<f64> {
+    let pairs = values.iter().zip(parameters);
+    pairs.map(|(value, p)| value.clamp(p.variable.lower, p.variable.upper)).collect()
+}
+
 fn candidates(context: &Context) -> Vec<Shared> {
     if !context.is_even {
         return Vec::new();
@@ -66,7 +72,8 @@ impl Effect for ColouredNoise {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        [3.0, 20.0].into_iter().map(|steps| vec![self.noise_std_k, steps * self.step_s]).collect()
+        let start = |steps: f64| inside(&self.seat.parameters, [self.noise_std_k, steps * self.step_s]);
+        [3.0, 20.0].map(start).to_vec()
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

@@ -21,7 +21,6 @@ pub(crate) static ABOUT: About = About::new("input-mismatch", 14, candidates)
 
 struct InputMismatch {
     seat: Seat,
-    step_s: f64,
     tau_s: f64,
     swing_k: f64,
 }
@@ -34,7 +33,6 @@ fn candidates(context: &Context) -> Vec<Shared> {
     let parameters = coloured_noise::extra(context, 0.01 * context.swing_k);
     vec![Arc::new(InputMismatch {
         seat: Seat::new(Identifier::INPUT_MISMATCH, None, parameters),
-        step_s: context.step_s,
         tau_s,
         swing_k: context.swing_k,
     })]
@@ -48,7 +46,7 @@ impl Effect for InputMismatch {
     fn starts(&self) -> Vec<Vec<f64>> {
         [0.3 * self.tau_s, 3.0 * self.tau_s]
             .into_iter()
-            .map(|tau_s| vec![0.02 * self.swing_k, tau_s.max(self.step_s)])
+            .map(|tau_s| coloured_noise::inside(&self.seat.parameters, [0.02 * self.swing_k, tau_s]))
             .collect()
     }
 

@@ -41,8 +41,8 @@ const NAMES: [&str; 32] = [
 ];
 const RATIO_NAMES: [&str; RATIO_SIZE] = ["ratio1", "ratio2", "ratio3", "ratio4"];
 
-/// A typical change, by which steps of a fit are measured: with the tenth of it, the longest step that a fit takes
-/// is short beside the changes that there are, and forty of them do not reach the end.
+/// Size of a change that matters, twice which is the longest step of a fit: a half, as doubling the flow makes it. With a
+/// tenth of that a fit ended after its forty iterations, short of the minimum.
 const TYPICAL_CHANGE: f64 = 0.5;
 
 /// What `m` is a function of.

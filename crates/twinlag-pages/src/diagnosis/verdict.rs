@@ -5,7 +5,7 @@ use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag_report::{Document, rounded};
 
 use super::Page;
-use crate::words::{capital, estimate, identifiers, listed, parameter, place, sentence, with_unit, words};
+use crate::words::{capital, identifiers, interval_of, listed, parameter, place, seconds, sentence, with_unit, words};
 
 impl Page<'_> {
     pub(super) fn verdict(&self, document: Document) -> Document {
@@ -14,12 +14,14 @@ impl Page<'_> {
         if answer.verdict != Verdict::Refused {
             let [first, second] = &answer.last.sensors;
             document = document.paragraph(format!(
-                "Time constants{}: {} {}, {} {}.",
+                "Time constants{}, with 95 % intervals: {} {} ({}), {} {} ({}).",
                 if self.changed { " with the effects" } else { "" },
                 first.channel,
-                estimate(first),
+                seconds(first),
+                interval_of(first),
                 second.channel,
-                estimate(second)
+                seconds(second),
+                interval_of(second)
             ));
         }
         // Why it was refused, or what to know before the numbers are used.

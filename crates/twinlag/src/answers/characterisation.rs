@@ -247,13 +247,18 @@ pub struct Characterisation {
     pub made_by: MadeBy,
 }
 
+/// Whether a fit ended on a bound of a time constant, so that neither it nor the difference is an estimate.
+pub(crate) fn is_on_bound_of_time_constant(end: &End) -> bool {
+    matches!(end, End::OnBound(which) if which.iter().any(|&i| i < 2))
+}
+
 impl Characterisation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.characterisation/1";
 
     /// Takes the difference out where the best fit lies on a bound of a time constant.
     pub(crate) fn drop_difference_on_bound(&mut self) {
-        if matches!(&self.fit.end, End::OnBound(which) if which.iter().any(|&i| i < 2)) {
+        if is_on_bound_of_time_constant(&self.fit.end) {
             self.time_constant_difference_s = Difference { value: None, interval_95_s: None };
             self.not_identifiable.push("time_constant_difference_s".into());
             self.warnings.push(

@@ -24,6 +24,8 @@ pub(crate) struct FittedAnswer<'a> {
     pub(crate) is_even: bool,
     /// Whether the levels of the noise were given, by the options or a model.
     pub(crate) is_noise_given: bool,
+    /// Whether the difference of the time constants is a total delay, the same wherever on its valley the fit ends.
+    pub(crate) is_total_delay: bool,
 }
 
 impl FittedAnswer<'_> {
@@ -37,7 +39,7 @@ impl FittedAnswer<'_> {
     pub(crate) fn characterisation(&self, status: Status) -> Characterisation {
         let Self { record, fit, options, .. } = *self;
         let undetermined = (0..2).filter(|&i| fit.time_constants[i].value_s.is_none());
-        Characterisation {
+        let mut out = Characterisation {
             schema: Characterisation::SCHEMA.into(),
             record: RecordSummary::of(record),
             estimator: ESTIMATOR.into(),
@@ -72,7 +74,11 @@ impl FittedAnswer<'_> {
             starts: None,
             notes: record.notes.iter().map(ToString::to_string).collect(),
             made_by: MadeBy::with(options),
+        };
+        if !self.is_total_delay {
+            out.drop_difference_on_bound();
         }
+        out
     }
 
     fn sensor(&self, i: usize) -> SensorEstimate {

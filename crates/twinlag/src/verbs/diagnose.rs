@@ -28,7 +28,7 @@ pub struct DiagnoseOptions {
 /// Finds what two first-order lags leave over in `record`, and which effects account for it.
 ///
 /// # Errors
-/// [`Error::Diagnose`] for a record that is too short or in which a channel never changes;
+/// [`Error::Model`] for a record that is too short or in which a channel never changes;
 /// [`Error::Setting`] for options that contradict each other.
 ///
 /// ```
@@ -126,13 +126,13 @@ fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) ->
     } else if status == Status::NotIdentifiable {
         out.warnings.push("two first-order lags: this record does not determine both time constants".into());
     }
-    out.drop_difference_on_bound();
     out
 }
 
 /// The model with the effects.
 pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
-    let fitted = fitted(record, options, rows, &core.last);
+    let is_total_delay = core.remarks.contains(&Remark::LagAlone);
+    let fitted = FittedAnswer { is_total_delay, ..fitted(record, options, rows, &core.last) };
     let status = match (core.verdict, fitted.is_determined()) {
         (Verdict::Refused, _) | (_, false) => Status::NotIdentifiable,
         (Verdict::Adequate | Verdict::Explained, _) => Status::Ok,
@@ -140,11 +140,7 @@ pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Ro
     };
     let mut out = fitted.characterisation(status);
     out.free = FreeParameters::among(&core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
-    out.warnings = core.remarks.iter().map(ToString::to_string).collect();
-    // The total delay is the same wherever on its valley the fit ends.
-    if !core.remarks.contains(&Remark::LagAlone) {
-        out.drop_difference_on_bound();
-    }
+    out.warnings.extend(core.remarks.iter().map(ToString::to_string));
     out
 }
 
@@ -155,7 +151,14 @@ fn fitted<'a>(
     fit: &'a twinlag_diagnose::ModelFit,
 ) -> FittedAnswer<'a> {
     let options = &options.characterise;
-    FittedAnswer { record, fit, options, is_even: rows.is_even, is_noise_given: options.noise_std_k.is_some() }
+    FittedAnswer {
+        record,
+        fit,
+        options,
+        is_even: rows.is_even,
+        is_noise_given: options.noise_std_k.is_some(),
+        is_total_delay: false,
+    }
 }
 
 fn remark_on_reference(error: &ErrorBeforeAfter) -> Option<String> {

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{Change, Settings, track as follow};
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
@@ -19,9 +20,10 @@ use crate::watch::{UNWATCHED, Watch};
 const RATIO_CHANGES: f64 = 1e-3;
 /// Windows of a sliding estimate that overlap.
 const OVERLAP: f64 = 4.0;
-/// Share of windows whose residual is more than noise, above which the model is rejected: ten times
-/// as many as of a correct model.
-const REJECTED_WINDOWS: f64 = 0.01;
+/// Probability that one window of a correct model is rejected.
+const REJECTED_WINDOW_PROBABILITY: f64 = 1e-3;
+/// Probability of as many rejected windows, below which the model is rejected: wrong in one record of a hundred.
+const REJECTED_WINDOWS_P_VALUE: f64 = 0.01;
 /// Fewest samples of a window.
 const SHORTEST_WINDOW: usize = 200;
 
@@ -113,6 +115,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         options: &options.characterise,
         is_even,
         is_noise_given: settings.noise_std_k.is_some(),
+        is_total_delay: false,
     };
     let last = fitted.characterisation(status);
     let mut warnings = Vec::new();
@@ -154,8 +157,12 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
 
 /// A time constant with its band, whose logarithm is normal; NaN where it is not determined.
 fn along(tau_s: &[f64], log_error: &[f64]) -> Along {
-    let known = |e: f64| if e <= MAX_LOG_STANDARD_ERROR { e } else { f64::NAN };
-    let by = |sign: f64| tau_s.iter().zip(log_error).map(|(tau, e)| tau * (sign * Z_975 * known(*e)).exp()).collect();
+    let by = |sign: f64| {
+        let pairs = tau_s.iter().zip(log_error);
+        pairs
+            .map(|(tau, e)| if *e <= MAX_LOG_STANDARD_ERROR { tau * (sign * Z_975 * e).exp() } else { f64::NAN })
+            .collect()
+    };
     Along { tau_s: by(0.0), low_s: by(-1.0), high_s: by(1.0) }
 }
 
@@ -164,11 +171,21 @@ fn is_any(sensors: &[Along; 2]) -> bool {
     sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()))
 }
 
-/// How many instants of how many determine not both time constants, where some do not.
+/// Whether `rejected` of `answered` windows are more than chance rejects of a correct model, as many of them counted as do not
+/// overlap.
+fn are_too_many(rejected: usize, answered: usize) -> bool {
+    let apart = |windows: usize| (windows as f64 / OVERLAP).ceil();
+    let (rejected, answered) = (apart(rejected), apart(answered));
+    let Ok(by_chance) = Binomial::new(REJECTED_WINDOW_PROBABILITY, answered as u64) else { return false };
+    rejected > 0.0 && by_chance.sf(rejected as u64 - 1) < REJECTED_WINDOWS_P_VALUE
+}
+
+/// Says at how many places a time constant is not determined; `None` if at none.
 fn undetermined(sensors: &[Along; 2], what: &str) -> Option<String> {
     let pairs = || sensors[0].tau_s.iter().zip(&sensors[1].tau_s);
     let empty = pairs().filter(|(a, b)| a.is_nan() || b.is_nan()).count();
-    (empty > 0).then(|| format!("{empty} of {} {what} do not determine both time constants", pairs().count()))
+    (empty > 0)
+        .then(|| format!("at {empty} of {} {what} the readings do not determine both time constants", pairs().count()))
 }
 
 fn range(sensors: &[Along; 2]) -> [[f64; 2]; 2] {
@@ -208,7 +225,8 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
     }
     let hop_s = window_s / OVERLAP;
     let count = ((span_s - window_s) / hop_s).floor() as usize + 1;
-    let (mut time_s, mut sensors, mut rejected) = (Vec::new(), [Along::default(), Along::default()], 0);
+    let (mut time_s, mut sensors) = (Vec::new(), [Along::default(), Along::default()]);
+    let (mut answered, mut rejected) = (0, 0);
     for k in 0..count {
         if watch("windows", k, count).is_break() {
             return Err(Error::Cancelled);
@@ -216,8 +234,13 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
         let from_s = record.time_s[0] + k as f64 * hop_s;
         let rows =
             record.time_s.partition_point(|t| *t < from_s)..record.time_s.partition_point(|t| *t <= from_s + window_s);
-        // Of too few samples, or of a sensor that is dead, there is nothing to say.
-        let answer = part(record, rows).and_then(|part| characterise(&part, &options.characterise)).ok();
+        let answer = match part(record, rows).and_then(|part| characterise(&part, &options.characterise)) {
+            Ok(answer) => Some(answer),
+            // Of too few samples, or of a sensor that is dead, there is nothing to say.
+            Err(Error::Record(_) | Error::Cost(_) | Error::Noise(_) | Error::Estimate(_)) => None,
+            Err(error) => return Err(error),
+        };
+        answered += usize::from(answer.is_some());
         rejected += usize::from(answer.as_ref().is_some_and(|a| a.status == Status::ModelRejected));
         time_s.push(from_s + 0.5 * window_s);
         for (i, along) in sensors.iter_mut().enumerate() {
@@ -231,16 +254,19 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
     let mut warnings: Vec<String> = undetermined(&sensors, "windows").into_iter().collect();
     if rejected > 0 {
         warnings.push(format!(
-            "in {rejected} of {count} windows the residual is more than noise: their numbers are the best fit of a model \
+            "in {rejected} of {answered} windows the residual is more than noise: their numbers are the best fit of a model \
              that they contradict. A diagnosis looks for what is missing"
         ));
     }
     let is_any = is_any(&sensors);
-    let status = match (is_any, rejected as f64 > REJECTED_WINDOWS * count as f64) {
+    let status = match (is_any, are_too_many(rejected, answered)) {
         (false, _) => Status::NotIdentifiable,
         (true, true) => Status::ModelRejected,
         (true, false) => Status::Ok,
     };
+    if !is_any {
+        (time_s, sensors) = Default::default();
+    }
     Ok(Track {
         schema: Track::SCHEMA.into(),
         status,

@@ -49,7 +49,14 @@ pub(crate) fn with_model(
     let settings = Settings { noise_std_k, known: known_time_constants(options), ..Settings::default() };
     let effects = model.map(Model::known_effects).unwrap_or_default();
     let known = fit_with(&observations, &settings, &effects)?;
-    let fitted = FittedAnswer { record, fit: &known.fit, options, is_even, is_noise_given: noise_std_k.is_some() };
+    let fitted = FittedAnswer {
+        record,
+        fit: &known.fit,
+        options,
+        is_even,
+        is_noise_given: noise_std_k.is_some(),
+        is_total_delay: false,
+    };
     let status = match (fitted.is_determined(), known.fit.is_contradicted()) {
         (false, _) => Status::NotIdentifiable,
         (true, true) => Status::ModelRejected,
@@ -61,7 +68,9 @@ pub(crate) fn with_model(
     };
     if !effects.is_empty() {
         let names = listed(&mut effects.iter().map(|e| e.effect));
-        out.warnings.push(format!("effects held at the values of the model: {names}"));
+        out.warnings.push(format!(
+            "effects held at the values of the model: {names}. The intervals do not cover the uncertainty of these values"
+        ));
     }
     if !known.fitted_again.is_empty() {
         let again = listed(&mut known.fitted_again.iter().copied());

@@ -5,7 +5,7 @@ use twinlag_estimate::{Known, NoiseColour, REJECTION_P_VALUE, Ridge, spans_too_m
 use twinlag_optimise::End;
 
 use super::conclude::Conclusion;
-use crate::answers::{Characterisation, Difference, IntervalMethod};
+use crate::answers::{Characterisation, Difference, IntervalMethod, is_on_bound_of_time_constant};
 use crate::setting::Setting;
 
 impl<const P: usize> Conclusion<'_, '_, P> {
@@ -46,7 +46,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         out.interval_method = IntervalMethod::Profile;
         let (value, [low, high]) = ridge.difference;
         // The interval is that of the walk, which knows the bound; the value is where the fit ran into it.
-        let value = Some(value).filter(|_| !matches!(self.best.end, End::OnBound(_)));
+        let value = Some(value).filter(|_| !is_on_bound_of_time_constant(&self.best.end));
         out.time_constant_difference_s = Difference { value, interval_95_s: Some([low, high]) };
         if low <= 0.0 && high >= 0.0 {
             out.not_identifiable.push("time_constant_difference_s".into());
@@ -180,8 +180,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
         } else if self.levels.outliers != [0, 0] && failed.contains(&TestName::TotalEnergy) {
-            "some samples are too far off for noise (counted in the next warnings): correct or empty these cells \
-                     first"
+            "some samples are too far off for noise (the warning on third differences counts them): correct or empty \
+             these cells first"
                 .into()
         } else if failed.contains(&TestName::Calibration) {
             let colour = if may_be_coloured { ", and if it does not help autoregressive noise" } else { "" };
