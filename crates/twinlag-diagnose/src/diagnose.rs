@@ -160,7 +160,7 @@ mod tests {
             })
             .collect();
         let compared = state.moves.iter().filter(|m| matches!(m, Move::Keep { .. })).count();
-        assert!(taken.len() >= 2 && compared >= 2, "two effects, each compared again: {:?}", state.moves);
+        assert!(taken.len() >= 2 && compared >= 1, "two effects, one with ties compared again: {:?}", state.moves);
         assert_eq!(replayed(&state.moves), taken, "{:?}", state.moves);
     }
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
+use crate::effect::parameter::inside;
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared};
 use crate::number::Number;
 use crate::plant::{Extra, Place, Plant};
@@ -47,12 +48,6 @@ pub(super) fn extra(context: &Context, typical_k: f64) -> Vec<Parameter> {
     ]
 }
 
-/// Values of extra noise within the bounds of its parameters: in a short record the longest correlation is short.
-pub(super) fn inside(parameters: &[Parameter], values: [f64; 2]) -> Vec<f64> {
-    let pairs = values.iter().zip(parameters);
-    pairs.map(|(value, p)| value.clamp(p.variable.lower, p.variable.upper)).collect()
-}
-
 fn candidates(context: &Context) -> Vec<Shared> {
     if !context.is_even {
         return Vec::new();
@@ -72,7 +67,7 @@ impl Effect for ColouredNoise {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        let start = |steps: f64| inside(&self.seat.parameters, [self.noise_std_k, steps * self.step_s]);
+        let start = |steps: f64| inside(&self.seat.parameters, &[self.noise_std_k, steps * self.step_s]);
         [3.0, 20.0].map(start).to_vec()
     }
 

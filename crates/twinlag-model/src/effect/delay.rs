@@ -7,6 +7,7 @@ use std::sync::Arc;
 use twinlag_optimise::Variable;
 
 use crate::chain::UNEVEN_REACH;
+use crate::effect::parameter::inside;
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared};
 use crate::number::Number;
 use crate::plant::Plant;
@@ -41,7 +42,7 @@ impl Effect for Delay {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.3 * self.step_s], vec![-3.0 * self.step_s], vec![3.0 * self.step_s]]
+        [0.3, -3.0, 3.0].map(|steps| inside(&self.seat.parameters, &[steps * self.step_s])).to_vec()
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::coloured_noise;
+use crate::effect::parameter::inside;
 use crate::effect::{About, Context, Effect, Identifier, Seat, Shared};
 use crate::number::Number;
 use crate::plant::{Extra, Place, Plant};
@@ -46,7 +47,7 @@ impl Effect for InputMismatch {
     fn starts(&self) -> Vec<Vec<f64>> {
         [0.3 * self.tau_s, 3.0 * self.tau_s]
             .into_iter()
-            .map(|tau_s| coloured_noise::inside(&self.seat.parameters, [0.02 * self.swing_k, tau_s]))
+            .map(|tau_s| inside(&self.seat.parameters, &[0.02 * self.swing_k, tau_s]))
             .collect()
     }
 

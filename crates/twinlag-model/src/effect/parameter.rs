@@ -134,3 +134,9 @@ impl Derived {
         Self { name, unit, of: Box::new(move |_| value) }
     }
 }
+
+/// `values` of `parameters`, those beyond a bound on it.
+pub(crate) fn inside(parameters: &[Parameter], values: &[f64]) -> Vec<f64> {
+    let pairs = values.iter().zip(parameters);
+    pairs.map(|(value, p)| value.clamp(p.variable.lower, p.variable.upper)).collect()
+}
