@@ -119,7 +119,7 @@ impl Search<'_> {
             model.fit(&theta, self.observations, self.selection, Effort::Look)
         };
         let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        if white_gain(current, &best) < -self.policy.look_alike_deviance_per_residual * best.count {
+        if white_gain(current, &best) < -self.policy.look_alike_deficit_share * best.count {
             return None;
         }
         let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);

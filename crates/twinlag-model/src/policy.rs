@@ -130,7 +130,7 @@ policy! {
     rival_share: f64 = 0.5,
     /// Deviance per residual by which a look-alike may be worse at first sight and still be fitted to the end: a tenth
     /// more energy, which the last iterations of a fit do not take off.
-    look_alike_deviance_per_residual: f64 = 0.1,
+    look_alike_deficit_share: f64 = 0.1,
 
     /// Effects that are added at most: twice as many as can usually be distinguished, so that a
     /// record in which they cannot is seen as one. Chosen.
