@@ -34,8 +34,8 @@ pub struct Ratio {
 pub struct Track {
     /// `twinlag.track/1`.
     pub schema: String,
-    /// `ok`, `model-rejected` where something is left over (of windows, in more than one of a
-    /// hundred), `not-identifiable` where the record determines time constants nowhere.
+    /// `ok`, `model-rejected` where something is left over (of windows, in more than
+    /// chance explains), `not-identifiable` where the record determines time constants nowhere.
     pub status: Status,
     /// `constant`, `smooth`, `step` or `windows`.
     pub change: String,
