@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use twinlag_model::{
     Bands, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
     Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report, runs,
+    white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -203,7 +204,7 @@ impl<'a> Search<'a> {
     /// `−2 ln L` of white noise whose levels are as free as those beside a noise of another colour.
     fn at_free_levels(&self, fitted: &Fitted) -> f64 {
         let plant = fitted.model.plant(&fitted.theta, self.observations);
-        fit_noise(&plant, self.observations, &self.bands(fitted), None, &[], self.context.is_coarse).likelihood
+        white_deviance(&plant, self.observations, &self.bands(fitted), self.context.is_coarse)
     }
 
     /// Both gains of a candidate, white and robust. A line has its own frequency, and is judged

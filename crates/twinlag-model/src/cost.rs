@@ -274,10 +274,11 @@ mod tests {
                 let name = effect.identifier().name();
                 let noise_std_k = if kind == Kind::Masked { [5.0, 7.0] } else { [0.05, 0.07] };
                 let model = Model::new(&[], noise_std_k).with(effect.clone());
-                // Off the start, where some derivatives vanish.
+                // Off the start, where some derivatives vanish; all parameters together, since those of a spline add up.
+                let together = 0.7 / effect.parameters().len() as f64;
                 let off = |(p, x): (&Parameter, f64)| match p.variable.scale {
                     Scale::Logarithmic => 1.1 * x,
-                    Scale::Linear { typical } => x + 0.07 * typical,
+                    Scale::Linear { typical } => x + together * typical,
                 };
                 let start = effect.starts().remove(0);
                 let values = effect.parameters().iter().zip(start).map(off);

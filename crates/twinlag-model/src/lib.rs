@@ -57,7 +57,7 @@ pub use policy::Policy;
 pub use prepare::Prepared;
 pub use selection::Selection;
 pub use settings::{Settings, Watch, report};
-pub use spectrum::{Bands, fit_noise, runs};
+pub use spectrum::{Bands, fit_noise, runs, white_deviance};
 pub use spline::Spline;
 pub use summary::{covariance, is_unresolved, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};

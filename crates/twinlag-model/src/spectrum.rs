@@ -234,6 +234,66 @@ impl Cost for NoiseCost<'_> {
     }
 }
 
+/// What a noise is fitted to, and from where.
+struct NoiseSearch<'a> {
+    observations: &'a Observations,
+    bands: &'a Bands,
+    paths: Paths,
+    /// Power of the whitening in each band.
+    base: Vec<f64>,
+    place: Option<Place>,
+    starts: &'a [[f64; 2]],
+    is_coarse: [bool; 2],
+}
+
+impl<'a> NoiseSearch<'a> {
+    fn of(plant: &Plant, observations: &'a Observations, bands: &'a Bands, is_coarse: [bool; 2]) -> Self {
+        let paths = Paths::of(plant, observations);
+        let power = |b: &Band| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE);
+        let base = bands.0.iter().map(power).collect();
+        Self { observations, bands, paths, base, place: None, starts: &[], is_coarse }
+    }
+
+    fn cost(&self, half: Half) -> NoiseCost<'_> {
+        let Self { bands, paths, base, place, is_coarse, .. } = self;
+        NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse }
+    }
+
+    /// The best levels, and the best extra noise, of a half.
+    fn solve(&self, half: Half) -> Vec<f64> {
+        let cost = self.cost(half);
+        let mut variables = ["level 1", "level 2"]
+            .map(|name| Variable::logarithmic(name, 1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR))
+            .to_vec();
+        let mut all = vec![vec![1.0, 1.0]];
+        if self.place.is_some() {
+            let swing = self.observations.swing_k();
+            variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
+            variables.push(Variable::logarithmic(
+                "correlation time",
+                MIN_CORRELATION_STEPS * self.observations.step_s(),
+                MAX_CORRELATION_SPANS * self.observations.span_s(),
+            ));
+            all = self.starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
+        }
+        let problem = Problem::new(&cost, variables).expect("bounds are in order");
+        let simplex = Optimiser::NelderMead { spread_tolerance: 1e-7, edge: 0.5 };
+        let fits = all.iter().map(|start| {
+            let fit = simplex.minimise(&problem, start, &Budget { iterations: 300, evaluations: 600 });
+            fit.expect("the start is finite")
+        });
+        fits.min_by(|a, b| a.value.total_cmp(&b.value)).expect("at least one start").x
+    }
+}
+
+/// `−2 ln L` of white noise with the best levels for the residual of `plant`.
+///
+/// - `is_coarse`: channels whose levels third differences do not determine
+pub fn white_deviance(plant: &Plant, observations: &Observations, bands: &Bands, is_coarse: [bool; 2]) -> f64 {
+    let search = NoiseSearch::of(plant, observations, bands, is_coarse);
+    search.cost(Half::Both).likelihood(&search.solve(Half::Both), Half::Both)
+}
+
 /// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
 /// - `is_coarse`: channels whose levels third differences do not determine
@@ -248,45 +308,14 @@ pub fn fit_noise(
     starts: &[[f64; 2]],
     is_coarse: [bool; 2],
 ) -> NoiseFit {
-    let paths = Paths::of(plant, observations);
-    let base: Vec<f64> =
-        bands.0.iter().map(|b| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE)).collect();
-    let solve = |half: Half| -> (Vec<f64>, f64) {
-        let cost = NoiseCost { bands, paths: &paths, base: &base, place, half, is_coarse };
-        let mut variables = ["level 1", "level 2"]
-            .map(|name| Variable::logarithmic(name, 1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR))
-            .to_vec();
-        let mut all = vec![vec![1.0, 1.0]];
-        if place.is_some() {
-            let swing = observations.swing_k();
-            variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
-            variables.push(Variable::logarithmic(
-                "correlation time",
-                MIN_CORRELATION_STEPS * observations.step_s(),
-                MAX_CORRELATION_SPANS * observations.span_s(),
-            ));
-            all = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
-        }
-        let problem = Problem::new(&cost, variables).expect("bounds are in order");
-        let simplex = Optimiser::NelderMead { spread_tolerance: 1e-7, edge: 0.5 };
-        all.iter()
-            .map(|start| {
-                let fit = simplex.minimise(&problem, start, &Budget { iterations: 300, evaluations: 600 });
-                let fit = fit.expect("the start is finite");
-                (fit.x, fit.value)
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .expect("at least one start")
-    };
-    let (x, _) = solve(Half::Both);
-    let cost = NoiseCost { bands, paths: &paths, base: &base, place, half: Half::Both, is_coarse };
-    let (even, odd) = (solve(Half::Even).0, solve(Half::Odd).0);
-    let held_out = cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even);
+    let search = NoiseSearch { place, starts, ..NoiseSearch::of(plant, observations, bands, is_coarse) };
+    let [x, even, odd] = [Half::Both, Half::Even, Half::Odd].map(|half| search.solve(half));
+    let cost = search.cost(Half::Both);
     NoiseFit {
         noise_std_k: [0, 1].map(|i| plant.noise_std_k[i] * x[i]),
         extra: place.map(|place| Extra { place, std_k: x[2], correlation_s: x[3] }),
         likelihood: cost.likelihood(&x, Half::Both),
-        held_out,
+        held_out: cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even),
     }
 }
 
