@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
-use twinlag::record::{ColumnRef, SamplingChoice, Selection};
+use twinlag::record::{ColumnRef, SamplingChoice, Selection, Unit};
 use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise::Optimiser};
 
 use crate::console::Console;
@@ -20,6 +20,7 @@ use crate::study::Study;
 /// temperature. The confidence intervals account for the noise in the readings.
 #[derive(Debug, Parser)]
 #[command(
+    name = "twinlag",
     version,
     after_help = "\
 Try it without a file:    twinlag demo
@@ -85,7 +86,7 @@ Status:
   model-rejected     the residual is more than noise: two first-order lags do not explain the record
 
 Two thermometers rarely agree at rest. If the model is rejected, try --free gain,offset first, then --second-order T1,T2.
-A data-sheet value for one sensor often settles the rest: --known T1.time_constant_s=0.5+-0.05. If the gas temperature is
+A data-sheet value for one sensor often settles the rest: --known T1=0.5s+-10%. If the gas temperature is
 steady for a while, say when: --quiet-segment 0..2.5.
 
 Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
@@ -262,6 +263,10 @@ pub(crate) struct Columns {
     /// Time column: its name, or its number counted from 1.
     #[arg(long, value_name = "COL")]
     time: Option<ColumnRef>,
+    /// Unit of a time column of numbers, in place of the one in its header: s, ms, us, ns, min, h or
+    /// d.
+    #[arg(long, value_name = "UNIT", value_parser = time_unit)]
+    time_unit: Option<Unit>,
     /// First sensor: column name, or number counted from 1.
     #[arg(long, value_name = "COL")]
     t1: Option<ColumnRef>,
@@ -284,6 +289,13 @@ pub(crate) struct Columns {
     sampling: SamplingChoice,
 }
 
+fn time_unit(text: &str) -> Result<Unit, String> {
+    match Unit::parse(text) {
+        unit @ Unit::Time { .. } => Ok(unit),
+        _ => Err("expected s, ms, us, ns, min, h or d".into()),
+    }
+}
+
 fn sampling(text: &str) -> Result<SamplingChoice, String> {
     match text {
         "auto" => Ok(SamplingChoice::Auto),
@@ -297,6 +309,7 @@ impl Columns {
     pub(crate) fn selection(&self) -> Selection {
         Selection {
             time: self.time.clone(),
+            time_unit: self.time_unit.clone(),
             t1: self.t1.clone(),
             t2: self.t2.clone(),
             reference: self.reference.clone(),
@@ -338,9 +351,11 @@ pub(crate) struct Method {
     /// Also fit a second lag in series in these sensors: T1, T2 or T1,T2.
     #[arg(long, value_name = "LIST")]
     second_order: Option<String>,
-    /// A parameter that is already known, exactly or with a standard deviation; may be given once
-    /// for each of `T1.time_constant_s`, `T2.time_constant_s`, `T2.gain`, `T2.offset_K`,
-    /// `T1.second_time_constant_s`, `T2.second_time_constant_s`.
+    /// A parameter that is already known, exactly or with a standard deviation, for example
+    /// T1=0.5s+-20%. Names are T1 and T2 for the time constants (units s, ms, us, min), gain, offset
+    /// (K), T1.second and T2.second for second time constants; in full `T1.time_constant_s`,
+    /// `T2.time_constant_s`, `T2.gain`, `T2.offset_K`, `T1.second_time_constant_s`,
+    /// `T2.second_time_constant_s`. May be given once for each.
     #[arg(long, value_name = "NAME=VALUE[+-SD]", allow_hyphen_values = true)]
     known: Vec<Known>,
     /// Samples that the cross-relation, bias-compensated, normalised and hybrid estimators leave

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use twinlag::record::RecordError;
+use twinlag::record::{RecordError, Setting as ReaderSetting};
 use twinlag_pages::ReportError;
 
 use crate::settings::{options, reader_option};
@@ -73,7 +73,16 @@ impl From<ReportError> for Failure {
 
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
-        let text = with_options(&error, error.settings().iter().copied().filter_map(reader_option));
+        let text = match &error {
+            // Here an option can be shown as it would be typed.
+            RecordError::ChannelsUnclear { candidates, .. } if !candidates.example.is_empty() => {
+                let typed =
+                    |(setting, column): &(ReaderSetting, usize)| Some(format!("{} {column}", reader_option(*setting)?));
+                let typed = candidates.example.iter().filter_map(typed);
+                format!("{error} (for example {})", typed.collect::<Vec<_>>().join(" "))
+            }
+            _ => with_options(&error, error.settings().iter().copied().filter_map(reader_option)),
+        };
         match error {
             RecordError::CannotWrite { .. } => Self::Other(text),
             RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {

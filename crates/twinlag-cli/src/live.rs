@@ -54,6 +54,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     out.flush()?;
     let source = table.source();
     let mut bad = Bad::default();
+    let mut last_s = record.time_s.last().copied().unwrap_or(0.0);
     let (mut is_beyond, mut is_wider) = (false, false);
     while let Some((number, line)) = lines.next()? {
         let (time_s, reading_c) = match reader.read(&line, number) {
@@ -66,13 +67,17 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
         };
         let answer = live.push(time_s, reading_c);
         if answer.is_none() {
+            let [before, now] = [last_s, time_s.unwrap_or(last_s)].map(|s| print::digits(s, 9));
             bad.say(
                 &format!(
-                    "{source}: line {number}: expected a time shortly after that of the previous row; this row is left out"
+                    "{source}: line {number}: expected a time shortly after that of the previous row, {before} s from the \
+                     start, got {now} s ('{}'); this row is left out",
+                    line.trim_end()
                 ),
                 console,
             );
         }
+        last_s = answer.map_or(last_s, |now| now.time_s);
         if let Some(now) = answer.filter(|now| now.is_beyond && !is_beyond) {
             is_beyond = true;
             console.note(|| {

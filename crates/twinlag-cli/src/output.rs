@@ -15,6 +15,12 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     let mut seen: Vec<(&str, PathBuf)> = Vec::new();
     for (option, path) in outputs {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.exists() {
+            let (path, folder) = (path.display(), folder.display());
+            return Err(Failure::Other(format!(
+                "{path}: cannot be written: there is no folder {folder}; create it, or choose another for {option}"
+            )));
+        }
         let folder = folder.canonicalize().map_err(|e| cannot_be_written(path, &e))?;
         let Some(name) = path.file_name().filter(|_| !path.is_dir()) else {
             return usage(format!("{} is a folder: name a file in it", path.display()));

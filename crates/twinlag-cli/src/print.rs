@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 use twinlag::diagnosis::Verdict;
 use twinlag::estimate::IntervalBasis;
-use twinlag::record::Record;
+use twinlag::record::{Note, Record};
 use twinlag::{
     Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag, SensorEstimate,
     Status, Track,
@@ -27,7 +27,14 @@ pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
 /// Prints on standard error how the file was read.
 pub(crate) fn notes(record: &Record, console: Console) {
     if !console.quiet {
-        record.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        for note in &record.notes {
+            let option = match note {
+                Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
+                Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
+                _ => String::new(),
+            };
+            eprintln!("note: {note}{option}");
+        }
     }
 }
 

@@ -32,6 +32,7 @@ pub(crate) fn options(setting: Setting) -> &'static [&'static str] {
 pub(crate) fn reader_option(setting: ReaderSetting) -> Option<&'static str> {
     Some(match setting {
         ReaderSetting::Time => "--time",
+        ReaderSetting::TimeUnit => "--time-unit",
         ReaderSetting::T1 => "--t1",
         ReaderSetting::T2 => "--t2",
         ReaderSetting::Reference => "--reference",

@@ -334,7 +334,11 @@ fn no_time_column_is_refused_and_a_period_mends_it() {
 fn a_period_that_is_none_is_wrong_usage() {
     let bench = good("bad_period");
     for (argument, shown) in [("--period=0", "got 0 s"), ("--period=-1", "got -1 s"), ("--period=nan", "got nan s")] {
-        bench.refuses(2, &["characterise", "run.csv", argument], &["period", "must be finite and positive", shown]);
+        bench.refuses(
+            2,
+            &["characterise", "run.csv", argument],
+            &["period", "must be positive, from a nanosecond to a year", shown],
+        );
     }
     bench.refuses(2, &["characterise", "run.csv", "--period", "soon"], &["soon", "--period"]);
 }
@@ -372,19 +376,27 @@ fn an_unknown_optimiser_is_wrong_usage_and_the_known_ones_are_listed() {
 #[test]
 fn nonsense_known_beforehand_is_wrong_usage() {
     let bench = good("known");
-    for bad in [
-        "nonsense",
-        "T1.time_constant_s",
-        "T1.time_constant_s=",
-        "T1.time_constant_s=fast",
-        "T1.time_constant_s=-0.02",
-        "T1.time_constant_s=0",
-        "T1.time_constant_s=nan",
-        "T1.time_constant_s=0.02+-0",
-        "T1.time_constant_s=0.02+-many",
-        "T3.time_constant_s=0.02",
+    let time = "expected a time in s, ms, us or min";
+    let deviation = "expected a positive standard deviation";
+    for (bad, expected) in [
+        ("nonsense", "expected a name, =, and a value"),
+        ("T1.time_constant_s", "expected a name, =, and a value"),
+        ("T1.time_constant_s=", time),
+        ("T1.time_constant_s=fast", time),
+        ("T1.time_constant_s=0,02", "decimal point, no comma"),
+        ("T1=20mm", time),
+        ("T1.time_constant_s=-0.02", "expected a positive time constant"),
+        ("T1=0s", "expected a positive time constant"),
+        ("T1.time_constant_s=nan", time),
+        ("T1.time_constant_s=0.02+-0", deviation),
+        ("T1=20ms+-0%", deviation),
+        ("T1.time_constant_s=0.02+-many", "expected a standard deviation, in per cent or as a time"),
+        ("T3.time_constant_s=0.02", "T1, T2, gain, offset, T1.second, T2.second, or in full T1.time_constant_s"),
+        ("gain=1K", "expected a number without a unit"),
+        ("offset=1s", "expected a temperature difference in K"),
+        ("offset=0+-5%", "expected a standard deviation in K"),
     ] {
-        let want = ["--known", "expected NAME=VALUE", "T1.time_constant_s", "T2.offset_K", bad];
+        let want = ["--known", expected, "write NAME=VALUE, or NAME=VALUE+-SD, for example T1=0.5s+-20%", bad];
         bench.refuses(2, &["characterise", "run.csv", "--known", bad], &want);
     }
 }
@@ -908,4 +920,68 @@ fn no_estimator_makes_an_answer_of_white_noise() {
             bench.characterise("run.csv", &["--estimator", estimator]).status(&UNKNOWN);
         }
     }
+}
+
+#[test]
+fn columns_that_are_not_clear_are_asked_for_in_the_words_of_the_program() {
+    let bench = spoiled("unclear", |lines| {
+        lines[0] = "time_s,TC1,TC2,TC3,TC4".to_owned();
+        for line in &mut lines[1..] {
+            let cells: Vec<&str> = line.split(',').collect();
+            *line = [cells[0], cells[1], cells[2], cells[1], cells[2]].join(",");
+        }
+    });
+    bench.refuses(3, &FILE, &["4 columns", "2 'TC1', 3 'TC2', 4 'TC3', 5 'TC4'", "(for example --t1 2 --t2 3)"]);
+    let one = [&FILE[..], &["--t1", "TC4"]].concat();
+    bench.refuses(3, &one, &["beside column 5 'TC4'", "(for example --t2 2)"]);
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_named() {
+    let report = ["diagnose", "run.csv", "--report", "nowhere/run.html"];
+    let want = ["nowhere/run.html", "there is no folder nowhere", "create it", "--report"];
+    good("no_folder").refuses(1, &report, &want);
+}
+
+#[test]
+fn a_period_of_nearly_nothing_is_wrong_usage() {
+    let period = ["characterise", "run.csv", "--period", "1e-300"];
+    good("period_of_nothing").refuses(2, &period, &["from a nanosecond to a year, got 1e-300 s", "--period"]);
+}
+
+#[test]
+fn the_program_says_its_own_name() {
+    let answer = Bench::new("version").run(&["--version"]);
+    assert!(answer.code == 0 && answer.stdout.starts_with("twinlag 0."), "{answer:#?}");
+}
+
+/// The good record with its times times a factor, in whole numbers, under a header without a unit.
+fn with_times(test: &str, time: impl Fn(f64) -> String) -> Bench {
+    spoiled(test, |lines| {
+        lines[0] = lines[0].replacen("time_s", "time", 1);
+        for line in 2..=lines.len() {
+            let stamp: f64 = lines[line - 1].split(',').next().and_then(|cell| cell.parse().ok()).expect("a time");
+            set(lines, line, 1, &time(stamp));
+        }
+    })
+}
+
+#[test]
+fn time_in_milliseconds_since_1970_is_recognised_and_a_counter_is_asked_about() {
+    let epoch = with_times("epoch_ms", |s| format!("{}", 1_769_853_600_000_i64 + (1000.0 * s).round() as i64));
+    let answer = epoch.run(&FILE);
+    answer.says(&["column 1 'time' names no unit", "milliseconds since 1970", "(option --time-unit s)"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let counter = with_times("counter_ms", |s| format!("{}", (1000.0 * s).round()));
+    counter.run(&FILE).says(&["is column 1 'time' really in s? If it counts milliseconds", "(option --time-unit ms)"]);
+    let chosen = counter.run(&[&FILE[..], &["--time-unit", "ms", "--json"]].concat());
+    assert!(chosen.stderr.contains("taken to be in ms, as chosen"), "{chosen:#?}");
+    recovers(&chosen.json(), GOOD_S);
+    counter.refuses(
+        2,
+        &[&FILE[..], &["--time-unit", "K"]].concat(),
+        &["--time-unit", "expected s, ms, us, ns, min, h or d"],
+    );
+    let unclear = with_times("unclear_time", |s| format!("{}", (5e8 * s).round()));
+    unclear.refuses(3, &FILE, &["column 1 'time' names no unit of time", "steps of 1000000", "(option --time-unit)"]);
 }

@@ -110,7 +110,7 @@ fn bad_rows_do_not_end_it() {
     broken.extend(lines[1900..2000].iter().map(ToString::to_string));
     let answer = bench.run_with_input(&LIVE, (broken.join("\n") + "\n").as_bytes());
     assert_eq!(answer.code, 0, "{answer:#?}");
-    answer.says(&["line 1801", "'warm'", "line 1802", "shortly after", "line 1804"]);
+    answer.says(&["line 1801", "'warm'", "line 1802", "shortly after", "17.99 s", "got 16.99 s ('", "line 1804"]);
     let rows = rows(&answer.stdout);
     assert_eq!(rows.len(), 1799 + 2 + 100);
     assert!(rows.iter().flatten().all(|v| v.is_finite()));

@@ -19,6 +19,11 @@ pub enum EstimateError {
     #[error("{what}: expected {expected}, got \"{got}\"")]
     Unexpected { what: &'static str, expected: String, got: String },
     #[error(
+        "known value \"{text}\": expected {expected}, got \"{got}\"; write NAME=VALUE, or NAME=VALUE+-SD, for example \
+         T1=0.5s+-20%"
+    )]
+    BadKnown { text: String, expected: String, got: String },
+    #[error(
         "the first {discard} samples are to be discarded, but the longest unbroken stretch has {longest}: \
          use a longer record, discard fewer, or the whitened estimator, which discards none"
     )]
@@ -31,6 +36,6 @@ impl EstimateError {
     /// Whether the question is at fault (a name that there is not, options that contradict each
     /// other), not the data.
     pub fn is_usage(&self) -> bool {
-        matches!(self, Self::Unexpected { .. } | Self::Optimiser(_))
+        matches!(self, Self::Unexpected { .. } | Self::BadKnown { .. } | Self::Optimiser(_))
     }
 }

@@ -51,6 +51,7 @@ mod estimate;
 mod fitting;
 mod hold;
 mod intervals;
+mod known;
 mod levels;
 mod objective;
 mod outcome;
@@ -68,6 +69,7 @@ pub use error::EstimateError;
 pub use estimate::Estimate;
 pub use hold::other_hold;
 pub use intervals::TauIntervals;
+pub use known::Known;
 pub use levels::{MIN_DEGREES_OF_FREEDOM_AT_REST, NoiseLevels};
 pub use objective::Prior;
 pub use outcome::{Outcome, Solved};
@@ -75,9 +77,7 @@ pub use profile::Ridge;
 pub use residual::REJECTION_P_VALUE;
 pub use second_lag::Unseen;
 pub use task::{RunAtRest, Task};
-pub use vocabulary::{
-    Bootstrap, Estimator, Hold, IntervalBasis, Intervals, Known, NoiseColour, NoiseKnowledge, NoiseSource,
-};
+pub use vocabulary::{Bootstrap, Estimator, Hold, IntervalBasis, Intervals, NoiseColour, NoiseKnowledge, NoiseSource};
 pub use whitened::{ENERGY_THAT_OUTWEIGHS_NOISE, WhitenedFit};
 
 /// Questions and answers may go to any thread, and be read by several.

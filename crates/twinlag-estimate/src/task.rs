@@ -4,9 +4,10 @@ use twinlag_cross_relation::{Parameter, Readings, Segment};
 use twinlag_optimise::{Minimiser, Optimiser, Variable};
 use twinlag_sensor::Discretisation;
 
+use crate::known::Known;
 use crate::objective::Prior;
 use crate::starts::hold_known;
-use crate::vocabulary::{Known, NoiseColour, NoiseKnowledge};
+use crate::vocabulary::{NoiseColour, NoiseKnowledge};
 
 /// Shortest first time constant that is looked for, sample periods. The pole of one is `exp(−5)`:
 /// its sensor's reading is the gas to within 0.7 %, and shorter ones look the same.

@@ -1,11 +1,10 @@
-//! The words in which a question is put: which estimator, what is known of noise and parameters,
-//! what intervals are made of.
+//! The words in which a question is put: which estimator, what is known of the noise, what intervals
+//! are made of.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-use twinlag_cross_relation::Parameter;
 use twinlag_sensor::Discretisation;
 
 use crate::error::EstimateError;
@@ -145,55 +144,6 @@ pub enum Intervals {
     Bootstrap(Bootstrap),
 }
 
-/// Something known of a parameter beforehand: `T1.time_constant_s=0.5`, or
-/// `T1.time_constant_s=0.5+-0.05`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Known {
-    /// Which one.
-    pub parameter: Parameter,
-    /// Its value: s for time constants, 1 for the gain, K at 0 °C for the offset.
-    pub value: f64,
-    /// Standard deviation of that knowledge; `None` holds the parameter at the value.
-    pub std: Option<f64>,
-}
-
-impl Known {
-    /// Names that [`Known::from_str`] takes, in the order of [`Parameter::ALL`].
-    pub const NAMES: [&'static str; 6] = [
-        "T1.time_constant_s",
-        "T2.time_constant_s",
-        "T2.gain",
-        "T2.offset_K",
-        "T1.second_time_constant_s",
-        "T2.second_time_constant_s",
-    ];
-}
-
-impl FromStr for Known {
-    type Err = EstimateError;
-
-    fn from_str(text: &str) -> Result<Self, EstimateError> {
-        let wrong = || EstimateError::Unexpected {
-            what: "known value",
-            expected: format!(
-                "NAME=VALUE or NAME=VALUE+-SD, VALUE and SD positive (an offset may be negative), NAME one of {}",
-                Self::NAMES.join(", ")
-            ),
-            got: text.into(),
-        };
-        let (name, value) = text.split_once('=').ok_or_else(wrong)?;
-        let index = Self::NAMES.iter().position(|n| *n == name.trim()).ok_or_else(wrong)?;
-        let (value, std) = match value.split_once("+-").or_else(|| value.split_once('±')) {
-            Some((value, std)) => (value, Some(std.trim().parse::<f64>().map_err(|_| wrong())?)),
-            None => (value, None),
-        };
-        let value: f64 = value.trim().parse().map_err(|_| wrong())?;
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        let sound = if index == 3 { value.is_finite() } else { positive(value) } && std.is_none_or(positive);
-        if sound { Ok(Self { parameter: Parameter::ALL[index], value, std }) } else { Err(wrong()) }
-    }
-}
-
 /// What noise is taken to be like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -297,19 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn knowledge_is_read_with_and_without_uncertainty() {
-        let known: Known = "T1.time_constant_s=0.5+-0.05".parse().expect("well formed");
-        assert_eq!(known, Known { parameter: Parameter::Tau1, value: 0.5, std: Some(0.05) });
-        let known: Known = "T2.offset_K=-1.5".parse().expect("well formed");
-        assert_eq!(known, Known { parameter: Parameter::Offset, value: -1.5, std: None });
-    }
-
-    #[test]
     fn nonsense_is_refused_with_what_was_expected() {
-        for text in ["T1.tau=1", "T1.time_constant_s", "T1.time_constant_s=-1", "T2.gain=1+-0", "T2.gain=one"] {
-            let message = text.parse::<Known>().expect_err("not well formed").to_string();
-            assert!(message.contains("T1.time_constant_s") && message.contains(text), "{message}");
-        }
         let message = "least-squares".parse::<Estimator>().expect_err("unknown").to_string();
         assert!(message.contains("whitened") && message.contains("normalised"), "{message}");
     }

@@ -4,8 +4,9 @@
 use crate::RecordError;
 use crate::clock;
 use crate::column::{Column, Kind};
+use crate::error::Candidates;
 use crate::note::Note;
-use crate::selection::Selection;
+use crate::selection::{Selection, Setting};
 use crate::table::Table;
 use crate::time_axis::TimeColumns;
 use crate::unit::Unit;
@@ -66,7 +67,7 @@ const TEMPERATURE: [&str; 20] = [
     "therm",
 ];
 /// Never T1 or T2, whatever else is there.
-const APART: [&str; 17] = [
+const APART: [&str; 15] = [
     "ref",
     "tref",
     "reference",
@@ -74,8 +75,6 @@ const APART: [&str; 17] = [
     "true",
     "truth",
     "ttrue",
-    "tgas",
-    "gas",
     "set",
     "setpoint",
     "sp",
@@ -85,11 +84,62 @@ const APART: [&str; 17] = [
     "target",
     "setpt",
 ];
+/// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
+const GAS: [&str; 2] = ["gas", "tgas"];
 /// Perhaps a sensor, perhaps its surroundings: only the caller knows.
 const SURROUNDINGS: [&str; 16] = [
     "chamber", "ambient", "room", "bath", "oven", "furnace", "block", "housing", "case", "board", "cjc", "junction",
     "internal", "raum", "kammer", "ofen",
 ];
+
+/// Other quantities that are often written without their unit.
+const OTHER_QUANTITIES: [&str; 40] = [
+    "pressure",
+    "depth",
+    "altitude",
+    "height",
+    "flow",
+    "velocity",
+    "speed",
+    "humidity",
+    "rh",
+    "rpm",
+    "voltage",
+    "volt",
+    "volts",
+    "vbat",
+    "battery",
+    "current",
+    "power",
+    "level",
+    "angle",
+    "position",
+    "torque",
+    "load",
+    "force",
+    "mass",
+    "weight",
+    "lat",
+    "latitude",
+    "lon",
+    "longitude",
+    "salinity",
+    "conductivity",
+    "density",
+    "oxygen",
+    "light",
+    "resistance",
+    "strain",
+    "status",
+    "state",
+    "flag",
+    "error",
+];
+
+/// Periods from row to row that may be given: no logger is faster than a nanosecond or slower than
+/// a year. What is beyond is a slip of the exponent.
+const SHORTEST_PERIOD_S: f64 = 1e-9;
+const LONGEST_PERIOD_S: f64 = 366.0 * 86_400.0;
 
 fn words(text: &str) -> impl Iterator<Item = String> {
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase)
@@ -129,6 +179,12 @@ fn is_temperature(column: &Column) -> bool {
     column.kind() == Kind::Number && is_called_temperature(column)
 }
 
+/// Whether it is no sensor by its name: a reference, a setpoint, the one column of the gas.
+fn is_apart(column: &Column, columns: &[Column]) -> bool {
+    let of_gas = |column: &&Column| is_called_temperature(column) && has(column, &GAS) && !has(column, &APART);
+    has(column, &APART) || (has(column, &GAS) && columns.iter().filter(of_gas).count() < 2)
+}
+
 fn first_word(column: &Column) -> String {
     words(column.label()).next().unwrap_or_default()
 }
@@ -152,7 +208,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         if let Some(time) = named_time {
             return Err(RecordError::TimeAndPeriod { file, column: table.title(time), period_s });
         }
-        if !(period_s.is_finite() && period_s > 0.0) {
+        if !(SHORTEST_PERIOD_S..=LONGEST_PERIOD_S).contains(&period_s) {
             return Err(RecordError::BadPeriod { file, period_s });
         }
     }
@@ -187,7 +243,8 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
         // number.
         let first = columns.first().filter(|_| free(&0))?;
         let rises = first.raw().windows(2).all(|pair| pair[1] > pair[0]);
-        let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !has(first, &APART);
+        let open =
+            *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !is_apart(first, columns);
         (first.kind() == Kind::Number && rises && open).then_some(0)
     })
 }
@@ -230,35 +287,11 @@ fn guess_channels(
         };
         !of_time && reference != Some(index) && flow != Some(index) && !named.contains(&Some(index))
     };
-    let has_names = columns.iter().any(|column| !column.name().is_empty());
     let free: Vec<usize> = (0..columns.len()).filter(|&index| is_free(index)).collect();
-    let of_kinds = |kinds: &[Kind]| -> Vec<usize> {
-        let may_be = |column: &Column| {
-            let named = is_called_temperature(column) && !has(column, &APART) && !is_index(column);
-            kinds.contains(&column.kind()) && (named || !has_names)
-        };
-        free.iter().copied().filter(|&index| may_be(&columns[index])).collect()
-    };
-    let candidates = of_kinds(&[Kind::Number]);
-    let Some(channels) = clear_pair(columns, named, &candidates) else {
-        let file = table.source().to_owned();
-        // What would have been clear but for one fault is refused for that fault.
-        let with_empty = clear_pair(columns, named, &of_kinds(&[Kind::Number, Kind::Empty]));
-        let mut pair = with_empty.into_iter().flatten();
-        if let Some(empty) = pair.find(|&index| columns[index].kind() == Kind::Empty) {
-            return Err(RecordError::NoValues { file, column: table.title(empty) });
-        }
-        if let Some(index) = reference.filter(|&index| ["t1", "t2"].contains(&first_word(&columns[index]).as_str())) {
-            return Err(RecordError::SameColumn { file, column: table.title(index) });
-        }
-        if let Some(index) = foreign_unit(columns, named, &free).filter(|_| candidates.is_empty()) {
-            let unit = columns[index].unit().to_string();
-            return Err(RecordError::NotATemperature { file, column: table.title(index), unit });
-        }
-        let titles: Vec<_> = candidates.iter().map(|&index| table.title(index)).collect();
-        let candidates = if titles.is_empty() { "none".to_owned() } else { titles.join(", ") };
-        let found = titles.len() + named.iter().flatten().count();
-        return Err(RecordError::ChannelsUnclear { file, found, candidates, columns: table.listing() });
+    let candidates = candidates(columns, &free, &[Kind::Number]);
+    let pair = clear_pair(columns, named, &candidates).or_else(|| only_pair(columns, named, &free, &[Kind::Number]));
+    let Some(channels) = pair else {
+        return Err(unclear(table, named, reference, &free, &candidates));
     };
     for (role, (was, index)) in ["T1", "T2"].into_iter().zip(named.into_iter().zip(channels)) {
         if was.is_none() {
@@ -266,6 +299,76 @@ fn guess_channels(
         }
     }
     Ok(channels)
+}
+
+/// The columns that may be sensors by their names and units.
+fn candidates(columns: &[Column], free: &[usize], kinds: &[Kind]) -> Vec<usize> {
+    let has_names = columns.iter().any(|column| !column.name().is_empty());
+    let may_be = |column: &Column| {
+        let named = is_called_temperature(column) && !is_apart(column, columns) && !is_index(column);
+        kinds.contains(&column.kind()) && (named || !has_names)
+    };
+    free.iter().copied().filter(|&index| may_be(&columns[index])).collect()
+}
+
+/// Two columns beside the time that nothing calls anything but sensors, in a file in which nothing
+/// is called a temperature: `Time,Thin,Thick`.
+fn only_pair(columns: &[Column], named: [Option<usize>; 2], free: &[usize], kinds: &[Kind]) -> Option<[usize; 2]> {
+    let is_data = |index: &&usize| kinds.contains(&columns[**index].kind()) && !is_index(&columns[**index]);
+    let is_open = |index: usize| {
+        let column = &columns[index];
+        let is_other = has(column, &OTHER_QUANTITIES) || has(column, &SURROUNDINGS) || is_apart(column, columns);
+        *column.unit() == Unit::Unstated && !is_other
+    };
+    let no_temperature = named == [None; 2] && !free.iter().any(|&index| is_called_temperature(&columns[index]));
+    match free.iter().filter(is_data).collect::<Vec<_>>()[..] {
+        [&t1, &t2] if no_temperature && is_open(t1) && is_open(t2) => Some([t1, t2]),
+        _ => None,
+    }
+}
+
+/// Why T1 and T2 are not clear. What would have been clear but for one fault is refused for that
+/// fault.
+fn unclear(
+    table: &Table,
+    named: [Option<usize>; 2],
+    reference: Option<usize>,
+    free: &[usize],
+    candidates: &[usize],
+) -> RecordError {
+    let (file, columns) = (table.source().to_owned(), table.columns());
+    let kinds = [Kind::Number, Kind::Empty];
+    let with_empty = clear_pair(columns, named, &self::candidates(columns, free, &kinds))
+        .or_else(|| only_pair(columns, named, free, &kinds));
+    let mut pair = with_empty.into_iter().flatten();
+    if let Some(empty) = pair.find(|&index| columns[index].kind() == Kind::Empty) {
+        return RecordError::NoValues { file, column: table.title(empty) };
+    }
+    if let Some(index) = reference.filter(|&index| ["t1", "t2"].contains(&first_word(&columns[index]).as_str())) {
+        return RecordError::SameColumn { file, column: table.title(index) };
+    }
+    if let Some(index) = foreign_unit(columns, named, free).filter(|_| candidates.is_empty()) {
+        let unit = columns[index].unit().to_string();
+        return RecordError::NotATemperature { file, column: table.title(index), unit };
+    }
+    let is_doubtful = |index: &usize| has(&columns[*index], &SURROUNDINGS);
+    let titles = |which: &dyn Fn(&usize) -> bool| -> Vec<String> {
+        candidates.iter().filter(|index| which(index)).map(|&index| table.title(index)).collect()
+    };
+    // The likelier ones first: sensors by name and unit, then any other numbers.
+    let numbers = || free.iter().filter(|&&index| columns[index].kind() == Kind::Number && !is_index(&columns[index]));
+    let sure = candidates.iter().filter(|index| !is_doubtful(index));
+    let rest = numbers()
+        .filter(|index| !candidates.contains(index) && !is_apart(&columns[**index], columns))
+        .filter(|index| *columns[**index].unit() == Unit::Unstated);
+    let mut likely = sure.chain(rest).chain(candidates.iter().filter(|index| is_doubtful(index)));
+    let mut example = Vec::new();
+    for (setting, _) in [Setting::T1, Setting::T2].into_iter().zip(named).filter(|(_, named)| named.is_none()) {
+        example.extend(likely.next().map(|index| (setting, index + 1)));
+    }
+    let chosen = named.into_iter().flatten().next().map(|index| table.title(index));
+    let why = Candidates { chosen, found: titles(&|_| true), surroundings: titles(&is_doubtful), example };
+    RecordError::ChannelsUnclear { file, candidates: Box::new(why), columns: table.listing() }
 }
 
 /// T1 and T2, if there is one way only to take them from the candidates.
@@ -300,7 +403,7 @@ fn foreign_unit(columns: &[Column], named: [Option<usize>; 2], free: &[usize]) -
         .copied()
         .filter(|&index| {
             let column = &columns[index];
-            column.kind() == Kind::Number && !has(column, &APART) && !is_index(column)
+            column.kind() == Kind::Number && !is_apart(column, columns) && !is_index(column)
         })
         .collect();
     let mut foreign = numbers.iter().copied().filter(is_foreign);

@@ -26,6 +26,37 @@ impl fmt::Display for Place {
     }
 }
 
+/// The columns that may be the sensors, as `2 'T1'`. Its `Display` says why nothing could be guessed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidates {
+    /// The one that the caller chose.
+    pub chosen: Option<String>,
+    /// Those with the name or the unit of a temperature.
+    pub found: Vec<String>,
+    /// Those of them that may be of the surroundings.
+    pub surroundings: Vec<String>,
+    /// What may be meant: settings, and numbers of columns.
+    pub example: Vec<(Setting, usize)>,
+}
+
+impl fmt::Display for Candidates {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(chosen) = &self.chosen {
+            write!(f, "beside column {chosen}, ")?;
+        }
+        let list = self.found.join(", ");
+        match self.found.len() {
+            0 => write!(f, "no column has the name or the unit of a temperature")?,
+            1 => write!(f, "only column {list} has the name or the unit of a temperature")?,
+            count => write!(f, "{count} columns have the name or the unit of a temperature ({list})")?,
+        }
+        match &self.surroundings[..] {
+            [] => Ok(()),
+            some => write!(f, ", and {} may be that of the surroundings", some.join(", ")),
+        }
+    }
+}
+
 /// Why a record could not be read, built or written. `file` is the name that the caller gave to the
 /// source.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -107,16 +138,21 @@ pub enum RecordError {
     )]
     SameColumn { file: String, column: String },
     #[error(
-        "{file}: expected exactly two columns that are clearly the sensors, found {found} that may be ({candidates}); \
-         choose both, by name or number; the columns are {columns}"
+        "{file}: which columns are the two sensors is not clear: {candidates}; choose both, by name or number{shown}; the \
+         columns are {columns}",
+        shown = example_of_columns(&candidates.example)
     )]
-    ChannelsUnclear { file: String, found: usize, candidates: String, columns: String },
+    ChannelsUnclear { file: String, candidates: Box<Candidates>, columns: String },
     #[error(
         "{file}: no column is recognisably the time; choose it, by name or number, or, if there is none, give the \
          sample period in seconds; the columns are {columns}"
     )]
     NoTime { file: String, columns: String },
-    #[error("{file}: the sample period must be finite and positive, got {period_s} s")]
+    #[error(
+        "{file}: the sample period must be positive, from a nanosecond to a year, got {shown} s; give the time from row to \
+         row in seconds",
+        shown = plain(*period_s)
+    )]
     BadPeriod { file: String, period_s: f64 },
     #[error("{file}: both a time column ({column}) and a sample period ({period_s} s) were given; give one of them")]
     TimeAndPeriod { file: String, column: String, period_s: f64 },
@@ -140,10 +176,16 @@ pub enum RecordError {
     )]
     NotATemperature { file: String, column: String, unit: String },
     #[error(
-        "{file}: column {column} is in '{unit}', expected a time in s, ms, us, min, h or d, or date-times; convert it, or \
+        "{file}: column {column} is in '{unit}', expected a time in s, ms, us, ns, min, h or d, or date-times; convert it, or \
          correct the unit in the header, for example 'time [s]'"
     )]
     NotATimeUnit { file: String, column: String, unit: String },
+    #[error(
+        "{file}: column {column} names no unit of time, and its numbers, with steps of {shown}, are the stamps of no logger in \
+         s, nor in ms, us, ns or days since a usual date; choose the unit, or write it in the header, for example 'time [us]'",
+        shown = plain(*step)
+    )]
+    TimeUnitUnclear { file: String, column: String, step: f64 },
     #[error(
         "{file}: {at}, column {column}: {shown} {unit} is not between absolute zero and 5000 °C; is the unit right, is \
          the thermocouple open? Empty the cells that are not measurements",
@@ -199,10 +241,19 @@ impl RecordError {
             | Self::SameColumn { .. } => &Setting::COLUMNS,
             Self::BadFlow { .. } | Self::ConstantFlow { .. } => &[Setting::Flow],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
+            Self::NotATimeUnit { .. } | Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],
             Self::BadPeriod { .. } | Self::TimeNotIncreasing { .. } => &[Setting::Period],
             _ => &[],
         }
+    }
+}
+
+fn example_of_columns(example: &[(Setting, usize)]) -> String {
+    match example {
+        [(_, first), (_, second)] => format!(", for example {first} and {second}"),
+        [(_, other)] => format!(", for example {other}"),
+        _ => String::new(),
     }
 }
 

@@ -57,6 +57,55 @@ pub enum Note {
         /// The unit that it was converted to, if another one.
         to: Option<&'static str>,
     },
+    /// A column that is in K by its header reads as no gas does: the K may be a type of thermocouple.
+    ColdKelvin {
+        /// The column.
+        column: String,
+        /// Its median reading.
+        reading_k: f64,
+    },
+    /// Two sensors differ by the distance of the two scales.
+    IcePointApart {
+        /// The column that reads more.
+        upper: String,
+        /// The column that reads less.
+        lower: String,
+        /// The median difference.
+        apart_k: f64,
+    },
+    /// The unit of the time column is that which the caller chose.
+    TimeUnitChosen {
+        /// The column.
+        column: String,
+        /// Its unit.
+        unit: &'static str,
+        /// The unit that it was converted to, if another one.
+        to: Option<&'static str>,
+    },
+    /// A time column without a unit is of the size and the step of a usual clock, and was read as
+    /// that.
+    TimeRecognised {
+        /// The column.
+        column: String,
+        /// Its unit.
+        unit: &'static str,
+        /// What it counts.
+        name: &'static str,
+        /// From row to row.
+        step_s: f64,
+    },
+    /// A time column without a unit was taken to be in seconds, and might as well count something
+    /// else.
+    TimeQuestion {
+        /// The column.
+        column: String,
+        /// The other unit.
+        unit: &'static str,
+        /// What it would count.
+        name: &'static str,
+        /// From row to row, if it does.
+        step_s: f64,
+    },
     /// Time was counted from the row number and a period that the caller gave.
     PeriodGiven {
         /// The period.
@@ -123,6 +172,49 @@ pub enum Note {
     },
 }
 
+impl Note {
+    /// What was made of units; nothing for any other note.
+    fn write_units(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unit { column, unit, stated, to } => {
+                let how = if *stated { "is in" } else { "names no unit and was taken to be in" };
+                write!(f, "column {column} {how} {unit}")?;
+                to.map_or(Ok(()), |to| write!(f, ", converted to {to}"))
+            }
+            Self::ColdKelvin { column, reading_k } => {
+                write!(
+                    f,
+                    "column {column} is in K by its header and reads {} K: if K is the type of the ",
+                    three(*reading_k)
+                )?;
+                write!(f, "thermocouple and the readings are in °C, say so in the header, as 'T1 [°C]'")
+            }
+            Self::IcePointApart { upper, lower, apart_k } => {
+                write!(f, "column {upper} reads {} K more than column {lower}, about 273.15 K: ", three(*apart_k))?;
+                write!(f, "if one of them is in K and the other in °C, say so in the header, as 'T1 [K]'")
+            }
+            Self::TimeUnitChosen { column, unit, to } => {
+                write!(f, "column {column} was taken to be in {unit}, as chosen")?;
+                to.map_or(Ok(()), |to| write!(f, ", converted to {to}"))
+            }
+            Self::TimeRecognised { column, unit, name, step_s } => {
+                write!(f, "column {column} names no unit; its numbers are of the size and the step of {name}, ")?;
+                write!(f, "{} s from row to row, and were converted from {unit} to s. ", three(*step_s))?;
+                write!(f, "If that is wrong, choose its unit, or write it in the header, as 'time [s]'")
+            }
+            Self::TimeQuestion { column, unit, name, step_s } => {
+                write!(
+                    f,
+                    "is column {column} really in s? If it counts {name}, rows are {} s apart: ",
+                    three(*step_s)
+                )?;
+                write!(f, "then choose its unit, or write it in the header, as 'time [{unit}]'")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -137,11 +229,6 @@ impl fmt::Display for Note {
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
             Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
             Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
-            Self::Unit { column, unit, stated, to } => {
-                let how = if *stated { "is in" } else { "names no unit and was taken to be in" };
-                write!(f, "column {column} {how} {unit}")?;
-                to.map_or(Ok(()), |to| write!(f, ", converted to {to}"))
-            }
             Self::PeriodGiven { period_s } => {
                 write!(f, "time counted from the row number, {period_s} s per row as given; no time column was used")
             }
@@ -179,28 +266,31 @@ impl fmt::Display for Note {
             Self::LoneRows { rows } => {
                 write!(f, "{rows} rows stand alone between gaps or masked rows and are not used")
             }
-            Self::Sampling { sampling, chosen } => {
-                let Sampling { period_s, jitter_s, largest_departure_s, stamp_resolution_s, kind } = sampling;
-                let what = match kind {
-                    SamplingKind::Uniform => "uniform",
-                    SamplingKind::Rounded => "even with rounded stamps, taken as evenly spaced",
-                    SamplingKind::Irregular => "irregular, steps used as stamped",
-                };
-                let who = if *chosen { " (as chosen)" } else { "" };
-                let period = if *kind == SamplingKind::Irregular { "median step" } else { "period" };
-                write!(f, "sampling {what}{who}: {period} {} s", brief(*period_s))?;
-                if *largest_departure_s >= EXACT_PERIODS * period_s {
-                    let [rms, most] = [jitter_s, largest_departure_s].map(|s| three(*s));
-                    write!(f, ", stamps depart from even spacing by {rms} s rms and {most} s at most")?;
-                    if largest_departure_s > period_s && *kind != SamplingKind::Irregular {
-                        write!(f, " (more than a period: the clock wanders)")?;
-                    }
-                    if let Some(resolution_s) = stamp_resolution_s {
-                        write!(f, ", stamp resolution {} s", brief(*resolution_s))?;
-                    }
-                }
-                write!(f, "; nothing was resampled")
-            }
+            Self::Sampling { sampling, chosen } => write_sampling(f, sampling, *chosen),
+            of_units => of_units.write_units(f),
         }
     }
+}
+
+fn write_sampling(f: &mut fmt::Formatter<'_>, sampling: &Sampling, chosen: bool) -> fmt::Result {
+    let Sampling { period_s, jitter_s, largest_departure_s, stamp_resolution_s, kind } = sampling;
+    let what = match kind {
+        SamplingKind::Uniform => "uniform",
+        SamplingKind::Rounded => "even with rounded stamps, taken as evenly spaced",
+        SamplingKind::Irregular => "irregular, steps used as stamped",
+    };
+    let who = if chosen { " (as chosen)" } else { "" };
+    let period = if *kind == SamplingKind::Irregular { "median step" } else { "period" };
+    write!(f, "sampling {what}{who}: {period} {} s", brief(*period_s))?;
+    if *largest_departure_s >= EXACT_PERIODS * period_s {
+        let [rms, most] = [jitter_s, largest_departure_s].map(|s| three(*s));
+        write!(f, ", stamps depart from even spacing by {rms} s rms and {most} s at most")?;
+        if largest_departure_s > period_s && *kind != SamplingKind::Irregular {
+            write!(f, " (more than a period: the clock wanders)")?;
+        }
+        if let Some(resolution_s) = stamp_resolution_s {
+            write!(f, ", stamp resolution {} s", brief(*resolution_s))?;
+        }
+    }
+    write!(f, "; nothing was resampled")
 }

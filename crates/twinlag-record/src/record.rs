@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
 use crate::note::Note;
-use crate::sampling::{self, Sampling, SamplingKind};
+use crate::sampling::{self, Clock, Sampling, SamplingKind};
 use crate::selection::{SamplingChoice, Selection};
 use crate::table::{Table, shortened};
 use crate::time_axis::{self, TimeAxis};
@@ -27,6 +27,13 @@ const MAX_LISTED_GAPS: usize = 5;
 pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// No thermocouple reaches this; sentinels such as 9999 and 1e37 lie beyond.
 pub(crate) const MAX_TEMPERATURE_C: f64 = 5000.0;
+
+/// Below this, in K, a reading calls for a question: colder than any gas but hydrogen and helium boils.
+/// Chosen; a note depends on it and no number.
+const COLD_K: f64 = 60.0;
+/// How near to 273.15 K the median difference of two sensors must be for the same question. Sensors
+/// of one gas differ by lags, whose median is small, and calibration, which is a few K. Chosen.
+const NEAR_ICE_POINT_K: f64 = 10.0;
 
 /// Vectors to make a record from; `[n]` each, missing temperatures NaN.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,10 +133,11 @@ impl Record {
     pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(table, selection, &mut notes)?;
-        let (time_s, unit_s) = match (chosen.time, selection.period_s) {
+        let (time_s, clock) = match (chosen.time, selection.period_s) {
             (Some(columns), _) => {
-                let TimeAxis { time_s, unit_s } = time_axis::read(table, columns, &mut notes)?;
-                (time_s, Some(unit_s))
+                let TimeAxis { time_s, clock } =
+                    time_axis::read(table, columns, selection.time_unit.as_ref(), &mut notes)?;
+                (time_s, Some(clock))
             }
             (None, period_s) => {
                 let period_s = period_s.unwrap_or(1.0);
@@ -164,7 +172,7 @@ impl Record {
         };
         let mut all = table.notes().to_vec();
         all.append(&mut notes);
-        let record = Self::build(channels, selection.sampling, unit_s, all, &origin)?;
+        let record = Self::build(channels, selection.sampling, clock, all, &origin)?;
         let Some(index) = chosen.flow else { return Ok(record) };
         let at = |row: usize| table.place_of(row);
         record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at)
@@ -234,13 +242,14 @@ impl Record {
         }
         let units = [Unit::Celsius, Unit::Celsius, Unit::Celsius];
         let origin = Origin { file: &file, table: None, columns: names, units };
-        Self::build(channels, sampling, Some(1.0), Vec::new(), &origin)
+        let clock = Clock { unit_s: 1.0, first: channels.time_s.first().copied().unwrap_or(0.0) };
+        Self::build(channels, sampling, Some(clock), Vec::new(), &origin)
     }
 
     fn build(
         channels: Channels,
         choice: SamplingChoice,
-        unit_s: Option<f64>,
+        clock: Option<Clock>,
         mut notes: Vec<Note>,
         origin: &Origin<'_>,
     ) -> Result<Self, RecordError> {
@@ -274,7 +283,7 @@ impl Record {
                 *t -= first;
             }
         }
-        let sampling = sampling::judge(&time_s, unit_s, choice);
+        let sampling = sampling::judge(&time_s, clock, choice);
         let runs: Vec<_> = sampling::runs(&time_s, sampling.gap_s()).collect();
         note_gaps(&time_s, &runs, origin, &mut notes);
         let segments: Vec<_> = runs.into_iter().flat_map(|run| whole_parts(run, &is_whole)).collect();
@@ -297,6 +306,7 @@ impl Record {
             let [first, second, _] = origin.columns.clone();
             return Err(RecordError::Identical { file: file(), first, second });
         }
+        note_kelvins([&t1_c, &t2_c], origin, &mut notes);
         notes.push(Note::Sampling { sampling, chosen: choice != SamplingChoice::Auto });
         Ok(Self {
             source,
@@ -410,6 +420,30 @@ fn note_gaps(time_s: &[f64], runs: &[Range<usize>], origin: &Origin<'_>, notes: 
     if count > 0 {
         notes.push(Note::FurtherGaps { count, length_s: gaps.skip(MAX_LISTED_GAPS).map(|gap| gap.1).sum() });
     }
+}
+
+/// Questions about a K in a header, or one that is missing there. A reading of 20 that is in K is
+/// one of −253 °C, and two sensors of one gas are not 273 K apart.
+fn note_kelvins(values_c: [&[f64]; 2], origin: &Origin<'_>, notes: &mut Vec<Note>) {
+    for (i, values_c) in values_c.into_iter().enumerate() {
+        let cold = || median(values_c.iter().copied()).map(|c| c - ABSOLUTE_ZERO_C).filter(|k| *k < COLD_K);
+        if let Some(reading_k) = Some(&origin.units[i]).filter(|unit| **unit == Unit::Kelvin).and_then(|_| cold()) {
+            notes.push(Note::ColdKelvin { column: origin.columns[i].clone(), reading_k });
+        }
+    }
+    let Some(apart_k) = median(values_c[0].iter().zip(values_c[1]).map(|(a, b)| a - b)) else { return };
+    if (apart_k.abs() + ABSOLUTE_ZERO_C).abs() < NEAR_ICE_POINT_K {
+        let [first, second, _] = origin.columns.clone();
+        let (upper, lower) = if apart_k > 0.0 { (first, second) } else { (second, first) };
+        notes.push(Note::IcePointApart { upper, lower, apart_k: apart_k.abs() });
+    }
+}
+
+/// Of those that are there.
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// The maximal runs of whole rows within a run.

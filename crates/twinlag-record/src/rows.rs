@@ -9,7 +9,7 @@ use crate::record::{ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C};
 use crate::selection::Selection;
 use crate::sign::{Decimal, Delimiter};
 use crate::table::{Table, shortened};
-use crate::time_axis::{TimeColumns, seconds};
+use crate::time_axis::{self, TimeColumns, seconds};
 use crate::unit::Unit;
 use crate::{Place, RecordError};
 
@@ -77,7 +77,7 @@ impl RowReader {
         let column = |index: usize| &table.columns()[index];
         let time = match chosen.time {
             Some(TimeColumns::One(index)) if column(index).kind() == Kind::Number => {
-                let unit_s = if let Unit::Time { seconds, .. } = column(index).unit() { *seconds } else { 1.0 };
+                let unit_s = time_axis::unit_s(table, index, selection.time_unit.as_ref(), &mut Vec::new())?;
                 let first = column(index).raw().first().copied().unwrap_or(0.0);
                 Some(Time { index, first, unit_s })
             }

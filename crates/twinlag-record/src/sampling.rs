@@ -47,7 +47,9 @@ pub struct Sampling {
 /// A beat is at least one in so many steps: a logger's period is not off its clock's unit by less.
 const MAX_STEPS_PER_BEAT: usize = 50;
 /// Significant digits of a stamp, at most: those of more are not rounded to any number of them.
-const MAX_DIGITS: i32 = 12;
+const MAX_DIGITS: i32 = 15;
+/// Digits that single precision gives for any number.
+const SINGLE_DIGITS: i32 = 7;
 /// Departure, in periods, below which stamps count as even.
 const EXACT_PERIODS: f64 = 0.01;
 
@@ -69,14 +71,35 @@ impl Sampling {
     }
 }
 
+/// The clock that stamps were printed from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Clock {
+    /// Its unit.
+    pub(crate) unit_s: f64,
+    /// What the first stamp was, in that unit; 0 where stamps are dates.
+    pub(crate) first: f64,
+}
+
+impl Clock {
+    /// Seconds from 0.
+    pub(crate) const SECONDS: Self = Self { unit_s: 1.0, first: 0.0 };
+
+    /// The stamps as they were printed.
+    fn printed(self, time_s: &[f64]) -> impl Iterator<Item = f64> + Clone {
+        time_s.iter().map(move |t| self.first + t / self.unit_s)
+    }
+}
+
 /// Judges stamps: at least two, strictly increasing.
 ///
 /// - `time_s`: the stamps
-/// - `unit_s`: the time unit that they were printed in, if they were
-pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice) -> Sampling {
+/// - `clock`: what they were printed from, if they were
+pub(crate) fn judge(time_s: &[f64], clock: Option<Clock>, choice: SamplingChoice) -> Sampling {
     let steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let median = median(&steps);
-    let grid = unit_s.and_then(|unit_s| grid(time_s, &steps, unit_s));
+    let digits = clock.map(|clock| rounding(time_s, clock));
+    let coarsest = digits.as_ref().and_then(|digits| digits.iter().copied().reduce(f64::max));
+    let grid = clock.and_then(|clock| grid(time_s, &steps, clock.unit_s, coarsest));
     let may_be_rounded = |unit: &f64| *unit < median * 1.5 && !are_skips(&steps, median);
     let rounding = grid.filter(may_be_rounded).unwrap_or(0.0);
     let limit = 1.5 * median + rounding;
@@ -92,7 +115,8 @@ pub(crate) fn judge(time_s: &[f64], unit_s: Option<f64>, choice: SamplingChoice)
     // as stamped.
     let is_whole = 20 * skips <= steps.len();
     let is_uniform = high - period <= 0.01 * period && period - low <= 0.01 * period;
-    let is_rounded = grid.is_some_and(|unit| high - low <= 1.01 * unit && is_steady(time_s, limit, period, unit));
+    let is_rounded = grid.is_some_and(|unit| high - low <= 1.01 * unit && is_steady(time_s, limit, period, unit))
+        || digits.is_some_and(|digits| is_even_but_for_digits(time_s, &digits, limit, period));
     let kind = match choice {
         SamplingChoice::Uniform => SamplingKind::Uniform,
         SamplingChoice::Auto if is_whole && is_uniform => SamplingKind::Uniform,
@@ -133,7 +157,61 @@ fn is_steady(time_s: &[f64], limit_s: f64, period_s: f64, unit_s: f64) -> bool {
     })
 }
 
-fn median(steps: &[f64]) -> f64 {
+/// Whether every stamp is that of an even grid, rounded to the digits that it was printed with. A
+/// format of few significant digits rounds later stamps more than earlier ones.
+///
+/// Each run of rows has a start of its own, and all have one period. Stamp `k` of a run allows the
+/// starts `t[k] − k P ± q[k]/2`; the grid exists if there is a `P` at which each run has a start that all
+/// its stamps allow. What lacks for that, the latest of the earliest starts less the earliest of the
+/// latest ones, is convex in `P`: bisection by its slope finds a place where it is not positive, or
+/// that there is none.
+///
+/// The chance that a clock that jitters passes: of `n` stamps in `r` runs that jitter evenly within
+/// `±J`, each must lie in a window of `q`, which `n − r − 1` independent ones do with a probability of
+/// `(q/2J)^(n − r − 1)`: for `J = q` and 100 rows in one run 3e-30. Jitter that is much smaller than the
+/// last digit is not in the stamps, which are then as even as they can be.
+fn is_even_but_for_digits(time_s: &[f64], digits_s: &[f64], limit_s: f64, period_s: f64) -> bool {
+    // A row that is missing must show: two periods less the rounding of both stamps are more than
+    // the limit of 1.5 periods and one rounding.
+    if digits_s.iter().any(|q| *q > 0.25 * period_s) {
+        return false;
+    }
+    let runs: Vec<_> = runs(time_s, limit_s).collect();
+    // What lacks, at the period and so much, and how it changes with that.
+    let lack = |correction_s: f64| {
+        let of_run = |run: &Range<usize>| {
+            let (mut latest, mut earliest) = ((f64::NEG_INFINITY, 0.0), (f64::INFINITY, 0.0));
+            for row in run.clone() {
+                let k = (row - run.start) as f64;
+                let start = (time_s[row] - time_s[run.start] - k * period_s) - k * correction_s;
+                // As of grids: a stamp may miss its place by a hundredth of the unit.
+                let half = 0.51 * digits_s[row];
+                if start - half > latest.0 {
+                    latest = (start - half, k);
+                }
+                if start + half < earliest.0 {
+                    earliest = (start + half, k);
+                }
+            }
+            (latest.0 - earliest.0, earliest.1 - latest.1)
+        };
+        runs.iter().map(of_run).fold((f64::NEG_INFINITY, 0.0), |most, now| if now.0 > most.0 { now } else { most })
+    };
+    let (mut low, mut high) = (-0.01 * period_s, 0.01 * period_s);
+    // So many halvings leave less than the last bit of any period.
+    for _ in 0..f64::MANTISSA_DIGITS {
+        let middle = 0.5 * (low + high);
+        match lack(middle) {
+            (lack, _) if lack <= 0.0 => return true,
+            (_, slope) if slope > 0.0 => high = middle,
+            (_, slope) if slope < 0.0 => low = middle,
+            _ => return false,
+        }
+    }
+    false
+}
+
+pub(crate) fn median(steps: &[f64]) -> f64 {
     let mut sorted = steps.to_vec();
     let middle = sorted.len() / 2;
     *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
@@ -189,7 +267,9 @@ fn line(time_s: &[f64], limit_s: f64) -> Line {
 
 /// The grid of the stamps. A stamp may miss its grid point by a hundredth of the unit: differences
 /// of large stamps do.
-fn grid(time_s: &[f64], steps: &[f64], unit_s: f64) -> Option<f64> {
+///
+/// - `coarsest`: the last digit of the largest stamp, where that differs from stamp to stamp
+fn grid(time_s: &[f64], steps: &[f64], unit_s: f64, coarsest: Option<f64>) -> Option<f64> {
     let first = *time_s.first()?;
     let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
     let power = (-9..=6).rev().map(|exponent| 10_f64.powi(exponent)).find(|power| {
@@ -198,7 +278,7 @@ fn grid(time_s: &[f64], steps: &[f64], unit_s: f64) -> Option<f64> {
         unit <= 1.001 * shortest && time_s.iter().all(|t| off_grid((t - first) / unit) < 0.01)
     })?;
     let unit = power * unit_s;
-    if let Some(coarsest) = last_digit(time_s, unit_s).filter(|last| *last > unit && *last <= shortest) {
+    if let Some(coarsest) = coarsest.filter(|last| *last > unit && *last <= shortest) {
         return Some(coarsest);
     }
     let common = steps.iter().map(|step| (step / unit).round() as u64).fold(0, divisor);
@@ -207,16 +287,38 @@ fn grid(time_s: &[f64], steps: &[f64], unit_s: f64) -> Option<f64> {
     Some(if common < shortest { unit * common.max(1) as f64 } else { unit })
 }
 
-/// The last digit of the largest stamp, where all are printed to one number of significant digits:
-/// seven of them give 0.04167 s and 1049.958 s.
-fn last_digit(time_s: &[f64], unit_s: f64) -> Option<f64> {
+/// The unit of the last digit of each stamp, where all are printed to one number of significant
+/// digits: seven give 0.04166667 s and 1049.958 s. Otherwise that of single precision, if all
+/// stamps were kept in it, or twice that of doubles, since what is added up is off by a unit: serial
+/// days are to no more than 1e-5 s.
+fn rounding(time_s: &[f64], clock: Clock) -> Vec<f64> {
     let exponent = |stamp: f64| stamp.abs().log10().floor() as i32;
-    let digits =
-        |stamp: f64| (1..=MAX_DIGITS).find(|digits| off_grid(stamp / 10_f64.powi(exponent(stamp) + 1 - digits)) < 0.01);
-    let stamps = || time_s.iter().map(|t| t / unit_s).filter(|stamp| *stamp != 0.0);
-    let most = stamps().map(digits).try_fold(0, |most, digits| Some(digits?.max(most)))?;
-    let largest = stamps().map(exponent).max()?;
-    Some(10_f64.powi(largest + 1 - most) * unit_s)
+    let is_printed = |stamp: f64, digits: i32| {
+        let unit = 10_f64.powi(exponent(stamp) + 1 - digits);
+        off_grid(stamp / unit) < 0.01 + 2.0 * f64::EPSILON * stamp.abs() / unit
+    };
+    let digits = |stamp: f64| (1..=MAX_DIGITS).find(|digits| is_printed(stamp, *digits));
+    let stamps = || clock.printed(time_s).filter(|stamp| *stamp != 0.0);
+    let of_each = |unit: &dyn Fn(f64) -> f64| {
+        // A stamp of zero is exact in any format: it is as good as the best of the others.
+        let best = stamps().map(unit).fold(f64::INFINITY, f64::min);
+        clock.printed(time_s).map(|stamp| clock.unit_s * if stamp == 0.0 { best } else { unit(stamp) }).collect()
+    };
+    let last_bit = |epsilon: f64| move |stamp: f64| epsilon * 2_f64.powf(stamp.abs().log2().floor());
+    match stamps().map(digits).try_fold(0, |most, digits| Some(digits?.max(most))) {
+        // Seven digits print the same in single precision and in double: they may be all there are.
+        Some(most) if most <= SINGLE_DIGITS => of_each(&|stamp| 10_f64.powi(exponent(stamp) + 1 - most)),
+        _ if stamps().all(is_single) => of_each(&last_bit(f64::from(f32::EPSILON))),
+        Some(most) => of_each(&|stamp| 10_f64.powi(exponent(stamp) + 1 - most)),
+        None => of_each(&last_bit(2.0 * f64::EPSILON)),
+    }
+}
+
+/// Whether a stamp is one of single precision, as it is or in the fewest digits that give it again.
+fn is_single(stamp: f64) -> bool {
+    let single = stamp as f32;
+    let is_near = |value: f64| (value - stamp).abs() <= 4.0 * f64::EPSILON * stamp.abs();
+    is_near(f64::from(single)) || single.to_string().parse().is_ok_and(is_near)
 }
 
 fn off_grid(position: f64) -> f64 {
@@ -233,7 +335,7 @@ mod tests {
     use super::*;
 
     fn auto(time_s: &[f64]) -> Sampling {
-        judge(time_s, Some(1.0), SamplingChoice::Auto)
+        judge(time_s, Some(Clock::SECONDS), SamplingChoice::Auto)
     }
 
     /// Rounding to q leaves errors of standard deviation q/√12, so the slope over n points has
@@ -258,6 +360,95 @@ mod tests {
         assert_eq!(got.kind, SamplingKind::Rounded);
         assert!((got.period_s - 1.0 / 24.0).abs() < 2.5e-9, "got {}, want {}", got.period_s, 1.0 / 24.0);
         assert!((got.stamp_resolution_s.unwrap() - 1e-3).abs() < 1e-12);
+    }
+
+    /// The stamps as a program prints them with `%g`: so many significant digits.
+    fn printed(stamp: f64, digits: usize) -> f64 {
+        format!("{stamp:.0$e}", digits - 1).parse().expect("a number that was just printed")
+    }
+
+    /// Six digits leave 1e-4 s after 10 s, 1e-3 s after 100 s and 0.01 s after 1000 s, which is a quarter of the period.
+    /// Failed: a clock that did not start at zero was irregular, and so was one with a period a little
+    /// below a whole number of milliseconds. Errors of at most half a unit q turn a slope over n points
+    /// by 1.5 q/n at most, if their signs are those of the lever.
+    #[test]
+    fn stamps_of_six_significant_digits_are_even_wherever_they_start() {
+        for period_s in [1.0 / 24.0, 0.041_999, 0.1, 1.0 / 30.0, 0.25] {
+            for from in [0, 1, 241, 5000] {
+                for count in [2000, 14_566] {
+                    let raw: Vec<f64> = (from..from + count).map(|k| printed(f64::from(k) * period_s, 6)).collect();
+                    let first = raw[0];
+                    let time_s: Vec<f64> = raw.iter().map(|t| t - first).collect();
+                    let coarsest = 10_f64.powi(raw[raw.len() - 1].log10().floor() as i32 - 5);
+                    if coarsest > 0.25 * period_s {
+                        continue;
+                    }
+                    let got = judge(&time_s, Some(Clock { unit_s: 1.0, first }), SamplingChoice::Auto);
+                    let what = format!("{period_s} s from row {from}, {count} rows: {got:?}");
+                    assert_ne!(got.kind, SamplingKind::Irregular, "{what}");
+                    let tolerance = 1.5 * coarsest / f64::from(count);
+                    assert!((got.period_s - period_s).abs() < tolerance, "{what}, tolerance {tolerance:e}");
+                    assert_eq!(runs(&time_s, got.gap_s()).count(), 1, "{what}");
+                }
+            }
+        }
+    }
+
+    /// Whole seconds of an even 15 s but for one that is a second late: no even grid rounds to that.
+    #[test]
+    fn one_stamp_beside_its_grid_is_irregular() {
+        let late = |k: u32| if k == 70 { 1.0 } else { 0.0 };
+        let time_s: Vec<f64> = (0..152).map(|k| 15.0 * f64::from(k) + late(k)).collect();
+        assert_eq!(auto(&time_s).kind, SamplingKind::Irregular);
+    }
+
+    #[test]
+    fn gaps_between_stamps_of_few_digits_stay_gaps() {
+        let is_there = |k: &u32| ![300, 4000, 4001, 9000].contains(k) && !(11_000..11_500).contains(k);
+        let raw: Vec<f64> = (241..14_566).filter(is_there).map(|k| printed(f64::from(k) / 24.0, 6)).collect();
+        let time_s: Vec<f64> = raw.iter().map(|t| t - raw[0]).collect();
+        let got = judge(&time_s, Some(Clock { unit_s: 1.0, first: raw[0] }), SamplingChoice::Auto);
+        assert_eq!(got.kind, SamplingKind::Rounded);
+        assert_eq!(runs(&time_s, got.gap_s()).count(), 5);
+        // Of the coarsest unit, 1e-3 s, over the shortest of five runs, 59 rows.
+        assert!((got.period_s - 1.0 / 24.0).abs() < 10.0 * 1e-3 * 14_566_f64.powf(-1.5), "{got:?}");
+    }
+
+    /// Single precision keeps 2⁻¹⁰ s after 8192 s, 2 % of the period; both as it is and as it prints.
+    #[test]
+    fn stamps_of_single_precision_are_even() {
+        let single = |k: u32| (f64::from(k) / 24.0) as f32;
+        let shortest = |k: u32| single(k).to_string().parse().expect("a number that was just printed");
+        for of in [&|k| f64::from(single(k)), &shortest as &dyn Fn(u32) -> f64] {
+            let raw: Vec<f64> = (200_000..230_000).map(of).collect();
+            let time_s: Vec<f64> = raw.iter().map(|t| t - raw[0]).collect();
+            let got = judge(&time_s, Some(Clock { unit_s: 1.0, first: raw[0] }), SamplingChoice::Auto);
+            assert_eq!(got.kind, SamplingKind::Rounded, "{got:?}");
+            assert!((got.period_s - 1.0 / 24.0).abs() < 10.0 * 2_f64.powi(-10) * 30_000_f64.powf(-1.5), "{got:?}");
+        }
+    }
+
+    /// Jitter of once, twice and five times the coarsest digit, 1e-3 s: the first of them passes with a chance of
+    /// 0.5^9757. A single stamp that is off by 5 % of a period among fine ones shows as well.
+    #[test]
+    fn jitter_of_more_than_a_digit_is_irregular() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for jitter_s in [0.001, 0.002, 0.005] {
+            let raw: Vec<f64> =
+                (241..10_000).map(|k| printed(f64::from(k) / 24.0 + jitter_s * (2.0 * uniform() - 1.0), 6)).collect();
+            let time_s: Vec<f64> = raw.iter().map(|t| t - raw[0]).collect();
+            let got = judge(&time_s, Some(Clock { unit_s: 1.0, first: raw[0] }), SamplingChoice::Auto);
+            assert_eq!(got.kind, SamplingKind::Irregular, "{jitter_s}: {got:?}");
+        }
+        let off = |k: u32| if k == 700 { 0.002 } else { 0.0 };
+        let raw: Vec<f64> = (241..10_000).map(|k| printed(f64::from(k) / 24.0 + off(k), 6)).collect();
+        let time_s: Vec<f64> = raw.iter().map(|t| t - raw[0]).collect();
+        let got = judge(&time_s, Some(Clock { unit_s: 1.0, first: raw[0] }), SamplingChoice::Auto);
+        assert_eq!(got.kind, SamplingKind::Irregular, "{got:?}");
     }
 
     /// 3.86 s with stamps cut to whole seconds: steps of 3 and 4 s. The slope's error is below the
@@ -339,10 +530,10 @@ mod tests {
     #[test]
     fn the_caller_may_choose() {
         let time_s: Vec<f64> = (0..100).map(|k| f64::from(k) + 0.2 * f64::from(k % 3)).collect();
-        assert_eq!(judge(&time_s, Some(1.0), SamplingChoice::Auto).kind, SamplingKind::Irregular);
-        assert_eq!(judge(&time_s, Some(1.0), SamplingChoice::Uniform).kind, SamplingKind::Uniform);
+        assert_eq!(judge(&time_s, Some(Clock::SECONDS), SamplingChoice::Auto).kind, SamplingKind::Irregular);
+        assert_eq!(judge(&time_s, Some(Clock::SECONDS), SamplingChoice::Uniform).kind, SamplingKind::Uniform);
         let even: Vec<f64> = (0..100).map(f64::from).collect();
-        assert_eq!(judge(&even, Some(1.0), SamplingChoice::AsStamped).kind, SamplingKind::Irregular);
+        assert_eq!(judge(&even, Some(Clock::SECONDS), SamplingChoice::AsStamped).kind, SamplingKind::Irregular);
     }
 
     /// Minutes printed to two decimals lie on a grid of 0.6 s, which no power of ten of a second
@@ -350,7 +541,7 @@ mod tests {
     #[test]
     fn the_grid_is_one_of_the_printed_unit() {
         let time_s: Vec<f64> = (0..300).map(|k| 60.0 * (f64::from(k) * 1.7 / 60.0 * 100.0).round() / 100.0).collect();
-        let got = judge(&time_s, Some(60.0), SamplingChoice::Auto);
+        let got = judge(&time_s, Some(Clock { unit_s: 60.0, first: 0.0 }), SamplingChoice::Auto);
         assert!((got.stamp_resolution_s.unwrap() - 0.6).abs() < 1e-9, "got {:?}", got.stamp_resolution_s);
         assert_eq!(got.kind, SamplingKind::Rounded);
     }

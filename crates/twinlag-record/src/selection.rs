@@ -4,6 +4,8 @@ use std::convert::Infallible;
 use std::fmt;
 use std::str::FromStr;
 
+use crate::unit::Unit;
+
 /// A column, by name or by number from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ColumnRef {
@@ -81,6 +83,8 @@ pub enum SamplingChoice {
 pub struct Selection {
     /// The time column.
     pub time: Option<ColumnRef>,
+    /// The unit of a time column of numbers, [`Unit::Time`]; it goes before the one in the header.
+    pub time_unit: Option<Unit>,
     /// The first sensor.
     pub t1: Option<ColumnRef>,
     /// The second sensor.
@@ -101,6 +105,8 @@ pub struct Selection {
 pub enum Setting {
     /// [`Selection::time`].
     Time,
+    /// [`Selection::time_unit`].
+    TimeUnit,
     /// [`Selection::t1`].
     T1,
     /// [`Selection::t2`].

@@ -4,14 +4,16 @@ use crate::RecordError;
 use crate::clock::{self, DAY_NS, Day, Stamp};
 use crate::column::Kind;
 use crate::note::Note;
+use crate::sampling::Clock;
+use crate::scale::{self, Counter, Reading};
 use crate::table::Table;
 use crate::unit::Unit;
 use crate::wording::plain;
 
-/// Seconds since the first row, and the time unit that the stamps were printed in.
+/// Seconds since the first row, and the clock that the stamps were printed from.
 pub(crate) struct TimeAxis {
     pub(crate) time_s: Vec<f64>,
-    pub(crate) unit_s: f64,
+    pub(crate) clock: Clock,
 }
 
 /// Where time comes from.
@@ -23,15 +25,22 @@ pub(crate) enum TimeColumns {
 
 /// Reads the time of every row; not yet checked to increase.
 ///
+/// - `unit`: the unit of a column of numbers, where the caller chose one
+///
 /// # Errors
-/// [`RecordError::NotATimeUnit`], [`RecordError::NotATime`], [`RecordError::AmbiguousDate`],
+/// [`RecordError::NotATimeUnit`], [`RecordError::TimeUnitUnclear`], [`RecordError::NotATime`], [`RecordError::AmbiguousDate`],
 /// [`RecordError::MissingTime`], and those of [`Table::numbers`].
-pub(crate) fn read(table: &Table, columns: TimeColumns, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
+pub(crate) fn read(
+    table: &Table,
+    columns: TimeColumns,
+    unit: Option<&Unit>,
+    notes: &mut Vec<Note>,
+) -> Result<TimeAxis, RecordError> {
     match columns {
-        TimeColumns::One(index) if table.columns()[index].kind() != Kind::Stamp => numeric(table, index, notes),
+        TimeColumns::One(index) if table.columns()[index].kind() != Kind::Stamp => numeric(table, index, unit, notes),
         TimeColumns::One(index) => {
             let stamps = stamps(table, index)?;
-            Ok(TimeAxis { time_s: elapsed(table, index, &stamps, notes)?, unit_s: 1.0 })
+            Ok(TimeAxis { time_s: elapsed(table, index, &stamps, notes)?, clock: Clock::SECONDS })
         }
         TimeColumns::DateAndTime { date, time } => {
             let (dates, mut stamps) = (stamps(table, date)?, stamps(table, time)?);
@@ -39,32 +48,67 @@ pub(crate) fn read(table: &Table, columns: TimeColumns, notes: &mut Vec<Note>) -
                 stamp.day = date.day;
             }
             notes.push(Note::DateAndTime { date: table.title(date), time: table.title(time) });
-            Ok(TimeAxis { time_s: elapsed(table, date, &stamps, notes)?, unit_s: 1.0 })
+            Ok(TimeAxis { time_s: elapsed(table, date, &stamps, notes)?, clock: Clock::SECONDS })
         }
     }
 }
 
-fn numeric(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
+fn numeric(table: &Table, index: usize, chosen: Option<&Unit>, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
     let values = table.numbers(index)?;
-    let column = &table.columns()[index];
-    let (unit_s, symbol, stated) = match column.unit() {
-        Unit::Time { symbol, seconds } => (*seconds, *symbol, true),
-        Unit::Unstated => (1.0, "s", false),
-        unit => {
-            let (file, column, unit) = (table.source().to_owned(), table.title(index), unit.to_string());
-            return Err(RecordError::NotATimeUnit { file, column, unit });
-        }
-    };
     if let Some(row) = values.iter().position(|value| !value.is_finite()) {
         let (file, at) = (table.source().to_owned(), table.place_of(row));
         return Err(RecordError::MissingTime { file, at, column: table.title(index) });
     }
-    let to = (symbol != "s").then_some("s");
-    if to.is_some() || !stated {
-        notes.push(Note::Unit { column: table.title(index), unit: symbol.to_owned(), stated, to });
-    }
+    let unit_s = unit_s(table, index, chosen, notes)?;
     let first = values.first().copied().unwrap_or(0.0);
-    Ok(TimeAxis { time_s: values.iter().map(|value| seconds(value - first, unit_s)).collect(), unit_s })
+    let time_s = values.iter().map(|value| seconds(value - first, unit_s)).collect();
+    Ok(TimeAxis { time_s, clock: Clock { unit_s, first } })
+}
+
+/// The unit of a column of numbers: the one that the caller chose, else that of the header, else what its size
+/// and its step show.
+///
+/// # Errors
+/// [`RecordError::NotATimeUnit`], [`RecordError::TimeUnitUnclear`].
+pub(crate) fn unit_s(
+    table: &Table,
+    index: usize,
+    chosen: Option<&Unit>,
+    notes: &mut Vec<Note>,
+) -> Result<f64, RecordError> {
+    let column = || table.title(index);
+    let to = |symbol: &str| (symbol != "s").then_some("s");
+    match chosen.unwrap_or(table.columns()[index].unit()) {
+        Unit::Time { symbol, seconds } if chosen.is_some() => {
+            notes.push(Note::TimeUnitChosen { column: column(), unit: symbol, to: to(symbol) });
+            Ok(*seconds)
+        }
+        Unit::Time { symbol, seconds } => {
+            if to(symbol).is_some() {
+                notes.push(Note::Unit { column: column(), unit: (*symbol).to_owned(), stated: true, to: to(symbol) });
+            }
+            Ok(*seconds)
+        }
+        Unit::Unstated => match scale::judge(table.columns()[index].raw()) {
+            Reading::Recognised(Counter { symbol, seconds, name, step_s }) => {
+                notes.push(Note::TimeRecognised { column: column(), unit: symbol, name, step_s });
+                Ok(seconds)
+            }
+            Reading::Unclear { step } => {
+                Err(RecordError::TimeUnitUnclear { file: table.source().to_owned(), column: column(), step })
+            }
+            reading => {
+                notes.push(Note::Unit { column: column(), unit: "s".to_owned(), stated: false, to: None });
+                if let Reading::Question(Counter { symbol, name, step_s, .. }) = reading {
+                    notes.push(Note::TimeQuestion { column: column(), unit: symbol, name, step_s });
+                }
+                Ok(1.0)
+            }
+        },
+        unit => {
+            Err(RecordError::NotATimeUnit { file: table.source().to_owned(), column: column(), unit: unit.to_string() })
+        }
+    }
 }
 
 /// Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.

@@ -3,6 +3,8 @@
 
 use std::fmt;
 
+use crate::description::is_description;
+
 /// The unit of a column.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -30,7 +32,22 @@ impl Unit {
     /// Reads a unit that stands alone, as `°C` or `[ms]`; the empty text is [`Unit::Unstated`].
     pub fn parse(text: &str) -> Self {
         let text = text.trim().trim_start_matches(['[', '(', '{']).trim_end_matches([']', ')', '}']).trim();
-        if text.is_empty() { Self::Unstated } else { Self::known(text).unwrap_or_else(|| Self::Other(text.to_owned())) }
+        if text.is_empty() {
+            Self::Unstated
+        } else {
+            Self::explained(text).unwrap_or_else(|| Self::Other(text.to_owned()))
+        }
+    }
+
+    /// A known unit, perhaps with a word about it.
+    fn explained(text: &str) -> Option<Self> {
+        // `seconds since 1970-01-01`: the differences do not depend on since when.
+        if let Some((unit, _)) = text.split_once(" since ") {
+            return Self::known(unit.trim()).filter(|unit| matches!(unit, Self::Time { .. }));
+        }
+        // `ITS-90, deg C`: the scale of temperature, and the unit.
+        let unit = text.rsplit_once(',').map_or(text, |(_, unit)| unit.trim());
+        Self::known(unit)
     }
 
     fn known(text: &str) -> Option<Self> {
@@ -39,8 +56,9 @@ impl Unit {
         let lower = text.to_lowercase();
         match lower.as_str() {
             "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => return time("s", 1.0),
-            "ms" | "msec" | "millisecond" | "milliseconds" => return time("ms", 1e-3),
-            "us" | "µs" | "μs" | "usec" | "microseconds" => return time("us", 1e-6),
+            "ms" | "msec" | "millisecond" | "milliseconds" | "millis" => return time("ms", 1e-3),
+            "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" | "micros" => return time("us", 1e-6),
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" | "nanos" => return time("ns", 1e-9),
             "min" | "mins" | "minute" | "minutes" | "minuten" => return time("min", 60.0),
             "h" | "hr" | "hrs" | "hour" | "hours" | "std" | "stunden" => return time("h", 3600.0),
             "d" | "day" | "days" | "tage" => return time("d", 86_400.0),
@@ -58,7 +76,8 @@ impl Unit {
     }
 
     /// Splits a header into the name and its unit. Where a known unit is not set off by brackets it
-    /// must follow `_`, `/`, `,`, ` in ` or a blank; brackets always hold a unit, known or not.
+    /// must follow `_`, `/`, `,`, ` in ` or a blank. What stands in brackets is a unit, known or
+    /// not, unless it is the size, the type or the place of a sensor: that belongs to the name.
     ///
     /// ```
     /// use twinlag_record::Unit;
@@ -67,17 +86,41 @@ impl Unit {
     /// assert_eq!(Unit::split_header("gas_K"), ("gas".to_owned(), Unit::Kelvin));
     /// assert_eq!(Unit::split_header("T2 deg C"), ("T2".to_owned(), Unit::Celsius));
     /// assert_eq!(Unit::split_header("inlet"), ("inlet".to_owned(), Unit::Unstated));
+    /// assert_eq!(Unit::split_header("wire (0.5 mm)"), ("wire (0.5 mm)".to_owned(), Unit::Unstated));
+    /// assert_eq!(Unit::split_header("T1 (type K) [°C]"), ("T1 (type K)".to_owned(), Unit::Celsius));
     /// ```
     pub fn split_header(header: &str) -> (String, Self) {
         let header = header.trim();
         for (open, close) in [('[', ']'), ('(', ')'), ('{', '}')] {
             if let Some(start) = header.rfind(open).filter(|&start| start > 0 && header.ends_with(close)) {
-                return (
-                    header[..start].trim().trim_end_matches(['_', '/', ',']).to_owned(),
-                    Self::parse(&header[start..]),
-                );
+                let (before, bracket) = header.split_at(start);
+                let inside = &bracket[1..bracket.len() - 1];
+                let unit = Self::parse(inside);
+                if is_description(inside) || (unit == Self::Kelvin && is_type_next(before)) {
+                    return match Self::split_header(before) {
+                        (_, Self::Unstated) => (header.to_owned(), Self::Unstated),
+                        (name, unit) => (format!("{name} {bracket}"), unit),
+                    };
+                }
+                let name = before.trim().trim_end_matches(['_', '/', ',']).to_owned();
+                return if unit == Self::Unstated { Self::split_bare(&name) } else { (name, unit) };
             }
         }
+        Self::split_enclosed(header).unwrap_or_else(|| Self::split_bare(header))
+    }
+
+    /// A known unit in brackets, with a word behind: `Gas T (C) fine`.
+    fn split_enclosed(header: &str) -> Option<(String, Self)> {
+        [('[', ']'), ('(', ')'), ('{', '}')].into_iter().find_map(|(open, close)| {
+            let (before, rest) = header.split_once(open)?;
+            let (inside, after) = rest.split_once(close)?;
+            let unit = Self::known(inside.trim()).filter(|_| !before.trim().is_empty() && !is_type_next(before))?;
+            Some((format!("{} {}", before.trim(), after.trim()), unit))
+        })
+    }
+
+    /// A header without brackets, or of which they are no unit.
+    fn split_bare(header: &str) -> (String, Self) {
         for separator in ["_", "/", ",", " in ", " "] {
             let Some((name, unit)) = header.rsplit_once(separator) else { continue };
             let (name, unit) = (name.trim(), unit.trim());
@@ -86,7 +129,7 @@ impl Unit {
                 Some((before, "deg" | "Deg" | "°")) => (before.trim(), unit),
                 _ => (name, unit),
             };
-            if name.is_empty() || unit.is_empty() {
+            if name.is_empty() || unit.is_empty() || is_type_next(name) {
                 continue;
             }
             if let Some(known) = Self::known(unit) {
@@ -96,7 +139,11 @@ impl Unit {
                 return (name.to_owned(), Self::Other(unit.to_owned()));
             }
         }
-        (header.to_owned(), Self::Unstated)
+        // A column that is called by its unit. In the singular it may be a part of a date.
+        let is_plural = |word: &&str| word.len() > 3 && word.ends_with('s');
+        let unit =
+            Some(header).filter(is_plural).and_then(Self::known).filter(|unit| matches!(unit, Self::Time { .. }));
+        (header.to_owned(), unit.unwrap_or(Self::Unstated))
     }
 
     /// Whether it is a unit of temperature.
@@ -124,6 +171,12 @@ impl Unit {
             Self::Other(_) => "",
         }
     }
+}
+
+/// Whether the letter that follows is a type of thermocouple: `TC1 type K`, in which K is no kelvin.
+fn is_type_next(before: &str) -> bool {
+    let word = before.trim_end().rsplit(|c: char| !c.is_alphanumeric()).next().unwrap_or("");
+    ["type", "typ"].iter().any(|known| word.eq_ignore_ascii_case(known))
 }
 
 impl fmt::Display for Unit {
@@ -157,13 +210,27 @@ mod tests {
             ("T1_gpctd_C", "T1_gpctd", Unit::Celsius),
             ("temp_F", "temp", Unit::Fahrenheit),
             ("T1 [\u{FFFD}C]", "T1", Unit::Celsius),
-            ("time [ms]", "time", ms),
+            ("time [ms]", "time", ms.clone()),
             ("t_min", "t", minute),
-            ("time_s", "time", second),
+            ("time_s", "time", second.clone()),
             ("TC1_mV", "TC1", Unit::Other("mV".to_owned())),
             ("T1 [counts]", "T1", Unit::Other("counts".to_owned())),
             ("T1", "T1", Unit::Unstated),
             ("T1_Avg", "T1_Avg", Unit::Unstated),
+            ("Thin wire (0.5 mm)", "Thin wire (0.5 mm)", Unit::Unstated),
+            ("Thin (0.5 mm) [K]", "Thin (0.5 mm)", Unit::Kelvin),
+            ("Thin [°C] (0.5 mm)", "Thin (0.5 mm)", Unit::Celsius),
+            ("T1 (type K)", "T1 (type K)", Unit::Unstated),
+            ("TC1 [K-type]", "TC1 [K-type]", Unit::Unstated),
+            ("TC1 type K", "TC1 type K", Unit::Unstated),
+            ("TC1 Typ (K)", "TC1 Typ (K)", Unit::Unstated),
+            ("Temp 1 (deg C)", "Temp 1", Unit::Celsius),
+            ("Gas T (C) fine", "Gas T fine", Unit::Celsius),
+            ("T090C [ITS-90, deg C]", "T090C", Unit::Celsius),
+            ("depth [mm]", "depth", Unit::Other("mm".to_owned())),
+            ("time [seconds since 2020-01-01]", "time", second),
+            ("millis()", "millis", ms.clone()),
+            ("day", "day", Unit::Unstated),
         ];
         for (header, name, unit) in cases {
             assert_eq!(Unit::split_header(header), (name.to_owned(), unit), "{header}");

@@ -130,3 +130,150 @@ fn two_columns_of_one_name_are_chosen_by_number_alone() {
     let chosen = Selection { t1: number(3), t2: number(2), ..Selection::default() };
     assert_eq!(Record::from_table(&table, &chosen).expect("a record").t1_c[1], 20.5);
 }
+
+/// The channels as they are named, and what the second row reads, which shows the unit that was
+/// taken: the cells are 20 and 21, then 293.15 and 294.15 where the header says kelvin.
+#[test]
+fn headers_as_people_write_them_are_two_sensors() {
+    let pairs = [
+        ["Thin", "Thick"],
+        ["Thin wire (0.5 mm)", "Thick wire (1.2 mm)"],
+        ["Fast (50 um)", "Slow (250 um)"],
+        ["T1 (type K)", "T2 (type K)"],
+        ["TC1 [K-type]", "TC2 [K-type]"],
+        ["TC1 type K", "TC2 type K"],
+        ["Temp 1 (deg C)", "Temp 2 (deg C)"],
+        ["Gas T (C) fine", "Gas T (C) coarse"],
+        ["T090C [ITS-90, deg C]", "T190C [ITS-90, deg C]"],
+        ["T1 (0.5 mm) [°C]", "T2 (1.2 mm) [°C]"],
+        ["front", "back"],
+    ];
+    for pair in pairs {
+        let got = record([ramp("Time", 0.0, 0.5), ramp(pair[0], 20.0, 1.0), ramp(pair[1], 20.0, 0.5)]);
+        let got = got.unwrap_or_else(|error| panic!("{pair:?}: {error}"));
+        assert_eq!((got.t1_c[1], got.t2_c[1]), (21.0, 20.5), "{pair:?}: {:?}", got.channels);
+        let got = record([
+            ramp("Record", 1.0, 1.0),
+            ramp("Time", 0.0, 0.5),
+            ramp(pair[0], 20.0, 1.0),
+            ramp(pair[1], 20.0, 0.5),
+        ]);
+        assert!(got.is_ok(), "with a row number, {pair:?}: {}", got.expect_err("an error"));
+    }
+    let kelvin =
+        record([ramp("Time", 0.0, 0.5), ramp("T1 (0.5 mm) [K]", 293.15, 1.0), ramp("T2 [K] (fine)", 293.15, 0.5)]);
+    // 293.15 - 273.15 is off by as much as doubles near 300 lie apart.
+    assert!((kelvin.expect("a record").t1_c[1] - 21.0).abs() < 300.0 * f64::EPSILON);
+}
+
+/// Slopes differ, so that the channels do.
+#[test]
+fn kelvins_that_may_be_none_are_asked_about() {
+    let notes = |first: (&str, f64), second: (&str, f64)| {
+        let columns = [ramp("Time", 0.0, 0.5), ramp(first.0, first.1, 1.0), ramp(second.0, second.1, 0.5)];
+        let notes = record(columns).expect("a record").notes;
+        notes.iter().map(ToString::to_string).filter(|note| note.contains(": if ")).collect::<Vec<_>>()
+    };
+    let mixed = notes(("T1", 293.15), ("T2", 20.0));
+    assert_eq!(mixed.len(), 1, "{mixed:?}");
+    // The median of the differences is that of row 6: 273.15 + 0.5 × 6.
+    assert!(mixed[0].starts_with("column 2 'T1' reads 276 K more than column 3 'T2', about 273.15 K"), "{mixed:?}");
+    let types = notes(("T1 (K)", 20.0), ("T2 (K)", 20.0));
+    assert!(
+        types.len() == 2 && types[0].contains("column 2 'T1 (K)' is in K by its header and reads 26 K"),
+        "{types:?}"
+    );
+    for pair in [("T1 [K]", "T2 [K]"), ("T1", "T2")] {
+        assert!(notes((pair.0, 293.15), (pair.1, 293.15)).is_empty());
+    }
+    // Not in the same gas, and not the distance of the scales.
+    assert!(notes(("T1", 420.0), ("T2", 120.0)).is_empty());
+}
+
+fn timed(name: &str, first: f64, step: f64) -> Result<Record, RecordError> {
+    record([ramp(name, first, step), ramp("T1", 20.0, 1.0), ramp("T2", 20.0, 0.5)])
+}
+
+fn note_of(record: &Record, word: &str) -> String {
+    record.notes.iter().map(ToString::to_string).find(|note| note.contains(word)).unwrap_or_default()
+}
+
+/// A quarter of a second in each way to count. The stamps are off by as much as doubles of their size
+/// are, which the tolerances are: 256 ns, and two units of serial days.
+#[test]
+fn time_that_is_not_in_seconds_is_converted_and_said() {
+    let day_s = 86_400.0;
+    for (name, first, unit_s, tolerance_s, says) in [
+        ("time", 1_769_853_600e3, 1e-3, 0.0, "milliseconds since 1970, 0.25 s from row to row"),
+        ("time", 1_769_853_600e6, 1e-6, 0.0, "microseconds since 1970"),
+        ("timestamp", 1_769_853_600e9, 1e-9, 2.56e-7, "nanoseconds since 1970"),
+        ("time", 46_053.416_67, day_s, 2.0 * 6.3e-7, "serial days of a spreadsheet, 0.25 s from row to row"),
+        ("time", 740_012.416_67, day_s, 2.0 * 1.1e-5, "serial days of MATLAB"),
+        ("time", 2_461_071.916_67, day_s, 2.0 * 4.1e-5, "Julian days"),
+    ] {
+        let got = timed(name, first, 0.25 / unit_s).unwrap_or_else(|error| panic!("{says}: {error}"));
+        for (k, t) in got.time_s.iter().enumerate() {
+            assert!((t - 0.25 * k as f64).abs() <= tolerance_s, "{says}, row {k}: {t}, tolerance {tolerance_s:e}");
+        }
+        assert_eq!(got.sampling.kind, SamplingKind::Uniform);
+        let note = note_of(&got, "size and the step");
+        assert!(note.contains(says) && note.contains("choose its unit, or write it in the header"), "{note}");
+    }
+}
+
+/// A unit in the header decides, and the caller's decides before that.
+#[test]
+fn a_stated_unit_of_time_decides() {
+    for (name, want_s) in
+        [("time [s]", 0.25), ("time_ms", 0.25e-3), ("millis", 0.25e-3), ("time [ns]", 0.25e-9), ("time [h]", 900.0)]
+    {
+        // An instant in milliseconds, were nothing said.
+        let got = timed(name, 1_769_853_600e3, 0.25).expect("a record");
+        assert!((got.time_s[1] - want_s).abs() <= f64::EPSILON * want_s, "{name}: {}", got.time_s[1]);
+        assert_eq!(note_of(&got, "size and the step"), "");
+    }
+    let minutes = Selection { time_unit: Some(Unit::parse("min")), ..Selection::default() };
+    let columns = [ramp("time [ms]", 0.0, 0.25), ramp("T1", 20.0, 1.0), ramp("T2", 20.0, 0.5)];
+    let got = Record::from_table(&table(columns.clone()), &minutes).expect("a record");
+    assert_eq!(got.time_s[1], 15.0);
+    assert!(note_of(&got, "as chosen").contains("'time [ms]' was taken to be in min"), "{:?}", got.notes);
+    let kelvin = Selection { time_unit: Some(Unit::Kelvin), ..Selection::default() };
+    let error = Record::from_table(&table(columns), &kelvin).expect_err("not a time");
+    assert!(matches!(&error, RecordError::NotATimeUnit { unit, .. } if unit == "K"), "{error}");
+}
+
+/// As before, and with a question where the numbers may count something else.
+#[test]
+fn numbers_that_may_be_seconds_stay_seconds_and_are_asked_about() {
+    for (first, step, unit) in [(0.0, 10.0, "[ms]"), (45_296.5, 1.0 / 24.0, "[d]")] {
+        let got = timed("time", first, step).expect("a record");
+        assert!((got.time_s[1] - step).abs() < 1e-11, "{}", got.time_s[1]); // as doubles near 45 296 are
+        let note = note_of(&got, "really in s?");
+        assert!(note.contains(unit) && note.contains("choose its unit"), "{note}");
+    }
+    for (first, step) in [(0.0, 1.0), (0.0, 0.01), (45_296.5, 0.01), (1_769_853_600.0, 10.0)] {
+        let got = timed("time", first, step).expect("a record");
+        assert_eq!(note_of(&got, "really in s?"), "", "{first}, {step}");
+    }
+    for (first, step) in [(0.0, 1e6), (1.8e12, 1e6)] {
+        let error = timed("time", first, step).expect_err("no clock").to_string();
+        assert!(error.contains("steps of 1000000") && error.contains("choose the unit"), "{error}");
+    }
+}
+
+/// 1 kHz in Julian days, which are to 4e-5 s: even to the last bit of the stamps.
+#[test]
+fn serial_days_of_a_fast_logger_are_even_to_their_last_bit() {
+    let day_s = 86_400.0;
+    let days: Vec<f64> = (0..3000).map(|k| 2_461_071.916_67 + 1e-3 * f64::from(k) / day_s).collect();
+    let channel = |slope: f64| (0..3000).map(|k| 20.0 + slope * f64::from(k % 50)).collect::<Vec<_>>();
+    let columns = [
+        NamedColumn::numbers("time [d]", days),
+        NamedColumn::numbers("T1", channel(1.0)),
+        NamedColumn::numbers("T2", channel(0.5)),
+    ];
+    let got = record(columns).expect("a record");
+    assert_eq!(got.sampling.kind, SamplingKind::Rounded, "{:?}", got.sampling);
+    // Errors of up to a unit turn the slope by 3 q/n at most.
+    assert!((got.sampling.period_s - 1e-3).abs() < 3.0 * 4.1e-5 / 3000.0, "{:?}", got.sampling);
+}

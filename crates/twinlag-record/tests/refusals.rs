@@ -101,16 +101,67 @@ fn time_must_increase() {
 fn which_columns_are_the_sensors_must_be_clear() {
     for header in ["time_s,a_C,b_C,c_C", "time_s,chamber_C,dut_C,ref_C"] {
         let text = rows(header, |_, t, a, b| format!("{t},{a},{b},{}", a + b));
-        assert_says(&refusal(&text), &["exactly two", "choose both", "1 'time_s'", "_C'"]);
+        assert_says(
+            &refusal(&text),
+            &["which columns are the two sensors is not clear", "choose both", "1 'time_s'", "_C'"],
+        );
     }
     let text = rows("time_s,T1,x", |_, t, a, b| format!("{t},{a},{b}"));
-    assert_says(&refusal(&text), &["found 1", "2 'T1'", "3 'x'"]);
+    assert_says(&refusal(&text), &["only column 2 'T1' has", "for example 2 and 3", "3 'x'"]);
     let with = |t1, t2| Selection { t1: pick(t1), t2: pick(t2), ..Selection::default() };
     assert_says(&refusal_with(plain().as_bytes(), &with("T9", "T2")), &["'T9'", "2 'T1'", "by name or number"]);
     assert_says(&refusal_with(plain().as_bytes(), &with("7", "T2")), &["'7'"]);
     assert_says(&refusal_with(plain().as_bytes(), &with("T2", "3")), &["3 'T2'", "twice"]);
     let text = rows("time_s,T,T", |_, t, a, b| format!("{t},{a},{b}"));
     assert_says(&refusal_with(text.as_bytes(), &with("T", "3")), &["[2, 3]", "by number"]);
+}
+
+/// Two columns beside the time are the sensors unless something says that one is none.
+#[test]
+fn two_columns_that_may_be_something_else_are_not_taken_for_sensors() {
+    for (header, says) in [
+        ("Time,Thin,Thick,Battery", "not clear: no column has"),
+        ("Time,Thin,Pressure", "not clear: no column has"),
+        ("Time,Thin,Ambient", "not clear: no column has"),
+        ("Time,Thin [V],Thick", "not clear: no column has"),
+        ("Time,Thin [V],Thick [V]", "column 2 'Thin [V]' is in 'V'"),
+    ] {
+        let four = header.matches(',').count() == 3;
+        let text = rows(header, |_, t, a, b| format!("{t},{a},{b}{}", if four { ",12" } else { "" }));
+        assert_says(&refusal(&text), &[says]);
+    }
+    let text = rows("Time,Thin,Thick", |_, t, a, _| format!("{t},{a},"));
+    assert_says(&refusal(&text), &["column 3 'Thick' has no value"]);
+}
+
+/// Failed: "expected exactly two columns, found 2".
+#[test]
+fn several_candidates_are_listed_with_numbers_and_an_example() {
+    let text = rows("Time,TC1,TC2,TC3,TC4", |_, t, a, b| format!("{t},{a},{b},{a},{b}"));
+    let want = [
+        "4 columns have the name or the unit of a temperature (2 'TC1', 3 'TC2', 4 'TC3', 5 'TC4')",
+        "for example 2 and 3",
+    ];
+    assert_says(&refusal(&text), &want);
+    let text = rows("time_s,chamber_C,dut_C,x", |_, t, a, b| format!("{t},{a},{b},{a}"));
+    let want = ["2 columns have", "and 2 'chamber_C' may be that of the surroundings", "for example 3 and 4"];
+    assert_says(&refusal(&text), &want);
+    let text = rows("Time,TC1,TC2,TC3", |_, t, a, b| format!("{t},{a},{b},{a}"));
+    let one = Selection { t1: pick("TC2"), ..Selection::default() };
+    let want = ["beside column 3 'TC2', 2 columns have", "(2 'TC1', 4 'TC3')", "for example 2;"];
+    assert_says(&refusal_with(text.as_bytes(), &one), &want);
+}
+
+#[test]
+fn a_period_that_no_logger_has_is_refused() {
+    let text = rows("T1,T2", |_, _, a, b| format!("{a},{b}"));
+    for (period_s, shown) in
+        [(1e-300, "1e-300"), (0.0, "0"), (f64::NAN, "NaN"), (4e7, "40000000"), (f64::INFINITY, "inf")]
+    {
+        let selection = Selection { period_s: Some(period_s), ..Selection::default() };
+        let want = ["from a nanosecond to a year", &format!("got {shown} s"), "in seconds"];
+        assert_says(&refusal_with(text.as_bytes(), &selection), &want);
+    }
 }
 
 #[test]
@@ -128,7 +179,7 @@ fn what_is_no_temperature_or_time_by_its_unit_is_refused() {
     assert_says(&refusal(&text), &["column 2 'fast [V]' is in 'V', expected a temperature"]);
     // Columns without unit may be the sensors: the depth is not to blame.
     let text = rows("time_s,depth [m],fast,slow", |_, t, a, b| format!("{t},1,{a},{b}"));
-    assert_says(&refusal(&text), &["exactly two", "found 0", "3 'fast'"]);
+    assert_says(&refusal(&text), &["not clear: no column has", "for example 3 and 4", "3 'fast'"]);
     let text = rows("x [m],T1,T2", |_, t, a, b| format!("{t},{a},{b}"));
     let selection = Selection { time: pick("x"), ..Selection::default() };
     assert_says(&refusal_with(text.as_bytes(), &selection), &["1 'x [m]'", "'m'", "time [s]"]);
@@ -204,7 +255,7 @@ fn a_reference_that_is_also_a_sensor_or_the_time_is_refused() {
     assert!(record_with(text.as_bytes(), &with(None, "Tref")).is_ok());
     // A guess keeps off the reference: what it lacks then is a sensor.
     let text = rows("time_s,T1,trusted_C", |_, t, a, b| format!("{t},{a},{b}"));
-    assert_says(&refusal_with(text.as_bytes(), &with(None, "trusted_C")), &["exactly two", "found 1"]);
+    assert_says(&refusal_with(text.as_bytes(), &with(None, "trusted_C")), &["not clear: only column 2 'T1' has"]);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! That further lines are read as the first ones were, and that a bad one is named and harms no other.
 
-use twinlag_record::{Place, RecordError, Row, RowReader, Selection, Table};
+use twinlag_record::{Place, RecordError, Row, RowReader, Selection, Table, Unit};
 
 const START: &str = "\
 Zeit [ms];T1 [°C];Sonde;T2 [K]
@@ -36,4 +36,18 @@ fn bad_lines_are_named() {
     assert!(matches!(error("104;warm;c;293,65"), RecordError::NotANumber { at: Place::Line(7), .. }));
     assert!(matches!(error("104;21,0;c;-5,0"), RecordError::OutOfRange { .. }));
     assert!(matches!(error("104;\"21,0;c;293,65"), RecordError::OpenQuote { line: 7, .. }));
+}
+
+/// Failed: an epoch in milliseconds without a unit was taken to be in seconds here, whatever the
+/// record made of it.
+#[test]
+fn the_unit_of_time_is_that_of_the_first_lines() {
+    let start = "time,T1,T2\n1769853600000,20,20\n1769853600010,20,20\n1769853600020,20,20\n";
+    let table = Table::read(start.as_bytes(), "pipe").expect("a table");
+    let reader = RowReader::after(&table, &Selection::default()).expect("clear columns");
+    let row = reader.read("1769853600030,21,20\n", 5).expect("a good line").expect("a row");
+    assert_eq!(row.time_s, Some(0.03));
+    let seconds = Selection { time_unit: Some(Unit::parse("s")), ..Selection::default() };
+    let row = RowReader::after(&table, &seconds).expect("clear columns").read("1769853600030,21,20\n", 5);
+    assert_eq!(row.expect("a good line").expect("a row").time_s, Some(30.0));
 }

@@ -46,7 +46,7 @@ pub struct Options {
     pub free_offset: bool,
     /// Which sensors have a second lag that is fitted.
     pub second_order: [bool; 2],
-    /// What is known beforehand.
+    /// What is known beforehand; in a settings file either as text, `"T1=0.5s+-20%"`, or as fields.
     pub known: Vec<Known>,
     /// Samples left out at the start of each unbroken stretch by the published family; by default
     /// ten times the longest time constant of the whitened estimate.
@@ -123,6 +123,24 @@ impl Options {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A settings file may hold known values as text; written out they are fields, and both are one.
+    #[test]
+    fn known_values_make_the_round_trip_through_a_settings_file() {
+        let text: Options = toml::from_str("known = [\"T1=500ms+-20%\", \"T2.gain=0.99\"]").expect("well formed");
+        let want = ["T1.time_constant_s=0.5+-0.1", "T2.gain=0.99"].map(|text| text.parse().expect("well formed"));
+        assert_eq!(text.known, want);
+        let written = toml::to_string(&text).expect("plain numbers");
+        assert!(written.contains("parameter = \"tau1\"") && written.contains("value = 0.5"), "{written}");
+        assert_eq!(toml::from_str::<Options>(&written), Ok(text));
+        for (bad, want) in [
+            ("[\"T1=0.5K\"]", "expected a time in s, ms, us or min"),
+            ("[{ parameter = \"tau1\", value = -1.0 }]", "expected a positive time constant, got \"-1\""),
+        ] {
+            let error = toml::from_str::<Options>(&format!("known = {bad}")).expect_err("refused").to_string();
+            assert!(error.contains(want), "found {error}, expected {want}");
+        }
+    }
 
     #[test]
     fn nonsense_is_refused() {

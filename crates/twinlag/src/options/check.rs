@@ -109,8 +109,7 @@ impl Options {
     /// Whether each parameter is known once, and not fitted besides.
     fn check_known(&self) -> Result<(), Error> {
         for (i, known) in self.known.iter().enumerate() {
-            let name = Known::NAMES[Parameter::ALL.iter().position(|p| *p == known.parameter).unwrap_or(0)];
-            let got = format!("{name}={}", known.value);
+            let got = known.to_string();
             if self.known[..i].iter().any(|k| k.parameter == known.parameter) {
                 return wrong(Setting::Known, "each parameter once", got, &[]);
             }
