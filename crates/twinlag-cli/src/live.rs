@@ -67,7 +67,8 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
         };
         let answer = live.push(time_s, reading_c);
         if answer.is_none() {
-            let [before, now] = [last_s, time_s.unwrap_or(last_s)].map(|s| print::digits(s, 9));
+            // To the nanosecond: the last bits are of the conversion to seconds.
+            let [before, now] = [last_s, time_s.unwrap_or(last_s)].map(|s| (s * 1e9).round() / 1e9);
             bad.say(
                 &format!(
                     "{source}: line {number}: expected a time shortly after that of the previous row, {before} s from the \
