@@ -5,6 +5,10 @@ use crate::RecordError;
 use crate::clock;
 use crate::column::{Column, Kind};
 use crate::error::Candidates;
+use crate::names::{
+    OTHER_QUANTITIES, SURROUNDINGS, TEMPERATURE, first_word, has, is_apart, is_called_temperature, is_index,
+    is_temperature, is_time,
+};
 use crate::note::Note;
 use crate::selection::{Selection, Setting};
 use crate::table::Table;
@@ -21,173 +25,10 @@ pub(crate) struct Chosen {
     pub(crate) flow: Option<usize>,
 }
 
-const TIME: [&str; 17] = [
-    "time",
-    "zeit",
-    "timestamp",
-    "datetime",
-    "date",
-    "datum",
-    "elapsed",
-    "uhrzeit",
-    "zeitstempel",
-    "uptime",
-    "seconds",
-    "sec",
-    "clock",
-    "datumzeit",
-    "systime",
-    "millis",
-    "epoch",
-];
-const INDEX: [&str; 14] = [
-    "sample", "samples", "no", "nr", "number", "record", "rn", "count", "counter", "index", "scan", "row", "id",
-    "messung",
-];
-const TEMPERATURE: [&str; 20] = [
-    "t",
-    "tc",
-    "temp",
-    "temperature",
-    "temperatur",
-    "thermocouple",
-    "thermo",
-    "te",
-    "thermoelement",
-    "pt",
-    "rtd",
-    "ntc",
-    "sensor",
-    "probe",
-    "ch",
-    "channel",
-    "kanal",
-    "fühler",
-    "tcouple",
-    "therm",
-];
-/// Never T1 or T2, whatever else is there.
-const APART: [&str; 15] = [
-    "ref",
-    "tref",
-    "reference",
-    "referenz",
-    "true",
-    "truth",
-    "ttrue",
-    "set",
-    "setpoint",
-    "sp",
-    "tset",
-    "soll",
-    "sollwert",
-    "target",
-    "setpt",
-];
-/// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
-const GAS: [&str; 2] = ["gas", "tgas"];
-/// Perhaps a sensor, perhaps its surroundings: only the caller knows.
-const SURROUNDINGS: [&str; 16] = [
-    "chamber", "ambient", "room", "bath", "oven", "furnace", "block", "housing", "case", "board", "cjc", "junction",
-    "internal", "raum", "kammer", "ofen",
-];
-
-/// Other quantities that are often written without their unit.
-const OTHER_QUANTITIES: [&str; 40] = [
-    "pressure",
-    "depth",
-    "altitude",
-    "height",
-    "flow",
-    "velocity",
-    "speed",
-    "humidity",
-    "rh",
-    "rpm",
-    "voltage",
-    "volt",
-    "volts",
-    "vbat",
-    "battery",
-    "current",
-    "power",
-    "level",
-    "angle",
-    "position",
-    "torque",
-    "load",
-    "force",
-    "mass",
-    "weight",
-    "lat",
-    "latitude",
-    "lon",
-    "longitude",
-    "salinity",
-    "conductivity",
-    "density",
-    "oxygen",
-    "light",
-    "resistance",
-    "strain",
-    "status",
-    "state",
-    "flag",
-    "error",
-];
-
 /// Periods from row to row that may be given: no logger is faster than a nanosecond or slower than
 /// a year. What is beyond is a slip of the exponent.
 const SHORTEST_PERIOD_S: f64 = 1e-9;
 const LONGEST_PERIOD_S: f64 = 366.0 * 86_400.0;
-
-fn words(text: &str) -> impl Iterator<Item = String> {
-    text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase)
-}
-
-/// Whether a word of the name is in the list, with or without a number behind it.
-fn has(column: &Column, list: &[&str]) -> bool {
-    words(column.label()).any(|word| {
-        let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
-        list.contains(&word.as_str()) || list.contains(&bare)
-    })
-}
-
-fn is_index(column: &Column) -> bool {
-    has(column, &INDEX) && !column.unit().is_temperature() && !matches!(column.unit(), Unit::Time { .. })
-}
-
-fn is_time(column: &Column) -> bool {
-    let named = has(column, &TIME) || column.label() == "t";
-    match column.kind() {
-        Kind::Stamp => true,
-        Kind::Number => {
-            !column.unit().is_temperature()
-                && !has(column, &["constant"])
-                && (named || matches!(column.unit(), Unit::Time { .. }) && !column.label().starts_with('T'))
-        }
-        _ => false,
-    }
-}
-
-/// Whether name and unit, whatever the cells hold, are those of a temperature.
-fn is_called_temperature(column: &Column) -> bool {
-    column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE))
-}
-
-fn is_temperature(column: &Column) -> bool {
-    column.kind() == Kind::Number && is_called_temperature(column)
-}
-
-/// Whether it is no sensor by its name: a reference, a setpoint, the one column of the gas.
-fn is_apart(column: &Column, columns: &[Column]) -> bool {
-    let of_gas = |column: &&Column| is_called_temperature(column) && has(column, &GAS) && !has(column, &APART);
-    has(column, &APART) || (has(column, &GAS) && columns.iter().filter(of_gas).count() < 2)
-}
-
-fn first_word(column: &Column) -> String {
-    words(column.label()).next().unwrap_or_default()
-}
 
 /// Makes the choice, and notes what was guessed.
 ///

@@ -45,6 +45,7 @@ mod error;
 mod from_columns;
 mod grid;
 mod layout;
+mod names;
 mod note;
 mod number;
 mod record;

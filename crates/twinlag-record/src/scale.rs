@@ -40,7 +40,7 @@ pub(crate) struct Counter {
 /// Records that are analysed here are of this time: from 1990 to 2100, in seconds since 1970.
 const EPOCH_S: [f64; 2] = [631_152_000.0, 4_102_444_800.0];
 const DAY_S: f64 = 86_400.0;
-/// The same years in days. The first are those of spreadsheets (since 1899-12-30, from 32 874) or modified
+/// Serial days from 1990 to 2100. The first range is those of spreadsheets (since 1899-12-30, from 32 874) or modified
 /// Julian days (since 1858-11-17, to 88 069).
 const DAY_COUNTS: [([f64; 2], &str); 3] = [
     ([32_874.0, 88_069.0], "serial days of a spreadsheet"),
