@@ -1,6 +1,7 @@
 //! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
 
 mod coverage;
+mod grades;
 mod loops;
 mod pair;
 mod policy;

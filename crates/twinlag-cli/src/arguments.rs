@@ -135,7 +135,7 @@ pub(crate) struct Diagnose {
 /// Reconstruct the gas temperature of a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The output has the columns time_s, gas_C and gas_std_K, with a row for every sample and, on an even grid, for every missing
+The output has the columns time_s, gas_C and gas_std_K (with --best-effort also the grade), with a row for every sample and, on an even grid, for every missing
 one. The standard deviation covers the noise, the high frequencies that the readings do not determine, and the uncertainty
 of the model's parameters.
 
@@ -377,6 +377,12 @@ pub(crate) struct Method {
     /// Seed of the bootstrap [default: 1].
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Also print numbers that are graded no-go, each marked as such: they may be far off.
+    #[arg(long, help_heading = "Grades")]
+    best_effort: bool,
+    /// Exit with 4 also where a number is right only under a condition.
+    #[arg(long, help_heading = "Grades")]
+    pub(crate) strict: bool,
 }
 
 fn optimisers() -> String {
@@ -422,10 +428,16 @@ impl Method {
             known: self.known.clone(),
             discard: self.discard,
             intervals: self.intervals()?,
+            best_effort: self.best_effort,
             ..Options::default()
         };
         let options = options.free(self.free.as_deref().unwrap_or(""))?;
         Ok(options.second_order(self.second_order.as_deref().unwrap_or(""))?)
+    }
+
+    /// Whether numbers are printed that may not be used.
+    pub(crate) fn best_effort(&self) -> bool {
+        self.best_effort
     }
 
     fn intervals(&self) -> Result<Intervals, Failure> {

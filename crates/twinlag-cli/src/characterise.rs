@@ -10,6 +10,7 @@ use twinlag::{Characterisation, Model, Options, Status};
 use crate::arguments::Characterise;
 use crate::console::Console;
 use crate::failure::{Failure, explained};
+use crate::grades;
 use crate::print;
 use crate::progress::Progress;
 
@@ -32,7 +33,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
         None => characterise(&record, &options, console)?,
     };
     print::characterisation(&answer, console)?;
-    Ok(exit_code(answer.status))
+    Ok(exit_code(&answer, command.input.method.strict))
 }
 
 pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
@@ -53,9 +54,10 @@ pub(crate) fn characterise(record: &Record, options: &Options, console: Console)
     answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// The exit code: 0 for an answer, 4 if the data were read but do not give one.
-pub(crate) fn exit_code(status: Status) -> u8 {
-    if status == Status::Ok { 0 } else { 4 }
+/// The exit code of a characterisation: it is asked for both time constants.
+fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
+    let asked = [0, 1].map(|i| answer.sensors[i].judgement.grade);
+    if answer.status == Status::Ok { grades::exit_code(&asked, &[], false, strict) } else { 4 }
 }
 
 pub(crate) fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {

@@ -1,5 +1,6 @@
 //! `twinlag compensate FILE --out OUT.csv`: the gas temperature with its standard deviation.
 
+use twinlag::diagnosis::Verdict;
 use twinlag::record::{Decimals, write_csv};
 use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 
@@ -7,6 +8,7 @@ use crate::arguments::{Compensate, Trust};
 use crate::characterise::{model, read};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::grades;
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
@@ -36,6 +38,9 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
             [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+        if command.input.method.best_effort() {
+            text = output::with_column(&text, "grade", &answer.judgement.grade.to_string());
+        }
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
@@ -46,5 +51,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
         output::write(path, report)?;
     }
     print::compensation(&answer, &command.out, to_stdout, console)?;
-    Ok(if answer.status == Status::Ok { 0 } else { 4 })
+    let is_partial = matches!(answer.verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained));
+    let code = grades::exit_code(&[answer.judgement.grade], &[], is_partial, command.input.method.strict);
+    Ok(if answer.status == Status::Ok { code } else { 4 })
 }

@@ -48,5 +48,5 @@ pub(crate) fn run(command: &Demo, console: Console) -> Result<u8, Failure> {
             }
         }
     }
-    Ok(exit_code(&answer))
+    Ok(exit_code(&answer, false))
 }

@@ -1,5 +1,6 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
+use twinlag::diagnosis::{Grade, Verdict};
 use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis, Status};
 use twinlag_pages::diagnosis_report;
@@ -8,6 +9,7 @@ use crate::arguments::Diagnose;
 use crate::characterise::read;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::grades;
 use crate::output;
 use crate::print;
 use crate::progress::Progress;
@@ -33,7 +35,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         output::write(path, &diagnosis_report(&record, &answer, &output::command_line())?)?;
     }
     print::diagnosis(&answer, console)?;
-    Ok(exit_code(&answer))
+    Ok(exit_code(&answer, command.input.method.strict))
 }
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
@@ -42,7 +44,13 @@ pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Cons
     answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// The exit code: 0 for an answer, 4 if the record was refused, or does not determine both time constants.
-pub(crate) fn exit_code(answer: &Diagnosis) -> u8 {
-    u8::from(answer.last.status == Status::NotIdentifiable) * 4
+/// The exit code of a diagnosis: it is asked for both time constants, and for what is missing.
+pub(crate) fn exit_code(answer: &Diagnosis, strict: bool) -> u8 {
+    if answer.last.status == Status::NotIdentifiable {
+        return 4;
+    }
+    let asked = [0, 1].map(|i| answer.last.sensors[i].judgement.grade);
+    let others: Vec<Grade> = answer.grades().collect();
+    let is_partial = matches!(answer.verdict, Verdict::PartlyExplained | Verdict::Unexplained);
+    grades::exit_code(&asked, &others, is_partial, strict)
 }

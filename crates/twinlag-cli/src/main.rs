@@ -14,6 +14,7 @@ mod console;
 mod demo;
 mod diagnose;
 mod failure;
+mod grades;
 mod live;
 mod output;
 mod print;

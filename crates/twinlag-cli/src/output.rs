@@ -81,6 +81,13 @@ pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failu
     write(out, text)
 }
 
+/// A table of numbers with one column more, the same in each row.
+pub(crate) fn with_column(text: &[u8], name: &str, value: &str) -> Vec<u8> {
+    let text = String::from_utf8_lossy(text);
+    let rows = text.lines().enumerate().map(|(k, row)| format!("{row},{}\n", if k == 0 { name } else { value }));
+    rows.collect::<String>().into_bytes()
+}
+
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
 }

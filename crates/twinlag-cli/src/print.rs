@@ -15,6 +15,7 @@ use twinlag_pages::parameter_in_words;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::grades::graded;
 use crate::settings::usage;
 
 /// Prints exactly one JSON object on standard output.
@@ -70,19 +71,12 @@ fn text(answer: &Characterisation) -> String {
         let (how, [least, most]) = if high < 0.0 { ("faster", [-high, -low]) } else { ("slower", [low, high]) };
         lines.push(format!("  {a} {how} than {b} by {} to {} s", digits(least, 3), digits(most, 3)));
     }
-    if let Some(value) = difference.value {
-        let (how, size) = if value < 0.0 { ("faster", -value) } else { ("slower", value) };
-        let by = match difference.interval_95_s {
-            Some([low, high]) if value < 0.0 => interval(size, -high, -low, " s"),
-            Some([low, high]) => interval(size, low, high, " s"),
-            None => format!("{} s", digits(size, 4)),
-        };
-        lines.push(format!("  {a} {how} than {b} by {by}"));
-    }
+    lines.extend(difference_line(answer));
     for (name, estimate, unit) in [("gain", &answer.free.gain, ""), ("offset at 0 °C", &answer.free.offset_k, " K")] {
         if let Some(e) = estimate {
             let channel = &answer.sensors[1].channel;
-            lines.push(format!("  {channel}: {name} {}", interval(e.value, e.interval_95[0], e.interval_95[1], unit)));
+            let number = interval(e.value, e.interval_95[0], e.interval_95[1], unit);
+            lines.push(format!("  {channel}: {name} {}", graded(Some(number), &e.judgement)));
         }
     }
     lines.push(String::new());
@@ -117,6 +111,24 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// How much later channel 2 is, where that is given.
+fn difference_line(answer: &Characterisation) -> Option<String> {
+    let difference = &answer.time_constant_difference_s;
+    let value = difference.value?;
+    let [a, b] = [&answer.sensors[1].channel, &answer.sensors[0].channel];
+    let (how, size) = match (difference.includes_delay, value < 0.0) {
+        (true, true) => ("ahead of", -value),
+        (true, false) => ("later than", value),
+        (false, true) => ("faster than", -value),
+        (false, false) => ("slower than", value),
+    };
+    let [low, high] = difference.interval_95_s?;
+    let ends = if value < 0.0 { [-high, -low] } else { [low, high] };
+    let what = if difference.includes_delay { " in all, time constants and delay together" } else { "" };
+    let number = interval(size, ends[0], ends[1], " s");
+    Some(format!("  {a} {how} {b} by {}{what}", graded(Some(number), &difference.judgement)))
 }
 
 /// Prints a diagnosis, as text or as JSON.
@@ -156,7 +168,8 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     }
     if let Some(gas) = &answer.gas {
         lines.push(String::new());
-        lines.push(format!("gas temperature written to {}: {} samples", out.display(), answer.gas_c.len()));
+        let written = format!("written to {}, {} samples", out.display(), answer.gas_c.len());
+        lines.push(format!("gas temperature: {}", graded(Some(written), &answer.judgement)));
         lines.push(format!("  standard deviation {} K (median)", digits(gas.median_std_k, 3)));
         lines.push(format!(
             "  of which {} K from the uncertainty of the model's parameters",
@@ -241,9 +254,15 @@ fn about(text: &str, to_stdout: bool, console: Console) -> Result<(), Failure> {
 
 fn diagnosis_text(answer: &Diagnosis) -> String {
     let record = &answer.base.record;
-    let mut lines =
-        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
-    lines.push(format!("verdict: {}", verdict(answer.verdict)));
+    let mut lines = vec![
+        format!("verdict: {}", verdict_of(answer)),
+        format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)),
+        String::new(),
+    ];
+    for sensor in &answer.last.sensors {
+        lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
+    }
+    lines.extend(difference_line(&answer.last));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
     lines.push(String::new());
@@ -270,11 +289,11 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     }
     for p in effect.parameters.iter().take(MAX_PARAMETERS) {
         let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-        let number = match p.interval_95 {
-            Some([low, high]) => interval(p.value, low, high, &unit),
-            None => format!("{}{unit}", digits(p.value, 4)),
-        };
-        lines.push(format!("    {} {number}", parameter_in_words(&p.name)));
+        let number = p.value.map(|value| match p.interval_95 {
+            Some([low, high]) => interval(value, low, high, &unit),
+            None => format!("{}{unit}", digits(value, 4)),
+        });
+        lines.push(format!("    {} {}", parameter_in_words(&p.name), graded(number, &p.judgement)));
     }
     if effect.parameters.len() > MAX_PARAMETERS {
         lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
@@ -291,10 +310,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     }
     if !effect.alternatives.is_empty() {
         let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
-        let (names, own) = (names.join(", "), effect.effect);
-        lines.push(format!(
-            "    equally well explained by: {names}; the numbers above are right only if the cause is {own}"
-        ));
+        lines.push(format!("    equally well explained by: {}", names.join(", ")));
     }
     lines.push(format!("    at the rig: {}", about.advice));
     lines
@@ -308,14 +324,6 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     };
     row("", "two lags", "with effects");
     let number = |x: f64| digits(x, 4);
-    for i in 0..2 {
-        let tau =
-            |c: &Characterisation| c.sensors[i].time_constant_s.map_or("-".into(), |t| format!("{} s", digits(t, 5)));
-        row(&format!("time constant {}", answer.base.sensors[i].channel), &tau(&answer.base), &tau(&answer.last));
-        let interval =
-            |c: &Characterisation| c.sensors[i].interval_95_s.map_or("-".into(), |ends| format!("{} s", between(ends)));
-        row("  its 95 % interval", &interval(&answer.base), &interval(&answer.last));
-    }
     for i in 0..2 {
         let noise = |c: &Characterisation| format!("{} K", digits(c.sensors[i].noise_std_k, 3));
         row(&format!("noise {}", answer.base.sensors[i].channel), &noise(&answer.base), &noise(&answer.last));
@@ -341,6 +349,21 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
 /// Number of parameters of one effect that are printed.
 const MAX_PARAMETERS: usize = 4;
 
+/// The verdict, with how much is left over where it counts as complete all the same.
+fn verdict_of(answer: &Diagnosis) -> String {
+    match answer.explained_to.filter(|share| *share > 0.0) {
+        Some(share) => {
+            let name = if answer.verdict == Verdict::Adequate { "adequate" } else { "explained" };
+            let model = if answer.verdict == Verdict::Adequate { "two first-order lags" } else { "these effects" };
+            let percent = digits(100.0 * share, 2);
+            format!(
+                "{name} to {percent} %: beside noise {model} leave {percent} % of its energy, which intervals cover"
+            )
+        }
+        None => verdict(answer.verdict).into(),
+    }
+}
+
 fn verdict(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Adequate => "adequate: two first-order lags leave only noise in the residual",
@@ -365,16 +388,17 @@ fn status(status: Status) -> &'static str {
 }
 
 fn time_constant(sensor: &SensorEstimate) -> String {
-    match (sensor.time_constant_s, sensor.interval_95_s) {
-        (Some(value), Some([low, high])) => interval(value, low, high, " s"),
-        (Some(value), None) if sensor.known => format!("{} s (given)", digits(value, 5)),
-        _ => "not determined by this record".into(),
-    }
+    let number = match (sensor.time_constant_s, sensor.interval_95_s) {
+        (Some(value), Some([low, high])) => Some(interval(value, low, high, " s")),
+        (Some(value), None) if sensor.known => return format!("{} s (given)", digits(value, 5)),
+        _ => None,
+    };
+    graded(number, &sensor.judgement)
 }
 
 fn second_lag(lag: &SecondLag) -> String {
     match (lag.value, lag.interval_95) {
-        (Some(value), Some([low, high])) => interval(value, low, high, " s"),
+        (Some(value), Some([low, high])) => graded(Some(interval(value, low, high, " s")), &lag.judgement),
         (Some(value), None) => format!("{} s (given)", digits(value, 5)),
         (None, Some([0.0, high])) => format!("not detected, at most {} s", digits(high, 3)),
         (None, Some([low, high])) => format!("not determined, from {} to {} s", digits(low, 3), digits(high, 3)),
@@ -402,12 +426,7 @@ fn noise_source(from: NoiseSource) -> &'static str {
 
 fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
     let decimals = decimals_of([low, high]);
-    format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}]")
-}
-
-fn between([low, high]: [f64; 2]) -> String {
-    let decimals = decimals_of([low, high]);
-    format!("{low:.decimals$} to {high:.decimals$}")
+    format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}] (95 %)")
 }
 
 /// Decimals of the ends of an interval: two digits more than its width has.

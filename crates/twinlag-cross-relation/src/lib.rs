@@ -39,6 +39,7 @@ mod interval_95;
 mod inverse;
 mod noise_model;
 mod parameters;
+mod parts;
 mod polynomial;
 mod published;
 mod readings;
@@ -56,6 +57,7 @@ pub use inferred::{InferredInputs, inferred_inputs};
 pub use information::ScoreVariance;
 pub use interval_95::{CHI2_95, Z_975, log_normal_interval_95};
 pub use parameters::{CostValue, Parameter};
+pub use parts::{PartScatter, Scatter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
 pub use residual::{ResidualTest, TestName, residual_tests};
@@ -67,5 +69,5 @@ pub use whitened::{Form, Whitened};
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
     is_send_and_sync::<(CostError, CrossRelation<'static>, DifferenceEquationEstimator, FreeGains<'static>)>();
-    is_send_and_sync::<(InferredInputs, Readings, ResidualTest, Segment, Whitened<'static>)>();
+    is_send_and_sync::<(InferredInputs, PartScatter, Readings, ResidualTest, Scatter, Segment, Whitened<'static>)>();
 };

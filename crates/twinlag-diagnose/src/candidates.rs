@@ -269,6 +269,18 @@ impl<'a> Search<'a> {
         Ok(finished.into_iter().chain(noise.into_iter().map(|(_, c)| c)).collect())
     }
 
+    /// Candidates that turn phases, from a grid of time constants: with them the time constants may lie where no step
+    /// from `current` leads. None where the model is far off, since every candidate was fitted from there.
+    pub(crate) fn from_afar(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
+        if self.is_far_off(current) {
+            return Ok(Vec::new());
+        }
+        let mut all = self.candidates(&current.model);
+        all.retain(|c| c.about().turns_phases && !c.is_noise() && c.parameters().len() <= MOST_GRID_PARAMETERS);
+        let (excerpt, robust_before) = (self.prepared.excerpt(), self.robust(current));
+        self.each(&all, |effect| self.finished(current, &self.looked_at(current, effect, &excerpt), robust_before))
+    }
+
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
         let model = &looked.fitted.model;

@@ -1,16 +1,16 @@
 //! From the last state of the loop to the answer.
 
 use twinlag_cross_relation::TestName;
-use twinlag_model::{
-    Effort, Fitted, Identifier, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise,
-};
+use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise};
 
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
+use crate::grade::{Basis, Excess, Reason, excess};
+use crate::judge::Circumstances;
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
-use crate::moves::{Move, State};
-use crate::naming::{name, of_defect, widen};
+use crate::moves::{Move, State, Taken};
+use crate::naming::{Tie, judge_effect, name, of_defect, widen};
 use crate::remark::Remark;
 
 /// Most samples of a changing mean that stands for a filter where no spectrum says which
@@ -28,7 +28,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let limits = state.search().limits(&state.current)?;
     // Before is before everything: with the defects of the data in it.
     let unmasked = state.prepared.unmasked(&state.base);
-    let base = base_fit(&state, unmasked.as_ref(), policy);
+    let mut base = base_fit(&state, unmasked.as_ref(), policy);
     let with_effects = to_the_end(&state.current, &state);
     let mut last = summary(&with_effects, &state, policy);
     let mut remarks: Vec<Remark> = Vec::new();
@@ -37,10 +37,12 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
             remarks.push(remark);
         }
     }
-    remarks.extend(widen(&mut last, &whole_ties(&state), &state.prepared, policy));
-    let mut found: Vec<Found> = state.prepared.found.iter().map(of_defect).collect();
+    let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
+    remarks.extend(remark);
+    // Each with its place in the model, if it is in there.
+    let mut found: Vec<(Option<usize>, Found)> = state.prepared.found.iter().map(|d| (None, of_defect(d))).collect();
     let named = state.taken.iter().enumerate();
-    found.extend(named.map(|(index, taken)| name(index, taken, &with_effects, &last)));
+    found.extend(named.map(|(index, taken)| (Some(index), name(index, taken, &with_effects, &last))));
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
@@ -52,13 +54,42 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     }
     let is_coherent =
         last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
-    if is_coherent && found.iter().any(|f| f.effect.is_noise()) {
+    if is_coherent && found.iter().any(|(_, f)| f.effect.is_noise()) {
         // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the
         // same.
-        found.retain(|f| !f.effect.is_noise());
+        found.retain(|(_, f)| !f.effect.is_noise());
         remarks.push(Remark::ModelErrorAsNoise);
     }
-    let verdict = if is_refused { Verdict::Refused } else { verdict(&state, &found, left.as_ref(), policy) };
+    let has_noise = with_effects.model.noise().is_some();
+    let excess = excess(&last, has_noise).filter(|excess| excess.share <= policy.explained_excess_share);
+    let unbounded = left.as_ref().filter(|_| excess.is_none());
+    let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
+    let is_total_delay = remarks.contains(&Remark::LagAlone);
+    let basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
+    let span_s = state.prepared.observations.span_s();
+    let hidden = if matches!(verdict, Verdict::Adequate | Verdict::Explained) {
+        state.search().beside(&state.current).hidden(&state.current, half_intervals(&last))?
+    } else {
+        [None; 3]
+    };
+    let circumstances =
+        Circumstances { is_total_delay, causes, hidden, ..Circumstances::new(basis, &settings.known, span_s, policy) };
+    let judgements = circumstances.judge(&mut last);
+    let base_judgements = if verdict == Verdict::Adequate {
+        circumstances.judge(&mut base)
+    } else {
+        Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
+    };
+    let found: Vec<Found> = found
+        .into_iter()
+        .map(|(index, mut found)| {
+            if let Some(index) = index {
+                let scatter = &last.scatter[with_effects.model.range(index)];
+                judge_effect(&mut found, with_effects.model.effects[index].parameters(), scatter, &circumstances);
+            }
+            found
+        })
+        .collect();
     if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
         remarks.push(Remark::BiasUnknown);
     }
@@ -68,7 +99,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         error: errors(&state, unmasked.as_ref(), [&base, &last]),
         base,
         last,
-        unexplained: left.filter(|_| !is_refused),
+        unexplained: left.filter(|_| matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained)),
+        explained_to: excess.filter(|_| matches!(verdict, Verdict::Adequate | Verdict::Explained)).map(|e| e.share),
+        judgements,
+        base_judgements,
         not_testable: not_testable(&state.prepared.observations, tones, policy),
         limits,
         remarks,
@@ -101,21 +135,59 @@ fn base_fit(state: &State<'_>, unmasked: Option<&Fitted>, policy: &Policy) -> Mo
 
 /// Ties of the whole model: those of a time when less was known have been looked at again. None of
 /// them is noise.
-fn whole_ties<'a>(state: &'a State<'_>) -> Vec<(Identifier, &'a Fitted)> {
+fn whole_ties<'a>(state: &'a State<'_>) -> Vec<Tie<'a>> {
     let effects = state.current.model.effects.len();
-    let all = state.taken.iter().flat_map(|t| &t.ties);
-    let whole = all.filter(|t| !t.effect.is_noise() && t.fitted.model.effects.len() == effects);
-    whole.map(|t| (t.effect.identifier(), &t.fitted)).collect()
+    let of = |taken: &'a Taken| taken.ties.iter().map(move |t| (taken.candidate.effect.identifier(), t));
+    let whole = state
+        .taken
+        .iter()
+        .flat_map(of)
+        .filter(|(_, t)| !t.effect.is_noise() && t.fitted.model.effects.len() == effects);
+    whole.map(|(named, t)| Tie { named, other: t.effect.identifier(), fitted: &t.fitted }).collect()
+}
+
+/// Effects that are no noise.
+fn effects(state: &State<'_>) -> usize {
+    state.taken.iter().filter(|t| !t.candidate.effect.is_noise()).count()
+}
+
+/// Half the intervals of both time constants and of their difference, s.
+fn half_intervals(fit: &ModelFit) -> [Option<f64>; 3] {
+    let [one, two] = &fit.time_constants;
+    [one, two, &fit.difference].map(|number| number.interval_95_s.map(|[low, high]| 0.5 * (high - low)))
+}
+
+/// What all numbers of the model rest on.
+///
+/// - `excess`: what is left over beside the noise, where intervals can cover it
+/// - `is_bounded_otherwise`: whether a number holds without the rest of the model, or knowledge holds it
+fn basis(
+    state: &State<'_>,
+    verdict: Verdict,
+    excess: Option<Excess>,
+    is_bounded_otherwise: bool,
+    policy: &Policy,
+) -> Basis {
+    let mut basis = Basis::of(excess, is_bounded_otherwise, policy);
+    match verdict {
+        Verdict::Refused => basis.reasons = vec![Reason::Refused],
+        Verdict::PartlyExplained if excess.is_some() => {
+            basis.reasons.push(Reason::ManyEffects { count: effects(state) });
+        }
+        _ => {}
+    }
+    basis
 }
 
 /// Whether the effects that were found explain the record. Of more of them than can be
 /// distinguished together they imitate some other cause.
-fn verdict(state: &State<'_>, found: &[Found], left: Option<&Unexplained>, policy: &Policy) -> Verdict {
-    let effects = state.taken.iter().filter(|t| !t.candidate.effect.is_noise()).count();
-    match (found.is_empty(), left) {
+///
+/// - `left`: what is left over, where that is more than intervals can cover
+fn verdict(state: &State<'_>, is_nothing_found: bool, left: Option<&Unexplained>, policy: &Policy) -> Verdict {
+    match (is_nothing_found, left) {
         (true, None) => Verdict::Adequate,
         (true, Some(_)) => Verdict::Unexplained,
-        (false, None) if effects <= policy.most_distinguished_effects => Verdict::Explained,
+        (false, None) if effects(state) <= policy.most_distinguished_effects => Verdict::Explained,
         (false, _) => Verdict::PartlyExplained,
     }
 }

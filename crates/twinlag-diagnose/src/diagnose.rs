@@ -39,22 +39,30 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
 }
 
 /// The next move: an effect, reviewed with all others; where there is none, the noise; where that
-/// is right, the weights. Whether there was one.
+/// is right, the weights; then an effect with quite other time constants. Whether there was one.
 fn advance(state: &mut State<'_>, settings: &Settings) -> Result<bool, ModelError> {
+    let is_blind = |state: &State<'_>| {
+        settings.known.is_empty() && is_unresolved(&state.current, &state.prepared.observations, &settings.policy)
+    };
     if let Some(addition) = state.add()? {
         state.apply(addition);
-        let is_blind =
-            settings.known.is_empty() && is_unresolved(&state.current, &state.prepared.observations, &settings.policy);
         // What imitates a time constant that is not resolved can be refined at will.
-        if !is_blind || state.taken.last().is_some_and(|t| t.candidate.effect.is_noise()) {
+        if !is_blind(state) || state.taken.last().is_some_and(|t| t.candidate.effect.is_noise()) {
             review(state)?;
             return Ok(true);
         }
     }
-    let next = state.lower_noise().or_else(|| state.reweigh());
-    let has_moved = next.is_some();
-    next.into_iter().for_each(|proposal| state.apply(proposal));
-    Ok(has_moved)
+    if let Some(proposal) = state.lower_noise().or_else(|| state.reweigh()) {
+        state.apply(proposal);
+        return Ok(true);
+    }
+    if is_blind(state) {
+        return Ok(false);
+    }
+    let Some(addition) = state.add_from_afar()? else { return Ok(false) };
+    state.apply(addition);
+    review(state)?;
+    Ok(true)
 }
 
 /// Looks at every effect again, now that one more is known.

@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 use twinlag_model::{Identifier, ModelFit, Policy, Value};
 
 use crate::evidence::Evidence;
+use crate::grade::Judgement;
+use crate::judge::Judgements;
 use crate::moves::Move;
 use crate::remark::Remark;
 
@@ -24,19 +26,21 @@ pub enum Verdict {
     Refused,
 }
 
-/// An effect that was found; `Channel` is the place of a channel, 0 or 1, or its name.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// An effect that was found; channels are counted from 0.
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct Found<Channel = usize> {
+pub struct Found {
     /// The effect.
     pub effect: Identifier,
     /// Channel that has the effect; `None` if both have it, or if the record does not determine
     /// which.
-    pub channel: Option<Channel>,
+    pub channel: Option<usize>,
     /// Channel to which the parameters refer; `None` if they refer to both.
-    pub fitted_in: Option<Channel>,
+    pub fitted_in: Option<usize>,
     /// Parameters of the effect.
     pub parameters: Vec<Value>,
+    /// Their grades, in that order.
+    pub judgements: Vec<Judgement>,
     /// Why the effect was added; `None` for defects of the data, which are seen directly and not
     /// inferred.
     pub evidence: Option<Evidence>,
@@ -85,22 +89,6 @@ pub struct Unexplained {
     pub worst_s: Option<[f64; 2]>,
 }
 
-impl Found {
-    /// This effect with the names of its channels.
-    pub fn named(&self, channels: &[String; 2]) -> Found<String> {
-        let name = |place: Option<usize>| place.map(|i| channels[i].clone());
-        Found {
-            effect: self.effect,
-            channel: name(self.channel),
-            fitted_in: name(self.fitted_in),
-            parameters: self.parameters.clone(),
-            evidence: self.evidence,
-            alternatives: self.alternatives.clone(),
-            seen: self.seen.clone(),
-        }
-    }
-}
-
 /// The detection limit of an effect that was not found; `Channel` is the place of a channel, 0 or
 /// 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -147,6 +135,13 @@ pub struct Diagnosis {
     pub error: ErrorBudget,
     /// The unexplained part of the residual, if there is one.
     pub unexplained: Option<Unexplained>,
+    /// Energy that is left over beside that of the noise, as a share of it, under a verdict that the model is complete: 0
+    /// where no test sees any.
+    pub explained_to: Option<f64>,
+    /// Grades of the numbers of the model with the effects.
+    pub judgements: Judgements,
+    /// Grades of the numbers of two first-order lags.
+    pub base_judgements: Judgements,
     /// What this record does not determine.
     pub not_testable: Vec<String>,
     /// Detection limits of the effects that were not found.

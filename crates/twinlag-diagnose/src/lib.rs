@@ -40,6 +40,9 @@ mod diagnose;
 mod diagnosis;
 mod evidence;
 mod excitation;
+mod grade;
+mod hidden;
+mod judge;
 mod left_over;
 mod limits;
 mod moves;
@@ -51,6 +54,8 @@ pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Unexplained, Verdict};
 pub use evidence::Evidence;
 pub use excitation::is_single_tone;
+pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, excess};
+pub use judge::{Circumstances, Judgements};
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{

@@ -210,14 +210,25 @@ impl<'a> State<'a> {
     pub(crate) fn add(&self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
         let candidates = search.fitted(&self.current)?;
-        let Some((candidate, ties)) = search.accepted(&self.current, &candidates) else { return Ok(None) };
+        Ok(self.addition(&search, &candidates))
+    }
+
+    /// Adds the effect that explains the record best with time constants far from those that there are.
+    pub(crate) fn add_from_afar(&self) -> Result<Option<Proposal>, ModelError> {
+        let search = self.search().beside(&self.current);
+        let candidates = search.from_afar(&self.current)?;
+        Ok(self.addition(&search, &candidates))
+    }
+
+    fn addition(&self, search: &Search<'_>, candidates: &[Candidate]) -> Option<Proposal> {
+        let (candidate, ties) = search.accepted(&self.current, candidates)?;
         let entry = Move::Add {
             effect: candidate.effect.identifier(),
             channel: candidate.effect.channel(),
             evidence: Evidence::of(&candidate),
             ties: identifiers(&ties),
         };
-        Ok(Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) }))
+        Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
     }
 
     /// Gives effect `index` a parameter more, now that more is known.

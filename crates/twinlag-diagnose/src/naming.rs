@@ -1,16 +1,27 @@
 //! The effects that were found, in numbers.
 
-use twinlag_cross_relation::{Z_975, log_normal_interval_95};
-use twinlag_model::{Defect, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, covariance};
+use std::ops::Range;
+
+use twinlag_cross_relation::{PartScatter, Z_975, log_normal_interval_95};
+use twinlag_model::{
+    Defect, Derived, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, covariance,
+};
 use twinlag_optimise::Scale;
 
 use crate::diagnosis::Found;
 use crate::evidence::Evidence;
+use crate::grade::{Judgement, Number, Reason};
+use crate::judge::Circumstances;
 use crate::moves::Taken;
 use crate::remark::Remark;
 
 /// Relative change of an end of an interval that is worth a remark.
 const NOTICEABLE: f64 = 1e-3;
+/// Share of an interval by which other effects make it longer before the number is one of its cause: half as long again.
+const DECISIVE: f64 = 0.5;
+/// Step of the derivatives of a number that follows from parameters, in standard errors of these: small enough that a function
+/// that bends within ten of them is straight over it.
+const DERIVATIVE_STEP_SE: f64 = 0.1;
 
 /// Effect `index` of the model `last` with its numbers, whose uncertainty is that of `fit`.
 pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -> Found {
@@ -19,13 +30,7 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
     let range = last.model.range(index);
     let pairs = effect.parameters().iter().zip(range.clone());
     let mut parameters: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
-    parameters.extend(effect.derived().into_iter().map(|d| Value {
-        name: d.name.into(),
-        value: (d.of)(&last.theta[range.clone()]),
-        standard_error: None,
-        interval_95: None,
-        unit: d.unit.into(),
-    }));
+    parameters.extend(effect.derived().into_iter().map(|d| derived(&d, &last.theta, range.clone(), covariance)));
     let mut alternatives: Vec<Identifier> = taken.ties.iter().map(|t| t.effect.identifier()).collect();
     let is_of_either = alternatives.contains(&effect.identifier());
     alternatives.retain(|other| *other != effect.identifier());
@@ -35,6 +40,7 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
         effect: effect.identifier(),
         channel: effect.channel().filter(|_| !is_of_either),
         fitted_in: effect.channel(),
+        judgements: vec![Judgement::default(); parameters.len()],
         parameters,
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
@@ -62,6 +68,37 @@ fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
     }
 }
 
+/// A number that follows from the parameters in `range`, its error to first order.
+fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Option<&Vec<Vec<f64>>>) -> Value {
+    let at = &theta[range.clone()];
+    let slope = |c: &[Vec<f64>]| -> Vec<f64> {
+        let of = |i: usize, by: f64| {
+            let mut moved = at.to_vec();
+            moved[i] += by;
+            (derived.of)(&moved)
+        };
+        let one = |i: usize| {
+            let step = DERIVATIVE_STEP_SE * c[range.start + i][range.start + i].max(0.0).sqrt();
+            if step > 0.0 { (of(i, step) - of(i, -step)) / (2.0 * step) } else { 0.0 }
+        };
+        (0..at.len()).map(one).collect()
+    };
+    let variance = covariance.map(|c| {
+        let slope = slope(c);
+        let pairs = (0..at.len()).flat_map(|i| (0..at.len()).map(move |j| (i, j)));
+        pairs.map(|(i, j)| slope[i] * slope[j] * c[range.start + i][range.start + j]).sum::<f64>()
+    });
+    let value = (derived.of)(at);
+    let error = variance.map(f64::sqrt).filter(|s| *s > 0.0 && s.is_finite());
+    Value {
+        name: derived.name.into(),
+        value,
+        standard_error: error,
+        interval_95: error.map(|error| [value - Z_975 * error, value + Z_975 * error]),
+        unit: derived.unit.into(),
+    }
+}
+
 /// A defect of the data as an effect.
 pub(crate) fn of_defect(defect: &Defect) -> Found {
     Found {
@@ -69,32 +106,78 @@ pub(crate) fn of_defect(defect: &Defect) -> Found {
         channel: Some(defect.channel),
         fitted_in: Some(defect.channel),
         parameters: Vec::new(),
+        judgements: Vec::new(),
         evidence: None,
         alternatives: Vec::new(),
         seen: Some(defect.seen.clone()),
     }
 }
 
-/// Widens the intervals of both time constants, so that they hold whichever of the tied effects is
-/// the right one.
+/// Grades of the parameters of an effect, and their intervals with all that they have to cover.
+///
+/// - `scatter`: of its parameters between parts of the record; what is derived from them has none
+pub(crate) fn judge_effect(
+    found: &mut Found,
+    parameters: &[Parameter],
+    scatter: &[Option<PartScatter>],
+    circumstances: &Circumstances<'_>,
+) {
+    let basis = circumstances.whole_basis();
+    let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });
+    for (index, value) in found.parameters.iter_mut().enumerate() {
+        let is_positive = parameters.get(index).is_some_and(|p| p.variable.scale == Scale::Logarithmic);
+        if index >= parameters.len() && value.standard_error.is_none() && !found.effect.is_noise() {
+            found.judgements[index] = Judgement::reference_point();
+            continue;
+        }
+        let scatter = scatter.get(index).copied().flatten();
+        let number = Number { value: value.value, interval_95: value.interval_95, scatter, is_positive };
+        let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
+        let own = cause.clone().into_iter().chain(is_part.then_some(Reason::PartOfTotal)).collect();
+        (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
+    }
+}
+
+/// An effect that explains the record as well as the one that is named, with the fit of the whole model.
+pub(crate) struct Tie<'a> {
+    pub(crate) named: Identifier,
+    pub(crate) other: Identifier,
+    pub(crate) fitted: &'a Fitted,
+}
+
+/// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
+/// the right one; returns what to say of that, and with which effect alone each of them was right before.
 pub(crate) fn widen(
     fit: &mut ModelFit,
-    ties: &[(Identifier, &Fitted)],
+    ties: &[Tie<'_>],
     prepared: &Prepared,
     policy: &Policy,
-) -> Option<Remark> {
-    let mut effects = Vec::new();
-    for (effect, tie) in ties {
+) -> (Option<Remark>, [Option<Identifier>; 3]) {
+    let (mut effects, mut causes) = (Vec::new(), [None; 3]);
+    for Tie { named, other, fitted } in ties {
         let (observations, everything) = (&prepared.observations, &prepared.everything);
-        let other = tie.model.fit(&tie.theta, observations, everything, Effort::Finish).in_order();
-        let Some(covariance) = covariance(&other, observations, everything, false) else { continue };
-        for i in 0..2 {
-            let (value, error) = (other.theta[i], covariance[i][i].max(0.0).sqrt());
-            let Some([low, high]) = &mut fit.time_constants[i].interval_95_s else { continue };
-            if error > 0.0 && error < policy.vague_log_std * value {
-                let [from, to] = interval_95(value, error, &Scale::Logarithmic);
-                if from < (1.0 - NOTICEABLE) * *low || to > (1.0 + NOTICEABLE) * *high {
-                    effects.push(*effect);
+        let fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
+        let Some(covariance) = covariance(&fitted, observations, everything, false) else { continue };
+        let theta = &fitted.theta;
+        let variance = |i: usize, j: usize| covariance[i][j];
+        let of_difference = variance(0, 0) + variance(1, 1) - 2.0 * variance(0, 1);
+        let numbers = [
+            (theta[0], variance(0, 0), Scale::Logarithmic),
+            (theta[1], variance(1, 1), Scale::Logarithmic),
+            (theta[1] - theta[0], of_difference, Scale::Linear { typical: 1.0 }),
+        ];
+        for (i, (value, variance, scale)) in numbers.into_iter().enumerate() {
+            let error = variance.max(0.0).sqrt();
+            let number = if i < 2 { &mut fit.time_constants[i] } else { &mut fit.difference };
+            let Some([low, high]) = &mut number.interval_95_s else { continue };
+            if error > 0.0 && (i == 2 || error < policy.vague_log_std * value) {
+                let [from, to] = interval_95(value, error, &scale);
+                let more = (*low - from).max(0.0) + (to - *high).max(0.0);
+                if i < 2 && more > NOTICEABLE * value {
+                    effects.push(*other);
+                }
+                if more > DECISIVE * (*high - *low) {
+                    causes[i] = Some(*named);
                 }
                 (*low, *high) = (low.min(from), high.max(to));
             }
@@ -102,7 +185,7 @@ pub(crate) fn widen(
     }
     effects.sort_unstable_by_key(|e| e.name());
     effects.dedup();
-    (!effects.is_empty()).then_some(Remark::Widened { effects })
+    ((!effects.is_empty()).then_some(Remark::Widened { effects }), causes)
 }
 
 #[cfg(test)]

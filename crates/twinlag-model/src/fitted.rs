@@ -1,7 +1,7 @@
 //! A fitted model in numbers.
 
 use serde::{Deserialize, Serialize};
-use twinlag_cross_relation::ResidualTest;
+use twinlag_cross_relation::{PartScatter, ResidualTest};
 use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
@@ -23,7 +23,7 @@ pub struct Value {
 }
 
 /// A time constant.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TimeConstant {
     /// The estimate, s; `None` where the record does not determine it.
@@ -32,6 +32,8 @@ pub struct TimeConstant {
     pub standard_error_s: Option<f64>,
     /// Its 95 % interval, s.
     pub interval_95_s: Option<[f64; 2]>,
+    /// How far it moves between parts of the record; `None` where it has no standard error.
+    pub scatter: Option<PartScatter>,
 }
 
 /// A fit as a picture needs it.
@@ -80,6 +82,8 @@ pub struct ModelFit {
     pub trace: Trace,
     /// Covariance of the parameters, in their units, where there is one; the time constants come first.
     pub covariance: Option<Vec<Vec<f64>>>,
+    /// How far each parameter moves between parts of the record, in the order of the covariance.
+    pub scatter: Vec<Option<PartScatter>>,
     /// The model itself, for a compensation; `None` in a fit that was put together for its picture.
     pub extended: Option<Extended>,
 }

@@ -15,6 +15,7 @@ mod fitted;
 mod flow;
 mod held_out;
 mod implied;
+mod influence;
 mod inverse;
 mod known;
 mod model;

@@ -156,6 +156,22 @@ policy! {
     /// Factor by which a time constant is moved to see whether another fits as well: chosen.
     ridge_factor: f64 = 2.0,
 
+    /// Probability that parts of a record seem to disagree on a number of a right model: of the three that are asked most, in
+    /// three records of a thousand.
+    parts_rejection_probability: f64 = 1e-3,
+    /// Probability, before the record is seen, that it has a certain effect in a certain channel: of some twenty kinds and seats
+    /// one in every other record. Chosen.
+    prior_effect_probability: f64 = 0.025,
+    /// Probability that an effect is there unseen which moves a number out of its interval, from which on the number
+    /// is right only if there is none: the one in twenty that the interval leaves open itself.
+    hidden_effect_probability: f64 = 0.05,
+    /// Part of the record beyond which no time constant is given: ten of the longest one fit into it, fewer say nothing of
+    /// how it differs from a drift. Chosen.
+    longest_given_share: f64 = 0.1,
+    /// Energy beside that of the noise, as a share of it, up to which a record counts as explained, and intervals cover that
+    /// all of it goes with the number: half of what the test of the energy of 20 000 samples can see, `4 √(2/20 000)`.
+    explained_excess_share: f64 = 0.02,
+
     /// How many standard errors the energy must lie below that of the assumed levels before they are
     /// lowered: four, once in 30 000 records.
     lower_levels_standard_errors: f64 = 4.0,

@@ -9,6 +9,7 @@ use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::implied::Evaluation;
+use crate::influence::Influence;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::policy::Policy;
@@ -124,7 +125,10 @@ pub fn summarise(
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
     let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
-    let (time_constants, difference) = time_constants(fitted, observations, selection, covariance.as_deref(), policy);
+    let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
+    let (time_constants, difference) =
+        time_constants(fitted, observations, selection, covariance.as_deref(), influence.as_ref(), policy);
+    let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
     ModelFit {
         time_constants,
         difference,
@@ -136,6 +140,7 @@ pub fn summarise(
         chi2_per_dof,
         is_weighted_by_residual: rejects,
         covariance,
+        scatter,
         extended: Some(Extended::new(fitted, observations)),
         trace: trace(fitted, evaluation, &Bands::of(&residual_runs), observations, selection, policy),
     }
@@ -147,6 +152,7 @@ fn time_constants(
     observations: &Observations,
     selection: &Selection,
     covariance: Option<&[Vec<f64>]>,
+    influence: Option<&Influence<'_>>,
     policy: &Policy,
 ) -> ([TimeConstant; 2], TimeConstant) {
     let theta = &fitted.theta;
@@ -156,9 +162,10 @@ fn time_constants(
         is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
     let both = [0, 1].map(|i| {
         if unresolved && !fitted.model.knows(i) {
-            TimeConstant { value_s: None, standard_error_s: None, interval_95_s: None }
+            TimeConstant::default()
         } else {
-            time_constant(theta[i], variance(i), policy)
+            let scatter = influence.and_then(|i_of| i_of.scatter(&[(i, 1.0)]));
+            TimeConstant { scatter, ..time_constant(theta[i], variance(i), policy) }
         }
     });
     // Where the time constants cannot be distinguished from a delay, the total lag of channel 2 is reported.
@@ -172,7 +179,8 @@ fn time_constants(
         .map(|c| lag.iter().map(|(i, s)| lag.iter().map(|(j, t)| s * t * c[*i][*j]).sum::<f64>()).sum::<f64>());
     let standard_error_s = standard_error(variance);
     let interval_95_s = standard_error_s.map(|se| [value - Z_975 * se, value + Z_975 * se]);
-    (both, TimeConstant { value_s: Some(value), standard_error_s, interval_95_s })
+    let scatter = influence.and_then(|influence| influence.scatter(&lag));
+    (both, TimeConstant { value_s: Some(value), standard_error_s, interval_95_s, scatter })
 }
 
 /// A time constant, whose logarithm is normal. An interval that spans a factor of seven is no estimate; one that is held has none.
@@ -183,6 +191,7 @@ fn time_constant(value_s: f64, variance: Option<f64>, policy: &Policy) -> TimeCo
         value_s: (error_s.is_some() || is_held).then_some(value_s),
         standard_error_s: error_s,
         interval_95_s: error_s.map(|se| log_normal_interval_95(value_s, se)),
+        scatter: None,
     }
 }
 

@@ -1,11 +1,12 @@
 //! A gas temperature, and time constants along a record, as pages.
 
+use twinlag::diagnosis::Grade;
 use twinlag::record::Record;
-use twinlag_report::{Document, Figure, ReportError, Table, between, plus_minus, probability, rounded};
+use twinlag_report::{Document, Figure, ReportError, Table, between, probability, rounded};
 
 use crate::figures::WIDTH_PX;
 use crate::pictures::{spectra, temperature_figure, track_picture};
-use crate::words::{ABSENT, interval_of, listed, sentence, with_unit, words};
+use crate::words::{grade, interval_of, listed, seconds, sentence, with_unit, words};
 use twinlag::{Characterisation, Compensation, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
@@ -19,7 +20,10 @@ use twinlag::{Characterisation, Compensation, Track};
 pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
     let mut document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
     document = match &answer.gas {
-        None => document.lead("This record has no gas temperature."),
+        None => document.lead(format!("There is no gas temperature to use: {}.", answer.judgement.because)),
+        Some(_) if answer.judgement.grade == Grade::NoGo => {
+            document.lead(format!("No go, and drawn only since it was asked for: {}.", answer.judgement.because))
+        }
         Some(gas) => document.lead(format!(
             "The gas temperature is known to {} (standard deviation, median), and follows the gas up to {}.",
             with_unit(&rounded(gas.median_std_k, 2), "K"),
@@ -33,6 +37,7 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
     if let Some(gas) = &answer.gas {
         let effects: Vec<String> = answer.effects.iter().map(|e| words(e.effect)).collect();
         let mut facts = vec![
+            ("Grade", grade(&answer.judgement)),
             (
                 "Model",
                 if effects.is_empty() {
@@ -111,13 +116,13 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
 }
 
 fn numbers(document: Document, last: &Characterisation) -> Document {
-    let mut table = Table::new(["channel", "time constant", "95 % interval", "noise"]);
+    let mut table = Table::new(["channel", "time constant", "95 % interval", "grade", "noise"]);
     for sensor in &last.sensors {
-        let value = sensor.time_constant_s.map(|v| with_unit(&plus_minus(v, sensor.standard_error_s), "s"));
         table = table.row([
             sensor.channel.clone(),
-            value.unwrap_or(ABSENT.into()),
+            seconds(sensor),
             interval_of(sensor),
+            grade(&sensor.judgement),
             with_unit(&rounded(sensor.noise_std_k, 3), "K"),
         ]);
     }

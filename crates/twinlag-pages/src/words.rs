@@ -1,11 +1,11 @@
 //! Words and numbers of the report.
 
-use twinlag::cross_relation::{TestName, Z_975};
-use twinlag::diagnosis::Identifier;
-use twinlag::{Difference, SensorEstimate};
-use twinlag_report::{between, plus_minus, rounded};
+use twinlag::cross_relation::TestName;
+use twinlag::diagnosis::{Grade, Identifier, Judgement};
+use twinlag::{Difference, EffectNumber, SensorEstimate};
+use twinlag_report::{between, rounded};
 
-pub(crate) const ABSENT: &str = "not determined";
+pub(crate) const ABSENT: &str = "not given";
 
 /// A name for scripts as words.
 pub(crate) fn words_of(name: &str) -> String {
@@ -65,14 +65,24 @@ pub(crate) fn with_unit(number: &str, of: &str) -> String {
     if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
 }
 
-pub(crate) fn parameter(value: &twinlag::diagnosis::Value) -> String {
-    let number = plus_minus(value.value, value.standard_error);
-    format!("{} {}", parameter_in_words(&value.name), with_unit(&number, &value.unit))
+/// A number of an effect with its interval and its grade, or why it is not given.
+pub(crate) fn parameter(number: &EffectNumber) -> String {
+    let name = parameter_in_words(&number.name);
+    match number.value {
+        Some(value) => {
+            let ends = number.interval_95.map_or(String::new(), |ends| format!(", 95 % from {}", between(ends)));
+            format!("{name} {}{ends} ({})", with_unit(&rounded(value, 4), &number.unit), number.judgement.grade)
+        }
+        None => format!("{name} not given ({})", number.judgement.because),
+    }
 }
 
-/// A time constant with its standard error.
-pub(crate) fn estimate(of: &SensorEstimate) -> String {
-    of.time_constant_s.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, of.standard_error_s), "s"))
+/// The grade of a number, with its reason where it has a condition.
+pub(crate) fn grade(judgement: &Judgement) -> String {
+    match judgement.grade {
+        Grade::Go => "go".into(),
+        grade => format!("{grade}: {}", judgement.because),
+    }
 }
 
 /// A time constant to five digits.
@@ -80,10 +90,9 @@ pub(crate) fn seconds(of: &SensorEstimate) -> String {
     of.time_constant_s.map_or(ABSENT.into(), |value| with_unit(&rounded(value, 5), "s"))
 }
 
-/// A difference with its standard error, that of a normal interval.
+/// A difference to four digits.
 pub(crate) fn apart(of: &Difference) -> String {
-    let standard_error_s = of.interval_95_s.map(|[low, high]| (high - low) / (2.0 * Z_975));
-    of.value.map_or(ABSENT.into(), |value| with_unit(&plus_minus(value, standard_error_s), "s"))
+    of.value.map_or(ABSENT.into(), |value| with_unit(&rounded(value, 4), "s"))
 }
 
 pub(crate) fn interval(ends_s: Option<[f64; 2]>) -> String {

@@ -4,12 +4,11 @@
 use std::ops::ControlFlow;
 
 use serde_json::json;
-use twinlag::Diagnosis;
 use twinlag::diagnosis::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Found, Observations, Settings, Stretch, Trace, Unexplained, Verdict,
-    diagnose,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Observations, Settings, Stretch, Trace, Unexplained, Verdict, diagnose,
 };
 use twinlag::record::{Channels, Record, SamplingChoice};
+use twinlag::{Diagnosis, NamedEffect};
 use twinlag_pages::diagnosis_report;
 
 const SECTIONS: [&str; 10] = [
@@ -108,15 +107,15 @@ fn nothing(verdict: Verdict, record: &Record) -> Diagnosis {
     answer
 }
 
-fn found() -> Found<String> {
+fn found() -> NamedEffect {
     let found = json!({
         "effect": "delay", "channel": "T2 & more", "fitted_in": "T2 & more",
         "parameters": [{"name": "delay", "value": 0.0, "standard_error": 0.0, "interval_95": null, "unit": "s"}],
         "evidence": {"statistic": 0.0, "dof": 1, "p_value": 0.0, "held_out_gain_nats": 0.0, "robust_statistic": null},
         "alternatives": ["second-order"], "seen": null
     });
-    let mut found: Found<String> = serde_json::from_value(found).expect("the schema");
-    (found.parameters[0].value, found.parameters[0].standard_error) = (f64::NAN, Some(f64::NAN));
+    let mut found: NamedEffect = serde_json::from_value(found).expect("the schema");
+    (found.parameters[0].value, found.parameters[0].standard_error) = (Some(f64::NAN), Some(f64::NAN));
     let evidence = found.evidence.as_mut().expect("given");
     (evidence.statistic, evidence.held_out_gain_nats) = (f64::INFINITY, f64::NAN);
     found
@@ -131,7 +130,7 @@ fn left() -> Unexplained {
 
 fn has_every_section(page: &str) {
     assert!(!page.contains("NaN") && !page.contains("inf "), "{page}");
-    assert!(page.contains("not determined") && page.contains("a &lt;b&gt;.csv"));
+    assert!(page.contains("not given") && page.contains("a &lt;b&gt;.csv"));
     let mut rest = page;
     for section in SECTIONS {
         let heading = format!("<h2>{section}</h2>");

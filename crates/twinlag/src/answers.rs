@@ -12,7 +12,7 @@ pub use characterisation::{
     SecondLag, SensorEstimate, Status,
 };
 pub use compensation::{Compensation, Quality};
-pub use diagnosis::{Diagnosis, ErrorBeforeAfter, NamedEffect, NamedLimit};
+pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit};
 pub use model::{Model, ModelEffect};
 pub use track::{Along, Ratio, Track};
 

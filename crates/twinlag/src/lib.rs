@@ -83,9 +83,9 @@ mod verbs;
 mod watch;
 
 pub use answers::{
-    Along, Characterisation, Compensation, Diagnosis, Difference, ErrorBeforeAfter, Estimated, FreeParameters,
-    IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio, RecordSummary, Residual,
-    SecondLag, SensorEstimate, Status, Track,
+    Along, Characterisation, Compensation, Diagnosis, Difference, EffectNumber, ErrorBeforeAfter, Estimated,
+    FreeParameters, IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio, RecordSummary,
+    Residual, SecondLag, SensorEstimate, Status, Track,
 };
 pub use error::Error;
 pub use options::Options;

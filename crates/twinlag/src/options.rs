@@ -53,6 +53,8 @@ pub struct Options {
     pub discard: Option<usize>,
     /// What intervals are made of.
     pub intervals: Intervals,
+    /// Whether numbers are given that may not be used ([`Grade::NoGo`](crate::diagnosis::Grade::NoGo)).
+    pub best_effort: bool,
 }
 
 impl Options {

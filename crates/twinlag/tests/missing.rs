@@ -42,7 +42,7 @@ fn found(record: &Record) -> Diagnosis {
 /// Of the first effect.
 fn parameter(answer: &Diagnosis, name: &str) -> (f64, f64) {
     let value = answer.effects[0].parameters.iter().find(|p| p.name == name).expect("it has this parameter");
-    (value.value, value.standard_error.expect("a fitted number has one"))
+    (value.value.expect("a fitted number"), value.standard_error.expect("a fitted number has one"))
 }
 
 /// Ended in a panic: stretches that a delay makes too short were mistaken for others.

@@ -179,7 +179,7 @@ pub(crate) fn record_of(simulated: Simulated) -> Result<Record, twinlag::record:
 
 /// Both time constants as an answer means them: means over the record where the flow changes, those at the record's mean
 /// temperature where they change with it, the larger one of two.
-fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
+pub(super) fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
     let mean = |values: &mut dyn Iterator<Item = f64>| -> f64 {
         let (sum, n) = values.fold((0.0, 0.0_f64), |(sum, n), v| (sum + v, n + 1.0));
         sum / n.max(1.0)

@@ -61,7 +61,7 @@ fn rejected(answer: &Diagnosis) -> Result<()> {
 
 fn parameter(answer: &Diagnosis, effect: Identifier, name: &str) -> Result<f64> {
     let of_effect = answer.effects.iter().filter(|e| e.effect == effect).flat_map(|e| &e.parameters);
-    let value = of_effect.into_iter().find(|p| p.name == name).map(|p| p.value);
+    let value = of_effect.into_iter().find(|p| p.name == name).and_then(|p| p.value);
     value.with_context(|| format!("no {effect} with a {name}"))
 }
 
@@ -95,7 +95,7 @@ pub(super) fn run(dir: &Path) -> Diagnosed {
 
 fn one(dir: &Path, case: &Case<Diagnosis>, page: &mut Page) -> Result<()> {
     let record = Record::read(dir.join(case.file), &case.selection())?;
-    let mut options = Options::default();
+    let mut options = Options { best_effort: true, ..Options::default() };
     if !case.with.is_empty() {
         options.known.push(case.with.parse()?);
     }

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use twinlag::Diagnosis;
-use twinlag::diagnosis::Value;
+use twinlag::diagnosis::Grade;
+use twinlag::{Diagnosis, EffectNumber};
 use twinlag_pages::residual_picture;
 
 /// Everything that is written of the records.
@@ -19,8 +19,8 @@ pub(super) struct Page {
 impl Page {
     pub(super) fn new() -> Self {
         Self {
-            table: "| record | channels | known | verdict | effects | held-out rms before | after |\n\
-                    |---|---|---|---|---|---|---|\n"
+            table: "| record | channels | known | verdict | grades: T1, T2, difference | effects | held-out rms before | after |\n\
+                    |---|---|---|---|---|---|---|---|\n"
                 .into(),
             ..Self::default()
         }
@@ -36,8 +36,12 @@ impl Page {
         let from = self.table.len();
         let _ = writeln!(
             self.table,
-            "| `{file}` | {}, {} | {known} | {verdict} | {effects} | {:.2} | {:.2} |",
-            channels[0], channels[1], rms.before, rms.after
+            "| `{file}` | {}, {} | {known} | {verdict} | {} | {effects} | {:.2} | {:.2} |",
+            channels[0],
+            channels[1],
+            answer.last.grades().map(|grade: Grade| grade.to_string()).join(", "),
+            rms.before,
+            rms.after
         );
         self.section(file, channels, known, verdict, answer)?;
         Ok(self.table[from..].trim_end())
@@ -63,11 +67,12 @@ impl Page {
                 .sensors
                 .iter()
                 .map(|s| match (s.time_constant_s, s.interval_95_s) {
-                    (Some(tau_s), Some([low, high])) => {
-                        format!("{} {} s [{}, {}]", s.channel, number(tau_s), number(low), number(high))
+                    (Some(tau_s), Some([low, high])) if s.judgement.grade != Grade::NoGo => {
+                        let ends = format!("[{}, {}]", number(low), number(high));
+                        format!("{} {} s {ends} ({})", s.channel, number(tau_s), s.judgement.grade)
                     }
                     (Some(tau_s), None) => format!("{} {} s, known", s.channel, number(tau_s)),
-                    _ => format!("{} not determined", s.channel),
+                    _ => format!("{} not given ({})", s.channel, s.judgement.because),
                 })
                 .collect();
             lines.push(format!("- time constants, {name}: {}", sensors.join(", ")));
@@ -108,14 +113,17 @@ impl Page {
 
 /// An effect with its first parameters, `whole` with all and their intervals.
 fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
-    let parameter = |p: &Value| {
+    let parameter = |p: &EffectNumber| {
         let name = p.name.replace('_', " ");
+        let Some(value) = p.value.filter(|_| p.judgement.grade != Grade::NoGo) else {
+            return format!("{name} not given");
+        };
         match p.interval_95.filter(|_| whole) {
             Some([low, high]) => {
                 let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-                format!("{name} {} [{}, {}]{unit}", number(p.value), number(low), number(high))
+                format!("{name} {} [{}, {}]{unit}", number(value), number(low), number(high))
             }
-            None => format!("{name} {}", number(p.value)),
+            None => format!("{name} {}", number(value)),
         }
     };
     let most = if whole { usize::MAX } else { 3 };

@@ -1,10 +1,10 @@
 //! Why effects were added, and what the tests say before and after.
 
 use twinlag::cross_relation::TestName;
-use twinlag_report::{Document, Table, between, plus_minus, probability, rounded};
+use twinlag_report::{Document, Table, between, probability, rounded};
 
 use super::Page;
-use crate::words::{ABSENT, identifiers, parameter_in_words, place, question, unit, words, words_of};
+use crate::words::{ABSENT, grade, identifiers, parameter_in_words, place, question, unit, words, words_of};
 
 impl Page<'_> {
     pub(super) fn evidence(&self, document: Document) -> Document {
@@ -22,7 +22,7 @@ impl Page<'_> {
             "statistic, noise free in each band",
             "explains it equally well",
         ]);
-        let mut sizes = Table::new(["effect", "parameter", "value", "95 % interval", "unit"]);
+        let mut sizes = Table::new(["effect", "parameter", "value", "95 % interval", "unit", "grade"]);
         for found in &self.answer.effects {
             let place = place(found.channel.as_ref());
             let absent = || "–".to_owned();
@@ -50,13 +50,13 @@ impl Page<'_> {
                 ],
             });
             for value in &found.parameters {
-                let error = value.standard_error;
                 sizes = sizes.row([
                     words(found.effect),
                     parameter_in_words(&value.name),
-                    plus_minus(value.value, error),
+                    value.value.map_or(ABSENT.into(), |value| rounded(value, 4)),
                     value.interval_95.map_or_else(absent, between),
                     unit(&value.unit).to_owned(),
+                    grade(&value.judgement),
                 ]);
             }
         }
@@ -72,7 +72,7 @@ impl Page<'_> {
                 .table(evidence);
         }
         if !sizes.is_empty() {
-            document = document.table(sizes.caption("Parameters of the effects, with standard errors."));
+            document = document.table(sizes.caption("Parameters of the effects."));
         }
         document
     }

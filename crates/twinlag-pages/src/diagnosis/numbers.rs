@@ -5,26 +5,30 @@ use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table,
 
 use super::{Column, Page};
 use crate::figures::{WIDTH_PX, chart};
-use crate::words::{ABSENT, apart, estimate, interval, interval_of, short, with_unit};
+use crate::words::{ABSENT, apart, grade, interval, interval_of, seconds, short, with_unit};
 
 impl Page<'_> {
     pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
         let columns = self.columns();
-        let interval_95 = || "95 % interval".to_owned();
-        let header = columns.iter().flat_map(|m| [m.column.to_owned(), interval_95()]);
+        let header = columns.iter().flat_map(|m| [m.column, "95 % interval", "grade"].map(str::to_owned));
         let mut table = Table::new([String::new()].into_iter().chain(header));
         for (k, channel) in self.channels().iter().enumerate() {
-            let of = |m: &Column<'_>| [estimate(&m.answer.sensors[k]), interval_of(&m.answer.sensors[k])];
+            let of = |m: &Column<'_>| {
+                let sensor = &m.answer.sensors[k];
+                [seconds(sensor), interval_of(sensor), grade(&sensor.judgement)]
+            };
             table = table.row([format!("time constant of {channel}")].into_iter().chain(columns.iter().flat_map(of)));
         }
         let of = |m: &Column<'_>| {
             let difference = &m.answer.time_constant_difference_s;
-            [apart(difference), interval(difference.interval_95_s)]
+            [apart(difference), interval(difference.interval_95_s), grade(&difference.judgement)]
         };
-        table = table.row(["difference".to_owned()].into_iter().chain(columns.iter().flat_map(of)));
+        let is_total = self.answer.last.time_constant_difference_s.includes_delay;
+        let name = if is_total { "total delay of the second channel" } else { "difference" };
+        table = table.row([name.to_owned()].into_iter().chain(columns.iter().flat_map(of)));
         for (k, channel) in self.channels().iter().enumerate() {
             let noise = |m: &Column<'_>| with_unit(&rounded(m.answer.sensors[k].noise_std_k, 3), "K");
-            let cells = columns.iter().flat_map(|m| [noise(m), String::new()]);
+            let cells = columns.iter().flat_map(|m| [noise(m), String::new(), String::new()]);
             table = table.row([format!("noise of {channel}")].into_iter().chain(cells));
         }
         let mut document = document.heading("Time constants and noise, before and after").table(table);

@@ -1,28 +1,21 @@
 //! What a diagnosis says in short: verdict, effects, the record.
 
-use twinlag::NamedEffect;
 use twinlag::diagnosis::{Identifier, Verdict};
+use twinlag::{NamedEffect, SensorEstimate};
 use twinlag_report::{Document, rounded};
 
 use super::Page;
-use crate::words::{capital, identifiers, interval_of, listed, parameter, place, seconds, sentence, with_unit, words};
+use crate::words::{
+    apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence, with_unit,
+    words,
+};
 
 impl Page<'_> {
     pub(super) fn verdict(&self, document: Document) -> Document {
         let (answer, record) = (self.answer, self.record);
         let mut document = document.heading("Verdict").lead(self.lead());
         if answer.verdict != Verdict::Refused {
-            let [first, second] = &answer.last.sensors;
-            document = document.paragraph(format!(
-                "Time constants{}, with 95 % intervals: {} {} ({}), {} {} ({}).",
-                if self.changed { " with the effects" } else { "" },
-                first.channel,
-                seconds(first),
-                interval_of(first),
-                second.channel,
-                seconds(second),
-                interval_of(second)
-            ));
+            document = document.facts(self.graded());
         }
         // Why it was refused, or what to know before the numbers are used.
         for remark in &answer.remarks {
@@ -47,11 +40,53 @@ impl Page<'_> {
         ])
     }
 
+    /// Both time constants and their difference, with their intervals and grades.
+    fn graded(&self) -> Vec<(&'static str, String)> {
+        let last = &self.answer.last;
+        let of = |sensor: &SensorEstimate| match sensor.time_constant_s {
+            Some(_) => format!(
+                "{}: {} ({}), {}",
+                sensor.channel,
+                seconds(sensor),
+                interval_of(sensor),
+                grade(&sensor.judgement)
+            ),
+            None => format!("{}: not given, {}", sensor.channel, sensor.judgement.because),
+        };
+        let difference = &last.time_constant_difference_s;
+        let apart = match difference.value {
+            Some(_) => format!(
+                "{} ({}), {}",
+                apart(difference),
+                interval(difference.interval_95_s),
+                grade(&difference.judgement)
+            ),
+            None => format!("not given, {}", difference.judgement.because),
+        };
+        let [first, second] = &last.sensors;
+        let name = if difference.includes_delay { "Total delay of the second channel" } else { "Difference" };
+        vec![
+            ("Time constant, with 95 % interval", of(first)),
+            ("Time constant, with 95 % interval", of(second)),
+            (name, apart),
+        ]
+    }
+
     fn lead(&self) -> String {
         let answer = self.answer;
         let effects = listed(&answer.effects.iter().map(named).collect::<Vec<_>>());
         let many = answer.effects.len() > 1;
+        let left = answer.explained_to.filter(|share| *share > 0.0);
         match answer.verdict {
+            Verdict::Adequate | Verdict::Explained if left.is_some() => format!(
+                "{} this record to {} %: so much energy is left over beside that of the noise, and the intervals cover it.",
+                if effects.is_empty() {
+                    "Two first-order lags explain".into()
+                } else {
+                    format!("With {effects} the model explains")
+                },
+                rounded(100.0 * left.unwrap_or_default(), 2)
+            ),
             Verdict::Adequate => {
                 "Two first-order lags explain this record: what they leave over cannot be distinguished \
                                   from noise."

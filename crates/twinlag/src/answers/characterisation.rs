@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
+use twinlag_diagnose::{Grade, Judgement, Reason};
 use twinlag_estimate::{IntervalBasis, NoiseSource};
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, Sampling, SamplingKind};
@@ -27,7 +28,7 @@ pub enum Status {
 }
 
 /// A number with its uncertainty.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Estimated {
     /// The estimate.
@@ -36,6 +37,9 @@ pub struct Estimated {
     pub standard_error: Option<f64>,
     /// 95 % interval.
     pub interval_95: [f64; 2],
+    /// Whether it may be used.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
 }
 
 /// Summary of the record.
@@ -110,10 +114,13 @@ pub struct SensorEstimate {
     pub noise_from: Option<NoiseSource>,
     /// Whether the time constant was given, not found.
     pub known: bool,
+    /// Whether the time constant may be used; one that may not is not given.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
 }
 
 /// Estimate of a sensor's second lag.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SecondLag {
     /// The estimate, s; `None` if no second lag is detected, or if it is not determined.
@@ -124,6 +131,9 @@ pub struct SecondLag {
     pub interval_95: Option<[f64; 2]>,
     /// Whether the value was given, not estimated.
     pub known: bool,
+    /// Whether it may be used.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
 }
 
 /// Relative calibration of channel 2 against channel 1: `y2 = gain · y1 + offset` at rest. `None`
@@ -139,13 +149,20 @@ pub struct FreeParameters {
 }
 
 /// `time_constant_difference_s` of the schema.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Difference {
     /// `τ2 − τ1`, s; `None` where it is not determined, and where the best fit lies on a bound.
     pub value: Option<f64>,
     /// Its 95 % interval, s. Without a value it says how large the difference may be.
     pub interval_95_s: Option<[f64; 2]>,
+    /// Whether it is the total delay of channel 2, `τ2 − τ1` and a delay together, of which the record does not determine
+    /// the parts.
+    #[serde(default)]
+    pub includes_delay: bool,
+    /// Whether it may be used; one that may not is not given.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
 }
 
 /// The residual of the fit, and its tests.
@@ -256,10 +273,36 @@ impl Characterisation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.characterisation/1";
 
+    /// Takes out what may not be used.
+    pub(crate) fn withhold(&mut self) {
+        for sensor in self.sensors.iter_mut().filter(|s| s.judgement.grade == Grade::NoGo) {
+            (sensor.time_constant_s, sensor.standard_error_s, sensor.interval_95_s) = (None, None, None);
+            sensor.interval_basis = None;
+        }
+        let lags = self.sensors.iter_mut().filter_map(|s| s.second_time_constant_s.as_mut());
+        for lag in lags.filter(|lag| lag.judgement.grade == Grade::NoGo) {
+            (lag.value, lag.standard_error) = (None, None);
+        }
+        let difference = &mut self.time_constant_difference_s;
+        if difference.judgement.grade == Grade::NoGo && difference.value.take().is_some() {
+            difference.interval_95_s = None;
+        }
+        let is_given = |e: &Estimated| e.judgement.grade != Grade::NoGo;
+        self.free.gain = self.free.gain.take().filter(is_given);
+        self.free.offset_k = self.free.offset_k.take().filter(is_given);
+    }
+
+    /// Grades of what is asked of every record: both time constants and their difference.
+    pub fn grades(&self) -> [Grade; 3] {
+        let [one, two] = &self.sensors;
+        [one.judgement.grade, two.judgement.grade, self.time_constant_difference_s.judgement.grade]
+    }
+
     /// Takes the difference out where the best fit lies on a bound of a time constant.
     pub(crate) fn drop_difference_on_bound(&mut self) {
         if is_on_bound_of_time_constant(&self.fit.end) {
-            self.time_constant_difference_s = Difference { value: None, interval_95_s: None };
+            self.time_constant_difference_s =
+                Difference { judgement: Judgement::of(&[Reason::NotDetermined]), ..Difference::default() };
             self.not_identifiable.push("time_constant_difference_s".into());
             self.warnings.push(
                 "the best fit lies on a bound of a time constant, so neither it nor the difference of the time constants \

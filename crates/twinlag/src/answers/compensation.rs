@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Prior, Rig};
-use twinlag_diagnose::Verdict;
+use twinlag_diagnose::{Judgement, Verdict};
 
 use crate::answers::diagnosis::explained;
 use crate::answers::{Characterisation, NamedEffect, Status};
@@ -44,8 +44,11 @@ pub struct Compensation {
     pub status: Status,
     /// Which readings the answer for an instant rests on.
     pub form: Form,
-    /// How good the gas temperature is; `None` if the record has none.
+    /// How good the gas temperature is; `None` if it may not be used.
     pub gas: Option<Quality>,
+    /// Whether the gas temperature may be used: no better than the model that it follows from.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
     /// Instants, s: those of the record, and those that are missing in an even grid. The series are
     /// not part of the JSON.
     #[serde(skip)]

@@ -2,13 +2,81 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Found, Identifier, Limit, Move, Policy, Unexplained, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, Judgement, Limit, Move, Policy,
+    Unexplained, Verdict,
 };
 
 use crate::answers::{Characterisation, Model, ModelEffect};
 
+/// A number of an effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct EffectNumber {
+    /// Its name.
+    pub name: String,
+    /// The number; `None` where it may not be used.
+    pub value: Option<f64>,
+    /// Its standard error.
+    pub standard_error: Option<f64>,
+    /// Its 95 % interval.
+    pub interval_95: Option<[f64; 2]>,
+    /// Unit of the number.
+    pub unit: String,
+    /// Whether it may be used.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
+}
+
 /// An effect that was found, with the names of its channels.
-pub type NamedEffect = Found<String>;
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct NamedEffect {
+    /// The effect.
+    pub effect: Identifier,
+    /// Channel that has the effect; `None` if both have it, or if the record does not determine
+    /// which.
+    pub channel: Option<String>,
+    /// Channel to which the parameters refer; `None` if they refer to both.
+    pub fitted_in: Option<String>,
+    /// Parameters of the effect.
+    pub parameters: Vec<EffectNumber>,
+    /// Why the effect was added; `None` for defects of the data, which are seen directly and not
+    /// inferred.
+    pub evidence: Option<Evidence>,
+    /// Other effects that explain this record equally well.
+    pub alternatives: Vec<Identifier>,
+    /// What was seen in the data, for an effect without parameters: a count, a step.
+    pub seen: Option<String>,
+}
+
+impl NamedEffect {
+    /// An effect with the names of its channels.
+    ///
+    /// - `best_effort`: whether numbers are given that may not be used
+    pub(crate) fn of(found: &Found, channels: &[String; 2], best_effort: bool) -> Self {
+        let name = |place: Option<usize>| place.map(|i| channels[i].clone());
+        let graded = found.parameters.iter().zip(&found.judgements).map(|(p, judgement)| {
+            let is_given = best_effort || judgement.grade != Grade::NoGo;
+            EffectNumber {
+                name: p.name.clone(),
+                value: is_given.then_some(p.value),
+                standard_error: p.standard_error.filter(|_| is_given),
+                interval_95: p.interval_95.filter(|_| is_given),
+                unit: p.unit.clone(),
+                judgement: judgement.clone(),
+            }
+        });
+        Self {
+            effect: found.effect,
+            channel: name(found.channel),
+            fitted_in: name(found.fitted_in),
+            parameters: graded.collect(),
+            evidence: found.evidence,
+            alternatives: found.alternatives.clone(),
+            seen: found.seen.clone(),
+        }
+    }
+}
 
 /// What the search would have seen of an effect that it did not find, with the name of its channel.
 pub type NamedLimit = Limit<String>;
@@ -48,6 +116,10 @@ pub struct Diagnosis {
     pub last: Characterisation,
     /// What is left over.
     pub unexplained: Option<Unexplained>,
+    /// Energy that is left over beside that of the noise, as a share of it, where the model counts as complete; 0 where no
+    /// test sees any.
+    #[serde(default)]
+    pub explained_to: Option<f64>,
     /// What no record of two sensors, or not this one, can reveal.
     pub not_testable: Vec<String>,
     /// What would have been seen of the effects that were not found.
@@ -74,21 +146,29 @@ impl Diagnosis {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.diagnosis/1";
 
-    /// The model with the effects that were found, to be used on other records of the same rig.
+    /// The model with the effects that were found, to be used on other records of the same rig. It has all numbers that
+    /// were found, also those that this answer does not give; of an answer that was read from JSON those that it has.
     pub fn model(&self) -> Model {
-        let effects = self.effects.iter().map(|e| ModelEffect {
-            effect: e.effect,
-            channel: e.fitted_in.clone(),
-            parameters: e.parameters.clone(),
-        });
+        let channels = self.last.record.channels.clone();
+        let effects = match &self.core {
+            Some(core) => core.effects.iter().map(|found| ModelEffect::found(found, &channels)).collect(),
+            None => self.effects.iter().map(ModelEffect::given).collect(),
+        };
+        let of_core = |i: usize| self.core.as_ref().and_then(|core| core.last.time_constants[i].value_s);
         Model {
             schema: Model::SCHEMA.into(),
-            channels: self.last.record.channels.clone(),
-            time_constants_s: [0, 1].map(|i| self.last.sensors[i].time_constant_s),
+            channels,
+            time_constants_s: [0, 1].map(|i| self.last.sensors[i].time_constant_s.or_else(|| of_core(i))),
             noise_std_k: Some([0, 1].map(|i| self.last.sensors[i].noise_std_k)),
-            effects: effects.collect(),
+            effects,
             made_by: self.last.made_by.clone(),
         }
+    }
+
+    /// Grades of all numbers that were asked for: both time constants, their difference, the parameters of effects.
+    pub fn grades(&self) -> impl Iterator<Item = Grade> {
+        let of_effects = self.effects.iter().flat_map(|e| &e.parameters).map(|p| p.judgement.grade);
+        self.last.grades().into_iter().chain(of_effects)
     }
 }
 

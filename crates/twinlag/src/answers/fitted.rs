@@ -1,13 +1,13 @@
 //! A fit of the model of a rig as a characterisation.
 
 use twinlag_cross_relation::{Parameter, TestName};
-use twinlag_diagnose::{Identifier, ModelFit, TimeConstant, Value};
+use twinlag_diagnose::{Identifier, Judgements, ModelFit, TimeConstant};
 use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
-    SensorEstimate, Status,
+    Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, NamedEffect, RecordSummary,
+    Residual, SensorEstimate, Status,
 };
 use crate::options::Options;
 
@@ -26,6 +26,8 @@ pub(crate) struct FittedAnswer<'a> {
     pub(crate) is_noise_given: bool,
     /// Whether the difference of the time constants is a total delay, the same wherever on its valley the fit ends.
     pub(crate) is_total_delay: bool,
+    /// Grades of the numbers.
+    pub(crate) judgements: Judgements,
 }
 
 impl FittedAnswer<'_> {
@@ -50,6 +52,8 @@ impl FittedAnswer<'_> {
             time_constant_difference_s: Difference {
                 value: fit.difference.value_s,
                 interval_95_s: fit.difference.interval_95_s,
+                includes_delay: self.is_total_delay,
+                judgement: self.judgements.difference.clone(),
             },
             free: FreeParameters { gain: None, offset_k: None },
             residual: Residual {
@@ -78,6 +82,9 @@ impl FittedAnswer<'_> {
         if !self.is_total_delay {
             out.drop_difference_on_bound();
         }
+        if !options.best_effort {
+            out.withhold();
+        }
         out
     }
 
@@ -99,19 +106,19 @@ impl FittedAnswer<'_> {
                 (false, false) => NoiseSource::ThirdDifferences,
             }),
             known: self.options.known(Parameter::ALL[i]).is_some_and(|k| k.std.is_none()),
+            judgement: self.judgements.time_constants[i].clone(),
         }
     }
 }
 
 impl FreeParameters {
     /// Gain and offset among the parameters of effects.
-    pub(crate) fn among<'a>(effects: &(impl Iterator<Item = (Identifier, &'a [Value])> + Clone)) -> Self {
+    pub(crate) fn among(effects: &[NamedEffect]) -> Self {
         let free = |name: &str| {
-            let of_calibration = effects.clone().filter(|(effect, _)| *effect == Identifier::CALIBRATION);
-            of_calibration.flat_map(|(_, parameters)| parameters).find(|p| p.name == name).and_then(|p| {
-                let interval_95 = p.interval_95?;
-                Some(Estimated { value: p.value, standard_error: p.standard_error, interval_95 })
-            })
+            let of_calibration = effects.iter().filter(|e| e.effect == Identifier::CALIBRATION);
+            let p = of_calibration.flat_map(|e| &e.parameters).find(|p| p.name == name)?;
+            let (value, interval_95, judgement) = (p.value?, p.interval_95?, p.judgement.clone());
+            Some(Estimated { value, standard_error: p.standard_error, interval_95, judgement })
         };
         Self { gain: free("gain"), offset_k: free("offset") }
     }

@@ -1,10 +1,10 @@
 //! A model that was found in one record, to be used on others: schema `twinlag.model/1`.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{Identifier, KnownEffect, Value};
+use twinlag_diagnose::{Found, Identifier, KnownEffect, Value};
 use twinlag_record::Record;
 
-use crate::answers::MadeBy;
+use crate::answers::{EffectNumber, MadeBy, NamedEffect};
 use crate::error::Error;
 use crate::options::Options;
 
@@ -37,6 +37,23 @@ pub struct ModelEffect {
     pub channel: Option<String>,
     /// Its parameters.
     pub parameters: Vec<Value>,
+}
+
+impl ModelEffect {
+    /// An effect as the loop found it.
+    pub(crate) fn found(found: &Found, channels: &[String; 2]) -> Self {
+        let channel = found.fitted_in.map(|i| channels[i].clone());
+        Self { effect: found.effect, channel, parameters: found.parameters.clone() }
+    }
+
+    /// An effect with the numbers that an answer gives of it.
+    pub(crate) fn given(effect: &NamedEffect) -> Self {
+        let values = effect.parameters.iter().filter_map(|p| {
+            let EffectNumber { name, value, standard_error, interval_95, unit, .. } = p.clone();
+            Some(Value { name, value: value?, standard_error, interval_95, unit })
+        });
+        Self { effect: effect.effect, channel: effect.fitted_in.clone(), parameters: values.collect() }
+    }
 }
 
 impl Model {

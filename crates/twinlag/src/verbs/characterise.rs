@@ -7,6 +7,7 @@ mod bootstrap;
 mod conclude;
 mod explain;
 mod fill;
+mod judge;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
 use twinlag_diagnose::{Policy, Remark, is_single_tone};

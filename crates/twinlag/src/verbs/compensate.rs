@@ -1,7 +1,7 @@
 //! The gas temperature of a record with its standard deviation.
 
 use twinlag_compensate::{Form, bandwidth_hz};
-use twinlag_diagnose::{ModelFit, Verdict};
+use twinlag_diagnose::{Grade, Judgement, ModelFit, Reason, Verdict};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
@@ -9,7 +9,7 @@ use crate::bands::{Banded, Reconstruction};
 use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::Rows;
-use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, with_effects};
+use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, with_effects};
 use crate::verbs::with_model::with_model;
 use crate::watch::{Stop, UNWATCHED, Watch};
 
@@ -77,11 +77,13 @@ pub fn compensate_watched(
     watch: Watch<'_>,
 ) -> Result<Compensation, Error> {
     let Modelled { last, fit, verdict, effects, warnings, rows } = Modelled::of(record, options, watch)?;
+    let judgement = judged(&last, verdict);
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
         status: Status::NotIdentifiable,
         form: options.form,
         gas: None,
+        judgement,
         time_s: Vec::new(),
         gas_c: Vec::new(),
         gas_std_k: Vec::new(),
@@ -91,28 +93,33 @@ pub fn compensate_watched(
         warnings,
         rig: None,
     };
-    let is_unknown =
-        fit.time_constants.iter().any(|t| t.value_s.is_none()) || out.last.status == Status::NotIdentifiable;
-    if is_unknown || verdict == Some(Verdict::Refused) {
-        out.warnings.push(
-            "the record does not determine both time constants, so the gas temperature cannot be reconstructed: give a \
-             known time constant, or use a model from another record"
-                .into(),
-        );
+    let is_unknown = fit.time_constants.iter().any(|t| t.value_s.is_none());
+    let is_withheld = out.judgement.grade == Grade::NoGo && !options.diagnose.characterise.best_effort;
+    if is_unknown || is_withheld || verdict == Some(Verdict::Refused) {
+        if !is_unknown && out.last.status == Status::ModelRejected {
+            out.status = Status::ModelRejected;
+        }
+        out.warnings.push(format!(
+            "there is no gas temperature: {}. Give a known time constant, or use a model from another record",
+            out.judgement.because
+        ));
         return Ok(out);
-    }
-    if matches!(verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained)) {
-        out.warnings.push(
-            "the model does not explain the record: the bands cover noise and parameters, but \
-             not the error of the model"
-                .into(),
-        );
     }
     let stop = Stop::new(watch);
     let found = Reconstruction::of(&fit, options, &stop)?.banded()?;
     stop.check()?;
     fill(&mut out, found, record, &rows);
     Ok(out)
+}
+
+/// The judgement of a gas temperature by the model `last`.
+fn judged(last: &Characterisation, verdict: Option<Verdict>) -> Judgement {
+    if verdict == Some(Verdict::Refused) {
+        return Judgement::of(&[Reason::Refused]);
+    }
+    let sensors = last.sensors.iter().map(|s| (format!("the time constant of {}", s.channel), &s.judgement));
+    let named: Vec<(String, &Judgement)> = sensors.collect();
+    Judgement::following(named.iter().map(|(name, judgement)| (name.as_str(), *judgement)))
 }
 
 /// Writes the gas temperature into the answer.
@@ -165,10 +172,11 @@ impl Modelled {
             return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings, rows: Rows::of(record)? });
         }
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
+        let effects = named(record, &core, options.diagnose.characterise.best_effort);
         Ok(Self {
-            last: with_effects(record, &options.diagnose, &rows, &core),
+            last: with_effects(record, &options.diagnose, &rows, &core, &effects),
             verdict: Some(core.verdict),
-            effects: core.effects.iter().map(|f| f.named(&record.channels)).collect(),
+            effects,
             warnings: core.remarks.iter().map(ToString::to_string).collect(),
             fit: core.last,
             rows,

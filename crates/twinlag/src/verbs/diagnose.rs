@@ -1,11 +1,15 @@
 //! The closed loop on a record.
 
 use twinlag_cross_relation::Parameter;
-use twinlag_diagnose::{Diagnosis as Core, Identifier, Policy, Remark, Settings, Verdict, diagnose as close_the_loop};
+use twinlag_diagnose::{
+    Diagnosis as Core, Identifier, Judgements, ModelFit, Policy, Remark, Settings, Verdict, diagnose as close_the_loop,
+};
 use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FreeParameters, Status};
+use crate::answers::{
+    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FreeParameters, NamedEffect, Status,
+};
 use crate::error::Error;
 use crate::options::Options;
 use crate::reference::Reference;
@@ -69,14 +73,17 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
     let mut remarks: Vec<String> = core.remarks.iter().map(ToString::to_string).collect();
     remarks.extend(remark_on_reference(&error));
     remarks.extend(remark_on_options(&options.characterise));
+    let best_effort = options.characterise.best_effort;
+    let named = named(record, &core, best_effort);
     Ok(Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
         base: base(record, options, &rows, &core),
         verdict: core.verdict,
-        effects: core.effects.iter().map(|f| f.named(&record.channels)).collect(),
         error,
-        last: with_effects(record, options, &rows, &core),
+        last: with_effects(record, options, &rows, &core, &named),
+        effects: named,
         unexplained: core.unexplained.clone(),
+        explained_to: core.explained_to,
         not_testable: core.not_testable.clone(),
         limits: core.limits.iter().map(|l| l.named(&record.channels)).collect(),
         remarks,
@@ -111,7 +118,7 @@ impl Diagnosed {
 
 /// The two-lag model that the effects were added to.
 fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
-    let fitted = fitted(record, options, rows, &core.base);
+    let fitted = fitted(record, options, rows, &core.base, &core.base_judgements);
     let lacks_an_effect = core.base.is_contradicted() || core.effects.iter().any(|e| e.evidence.is_some());
     let status = if core.verdict == Verdict::Refused || !fitted.is_determined() {
         Status::NotIdentifiable
@@ -129,17 +136,28 @@ fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) ->
     out
 }
 
+/// The effects with the names of their channels.
+pub(crate) fn named(record: &Record, core: &Core, best_effort: bool) -> Vec<NamedEffect> {
+    core.effects.iter().map(|found| NamedEffect::of(found, &record.channels, best_effort)).collect()
+}
+
 /// The model with the effects.
-pub(crate) fn with_effects(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
+pub(crate) fn with_effects(
+    record: &Record,
+    options: &DiagnoseOptions,
+    rows: &Rows,
+    core: &Core,
+    effects: &[NamedEffect],
+) -> Characterisation {
     let is_total_delay = core.remarks.contains(&Remark::LagAlone);
-    let fitted = FittedAnswer { is_total_delay, ..fitted(record, options, rows, &core.last) };
+    let fitted = FittedAnswer { is_total_delay, ..fitted(record, options, rows, &core.last, &core.judgements) };
     let status = match (core.verdict, fitted.is_determined()) {
         (Verdict::Refused, _) | (_, false) => Status::NotIdentifiable,
         (Verdict::Adequate | Verdict::Explained, _) => Status::Ok,
         _ => Status::ModelRejected,
     };
     let mut out = fitted.characterisation(status);
-    out.free = FreeParameters::among(&core.effects.iter().map(|f| (f.effect, &f.parameters[..])));
+    out.free = FreeParameters::among(effects);
     out.warnings.extend(core.remarks.iter().map(ToString::to_string));
     out
 }
@@ -148,7 +166,8 @@ fn fitted<'a>(
     record: &'a Record,
     options: &'a DiagnoseOptions,
     rows: &Rows,
-    fit: &'a twinlag_diagnose::ModelFit,
+    fit: &'a ModelFit,
+    judgements: &Judgements,
 ) -> FittedAnswer<'a> {
     let options = &options.characterise;
     FittedAnswer {
@@ -158,6 +177,7 @@ fn fitted<'a>(
         is_even: rows.is_even,
         is_noise_given: options.noise_std_k.is_some(),
         is_total_delay: false,
+        judgements: judgements.clone(),
     }
 }
 

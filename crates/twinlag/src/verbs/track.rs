@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
-use twinlag_diagnose::{Change, Settings, track as follow};
+use twinlag_diagnose::{Basis, Change, Circumstances, Settings, excess, track as follow};
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
 
@@ -100,7 +100,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         known: known_time_constants(&options.characterise),
         ..Settings::default()
     };
-    let found = follow(&observations, &settings, &effects, watch)?;
+    let mut found = follow(&observations, &settings, &effects, watch)?;
     let is_left = found.fit.is_contradicted();
     let sensors = found.log_error.as_ref().map(|errors| [0, 1].map(|i| along(&found.tau_s[i], &errors[i])));
     let sensors = sensors.filter(is_any);
@@ -109,6 +109,10 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         (Some(_), true) => Status::ModelRejected,
         (Some(_), false) => Status::Ok,
     };
+    let policy = &settings.policy;
+    let basis = Basis::of(excess(&found.fit, false), !settings.known.is_empty(), policy);
+    let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
+    let judgements = circumstances.judge(&mut found.fit);
     let fitted = FittedAnswer {
         record,
         fit: &found.fit,
@@ -116,6 +120,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         is_even,
         is_noise_given: settings.noise_std_k.is_some(),
         is_total_delay: false,
+        judgements,
     };
     let last = fitted.characterisation(status);
     let mut warnings = Vec::new();

@@ -1,6 +1,6 @@
 //! A record with the effects of a model that was found in another one.
 
-use twinlag_diagnose::{Identifier, ModelFit, Settings, fit_with};
+use twinlag_diagnose::{Basis, Circumstances, Identifier, ModelFit, Settings, excess, fit_with};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, FittedAnswer, Model, Status};
@@ -48,7 +48,11 @@ pub(crate) fn with_model(
     let noise_std_k = options.noise_std_k.or(noisy.and_then(|m| m.noise_std_k));
     let settings = Settings { noise_std_k, known: known_time_constants(options), ..Settings::default() };
     let effects = model.map(Model::known_effects).unwrap_or_default();
-    let known = fit_with(&observations, &settings, &effects)?;
+    let mut known = fit_with(&observations, &settings, &effects)?;
+    let policy = &settings.policy;
+    let basis = Basis::of(excess(&known.fit, noisy.is_some()), !settings.known.is_empty(), policy);
+    let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
+    let judgements = circumstances.judge(&mut known.fit);
     let fitted = FittedAnswer {
         record,
         fit: &known.fit,
@@ -56,6 +60,7 @@ pub(crate) fn with_model(
         is_even,
         is_noise_given: noise_std_k.is_some(),
         is_total_delay: false,
+        judgements,
     };
     let status = match (fitted.is_determined(), known.fit.is_contradicted()) {
         (false, _) => Status::NotIdentifiable,

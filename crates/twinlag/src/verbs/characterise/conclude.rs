@@ -82,14 +82,20 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             _ => Status::Ok,
         };
         let mut out = self.skeleton(status);
+        let mut used = None;
         if let (Status::Ok | Status::ModelRejected, Some((covariance, intervals))) = (status, answer) {
             self.report(&mut out, &covariance, intervals)?;
+            used = Some(covariance);
         } else {
             let found = self.walk(&vague)?;
             self.explain(&mut out, found);
             if found.is_none() && matches!(self.solved.end, End::OnBound(_)) {
                 out.status = Status::AtBound;
             }
+        }
+        self.judge(&mut out, used.as_ref());
+        if !self.asked.options.best_effort {
+            out.withhold();
         }
         Ok(self.finish(out))
     }

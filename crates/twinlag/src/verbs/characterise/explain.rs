@@ -47,7 +47,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let (value, [low, high]) = ridge.difference;
         // The interval is that of the walk, which knows the bound; the value is where the fit ran into it.
         let value = Some(value).filter(|_| !is_on_bound_of_time_constant(&self.best.end));
-        out.time_constant_difference_s = Difference { value, interval_95_s: Some([low, high]) };
+        out.time_constant_difference_s =
+            Difference { value, interval_95_s: Some([low, high]), ..Difference::default() };
         if low <= 0.0 && high >= 0.0 {
             out.not_identifiable.push("time_constant_difference_s".into());
             self.warnings

@@ -1,6 +1,7 @@
 //! The numbers of an answer, and what goes with each.
 
 use twinlag_cross_relation::{Parameter, TestName, Z_975, log_normal_interval_95};
+use twinlag_diagnose::Judgement;
 use twinlag_estimate::{Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals};
 use twinlag_sensor::Discretisation;
 
@@ -32,7 +33,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             hold: hold_name(self.fit.whitened().hold()).into(),
             hold_sensitivity: self.hold_sensitivity,
             sensors: [self.unknown_sensor(0), self.unknown_sensor(1)],
-            time_constant_difference_s: Difference { value: None, interval_95_s: None },
+            time_constant_difference_s: Difference::default(),
             free: FreeParameters::default(),
             residual: Residual {
                 chi2_per_dof,
@@ -55,7 +56,13 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     fn unknown_sensor(&self, i: usize) -> SensorEstimate {
         let is_coloured = self.asked.options.noise_colour == NoiseColour::Autoregressive;
         let known = self.asked.options.known(Parameter::ALL[4 + i]).filter(|k| k.std.is_none()).map(|k| k.value);
-        let second = SecondLag { value: known, standard_error: None, interval_95: None, known: known.is_some() };
+        let second = SecondLag {
+            value: known,
+            standard_error: None,
+            interval_95: None,
+            known: known.is_some(),
+            judgement: Judgement::default(),
+        };
         SensorEstimate {
             channel: self.asked.record.channels[i].clone(),
             time_constant_s: None,
@@ -68,6 +75,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             noise_ar1: is_coloured.then_some(self.levels.ar1[i]),
             noise_from: Some(self.levels.source[i]),
             known: self.fit.is_held(i),
+            judgement: Judgement::default(),
         }
     }
 
@@ -104,8 +112,12 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let difference = theta[1] - theta[0];
         let variance = covariance[0][0] + covariance[1][1] - 2.0 * covariance[0][1];
         let width = Z_975 * (variance + (from_hold[1] - from_hold[0]).powi(2)).sqrt();
-        out.time_constant_difference_s =
-            Difference { value: Some(difference), interval_95_s: Some([difference - width, difference + width]) };
+        out.time_constant_difference_s = Difference {
+            value: Some(difference),
+            interval_95_s: Some([difference - width, difference + width]),
+            includes_delay: false,
+            judgement: Judgement::default(),
+        };
     }
 
     /// Relative calibration, where it was fitted.
@@ -118,6 +130,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                     value,
                     standard_error: Some(error),
                     interval_95: [value - Z_975 * error, value + Z_975 * error],
+                    judgement: Judgement::default(),
                 }
             };
             let (gain, offset, level) = (theta[2], theta[3], self.fit.readings().level());
@@ -138,7 +151,9 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let always = self.asked.options.intervals == Intervals::Profile;
         for sensor in 0..2 {
             let (i, name) = (4 + sensor, Known::NAMES[4 + sensor]);
-            let Some(mut lag) = out.sensors[sensor].second_time_constant_s.filter(|lag| !lag.known) else { continue };
+            let Some(mut lag) = out.sensors[sensor].second_time_constant_s.clone().filter(|lag| !lag.known) else {
+                continue;
+            };
             let channel = out.sensors[sensor].channel.clone();
             if let Some(unseen) = self.fit.unseen()[sensor] {
                 out.not_identifiable.push(name.into());

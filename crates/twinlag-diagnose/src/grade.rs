@@ -1,0 +1,383 @@
+//! Whether a number may be used: a grade, and why.
+//!
+//! A number is right under assumptions: that the model is complete, that the record is of one piece, that what was given beforehand holds.
+//! Where nothing speaks against these the number is [`Grade::Go`]; where one of them stays open it is
+//! [`Grade::Conditional`] and the reason says on which; where nothing says how far the number may be off it is
+//! [`Grade::NoGo`], and is not given. Each reason has its grade, and the worst one counts.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use twinlag_cross_relation::{PartScatter, Z_975};
+use twinlag_model::{Identifier, ModelFit, Policy};
+
+/// Whether a number may be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Grade {
+    /// The number and its interval may be used.
+    Go,
+    /// They are right if the assumption holds that is stated.
+    Conditional,
+    /// Nothing says how far the number may be off, so it is not given.
+    #[default]
+    NoGo,
+}
+
+impl fmt::Display for Grade {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Go => "go",
+            Self::Conditional => "conditional",
+            Self::NoGo => "no-go",
+        })
+    }
+}
+
+/// What speaks against a number, or what it rests on. Its [`Display`](fmt::Display) is a clause for the reader.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// Other values explain the record as well.
+    NotDetermined,
+    /// The record cannot be diagnosed at all.
+    Refused,
+    /// It would be longer than the record can show.
+    TooLong {
+        /// The longest that the record can show, s.
+        most_s: f64,
+    },
+    /// It is a part of the total delay of channel 2, which alone is determined.
+    PartOfTotal,
+    /// Nothing says how uncertain it is.
+    NoInterval,
+    /// More than noise is left over, and nothing says how far it moves the number.
+    LeftOver,
+    /// More than noise is left over, and the number is right if that does not go with it.
+    LeftOverAside,
+    /// Little more than noise is left over, and the interval covers that all of it goes with the number.
+    LeavesSome {
+        /// Energy that is left over beside that of the noise, as a share of it.
+        share: f64,
+    },
+    /// So many effects may imitate another cause together.
+    ManyEffects {
+        /// How many there are.
+        count: usize,
+    },
+    /// Parts of the record give different values, and the interval covers their scatter.
+    PartsDisagree {
+        /// Their scatter over that which noise makes.
+        ratio: f64,
+    },
+    /// Other effects explain the record as well, and with them the number is another.
+    Cause {
+        /// The effect that it is right with.
+        effect: Identifier,
+    },
+    /// An effect may be there that the record hardly shows, and that would move the number out of its interval.
+    Hidden {
+        /// The likeliest of such effects.
+        effect: Identifier,
+    },
+    /// A value was given beforehand.
+    Given {
+        /// What was given, as `T1 = 0.5 s`.
+        what: String,
+    },
+    /// The estimator has a bias that noise makes.
+    Biased,
+    /// What the number follows from has no better grade.
+    Follows {
+        /// What it follows from.
+        from: String,
+        /// The grade of that.
+        grade: Grade,
+        /// Why that has it.
+        because: String,
+    },
+}
+
+impl Reason {
+    /// The best grade that a number can have with it.
+    pub fn grade(&self) -> Grade {
+        match self {
+            Self::NotDetermined
+            | Self::Refused
+            | Self::TooLong { .. }
+            | Self::PartOfTotal
+            | Self::NoInterval
+            | Self::LeftOver => Grade::NoGo,
+            Self::Follows { grade, .. } => *grade,
+            _ => Grade::Conditional,
+        }
+    }
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotDetermined => f.write_str("the record does not determine it: other values explain it as well"),
+            Self::Refused => f.write_str("the record cannot be diagnosed"),
+            Self::TooLong { most_s } => {
+                write!(
+                    f,
+                    "the fit makes it longer than {most_s:.3} s, the longest that a record of this length can show"
+                )
+            }
+            Self::PartOfTotal => {
+                f.write_str("only the total delay of the second channel is determined, and not its parts")
+            }
+            Self::NoInterval => f.write_str("nothing says how uncertain it is"),
+            Self::LeftOver => {
+                f.write_str("the model leaves more than noise, and nothing says how far that moves this number")
+            }
+            Self::LeftOverAside => f.write_str("right if what is left over does not go with it"),
+            Self::LeavesSome { share } => write!(
+                f,
+                "right if no more is missing than what is left over, {:.2} % of the noise: the interval covers that",
+                100.0 * share
+            ),
+            Self::ManyEffects { count } => {
+                write!(f, "right if these {count} effects are the cause: so many may imitate another one together")
+            }
+            Self::PartsDisagree { ratio } => write!(
+                f,
+                "right if the record is typical: its parts give values that differ {ratio:.1} times as much as noise explains, \
+                 which the interval covers"
+            ),
+            Self::Cause { effect } => {
+                write!(f, "right if the cause is {effect}: others explain the record as well and give another number")
+            }
+            Self::Hidden { effect } => write!(
+                f,
+                "right if there is no {effect} of a usual size: the record would hardly show one, and it would move this number \
+                 out of its interval"
+            ),
+            Self::Given { what } => write!(f, "right if {what}, as given"),
+            Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
+            Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),
+        }
+    }
+}
+
+/// The grade of a number, and why.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Judgement {
+    /// Whether the number may be used.
+    #[serde(default)]
+    pub grade: Grade,
+    /// Why, for the reader; of a number that may be used, what speaks for it.
+    #[serde(default)]
+    pub because: String,
+}
+
+impl Judgement {
+    /// The judgement that `reasons` make, the gravest of them first.
+    ///
+    /// ```
+    /// use twinlag_diagnose::{Grade, Judgement, Reason};
+    ///
+    /// let given = Reason::Given { what: "T1 = 0.5 s".into() };
+    /// assert_eq!(Judgement::of(&[]).grade, Grade::Go);
+    /// assert_eq!(Judgement::of(&[given.clone()]).because, "right if T1 = 0.5 s, as given");
+    /// let worst = Judgement::of(&[given, Reason::LeftOver]);
+    /// assert_eq!(worst.grade, Grade::NoGo);
+    /// assert!(worst.because.starts_with("the model leaves more than noise"));
+    /// ```
+    pub fn of(reasons: &[Reason]) -> Self {
+        let grade = reasons.iter().map(Reason::grade).max().unwrap_or(Grade::Go);
+        // Of a number that is not given, conditions are of no use.
+        let said = reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string).collect::<Vec<_>>();
+        let because = if said.is_empty() { WHY_GO.to_owned() } else { said.join("; ") };
+        Self { grade, because }
+    }
+
+    /// The judgement of what was given beforehand.
+    pub fn given() -> Self {
+        Self { grade: Grade::Go, because: "given beforehand".into() }
+    }
+
+    /// The judgement of a point to which parameters refer: it is of the record as it stands, and no estimate.
+    pub(crate) fn reference_point() -> Self {
+        Self { grade: Grade::Go, because: "a point of reference, and no estimate".into() }
+    }
+
+    /// The judgement of what follows from numbers with these judgements, each with its name.
+    pub fn following<'a>(from: impl IntoIterator<Item = (&'a str, &'a Self)>) -> Self {
+        let reasons: Vec<Reason> = from
+            .into_iter()
+            .filter(|(_, j)| j.grade != Grade::Go)
+            .map(|(name, j)| Reason::Follows { from: name.into(), grade: j.grade, because: j.because.clone() })
+            .collect();
+        let worst = reasons.iter().map(Reason::grade).max();
+        // One of them says enough.
+        Self::of(&reasons.into_iter().find(|r| Some(r.grade()) == worst).into_iter().collect::<Vec<_>>())
+    }
+}
+
+/// What speaks for a number that may be used.
+const WHY_GO: &str = "what is left over is noise, and the parts of the record agree";
+
+/// What all numbers of a fit rest on.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Basis {
+    /// What holds for each of them.
+    pub reasons: Vec<Reason>,
+    /// Energy that is left over beside that of the noise, and may all go with a number.
+    pub excess_energy: f64,
+}
+
+impl Basis {
+    /// The numbers of a fit of which nothing but the residual is known.
+    ///
+    /// - `excess`: what it leaves over beside noise; `None` where nothing says what the noise is
+    /// - `is_bounded_otherwise`: whether a number holds without the rest of the model, or knowledge holds it
+    pub fn of(excess: Option<Excess>, is_bounded_otherwise: bool, policy: &Policy) -> Self {
+        match excess.filter(|excess| excess.share <= policy.explained_excess_share) {
+            Some(Excess { share, energy }) if share > 0.0 => {
+                Self { reasons: vec![Reason::LeavesSome { share }], excess_energy: energy }
+            }
+            Some(_) => Self::default(),
+            None if is_bounded_otherwise => Self { reasons: vec![Reason::LeftOverAside], excess_energy: 0.0 },
+            None => Self { reasons: vec![Reason::LeftOver], excess_energy: 0.0 },
+        }
+    }
+}
+
+/// A number with its interval, on its own scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Number {
+    /// The number.
+    pub value: f64,
+    /// Its 95 % interval.
+    pub interval_95: Option<[f64; 2]>,
+    /// How far it moves between parts of the record.
+    pub scatter: Option<PartScatter>,
+    /// Whether it is positive by nature, so that its interval is a factor either way.
+    pub is_positive: bool,
+}
+
+impl Number {
+    /// The judgement of this number, and its interval with all that it has to cover.
+    ///
+    /// - `own`: what speaks against this number alone
+    pub fn judged(&self, own: Vec<Reason>, basis: &Basis, policy: &Policy) -> (Judgement, Option<[f64; 2]>) {
+        let mut reasons = own;
+        reasons.extend(basis.reasons.iter().cloned());
+        let Some(interval) = self.interval_95 else {
+            reasons.push(Reason::NoInterval);
+            return (Judgement::of(&reasons), None);
+        };
+        let mut factor = (1.0 + basis.excess_energy).sqrt();
+        if let Some(scatter) = self.scatter.filter(|s| s.p_value() < policy.parts_rejection_probability) {
+            reasons.push(Reason::PartsDisagree { ratio: scatter.ratio() });
+            factor = factor.max(T_975_OF_7 / Z_975 * scatter.ratio());
+        }
+        let interval = self.widened(interval, factor);
+        if factor > 1.0 && self.is_vague(interval, policy) {
+            reasons.push(Reason::LeftOver);
+        }
+        (Judgement::of(&reasons), Some(interval))
+    }
+
+    fn widened(&self, [low, high]: [f64; 2], factor: f64) -> [f64; 2] {
+        let value = self.value;
+        if self.is_positive && low > 0.0 && value > 0.0 {
+            [value * (low / value).powf(factor), value * (high / value).powf(factor)]
+        } else {
+            [value - factor * (value - low), value + factor * (high - value)]
+        }
+    }
+
+    /// Whether an interval that had to be widened says anything still: of a positive number a factor, of another one its sign.
+    fn is_vague(&self, [low, high]: [f64; 2], policy: &Policy) -> bool {
+        if self.is_positive {
+            low <= 0.0 || (high / low).ln() > 2.0 * Z_975 * policy.vague_log_std
+        } else {
+            low * high <= 0.0
+        }
+    }
+}
+
+/// Quantile 0.975 of Student's distribution with as many degrees of freedom as the parts of a record have.
+const T_975_OF_7: f64 = 2.364_624;
+
+/// What a fit leaves over beside noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Excess {
+    /// Its energy, in units of that of the noise of one residual.
+    pub energy: f64,
+    /// Its energy, over that of the noise of all residuals.
+    pub share: f64,
+}
+
+/// What `fit` leaves over beside noise; `None` where nothing but the residual says what the noise is.
+///
+/// Bands count with what is more than two standard errors above the noise; what a test sees elsewhere has at least the energy at
+/// which a test of one degree of freedom rejects.
+///
+/// - `has_noise`: whether a noise that was found in the residual is part of the model
+pub fn excess(fit: &ModelFit, has_noise: bool) -> Option<Excess> {
+    if !fit.is_contradicted() {
+        return Some(Excess { energy: 0.0, share: 0.0 });
+    }
+    if fit.is_noise_of_residual || has_noise {
+        return None;
+    }
+    let bands = &fit.trace.bands;
+    let count: f64 = bands.iter().map(|[_, _, dof]| dof).sum();
+    let above = |[_, power, dof]: &[f64; 3]| ((power - 1.0 - 2.0 * (2.0 / dof).sqrt()) * dof).max(0.0);
+    let of_bands: f64 = bands.iter().map(above).sum();
+    let energy = of_bands.max((fit.chi2_per_dof - 1.0) * count).max(LEAST_EXCESS);
+    (count > 0.0).then_some(Excess { energy, share: energy / count })
+}
+
+/// Quantile of the chi-square distribution with one degree of freedom at which a test rejects, `p = 10⁻⁴`.
+const LEAST_EXCESS: f64 = 15.14;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn number(value: f64, interval: [f64; 2], is_positive: bool) -> Number {
+        Number { value, interval_95: Some(interval), scatter: None, is_positive }
+    }
+
+    /// An excess of 8 makes intervals three times as long, by a factor or by a distance.
+    #[test]
+    fn intervals_cover_what_is_left_over() {
+        let policy = Policy::default();
+        let share = 0.01;
+        let basis = Basis { reasons: vec![Reason::LeavesSome { share }], excess_energy: 8.0 };
+        let (judgement, interval) = number(2.0, [1.8, 2.0 / 0.9], true).judged(Vec::new(), &basis, &policy);
+        let [low, high] = interval.expect("it had one");
+        assert_eq!(judgement.grade, Grade::Conditional);
+        assert!((low - 2.0 * 0.729).abs() < 1e-12 && (high - 2.0 / 0.729).abs() < 1e-12, "{low} {high}");
+        let (_, interval) = number(2.0, [1.9, 2.1], false).judged(Vec::new(), &basis, &policy);
+        let [low, high] = interval.expect("it had one");
+        assert!((low - 1.7).abs() < 1e-12 && (high - 2.3).abs() < 1e-12, "{low} {high}");
+    }
+
+    /// A number whose sign or size is lost in a wider interval is not given.
+    #[test]
+    fn what_becomes_vague_is_not_given() {
+        let policy = Policy::default();
+        let basis = Basis { excess_energy: 99.0, ..Basis::default() };
+        let grade = |n: Number| n.judged(Vec::new(), &basis, &policy).0.grade;
+        assert_eq!(grade(number(0.5, [0.4, 0.6], false)), Grade::NoGo);
+        assert_eq!(grade(number(0.5, [0.4, 0.6], true)), Grade::NoGo);
+        assert_eq!(grade(number(0.5, [0.499, 0.501], true)), Grade::Go);
+        assert_eq!(
+            Number { interval_95: None, ..number(1.0, [0.0; 2], false) }
+                .judged(Vec::new(), &Basis::default(), &policy)
+                .0
+                .grade,
+            Grade::NoGo
+        );
+    }
+}

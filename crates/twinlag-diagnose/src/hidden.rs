@@ -1,0 +1,79 @@
+//! Which numbers an effect that nobody has seen could move.
+//!
+//! A search names an effect where it stands out from chance. One that does not may be there all the same, and where the record
+//! hardly shows it, it may move a time constant by more than its interval. How probable that is follows from Bayes'
+//! rule with two ingredients from outside the record: how often an effect is there at all, and how large it then usually is
+//! (a normal of zero mean whose standard deviation `s₀` is what counts as typical of it). With `σ` the standard error
+//! that the size would have, and `z` how many of these it seems to be, the odds of the effect against its absence are those
+//! from outside times `σ/√(σ² + s₀²) exp(½ z² s₀²/(s₀² + σ²))`: what the record shows well, and does not show, is not there.
+
+use twinlag_model::{Fitted, Identifier, Linearised, ModelError, Shared, dense};
+use twinlag_optimise::Scale;
+
+use crate::candidates::Search;
+
+/// An effect that may be there unseen.
+struct Hidden {
+    effect: Identifier,
+    /// Probability that it is there.
+    probability: f64,
+    /// How far both time constants and their difference would then be off, s.
+    shift_s: [f64; 3],
+}
+
+impl Search<'_> {
+    /// For both time constants and their difference the effect that is most probably there unseen, where all those that
+    /// would move the number by more than half its interval are together more probable than the policy allows.
+    ///
+    /// - `half_s`: half the intervals, s; `None` of a number that has none
+    ///
+    /// # Errors
+    /// [`ModelError::Cancelled`] if the watch says so.
+    pub(crate) fn hidden(
+        &self,
+        current: &Fitted,
+        half_s: [Option<f64>; 3],
+    ) -> Result<[Option<Identifier>; 3], ModelError> {
+        let mut all = self.candidates(&current.model);
+        all.retain(|c| !c.is_noise() && !c.about().is_narrow && c.main().is_some());
+        let now = current.model.linearised(&current.theta, self.observations, self.selection);
+        let each = self.each(&all, |effect| self.unseen(current, effect, &now))?;
+        let hidden: Vec<Hidden> = each.into_iter().flatten().collect();
+        Ok([0, 1, 2].map(|i| {
+            let half_s = half_s[i]?;
+            let decisive = || hidden.iter().filter(|h| h.shift_s[i] > half_s);
+            let together: f64 = decisive().map(|h| h.probability).sum();
+            let likeliest = decisive().max_by(|a, b| a.probability.total_cmp(&b.probability));
+            likeliest.filter(|_| together > self.policy.hidden_effect_probability).map(|h| h.effect)
+        }))
+    }
+
+    /// How probable an effect is, from the largest size that a search begins with.
+    fn unseen(&self, current: &Fitted, effect: &Shared, now: &Linearised) -> Option<Hidden> {
+        let main = effect.main()?;
+        let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
+        let model = current.model.with(effect.clone());
+        let theta = [&current.theta[..], &start].concat();
+        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
+        let inverse = dense::inverse(&dense::gram(&lin.columns))?;
+        let slope = lin.slope();
+        let energy = current.mean_energy().max(1.0);
+        let taken = dense::dot(&slope, &dense::times(&inverse, &slope));
+        let gain = (current.chi2 - dense::dot(&lin.residual, &lin.residual) + taken) / energy;
+        let at = current.theta.len() + main;
+        let variance = inverse[at][at] * energy;
+        let usual = match effect.parameters()[main].variable.scale {
+            Scale::Linear { typical } => typical,
+            Scale::Logarithmic => start[main],
+        };
+        // Other parameters of the effect take off one each by chance.
+        let z2 = (gain - (start.len() - 1) as f64).max(0.0);
+        let seen = usual * usual / (usual * usual + variance);
+        let odds = self.policy.prior_effect_probability * (1.0 - seen).sqrt() * (0.5 * z2 * seen).exp();
+        let size = (z2 * variance * seen * seen + variance * seen).sqrt();
+        let per_size = |i: usize| inverse[i][at] / inverse[at][at];
+        let shift_s = [per_size(0), per_size(1), per_size(1) - per_size(0)].map(|slope| (slope * size).abs());
+        let is_usable = variance > 0.0 && odds.is_finite() && shift_s.iter().all(|s| s.is_finite());
+        is_usable.then(|| Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
+    }
+}

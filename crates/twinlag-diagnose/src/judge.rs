@@ -1,0 +1,94 @@
+//! The numbers of a fit, each with its grade.
+
+use twinlag_model::{Identifier, KnownTimeConstant, ModelFit, Policy, TimeConstant};
+use twinlag_optimise::End;
+
+use crate::grade::{Basis, Judgement, Number, Reason};
+
+/// Grades of the numbers that every fit has.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Judgements {
+    /// Both time constants.
+    pub time_constants: [Judgement; 2],
+    /// Their difference, or the total delay of channel 2.
+    pub difference: Judgement,
+}
+
+/// What the numbers of a fit are judged by.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Circumstances<'a> {
+    /// What all of them rest on.
+    pub basis: Basis,
+    /// Time constants that were known beforehand.
+    pub known: &'a [KnownTimeConstant],
+    /// Length of the record, s.
+    pub span_s: f64,
+    /// Whether the difference is the total delay of channel 2, which holds wherever the fit ended.
+    pub is_total_delay: bool,
+    /// The effect that both time constants and their difference are right with alone, where others that explain the
+    /// record as well give other values.
+    pub causes: [Option<Identifier>; 3],
+    /// The effect that may be there unseen and would move the number, for both time constants and their difference.
+    pub hidden: [Option<Identifier>; 3],
+    /// The numbers that decide.
+    pub policy: &'a Policy,
+}
+
+impl<'a> Circumstances<'a> {
+    /// A record of `span_s` seconds, of whose model nothing is known but what `basis` says.
+    pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
+        Self { basis, known, span_s, is_total_delay: false, causes: [None; 3], hidden: [None; 3], policy }
+    }
+
+    /// What was given beforehand, for the reader.
+    fn given(&self) -> impl Iterator<Item = Reason> {
+        self.known.iter().map(|known| {
+            let KnownTimeConstant { sensor, value_s, std_s } = known;
+            let spread = std_s.map_or(String::new(), |std_s| format!(" ± {std_s}"));
+            Reason::Given { what: format!("T{} = {value_s}{spread} s", sensor + 1) }
+        })
+    }
+
+    /// What all numbers rest on, what was given among it.
+    pub(crate) fn whole_basis(&self) -> Basis {
+        let mut out = self.basis.clone();
+        out.reasons.extend(self.given());
+        out
+    }
+
+    /// Judges the numbers of `fit`, and widens their intervals to what they have to cover.
+    pub fn judge(&self, fit: &mut ModelFit) -> Judgements {
+        let basis = self.whole_basis();
+        let time_constants = [0, 1].map(|i| {
+            let is_held = self.known.iter().any(|k| k.sensor == i && k.std_s.is_none());
+            if is_held {
+                return Judgement::given();
+            }
+            self.judged(&mut fit.time_constants[i], true, i, &basis)
+        });
+        let is_on_bound = matches!(&fit.fit.end, End::OnBound(which) if which.iter().any(|i| *i < 2));
+        if is_on_bound && !self.is_total_delay {
+            fit.difference = TimeConstant::default();
+        }
+        let difference = self.judged(&mut fit.difference, false, 2, &basis);
+        Judgements { time_constants, difference }
+    }
+
+    fn judged(&self, number: &mut TimeConstant, is_positive: bool, index: usize, basis: &Basis) -> Judgement {
+        let Some(value) = number.value_s else { return Judgement::of(&[Reason::NotDetermined]) };
+        let most_s = self.policy.longest_given_share * self.span_s;
+        let cause = self.causes[index].map(|effect| Reason::Cause { effect });
+        let hidden = self.hidden[index].map(|effect| Reason::Hidden { effect });
+        let mut own: Vec<Reason> = cause.into_iter().chain(hidden).collect();
+        if value.abs() > most_s {
+            own.push(Reason::TooLong { most_s });
+        }
+        let TimeConstant { interval_95_s, scatter, .. } = *number;
+        let (judgement, interval) =
+            Number { value, interval_95: interval_95_s, scatter, is_positive }.judged(own, basis, self.policy);
+        number.interval_95_s = interval;
+        judgement
+    }
+}

@@ -1,0 +1,50 @@
+//! What each residual of a fit does to its numbers.
+
+use twinlag_cross_relation::PartScatter;
+
+use crate::cost::Linearised;
+use crate::dense;
+use crate::fit::Fitted;
+use crate::observations::Observations;
+use crate::selection::Selection;
+
+/// A fit, linearised where it ended.
+pub(crate) struct Influence<'a> {
+    linearised: Linearised,
+    /// Inverse of the products of its columns.
+    inverse: Vec<Vec<f64>>,
+    covariance: &'a [Vec<f64>],
+}
+
+impl<'a> Influence<'a> {
+    /// - `covariance`: of the parameters, as it is stated
+    ///
+    /// `None` where the columns are those of fewer parameters.
+    pub(crate) fn of(
+        fitted: &Fitted,
+        observations: &Observations,
+        selection: &Selection,
+        covariance: &'a [Vec<f64>],
+    ) -> Option<Self> {
+        let linearised = fitted.model.linearised(&fitted.theta, observations, selection);
+        let inverse = dense::inverse(&dense::gram(&linearised.columns))?;
+        Some(Self { linearised, inverse, covariance })
+    }
+
+    /// How far a sum of parameters, each by its index and its factor, moves between parts of the record.
+    pub(crate) fn scatter(&self, sum: &[(usize, f64)]) -> Option<PartScatter> {
+        let variance: f64 =
+            sum.iter().map(|(i, s)| sum.iter().map(|(j, t)| s * t * self.covariance[*i][*j]).sum::<f64>()).sum();
+        let weights: Vec<f64> = self.inverse.iter().map(|row| sum.iter().map(|(j, t)| row[*j] * t).sum()).collect();
+        let Linearised { columns, residual, samples, .. } = &self.linearised;
+        let n = samples.len();
+        let mut influence = vec![0.0; n];
+        for (column, weight) in columns.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0) {
+            influence.iter_mut().zip(column).for_each(|(d, x)| *d += weight * x);
+        }
+        let breaks = (1..n).filter(|k| samples[*k] != samples[*k - 1] + 1);
+        let ends: Vec<usize> = std::iter::once(0).chain(breaks).chain([n]).collect();
+        let runs = |values: &[f64]| -> Vec<Vec<f64>> { ends.windows(2).map(|w| values[w[0]..w[1]].to_vec()).collect() };
+        PartScatter::of(&runs(&residual[..n]), &runs(&influence), variance.max(0.0).sqrt())
+    }
+}

@@ -1,0 +1,139 @@
+//! Whether the numbers of a characterisation may be used.
+
+use twinlag_cross_relation::{Parameter, PartScatter, sandwich};
+use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
+use twinlag_estimate::{Estimator, Known};
+
+use super::conclude::Conclusion;
+use crate::answers::{Characterisation, Status};
+
+impl<const P: usize> Conclusion<'_, '_, P> {
+    /// Grades every number of `out`, and widens its interval to what it has to cover.
+    ///
+    /// - `covariance`: that the intervals rest on; `None` where there is none
+    pub(super) fn judge(&self, out: &mut Characterisation, covariance: Option<&[[f64; P]; P]>) {
+        let policy = Policy::default();
+        let basis = self.basis(out, &policy);
+        let most_s = policy.longest_given_share * self.span_s();
+        let scatter = covariance.filter(|_| self.is_whitened()).map(|c| Scattering::of(self, c));
+        let of = |sum: &[(usize, f64)]| scatter.as_ref().and_then(|s| s.between_parts(sum));
+        let judged = |value: Option<f64>, interval_95, scatter, is_positive, limit_s: f64| {
+            let Some(value) = value else { return (Judgement::of(&[Reason::NotDetermined]), interval_95) };
+            let own = if value.abs() > limit_s { vec![Reason::TooLong { most_s: limit_s }] } else { Vec::new() };
+            Number { value, interval_95, scatter, is_positive }.judged(own, &basis, &policy)
+        };
+        for i in 0..2 {
+            let sensor = &mut out.sensors[i];
+            if sensor.known && sensor.time_constant_s.is_some() {
+                sensor.judgement = Judgement::given();
+            } else {
+                (sensor.judgement, sensor.interval_95_s) =
+                    judged(sensor.time_constant_s, sensor.interval_95_s, of(&[(i, 1.0)]), true, most_s);
+            }
+            if let Some(lag) = &mut sensor.second_time_constant_s {
+                (lag.judgement, lag.interval_95) = match lag.known {
+                    true => (Judgement::given(), lag.interval_95),
+                    false => judged(lag.value, lag.interval_95, of(&[(4 + i, 1.0)]), true, most_s),
+                };
+            }
+        }
+        let difference = &mut out.time_constant_difference_s;
+        (difference.judgement, difference.interval_95_s) =
+            judged(difference.value, difference.interval_95_s, of(&[(0, -1.0), (1, 1.0)]), false, most_s);
+        let level = self.fit.readings().level();
+        let sums = [vec![(2, 1.0)], vec![(3, 1.0), (2, -level)]];
+        for (free, sum) in [&mut out.free.gain, &mut out.free.offset_k].into_iter().zip(sums) {
+            let Some(estimated) = free else { continue };
+            let (judgement, interval) =
+                judged(Some(estimated.value), Some(estimated.interval_95), of(&sum), false, f64::INFINITY);
+            (estimated.judgement, estimated.interval_95) = (judgement, interval.unwrap_or(estimated.interval_95));
+        }
+    }
+
+    /// What all numbers rest on.
+    fn basis(&self, out: &Characterisation, policy: &Policy) -> Basis {
+        let mut basis = Basis::default();
+        let options = self.asked.options;
+        if self.judged.is_rejected || out.status == Status::ModelRejected {
+            let count: f64 = self.fit.whitened().terms(&self.solved.theta) as f64;
+            let share = out.residual.chi2_per_dof.filter(|_| self.levels.energy_as_found.is_none()).map(|e| e - 1.0);
+            // Of a residual that is louder than noise by little the interval covers all.
+            match share.filter(|share| (0.0..=policy.explained_excess_share).contains(share)) {
+                Some(share) => {
+                    basis.excess_energy = share * count;
+                    basis.reasons.push(Reason::LeavesSome { share });
+                }
+                None if options.known.is_empty() => basis.reasons.push(Reason::LeftOver),
+                None => basis.reasons.push(Reason::LeftOverAside),
+            }
+        }
+        let is_biased = matches!(
+            options.estimator,
+            Estimator::CrossRelation | Estimator::DifferenceEquationLs | Estimator::DifferenceEquationTls
+        );
+        if is_biased {
+            basis.reasons.push(Reason::Biased);
+        }
+        basis.reasons.extend(options.known.iter().map(|known| Reason::Given { what: given(known) }));
+        basis
+    }
+
+    fn span_s(&self) -> f64 {
+        let time_s = &self.asked.record.time_s;
+        time_s.last().zip(time_s.first()).map_or(0.0, |(last, first)| last - first)
+    }
+}
+
+/// What was given, for the reader.
+fn given(known: &Known) -> String {
+    let name = Parameter::ALL.iter().position(|p| *p == known.parameter).map_or("it", |i| Known::NAMES[i]);
+    let spread = known.std.map_or(String::new(), |std| format!(" ± {std}"));
+    format!("{name} = {}{spread}", known.value)
+}
+
+/// What each residual does to the parameters.
+struct Scattering<'c, const P: usize> {
+    residual: Vec<Vec<f64>>,
+    /// Derivatives of each residual, run by run.
+    derivatives: Vec<Vec<[f64; P]>>,
+    /// Inverse of the sum of their products.
+    inverse: Option<[[f64; P]; P]>,
+    covariance: &'c [[f64; P]; P],
+}
+
+impl<'c, const P: usize> Scattering<'c, P> {
+    fn of(conclusion: &Conclusion<'_, '_, P>, covariance: &'c [[f64; P]; P]) -> Self {
+        let jacobian = conclusion.fit.whitened().jacobian(&conclusion.solved.theta);
+        let mut products = [[0.0; P]; P];
+        for (_, d) in jacobian.iter().flatten() {
+            for i in 0..P {
+                for j in 0..P {
+                    products[i][j] += d[i] * d[j];
+                }
+            }
+        }
+        let residual = jacobian.iter().map(|run| run.iter().map(|(r, _)| *r).collect()).collect();
+        let derivatives = jacobian.into_iter().map(|run| run.into_iter().map(|(_, d)| d).collect()).collect();
+        let inverse = sandwich(&products, &products, &conclusion.fit.free());
+        Self { residual, derivatives, inverse, covariance }
+    }
+
+    /// How far a sum of parameters, each by its index and its factor, moves between parts of the record.
+    fn between_parts(&self, sum: &[(usize, f64)]) -> Option<PartScatter> {
+        let inverse = self.inverse.as_ref().filter(|_| sum.iter().all(|(i, _)| *i < P))?;
+        let pairs = sum.iter().flat_map(|a| sum.iter().map(move |b| (a, b)));
+        let variance: f64 = pairs.map(|((i, s), (j, t))| s * t * self.covariance[*i][*j]).sum();
+        let weights: [f64; P] = std::array::from_fn(|i| sum.iter().map(|(j, t)| inverse[i][*j] * t).sum());
+        let influence = |d: &[f64; P]| d.iter().zip(&weights).map(|(d, w)| d * w).sum::<f64>();
+        let influences: Vec<Vec<f64>> =
+            self.derivatives.iter().map(|run| run.iter().map(influence).collect()).collect();
+        PartScatter::of(&self.residual, &influences, variance.max(0.0).sqrt())
+    }
+}
+
+impl Characterisation {
+    /// Whether a number that was asked for is not given.
+    pub fn has_no_go(&self) -> bool {
+        self.sensors.iter().any(|s| s.judgement.grade == Grade::NoGo)
+    }
+}
