@@ -35,7 +35,14 @@ pub struct NoiseLevel {
     /// Number of third differences left out because they are too large for noise. A dropout causes
     /// up to four of them, and a sharp step of the gas some.
     pub outliers: usize,
+    /// Number of these at which the other channel does nothing unusual: it changes across them by no more than three robust
+    /// standard deviations of its changes over as many samples anywhere. A sharp step of the gas moves both.
+    pub lone_outliers: usize,
 }
+
+/// Samples beside a third difference over which the other channel's change across it is taken: a slower sensor needs some to
+/// follow. Chosen.
+const SAMPLES_BESIDE: usize = 4;
 
 impl NoiseLevel {
     /// The converter's step, K, where it is coarser than the noise: see
@@ -88,7 +95,7 @@ impl NoiseLevel {
 /// # Errors
 /// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.
 pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError> {
-    let level = |channel: fn(&Segment) -> &[f64]| -> Result<NoiseLevel, NoiseError> {
+    let level = |channel: fn(&Segment) -> &[f64], other: fn(&Segment) -> &[f64]| -> Result<NoiseLevel, NoiseError> {
         let mut differences = Vec::new();
         for segment in readings.segments() {
             let y = channel(segment);
@@ -100,7 +107,11 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
         if differences.len() < 8 {
             return Err(NoiseError::TooShort { samples: readings.len(), needed: 11 });
         }
-        let outliers = drop_outliers(&mut differences);
+        let limit_k = largest_of_noise(&differences);
+        let all = differences.len();
+        let is_far: Vec<bool> = differences.iter().map(|d| d.abs() > limit_k).collect();
+        differences.retain(|d| d.abs() <= limit_k);
+        let lone_outliers = lone(&is_far, readings.segments().iter().map(other));
         let count = differences.len();
         let from_differences = (differences.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
         let step = quantisation_step(readings.segments().iter().map(channel));
@@ -113,25 +124,43 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
             std_k,
             standard_error_k: 0.5 * std_k * (4.62 / count as f64).sqrt(),
             quantisation_step_k: step,
-            outliers,
+            outliers: all - count,
+            lone_outliers,
         })
     };
-    Ok([level(Segment::y1)?, level(Segment::y2)?])
+    Ok([level(Segment::y1, Segment::y2)?, level(Segment::y2, Segment::y1)?])
 }
 
-/// Leaves out differences beyond six robust standard deviations (1.4826 times the median absolute
-/// value) and returns their number. White Gaussian noise has one such in five hundred million.
-/// Where more than half are zero, as with a coarse converter, there is no scale to judge by and all
-/// are kept.
-fn drop_outliers(differences: &mut Vec<f64>) -> usize {
-    let mut sizes: Vec<f64> = differences.iter().map(|d| d.abs()).collect();
-    let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let before = differences.len();
-    if median > 0.0 {
-        differences.retain(|d| d.abs() <= 6.0 * 1.4826 * median);
+/// Six robust standard deviations (1.4826 times the median absolute value) of the differences. White Gaussian noise has one
+/// in five hundred million beyond. Where more than half are zero, as with a coarse converter, there is no scale to judge by
+/// and it is infinite.
+fn largest_of_noise(differences: &[f64]) -> f64 {
+    match 6.0 * robust_std(differences) {
+        limit if limit > 0.0 => limit,
+        _ => f64::INFINITY,
     }
-    before - differences.len()
+}
+
+/// 1.4826 times the median absolute value, which is the standard deviation of Gaussian values; 0 of none.
+fn robust_std(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() { 0.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// How many of the differences of four readings that are too large lie where the `other` channel does nothing unusual.
+///
+/// - `is_far`: of each difference, through all segments
+fn lone<'a>(is_far: &[bool], other: impl Iterator<Item = &'a [f64]>) -> usize {
+    let mut changes = Vec::with_capacity(is_far.len());
+    for y in other {
+        for k in 0..y.len().saturating_sub(3) {
+            let (from, to) = (k.saturating_sub(SAMPLES_BESIDE), (k + 3 + SAMPLES_BESIDE).min(y.len() - 1));
+            changes.push(y[to] - y[from]);
+        }
+    }
+    let usual = 3.0 * robust_std(&changes);
+    is_far.iter().zip(&changes).filter(|(is_far, change)| **is_far && change.abs() <= usual).count()
 }
 
 /// Weights of unit sum of squares that take any parabola through samples `k..k+4` to zero.

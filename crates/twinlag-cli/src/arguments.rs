@@ -27,6 +27,7 @@ Try it without a file:    twinlag demo
 Analyse a logger file:    twinlag characterise run.csv
 Name the columns:         twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 Find missing effects:     twinlag diagnose run.csv --report run.html
+What a name means:        twinlag explain two-sensors
 Get the gas temperature:  twinlag compensate run.csv --out gas.csv
 Follow changing flow:     twinlag track run.csv --out tau.csv
 Use it in a script:       twinlag characterise run.csv --json
@@ -68,6 +69,8 @@ pub(crate) enum Command {
     /// results.
     #[command(subcommand)]
     Study(Study),
+    /// Explain an effect, a verdict, a status or a test in plain words, or what two sensors can never reveal.
+    Explain(Explain),
     /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no
     /// file.
     Demo(Demo),
@@ -500,6 +503,16 @@ pub(crate) struct Simulate {
     /// Overwrite the output if it exists.
     #[arg(long)]
     pub(crate) force: bool,
+}
+
+/// Explain a name in plain words.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+NAME is an effect (delay), a verdict (partly-explained), a status (model-rejected), a test of the residual (coherence), or
+two-sensors, which is what two sensors alone can never reveal. A name that is none of these is answered with the list.")]
+pub(crate) struct Explain {
+    /// What to explain.
+    pub(crate) name: String,
 }
 
 /// Simulate a built-in rig and diagnose it.

@@ -13,6 +13,7 @@ mod compensate;
 mod console;
 mod demo;
 mod diagnose;
+mod explain;
 mod failure;
 mod grades;
 mod live;
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Command::Simulate(command) => simulate::run(&command, console),
         Command::Track(command) => track::run(&command, console),
         Command::Study(command) => study::run(&command, console),
+        Command::Explain(command) => explain::run(&command, console),
         Command::Demo(command) => demo::run(&command, console),
     };
     match result {

@@ -4,7 +4,7 @@ use std::io::{Write, stdout};
 use std::path::Path;
 
 use serde::Serialize;
-use twinlag::diagnosis::Verdict;
+use twinlag::diagnosis::{Masked, NEVER_TESTABLE, Verdict};
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::{Note, Record};
 use twinlag::{
@@ -273,7 +273,13 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     if !answer.last.not_identifiable.is_empty() {
         lines.push(format!("not determined by this record: {}", answer.last.not_identifiable.join(", ")));
     }
-    lines.push(format!("these readings cannot reveal: {}", answer.not_testable.join("; ")));
+    if answer.limits.is_empty() && matches!(answer.verdict, Verdict::PartlyExplained | Verdict::Unexplained) {
+        lines.push("nothing can be excluded: what is left over may hide an effect of any size".into());
+    }
+    // What no record reveals is said once, by `explain`.
+    let of_record = answer.not_testable.iter().filter(|what| !NEVER_TESTABLE.contains(&what.as_str()));
+    lines.extend(of_record.map(|what| format!("this record cannot reveal: {what}")));
+    lines.push("what two sensors can never reveal: twinlag explain two-sensors".into());
     lines.push(String::new());
     lines.join("\n")
 }
@@ -286,6 +292,16 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     lines.push(format!("  {}{place}: {}", effect.effect, about.explanation));
     if let Some(seen) = &effect.seen {
         lines.push(format!("    {seen}"));
+    }
+    if !effect.masked.is_empty() {
+        let shown: Vec<String> = effect.masked.iter().take(MAX_MASKED).map(masked).collect();
+        let more = effect.masked.len() - shown.len();
+        let rest = if more > 0 { format!(" and {more} more places (see --json)") } else { String::new() };
+        lines.push(format!(
+            "    left out of {}: rows {}{rest}",
+            effect.channel.as_deref().unwrap_or("the fit"),
+            shown.join(", ")
+        ));
     }
     for p in effect.parameters.iter().take(MAX_PARAMETERS) {
         let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
@@ -338,12 +354,27 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     if let Some(r) = answer.error.reference_rmse_k {
         row("rms gas error against reference", &k(r.before), &k(r.after));
     }
+    lines.extend(answer.what_got_worse().iter().map(|why| format!("  {why}")));
     let sources = [&answer.base, &answer.last].map(|c| c.sensors[0].noise_from.map(noise_source));
     lines.push(match sources {
         [Some(before), Some(after)] if before != after => format!("  noise levels: {before}; with effects: {after}"),
         [before, after] => format!("  noise levels: {}", after.or(before).unwrap_or("not stated")),
     });
     lines
+}
+
+/// Places of masked readings of one effect that are printed.
+const MAX_MASKED: usize = 5;
+
+/// `120-134 (12.0-13.4 s)`.
+fn masked(run: &Masked) -> String {
+    let ([first, last], [from_s, to_s]) = (run.rows, run.time_s);
+    let seconds = |t: f64| format!("{t:.4}").trim_end_matches('0').trim_end_matches('.').to_owned();
+    if first == last {
+        format!("{first} ({} s)", seconds(from_s))
+    } else {
+        format!("{first}-{last} ({}-{} s)", seconds(from_s), seconds(to_s))
+    }
 }
 
 /// Number of parameters of one effect that are printed.

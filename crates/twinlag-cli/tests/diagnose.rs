@@ -177,6 +177,54 @@ fn a_single_sine_is_refused_with_its_json() {
     assert_ne!(value["final"]["status"], "ok", "{answer:#?}");
 }
 
+/// A converter that ends where a twentieth of the readings are above. The lines are those of the file, its comment and its
+/// header counted.
+#[test]
+fn readings_at_a_limit_are_listed_by_their_lines_and_times() {
+    let mut rows = Trace::GOOD.rows();
+    let mut sorted: Vec<f64> = rows.iter().map(|row| row[1]).collect();
+    sorted.sort_by(f64::total_cmp);
+    let limit_c = (1e6 * sorted[sorted.len() * 19 / 20]).round() / 1e6;
+    rows.iter_mut().for_each(|row| row[1] = row[1].min(limit_c));
+    let bench = Bench::with("limit", "run.csv", format!("# a converter that ends\n{}", csv(&rows)));
+    let (value, answer) = diagnosis(&bench, &[], 0);
+    let effect = &value["effects"][0];
+    assert_eq!((text(effect, "effect"), text(effect, "channel")), ("saturation", "T1"), "{answer:#?}");
+    let mut lines = Vec::new();
+    for run in list(effect, "masked") {
+        let [first, last] = [0, 1].map(|end| run["rows"][end].as_u64().expect("a line") as usize);
+        for (end, line) in [first, last].into_iter().enumerate() {
+            // Stamps are printed to 1e-6 s.
+            assert!((number(&run["time_s"][end]) - rows[line - 3][0]).abs() < 1e-6, "{run}");
+        }
+        lines.extend(first..=last);
+    }
+    // One that is below by less than the digits of the file is printed as the limit.
+    let expected: Vec<usize> = (0..rows.len()).filter(|k| limit_c - rows[*k][1] < 5e-7).map(|k| k + 3).collect();
+    assert_eq!(lines, expected);
+    let shown = bench.run(&["diagnose", "run.csv", "--quiet"]).stdout;
+    let first = list(effect, "masked")[0]["rows"][0].as_u64().expect("a line");
+    assert!(shown.contains(&format!("left out of T1: rows {first}")), "{shown}");
+}
+
+/// While something is left over, no effect is excluded; and what no record reveals is told by another command.
+#[test]
+fn nothing_is_excluded_while_something_is_left_over() {
+    let bench = offset("excluded");
+    let (adequate, _) = diagnosis(&bench, &[], 0);
+    assert!(!list(&adequate, "limits").is_empty(), "explained: {adequate:#}");
+    // Whatever an offset looks like.
+    let alike = ["calibration", "radiation", "drift", "crosstalk", "coloured-noise", "input-mismatch"];
+    let without: Vec<&str> = alike.iter().flat_map(|name| ["--without", name]).collect();
+    let answer = bench.run(&[&["diagnose", "run.csv", "--json"], &without[..]].concat());
+    let left = answer.json();
+    assert!(["partly-explained", "unexplained"].contains(&text(&left, "verdict")), "{answer:#?}");
+    assert!(list(&left, "limits").is_empty() && !list(&left, "not_testable").is_empty(), "{answer:#?}");
+    let shown = bench.run(&[&["diagnose", "run.csv"], &without[..]].concat()).stdout;
+    assert!(shown.contains("nothing can be excluded") && shown.contains("twinlag explain two-sensors"), "{shown}");
+    assert!(!shown.contains("that both sensors share"), "{shown}");
+}
+
 /// The text says what the JSON says: verdict, effect, both time constants.
 #[test]
 fn the_text_names_verdict_and_effect() {

@@ -25,7 +25,6 @@ const MOST_SMOOTHED_SAMPLES: f64 = 50.0;
 /// [`ModelError::Cancelled`] if the watch says so.
 pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usize>) -> Result<Diagnosis, ModelError> {
     let policy = &settings.policy;
-    let limits = state.search().limits(&state.current)?;
     // Before is before everything: with the defects of the data in it.
     let unmasked = state.prepared.unmasked(&state.base);
     let mut base = base_fit(&state, unmasked.as_ref(), policy);
@@ -33,14 +32,15 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut last = summary(&with_effects, &state, policy);
     let mut remarks: Vec<Remark> = Vec::new();
     for remark in state.moves.iter().filter_map(Move::remark) {
-        if remark != Remark::NoiseLowered || !remarks.contains(&remark) {
+        if !remarks.contains(&remark) {
             remarks.push(remark);
         }
     }
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
     // Each with its place in the model, if it is in there.
-    let mut found: Vec<(Option<usize>, Found)> = state.prepared.found.iter().map(|d| (None, of_defect(d))).collect();
+    let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, &last)));
+    let mut found: Vec<(Option<usize>, Found)> = defects.collect();
     let named = state.taken.iter().enumerate();
     found.extend(named.map(|(index, taken)| (Some(index), name(index, taken, &with_effects, &last))));
     let left = what_is_left(&last, policy);
@@ -93,6 +93,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
         remarks.push(Remark::BiasUnknown);
     }
+    remarks.sort_by_key(Remark::importance);
+    // What is left over may hide an effect of any size.
+    let can_exclude = matches!(verdict, Verdict::Adequate | Verdict::Explained);
+    let limits = if can_exclude { state.search().limits(&state.current)? } else { Vec::new() };
     Ok(Diagnosis {
         verdict,
         effects: found,

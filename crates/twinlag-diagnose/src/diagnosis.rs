@@ -1,7 +1,7 @@
 //! The result of a diagnosis.
 
 use serde::{Deserialize, Serialize};
-use twinlag_model::{Identifier, ModelFit, Policy, Value};
+use twinlag_model::{Identifier, ModelFit, Observations, Policy, Value};
 
 use crate::evidence::Evidence;
 use crate::grade::Judgement;
@@ -48,6 +48,43 @@ pub struct Found {
     pub alternatives: Vec<Identifier>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
+    /// Readings of the channel that are left out of the fit, in order.
+    pub masked: Vec<Masked>,
+}
+
+/// Neighbouring readings of one channel that are left out of the fit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Masked {
+    /// The first and the last of them: samples, counted from 0 through the stretches. In an answer on a record these are
+    /// lines of its file, and rows counted from 1 where it never was in one.
+    pub rows: [usize; 2],
+    /// Their instants, s.
+    pub time_s: [f64; 2],
+}
+
+impl Masked {
+    /// Runs of neighbours among `samples`, in order.
+    pub(crate) fn runs(samples: &[usize], observations: &Observations) -> Vec<Self> {
+        let mut out: Vec<Self> = Vec::new();
+        let mut first = 0;
+        let mut rest = samples;
+        for stretch in &observations.stretches {
+            let end = first + stretch.time_s.len();
+            let (here, after) = rest.split_at(rest.partition_point(|sample| *sample < end));
+            for (place, sample) in here.iter().enumerate() {
+                let time_s = stretch.time_s[sample - first];
+                match out.last_mut() {
+                    Some(last) if place > 0 && last.rows[1] + 1 == *sample => {
+                        (last.rows[1], last.time_s[1]) = (*sample, time_s);
+                    }
+                    _ => out.push(Self { rows: [*sample; 2], time_s: [time_s; 2] }),
+                }
+            }
+            (first, rest) = (end, after);
+        }
+        out
+    }
 }
 
 /// One number before and after the effects.
@@ -144,7 +181,7 @@ pub struct Diagnosis {
     pub base_judgements: Judgements,
     /// What this record does not determine.
     pub not_testable: Vec<String>,
-    /// Detection limits of the effects that were not found.
+    /// Detection limits of the effects that were not found; none where something is left over, since that may hide them.
     pub limits: Vec<Limit>,
     /// Why the record was refused, or what to know before using the numbers.
     pub remarks: Vec<Remark>,
@@ -157,6 +194,22 @@ pub struct Diagnosis {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use twinlag_model::Stretch;
+
+    /// A run ends with its stretch, though samples are counted on.
+    #[test]
+    fn masked_readings_are_listed_in_runs() {
+        let stretch = |from_s: f64| {
+            let time_s: Vec<f64> = (0..40).map(|k| from_s + 0.5 * f64::from(k)).collect();
+            Stretch::new(time_s.clone(), [time_s.clone(), time_s])
+        };
+        let observations = Observations::new(vec![stretch(0.0), stretch(100.0)], Some(0.5)).expect("long enough");
+        let runs = Masked::runs(&[3, 4, 5, 38, 39, 40, 77], &observations);
+        let found: Vec<([usize; 2], [f64; 2])> = runs.iter().map(|run| (run.rows, run.time_s)).collect();
+        let expected =
+            [([3, 5], [1.5, 2.5]), ([38, 39], [19.0, 19.5]), ([40, 40], [100.0, 100.0]), ([77, 77], [118.5, 118.5])];
+        assert_eq!(found, expected);
+    }
 
     #[test]
     fn a_limit_keeps_its_numbers_with_the_name_of_its_channel() {

@@ -51,11 +51,12 @@ mod rank;
 mod remark;
 
 pub use diagnose::diagnose;
-pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Unexplained, Verdict};
+pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;
 pub use excitation::is_single_tone;
 pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, excess};
 pub use judge::{Circumstances, Judgements};
+pub use limits::NEVER_TESTABLE;
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{

@@ -49,17 +49,19 @@ impl Search<'_> {
     }
 }
 
+/// What no record of two sensors reveals, however long and however lively the gas.
+pub const NEVER_TESTABLE: [&str; 3] = [
+    "anything that both sensors share (gain, offset, drift, delay, a second lag, a slow mode, \
+     radiation)",
+    "crosstalk that replaces part of a reading (it only makes one time constant wrong)",
+    "which channel picked up a sinusoid that is also in the gas",
+];
+
 /// What no record of two sensors shows, and what this one does not.
 ///
 /// - `tones`: separate tones of the gas, where it has few
 pub(crate) fn not_testable(observations: &Observations, tones: Option<usize>, policy: &Policy) -> Vec<String> {
-    let mut out = vec![
-        "anything that both sensors share (gain, offset, drift, delay, a second lag, a slow mode, \
-         radiation)"
-            .to_owned(),
-        "crosstalk that replaces part of a reading (it only makes one time constant wrong)".to_owned(),
-        "which channel picked up a sinusoid that is also in the gas".to_owned(),
-    ];
+    let mut out = NEVER_TESTABLE.map(str::to_owned).to_vec();
     if let Some(tones) = tones.filter(|t| (2..=policy.most_counted_tones).contains(t)) {
         let (equations, left) = (2 * tones, 2 * tones - 2);
         out.push(format!(

@@ -8,7 +8,7 @@ use twinlag_model::{
 };
 use twinlag_optimise::Scale;
 
-use crate::diagnosis::Found;
+use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
 use crate::grade::{Judgement, Number, Reason};
 use crate::judge::Circumstances;
@@ -45,6 +45,7 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
         seen: None,
+        masked: Vec::new(),
     }
 }
 
@@ -99,8 +100,12 @@ fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Op
     }
 }
 
-/// A defect of the data as an effect.
-pub(crate) fn of_defect(defect: &Defect) -> Found {
+/// A defect of the data as an effect, where `last` is the model with all of them.
+pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -> Found {
+    let mut seen = defect.seen.clone();
+    if defect.effect == Identifier::QUANTISATION && !accounts_for_the_rest(defect.channel, prepared, last) {
+        seen.push_str(", which is a fact of the data and too small for what is left over");
+    }
     Found {
         effect: defect.effect,
         channel: Some(defect.channel),
@@ -109,8 +114,17 @@ pub(crate) fn of_defect(defect: &Defect) -> Found {
         judgements: Vec::new(),
         evidence: None,
         alternatives: Vec::new(),
-        seen: Some(defect.seen.clone()),
+        seen: Some(seen),
+        masked: Masked::runs(&defect.masked, &prepared.observations),
     }
+}
+
+/// Whether rounding may be what `last` leaves over beyond the noise. The noise level of a coarse channel holds the `q²/12` of
+/// its steps already. That rounding errors hang together adds at most as much again: the rest has no more than their energy, over
+/// that of the noise.
+fn accounts_for_the_rest(channel: usize, prepared: &Prepared, last: &ModelFit) -> bool {
+    let rounding_k2 = prepared.levels.step_k[channel].map_or(0.0, |q| q * q / 12.0);
+    last.chi2_per_dof - 1.0 <= rounding_k2 / prepared.levels.std_k[channel].powi(2)
 }
 
 /// Grades of the parameters of an effect, and their intervals with all that they have to cover.

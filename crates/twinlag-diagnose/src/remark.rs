@@ -55,55 +55,82 @@ pub enum Remark {
     BiasUnknown,
 }
 
+impl Remark {
+    /// The place of the remark among several: 0 comes first. Those that forbid a use of the numbers come before those that
+    /// limit it, and these before those that only say how they came about.
+    pub fn importance(&self) -> u8 {
+        match self {
+            Self::SingleTone => 0,
+            Self::LagAlone => 1,
+            Self::BiasUnknown => 2,
+            Self::ModelErrorAsNoise => 3,
+            Self::Widened { .. } => 4,
+            Self::NoiseLowered => 5,
+            Self::Replaced { .. } => 6,
+            Self::OtherChannel { .. } => 7,
+            Self::Needless { .. } => 8,
+        }
+    }
+}
+
+/// What it means for whoever wants to use the numbers, and what to do.
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Replaced { before, after } => {
-                write!(f, "{before} was added first and later replaced, because {after} explains more")
-            }
-            Self::OtherChannel { effect } => {
-                write!(f, "{effect} was first placed in the other channel, but explains more in this one")
-            }
-            Self::Needless { effect } => write!(
-                f,
-                "{effect} was added first and later removed, because other effects explain the record \
-                 without it"
+            Self::SingleTone => f.write_str(
+                "the gas is a single tone. Its amplitude and phase are two equations for two time \
+                 constants, which absorb any missing effect without a trace: use no number of this record, and take one in \
+                 which the gas changes at more than one rate",
             ),
-            Self::NoiseLowered => f.write_str(
-                "the noise levels come from the residual, because the fastest changes of the readings \
-                 are larger and belong to the gas",
+            Self::LagAlone => f.write_str(
+                "this record does not distinguish time constants from a delay: use the difference alone, which is the total \
+                 delay of channel 2, τ2 − τ1 + delay, and the size of the delay only if you know that it is one. A known time \
+                 constant, or a gas that changes faster, separates them",
+            ),
+            Self::BiasUnknown => f.write_str(
+                "the intervals cover noise and the residual, but not the bias from the missing effect, so the truth may lie far \
+                 outside: give a time constant that is known, or remove the cause at the rig, before you use the numbers",
+            ),
+            Self::ModelErrorAsNoise => f.write_str(
+                "the residual is coherent with the gas temperature, so it is model error and not noise. \
+                 Its spectrum weights the fit and sets the intervals; look for its cause at the rig",
             ),
             Self::Widened { effects } => {
                 let names: Vec<&str> = effects.iter().map(|e| e.name()).collect();
                 write!(
                     f,
-                    "the intervals of the time constants also cover the alternatives ({}), which give \
-                     different values",
+                    "the intervals of the time constants also cover the alternatives ({}), which give different values. An \
+                     alternative that cannot be at the rig is best left out of another diagnosis: the intervals may become \
+                     shorter",
                     names.join(", ")
                 )
             }
-            Self::LagAlone => f.write_str(
-                "this record does not distinguish time constants from a delay, so the size of the delay holds only \
-                 if it is one: the difference is the total delay of channel 2, τ2 − τ1 + delay",
+            Self::NoiseLowered => f.write_str(
+                "the noise levels come from the residual, because the fastest changes of the readings \
+                 are larger and belong to the gas. Compare them with what is known of the instruments: if they are too low, so \
+                 are the intervals",
             ),
-            Self::SingleTone => f.write_str(
-                "the gas is a single tone. Its amplitude and phase are two equations for two time \
-                 constants, which absorb any missing effect without a trace. Take a record in which the \
-                 gas changes at more than one rate",
-            ),
-            Self::ModelErrorAsNoise => f.write_str(
-                "the residual is coherent with the gas temperature, so it is model error and not noise. \
-                 Its spectrum weights the fit and sets the intervals",
-            ),
-            Self::BiasUnknown => {
-                f.write_str("the intervals cover noise and the residual, but not the bias from the missing effect")
+            Self::Replaced { before, after } => {
+                write!(f, "{after} took the place of {before}, because it explains more: look for {after} at the rig")
             }
+            Self::OtherChannel { effect } => write!(
+                f,
+                "{effect} was first placed in the other channel, but explains more in this one: if the rig says otherwise, \
+                 believe the rig"
+            ),
+            Self::Needless { effect } => write!(
+                f,
+                "{effect} was added first and later removed, because other effects explain the record without it: there is no \
+                 need to look for it"
+            ),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -120,6 +147,8 @@ mod tests {
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown,
         ];
+        let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();
+        assert_eq!(importance.len(), all.len(), "no two remarks have one place");
         for remark in all {
             let text = remark.to_string();
             assert!(!text.contains("  ") && !text.ends_with('.'), "{text}");

@@ -50,6 +50,8 @@ pub struct NoiseLevels {
     pub coarse_step_k: [Option<f64>; 2],
     /// Third differences that are too large for noise, in each channel.
     pub outliers: [usize; 2],
+    /// Those of them at which the other channel does nothing unusual.
+    pub lone_outliers: [usize; 2],
     /// Energy of the residual in units of the levels as found, where these had to be scaled to it.
     pub energy_as_found: Option<f64>,
     /// No level is lower than this: the converter's own noise, or next to nothing.
@@ -92,6 +94,7 @@ impl NoiseLevels {
             ar1,
             coarse_step_k: [None; 2],
             outliers: [0; 2],
+            lone_outliers: [0; 2],
             energy_as_found: None,
             least_k: [0.0; 2],
         }
@@ -121,7 +124,7 @@ impl NoiseLevels {
             self.ar1[i] = phi;
             self.log_covariance[i][i] = 2.0 / sums.degrees_of_freedom * (1.0 + phi * phi) / (1.0 - phi * phi);
         }
-        self.outliers = [0; 2];
+        (self.outliers, self.lone_outliers) = ([0; 2], [0; 2]);
         self.source = [NoiseSource::QuietSegment; 2];
         self.given = true;
         self
@@ -162,6 +165,7 @@ impl NoiseLevels {
             ar1: [0.0; 2],
             coarse_step_k: found.map(|l| l.coarse_step_k()),
             outliers: found.map(|l| l.outliers),
+            lone_outliers: found.map(|l| l.lone_outliers),
             energy_as_found: None,
             least_k: found.map(|l| l.quantisation_step_k.map_or(nothing, |q| (q / 12.0_f64.sqrt()).max(nothing))),
         })

@@ -82,46 +82,6 @@ pub fn levels(observations: &Observations) -> Option<ChannelNoise> {
     })
 }
 
-/// Masks readings that lie at an extreme of their channel again and again, one after the other. Returns how many in each
-/// channel.
-///
-/// - `steps_k`: of a coarse converter, whose every value comes again and again
-pub(crate) fn mask_saturation(
-    observations: &mut Observations,
-    steps_k: [Option<f64>; 2],
-    policy: &Policy,
-) -> [usize; 2] {
-    let mut out = [0; 2];
-    for i in 0..2 {
-        let lowest = observations.channel(i).fold(f64::INFINITY, f64::min);
-        let highest = observations.channel(i).fold(f64::NEG_INFINITY, f64::max);
-        if lowest == highest {
-            continue;
-        }
-        for end in [lowest, highest] {
-            let at = |y: &f64| *y == end;
-            let count = observations.channel(i).filter(|y| at(y)).count();
-            // On a coarse grid every value comes again and again.
-            let crowded = steps_k[i].is_none() && count >= policy.fewest_readings_at_end;
-            let pairs: usize = observations
-                .stretches
-                .iter()
-                .map(|s| s.reading_c[i].windows(2).filter(|w| at(&w[0]) && at(&w[1])).count())
-                .sum();
-            if !crowded || 2 * pairs < count {
-                continue;
-            }
-            for stretch in &mut observations.stretches {
-                for (masked, y) in stretch.masked[i].iter_mut().zip(&stretch.reading_c[i]) {
-                    *masked |= *y == end;
-                }
-            }
-            out[i] += count;
-        }
-    }
-    out
-}
-
 /// What the best single change of each reading would take off, in robust standard deviations.
 fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
     let out = part.scores(channel, samples);

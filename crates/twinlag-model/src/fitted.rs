@@ -115,4 +115,6 @@ pub struct Defect {
     pub channel: usize,
     /// What was seen: a count, a step.
     pub seen: String,
+    /// Samples of the channel that are masked, counted through the stretches, in order.
+    pub masked: Vec<usize>,
 }

@@ -24,6 +24,7 @@ mod observations;
 mod plant;
 mod policy;
 mod prepare;
+mod range_end;
 mod residual;
 mod rows;
 mod selection;

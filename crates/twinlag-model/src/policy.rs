@@ -210,9 +210,20 @@ policy! {
     most_spike_rank_standard_errors: f64 = 3.5,
     /// Part of a channel's readings beyond which these are not isolated: chosen.
     most_spikes_share: f64 = 0.05,
-    /// Readings at one extreme value from which on the converter is taken to end there, if half of
-    /// them are neighbours: chosen.
+    /// Readings at one extreme value from which on the converter may end there, if half of them are
+    /// neighbours: chosen.
     fewest_readings_at_end: usize = 8,
+    /// Standard errors, beyond the steps of both converters, by which the other channel must move on while one stays at an
+    /// extreme: once in 30 000 ends.
+    limit_standard_errors: f64 = 4.0,
+    /// Runs at an extreme from which on noise may be cut off there: chosen.
+    fewest_cut_runs: usize = 20,
+    /// Steps of the converter that a reading beside such a run is away where noise is cut off. One that stays for two samples
+    /// moves by less than a step from sample to sample: chosen, far beyond that.
+    cut_noise_steps: f64 = 5.0,
+    /// Places along the record whose departures the other channel's must exceed, as a wrong model makes them: one in forty by
+    /// chance, of the few extremes that come in runs and that a flank runs into.
+    limit_comparisons: usize = 39,
 
     /// Power of a tone over that of the noise from which on it counts: a bin of noise is beyond it
     /// once in 10¹³.

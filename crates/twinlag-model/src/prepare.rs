@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::reach;
 use crate::policy::Policy;
+use crate::range_end::{Judge, RangeEnd, range_ends};
 use crate::selection::Selection;
 use crate::settings::Settings;
 use crate::spectrum::runs;
@@ -36,8 +37,8 @@ pub struct Prepared {
     pub context: Context,
     /// Defects of the data.
     pub found: Vec<Defect>,
-    /// Single wrong readings of each channel.
-    spikes: [usize; 2],
+    /// Single wrong readings of each channel, counted through the stretches.
+    spikes: [Vec<usize>; 2],
     /// The record as it came, and its noise.
     pub raw: (Observations, ChannelNoise),
     /// Residuals of the whole record.
@@ -83,7 +84,7 @@ impl Prepared {
             levels,
             policy,
             found,
-            spikes: [0; 2],
+            spikes: [Vec::new(), Vec::new()],
             raw,
         })
     }
@@ -118,7 +119,7 @@ impl Prepared {
 
     pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
         let evaluation = base.model.evaluate(&base.theta, &self.observations);
-        let mut counts = [0; 2];
+        let mut new = [Vec::new(), Vec::new()];
         let policy = &self.policy;
         for (round, far) in
             [policy.spike_standard_deviations, policy.further_spike_standard_deviations].into_iter().enumerate()
@@ -126,18 +127,21 @@ impl Prepared {
             let spikes = defects::spikes(&self.observations, &evaluation, far, policy);
             for i in 0..2 {
                 // Where there are some there are smaller ones.
-                if round == 0 || counts[i] > 0 {
+                if round == 0 || !new[i].is_empty() {
                     defects::mask(&mut self.observations, i, &spikes[i]);
-                    counts[i] += spikes[i].len();
+                    new[i].extend_from_slice(&spikes[i]);
                 }
             }
         }
-        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
-            self.spikes[i] += count;
+        let any = new.iter().any(|samples| !samples.is_empty());
+        for (i, samples) in new.into_iter().enumerate().filter(|(_, samples)| !samples.is_empty()) {
+            let all = &mut self.spikes[i];
+            all.extend(samples);
+            all.sort_unstable();
             self.found.retain(|f| f.effect != Identifier::SPIKES || f.channel != i);
-            self.found.push(defect(Identifier::SPIKES, i, format!("{} single readings", self.spikes[i])));
+            self.found.push(masking(Identifier::SPIKES, i, format!("{} single readings", all.len()), all.clone()));
         }
-        counts != [0; 2]
+        any
     }
 
     /// Levels again, without what is masked and without the disturbances of `fitted`, unless they were given.
@@ -212,9 +216,13 @@ fn data_defects(observations: &mut Observations, levels: &ChannelNoise, settings
     let allowed = &settings.effects;
     let mut out = Vec::new();
     if allowed.contains(&Identifier::SATURATION) {
-        let counts = defects::mask_saturation(observations, levels.coarse_step_k(), &settings.policy);
-        for (i, count) in counts.into_iter().enumerate().filter(|(_, c)| *c > 0) {
-            out.push(defect(Identifier::SATURATION, i, format!("{count} readings at an end of the range")));
+        for (i, samples) in saturated(observations, levels, settings).into_iter().enumerate() {
+            if samples.is_empty() {
+                continue;
+            }
+            defects::mask(observations, i, &samples);
+            let seen = format!("{} readings at an end of the range", samples.len());
+            out.push(masking(Identifier::SATURATION, i, seen, samples));
         }
     }
     if allowed.contains(&Identifier::QUANTISATION) {
@@ -223,13 +231,60 @@ fn data_defects(observations: &mut Observations, levels: &ChannelNoise, settings
     out
 }
 
-fn coarse_steps(levels: &ChannelNoise) -> impl Iterator<Item = Defect> {
-    let steps = levels.coarse_step_k().into_iter().enumerate();
-    steps.filter_map(|(i, step)| Some(defect(Identifier::QUANTISATION, i, format!("steps of {:.4} K", step?))))
+/// Samples of each channel at which its converter is at a limit.
+fn saturated(observations: &Observations, levels: &ChannelNoise, settings: &Settings) -> [Vec<usize>; 2] {
+    let policy = &settings.policy;
+    let ends = range_ends(observations, levels, policy);
+    let mut out = [Vec::new(), Vec::new()];
+    if ends.is_empty() {
+        return out;
+    }
+    let tau_s = lags_without(&ends, observations, levels, settings);
+    let judge = Judge::new(&ends, observations, levels, tau_s, policy);
+    for end in ends.iter().filter(|end| end.is_limit(&judge)) {
+        out[end.channel()].extend(end.samples(observations));
+    }
+    out.iter_mut().for_each(|samples| samples.sort_unstable());
+    out
 }
 
-fn defect(effect: Identifier, channel: usize, seen: String) -> Defect {
-    Defect { effect, channel, seen }
+/// Time constants of the two-lag model with gain and offset, without the readings of `ends`, s.
+fn lags_without(
+    ends: &[RangeEnd],
+    observations: &Observations,
+    levels: &ChannelNoise,
+    settings: &Settings,
+) -> [f64; 2] {
+    let mut without = observations.clone();
+    for end in ends {
+        defects::mask(&mut without, end.channel(), &end.samples(observations));
+    }
+    let weighting = Weighting::of(&without, levels.std_k);
+    let (excerpt, searched) = if without.samples() < MIN_EXCERPTED_SAMPLES {
+        let all = selection(&without, None, &weighting);
+        (without, all)
+    } else {
+        let starts = blocks::after_judges(without.samples(), &settings.policy);
+        let excerpt = without.excerpt(starts, EXCERPT_SAMPLES);
+        let all = selection(&excerpt, None, &weighting);
+        (excerpt, all)
+    };
+    let static_disagreement = effect::calibration::gain_and_offset(&context(&excerpt, levels));
+    let rest = static_disagreement.starts().swap_remove(0);
+    let model = Model::new(&settings.known, levels.std_k).with(static_disagreement);
+    let fitted = model.fit_over_grid(&rest, GRID_STARTS, &excerpt, &searched);
+    [fitted.theta[0], fitted.theta[1]]
+}
+
+fn coarse_steps(levels: &ChannelNoise) -> impl Iterator<Item = Defect> {
+    let steps = levels.coarse_step_k().into_iter().enumerate();
+    steps.filter_map(|(i, step)| {
+        Some(masking(Identifier::QUANTISATION, i, format!("steps of {:.4} K", step?), Vec::new()))
+    })
+}
+
+fn masking(effect: Identifier, channel: usize, seen: String, masked: Vec<usize>) -> Defect {
+    Defect { effect, channel, seen, masked }
 }
 
 /// All residuals away from the ends.

@@ -17,6 +17,15 @@ pub enum Place {
     Sample(usize),
 }
 
+impl Place {
+    /// The number of the line or the sample, from 1.
+    pub fn number(self) -> usize {
+        match self {
+            Self::Line(number) | Self::Sample(number) => number,
+        }
+    }
+}
+
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

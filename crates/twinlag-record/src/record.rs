@@ -81,6 +81,8 @@ pub struct Record {
     pub segments: Vec<Range<usize>>,
     /// How the file was understood.
     pub notes: Vec<Note>,
+    /// Line of each row, where the record was read from a file.
+    lines: Option<Vec<usize>>,
 }
 
 /// What is known of the rows besides their numbers, for messages.
@@ -320,7 +322,15 @@ impl Record {
             sampling,
             segments,
             notes,
+            lines: origin.table.and_then(|(table, _)| table.lines()).map(<[usize]>::to_vec),
         })
+    }
+
+    /// Where a row is: its line in the file, or its number where the record never was in one.
+    ///
+    /// - `row`: from 0. Panics if the record has no such row.
+    pub fn place_of(&self, row: usize) -> Place {
+        self.lines.as_ref().map_or(Place::Sample(row + 1), |lines| Place::Line(lines[row]))
     }
 
     /// Number of rows, missing ones counted.

@@ -162,6 +162,14 @@ impl Table {
         }
     }
 
+    /// Line of each row in the file, from 1, if there is a file.
+    pub(crate) fn lines(&self) -> Option<&[usize]> {
+        match &self.places {
+            Places::Lines(lines) => Some(lines),
+            Places::Samples(_) => None,
+        }
+    }
+
     /// What was understood of the file so far.
     pub fn notes(&self) -> &[Note] {
         &self.notes

@@ -1,6 +1,6 @@
 //! The rows of a record as the model of a rig takes them.
 
-use twinlag_diagnose::{KnownTimeConstant, Observations, Stretch};
+use twinlag_diagnose::{KnownTimeConstant, Masked, Observations, Stretch};
 use twinlag_record::Record;
 
 use twinlag_cross_relation::Parameter;
@@ -35,6 +35,16 @@ impl Rows {
         });
         let observations = Observations::new(stretches.collect(), grid.period_s)?;
         Ok(Self { observations, of_sample, is_even: grid.period_s.is_some() })
+    }
+
+    /// Puts lines of the file and stamps in the place of samples.
+    pub(crate) fn place(&self, masked: &mut Masked, record: &Record) {
+        for (sample, time_s) in masked.rows.iter_mut().zip(&mut masked.time_s) {
+            // Only a reading that is there can be left out.
+            if let Some(row) = self.of_sample[*sample] {
+                (*sample, *time_s) = (record.place_of(row).number(), record.time_s[row]);
+            }
+        }
     }
 }
 

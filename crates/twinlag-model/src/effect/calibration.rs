@@ -47,6 +47,11 @@ fn candidates(context: &Context) -> Vec<Shared> {
     [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved].into_iter().map(|kind| of_kind(kind, context)).collect()
 }
 
+/// Gain and offset of the second channel relative to the first.
+pub(crate) fn gain_and_offset(context: &Context) -> Shared {
+    of_kind(Kind::Both, context)
+}
+
 fn of_kind(kind: Kind, context: &Context) -> Shared {
     let [m1, m2] = context.mean_c;
     let widest = 10.0 * context.swing_k + (m1 - m2).abs() + m1.abs().max(m2.abs());

@@ -64,7 +64,12 @@ impl Page<'_> {
             )
             .list(items);
         if limits.is_empty() {
-            return document;
+            return match self.answer.verdict {
+                Verdict::PartlyExplained | Verdict::Unexplained => document.paragraph(
+                    "Of the effects that were not found none can be excluded: what is left over may hide one of any size.",
+                ),
+                _ => document,
+            };
         }
         document
             .paragraph(

@@ -5,7 +5,7 @@ use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table,
 
 use super::{Column, Page};
 use crate::figures::{WIDTH_PX, chart};
-use crate::words::{ABSENT, apart, grade, interval, interval_of, seconds, short, with_unit};
+use crate::words::{ABSENT, apart, grade, interval, interval_of, seconds, sentence, short, with_unit};
 
 impl Page<'_> {
     pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
@@ -106,6 +106,8 @@ impl Page<'_> {
                  first two rows, 1 is what noise alone makes.",
             )
             .table(table);
+        let document =
+            self.answer.what_got_worse().iter().fold(document, |document, why| document.paragraph(sentence(why)));
         if self.answer.error.reference_rmse_k.is_none() {
             return document;
         }

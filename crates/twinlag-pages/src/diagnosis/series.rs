@@ -58,7 +58,27 @@ impl Page<'_> {
             let colour = [Colour::Blue, Colour::Vermilion][k];
             series.push(trace(short(&self.channels()[k]), time_s, &column[samples.clone()], colour));
         }
+        series.push(self.masked_points(samples));
         chart(title, [Axis::linear("time (s)"), Axis::linear("temperature (°C)")], series)
+    }
+
+    /// Readings among `samples` that are left out of the fit, as points.
+    fn masked_points(&self, samples: Range<usize>) -> Option<Series> {
+        let record = self.record;
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for found in &self.answer.effects {
+            let channel = self.channels().iter().position(|name| Some(name) == found.channel.as_ref());
+            let Some(column) = channel.map(|k| [&record.t1_c, &record.t2_c][k]) else { continue };
+            for [from_s, to_s] in found.masked.iter().map(|run| run.time_s) {
+                let from = record.time_s.partition_point(|t| *t < from_s).max(samples.start);
+                let to = record.time_s.partition_point(|t| *t <= to_s).min(samples.end);
+                for row in (from..to).filter(|row| column[*row].is_finite()) {
+                    x.push(record.time_s[row]);
+                    y.push(column[row]);
+                }
+            }
+        }
+        (!x.is_empty()).then(|| Series::points("left out", x, y).colour(Colour::Purple))
     }
 
     pub(super) fn residual(&self, document: Document) -> Result<Document, ReportError> {

@@ -2,7 +2,7 @@
 
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::{NamedEffect, SensorEstimate};
-use twinlag_report::{Document, rounded};
+use twinlag_report::{Document, Table, rounded};
 
 use super::Page;
 use crate::words::{
@@ -30,6 +30,9 @@ impl Page<'_> {
         }
         for found in &answer.effects {
             document = document.subheading(capital(&words(found.effect))).facts(facts(found));
+            if !found.masked.is_empty() {
+                document = masked(document, found);
+            }
         }
         let samples = record.time_s.len();
         let span_s = record.time_s.last().zip(record.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
@@ -121,6 +124,25 @@ fn named(found: &NamedEffect) -> String {
     let first = format!("{}{place}", words(found.effect));
     let others = found.alternatives.iter().map(|other| words(*other));
     [first].into_iter().chain(others).collect::<Vec<_>>().join(" or ")
+}
+
+/// Places of masked readings that are listed at most.
+const MAX_MASKED: usize = 40;
+
+/// Which readings are left out of the fit.
+fn masked(document: Document, found: &NamedEffect) -> Document {
+    let range = |first: String, last: String| if first == last { first } else { format!("{first} to {last}") };
+    let rows = found.masked.iter().take(MAX_MASKED).map(|run| {
+        let ([first, last], [from_s, to_s]) = (run.rows, run.time_s);
+        [range(first.to_string(), last.to_string()), range(rounded(from_s, 6), rounded(to_s, 6))]
+    });
+    let table = rows.fold(Table::new(["rows", "time (s)"]), Table::row);
+    let more = found.masked.len().saturating_sub(MAX_MASKED);
+    let rest = if more > 0 { format!(" {more} more places are in the JSON.") } else { String::new() };
+    document.table(table.caption(format!(
+        "Readings of {} that are left out of the fit; rows are lines of the file, if there is one.{rest}",
+        place(found.channel.as_ref())
+    )))
 }
 
 /// What is said of an effect.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, Judgement, Limit, Move, Policy,
-    Unexplained, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, Judgement, Limit, Masked, Move,
+    Policy, Unexplained, Verdict,
 };
 
 use crate::answers::{Characterisation, Model, ModelEffect};
@@ -47,6 +47,9 @@ pub struct NamedEffect {
     pub alternatives: Vec<Identifier>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
+    /// Readings of the channel that are left out of the fit, in order, by their lines in the file.
+    #[serde(default)]
+    pub masked: Vec<Masked>,
 }
 
 impl NamedEffect {
@@ -74,6 +77,7 @@ impl NamedEffect {
             evidence: found.evidence,
             alternatives: found.alternatives.clone(),
             seen: found.seen.clone(),
+            masked: found.masked.clone(),
         }
     }
 }
@@ -145,6 +149,25 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.diagnosis/1";
+
+    /// Why errors are larger with the effects than without them, where they are. The difference of the inferred inputs is not
+    /// among them: it grows with a longer lag, whatever the model.
+    pub fn what_got_worse(&self) -> Vec<String> {
+        // Four digits are printed.
+        let is_worse = |error: BeforeAfter<f64>| error.after > 1.0005 * error.before;
+        let budget = &self.error.budget;
+        if !is_worse(budget.chi2_per_dof) && !is_worse(budget.held_out_normalised_rms) {
+            return Vec::new();
+        }
+        let is_quieter = (0..2).any(|i| self.last.sensors[i].noise_std_k < 0.999 * self.base.sensors[i].noise_std_k);
+        let why = if is_quieter {
+            "the residual is larger with the effects because it is in units of the noise, whose levels are lower with them"
+        } else {
+            "the residual is larger with the effects: they were chosen by other frequencies or other blocks than are counted \
+             here, so check them at the rig before you rely on them"
+        };
+        vec![why.into()]
+    }
 
     /// The model with the effects that were found, to be used on other records of the same rig. It has all numbers that
     /// were found, also those that this answer does not give; of an answer that was read from JSON those that it has.

@@ -172,7 +172,7 @@ impl Modelled {
             return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings, rows: Rows::of(record)? });
         }
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
-        let effects = named(record, &core, options.diagnose.characterise.best_effort);
+        let effects = named(record, &core, &rows, options.diagnose.characterise.best_effort);
         Ok(Self {
             last: with_effects(record, &options.diagnose, &rows, &core, &effects),
             verdict: Some(core.verdict),

@@ -74,7 +74,7 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
     remarks.extend(remark_on_reference(&error));
     remarks.extend(remark_on_options(&options.characterise));
     let best_effort = options.characterise.best_effort;
-    let named = named(record, &core, best_effort);
+    let named = named(record, &core, &rows, best_effort);
     Ok(Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
         base: base(record, options, &rows, &core),
@@ -136,9 +136,12 @@ fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) ->
     out
 }
 
-/// The effects with the names of their channels.
-pub(crate) fn named(record: &Record, core: &Core, best_effort: bool) -> Vec<NamedEffect> {
-    core.effects.iter().map(|found| NamedEffect::of(found, &record.channels, best_effort)).collect()
+/// The effects with the names of their channels and the rows of their masked readings.
+pub(crate) fn named(record: &Record, core: &Core, rows: &Rows, best_effort: bool) -> Vec<NamedEffect> {
+    let of = |found| NamedEffect::of(found, &record.channels, best_effort);
+    let mut effects: Vec<NamedEffect> = core.effects.iter().map(of).collect();
+    effects.iter_mut().flat_map(|effect| &mut effect.masked).for_each(|masked| rows.place(masked, record));
+    effects
 }
 
 /// The model with the effects.

@@ -151,10 +151,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             ));
             return;
         }
-        let coarse: Vec<String> = (0..2)
-            .filter_map(|i| Some((i, self.levels.coarse_step_k[i]?)))
-            .map(|(i, step)| format!("{} is quantised in steps of {step:.3} K", self.asked.record.channels[i]))
-            .collect();
+        let (coarse, small) = self.coarse_steps(out);
         let is_white_assumed =
             self.asked.options.noise_colour == NoiseColour::White && self.asked.options.noise_std_k.is_none();
         let may_be_coloured =
@@ -180,9 +177,9 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             format!("{}, coarser than its noise, which alone may explain the residual", coarse.join(", "))
         } else if self.levels.energy_as_found.is_some() {
             "the samples are far apart for these sensors: sample faster".into()
-        } else if self.levels.outliers != [0, 0] && failed.contains(&TestName::TotalEnergy) {
-            "some samples are too far off for noise (the warning on third differences counts them): correct or empty \
-             these cells first"
+        } else if self.outliers_are_alone() && failed.contains(&TestName::TotalEnergy) {
+            "some samples are too far off for noise, and the other channel does nothing unusual there (the warning on third \
+             differences counts them): correct or empty these cells first"
                 .into()
         } else if failed.contains(&TestName::Calibration) {
             let colour = if may_be_coloured { ", and if it does not help autoregressive noise" } else { "" };
@@ -199,5 +196,33 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             "{model} do not explain this record (tests that fail: {names}), so the fitted time \
                      constants need not be those of the sensors; {hint}"
         ));
+        out.warnings.extend(small.into_iter().map(|step| {
+            format!(
+                "{step}, coarser than its noise, which is too little to explain the residual: it is a fact of the data"
+            )
+        }));
+    }
+
+    /// Steps of the converters that are coarser than the noise, in words: those whose rounding may be what the residual has
+    /// beyond noise, and those that are too small for it. The noise level of such a channel holds the `q²/12` of its steps
+    /// already; that rounding errors hang together adds at most as much again.
+    fn coarse_steps(&self, out: &Characterisation) -> (Vec<String>, Vec<String>) {
+        // Levels that were scaled to the residual have the energy of it in units of those before.
+        let scaled = self.levels.energy_as_found.unwrap_or(1.0);
+        let excess = self.levels.energy_as_found.or(out.residual.chi2_per_dof).unwrap_or(1.0) - 1.0;
+        let (mut coarse, mut small) = (Vec::new(), Vec::new());
+        for (i, step_k) in self.levels.coarse_step_k.iter().enumerate() {
+            let Some(step_k) = step_k else { continue };
+            let is_enough = excess <= step_k * step_k / 12.0 / self.levels.std_k[i].powi(2) * scaled;
+            let text = format!("{} is quantised in steps of {step_k:.3} K", self.asked.record.channels[i]);
+            if is_enough { coarse.push(text) } else { small.push(text) }
+        }
+        (coarse, small)
+    }
+
+    /// Whether most of the third differences that are too large for noise have nothing to do with the other channel.
+    fn outliers_are_alone(&self) -> bool {
+        let [all, alone] = [self.levels.outliers, self.levels.lone_outliers].map(|counts| counts.iter().sum::<usize>());
+        2 * alone > all
     }
 }

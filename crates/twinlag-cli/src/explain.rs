@@ -1,0 +1,181 @@
+//! `twinlag explain NAME`: an effect, a status, a verdict or a test in plain words.
+
+use std::io::{Write, stdout};
+
+use serde::Serialize;
+use twinlag::cross_relation::TestName;
+use twinlag::diagnosis::{Identifier, NEVER_TESTABLE};
+
+use crate::arguments::Explain;
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::print;
+
+/// What two sensors alone can never reveal.
+const TWO_SENSORS: &str = "two-sensors";
+
+const STATUSES: [(&str, &str); 4] = [
+    ("ok", "both time constants are determined, and what the model leaves over is consistent with noise"),
+    (
+        "at-bound",
+        "the best fit lies on a bound of a parameter, so its number is no estimate: the warning says which parameter, and \
+         whether faster sampling or a longer record would help",
+    ),
+    (
+        "not-identifiable",
+        "the record does not determine both time constants, however well it is fitted. It may still determine their \
+         difference, which is then printed. Give a time constant that is known (--known), or record a gas that changes faster",
+    ),
+    (
+        "model-rejected",
+        "what the model leaves over is more than noise, so its time constants need not be those of the sensors: \
+         'twinlag diagnose' looks for what it lacks",
+    ),
+];
+
+const VERDICTS: [(&str, &str); 5] = [
+    (
+        "adequate",
+        "two first-order lags leave only noise: no effect is needed, and effects above the limits in the report are excluded",
+    ),
+    ("explained", "with the effects that are named, only noise is left"),
+    (
+        "partly-explained",
+        "the effects that are named explain a part, and more than noise is left, or there are more of them than one record \
+         distinguishes: the numbers have a bias that no interval covers, and no other effect can be excluded",
+    ),
+    (
+        "unexplained",
+        "more than noise is left, and no effect of this library explains it: the numbers have a bias that no interval covers, \
+         and no effect can be excluded. The report shows where in frequency and in time most of it lies",
+    ),
+    ("refused", "the record cannot be diagnosed, for example because the gas has a single tone: take another record"),
+];
+
+/// What a test asks of the residual, and what it may mean if it fails.
+const TESTS: [(TestName, &str); 11] = [
+    (
+        TestName::TotalEnergy,
+        "is the energy of the residual that of the noise? More may be an effect that the model lacks, or a noise level that is \
+         too low",
+    ),
+    (
+        TestName::BandEnergy,
+        "does every band of frequencies have its share of the energy? A band with more shows how fast what is missing acts",
+    ),
+    (
+        TestName::Whiteness,
+        "are residuals a few samples apart unrelated? If not, something with a memory is missing, or the noise is coloured",
+    ),
+    (
+        TestName::Calibration,
+        "do both sensors agree at rest? If not, free gain and offset, or calibrate the sensors against each other",
+    ),
+    (
+        TestName::Coherence,
+        "is the residual unrelated to the gas temperature at every frequency? What goes with the gas is an error of the model and no noise",
+    ),
+    (
+        TestName::Level,
+        "is the residual unrelated to how high the gas temperature is? If not, look for radiation, curvature or a limited range",
+    ),
+    (
+        TestName::Rate,
+        "is the residual no larger where the gas changes fast? If it is, the dynamics of a sensor are not those of the model",
+    ),
+    (
+        TestName::Time,
+        "is the energy of the residual the same all along the record? If not, something changed or happened on the way",
+    ),
+    (TestName::Tails, "are the largest residuals those of Gaussian noise? If not, look for single wrong readings"),
+    (
+        TestName::Lines,
+        "is no single frequency far above its neighbours? If one is, look for mains pick-up or a machine that vibrates",
+    ),
+    (
+        TestName::RepeatedValues,
+        "do readings equal the one before no more often than noise explains? If they do, the converter is coarse or repeats itself",
+    ),
+];
+
+/// A name with what it means.
+#[derive(Serialize)]
+struct Explanation {
+    name: &'static str,
+    kind: &'static str,
+    text: Vec<String>,
+}
+
+/// Everything that has the name.
+#[derive(Serialize)]
+struct Explanations<'a> {
+    explanations: Vec<&'a Explanation>,
+}
+
+pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
+    let all = explanations();
+    // `calibration` is an effect and a test.
+    let found: Vec<&Explanation> = all.iter().filter(|e| e.name == command.name).collect();
+    if found.is_empty() {
+        let of = |kind: &str| all.iter().filter(|e| e.kind == kind).map(|e| e.name).collect::<Vec<_>>().join(", ");
+        let known: Vec<String> =
+            ["effect", "verdict", "status", "test", "limit"].map(|kind| format!("\n  {kind}: {}", of(kind))).to_vec();
+        return Err(Failure::Usage(format!("nothing is called '{}'; there are{}", command.name, known.concat())));
+    }
+    if console.json {
+        print::json(&Explanations { explanations: found })?;
+        return Ok(0);
+    }
+    let texts: Vec<String> =
+        found.iter().map(|e| format!("{} ({})\n  {}\n", e.name, e.kind, e.text.join("\n  "))).collect();
+    stdout().write_all(texts.concat().as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))?;
+    Ok(0)
+}
+
+fn explanations() -> Vec<Explanation> {
+    let effects = Identifier::ALL.into_iter().map(of_effect);
+    let worded = |kind: &'static str| {
+        move |(name, text): (&'static str, &'static str)| Explanation { name, kind, text: vec![text.to_owned()] }
+    };
+    let tests = TESTS.map(|(test, text)| (test.name(), text));
+    let never = NEVER_TESTABLE.iter().map(|what| format!("- {what}"));
+    let first = "The gas is seen through the two sensors alone. Whatever changes both alike leaves no trace in their \
+                 disagreement, even if it is large. No record, however long, reveals:";
+    let two_sensors =
+        Explanation { name: TWO_SENSORS, kind: "limit", text: [first.to_owned()].into_iter().chain(never).collect() };
+    effects
+        .chain(VERDICTS.map(worded("verdict")))
+        .chain(STATUSES.map(worded("status")))
+        .chain(tests.map(worded("test")))
+        .chain([two_sensors])
+        .collect()
+}
+
+fn of_effect(effect: Identifier) -> Explanation {
+    let about = effect.about();
+    let mut text = vec![
+        about.explanation.to_owned(),
+        format!("at the rig: {}", about.advice),
+        format!("two sensors cannot reveal: {}", about.unseen),
+    ];
+    let alike: Vec<&str> = effect.imitates().map(Identifier::name).collect();
+    if !alike.is_empty() {
+        text.push(format!("resembles, if it is small: {}", alike.join(", ")));
+    }
+    Explanation { name: effect.name(), kind: "effect", text }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn names_of_one_kind_differ() {
+        let all = explanations();
+        let names: BTreeSet<(&str, &str)> = all.iter().map(|e| (e.kind, e.name)).collect();
+        assert_eq!(names.len(), all.len());
+        assert!(all.iter().all(|e| !e.text.is_empty() && e.text.iter().all(|line| !line.ends_with(": "))));
+    }
+}
