@@ -68,7 +68,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
     let span_s = state.prepared.observations.span_s();
     let hidden = if matches!(verdict, Verdict::Adequate | Verdict::Explained) {
-        state.search().beside(&state.current).hidden(&state.current, half_intervals(&last))?
+        state.search().beside(&state.current).hidden(&state.current, &state.far, half_intervals(&last))?
     } else {
         [None; 3]
     };

@@ -10,7 +10,7 @@
 use twinlag_model::{Fitted, Identifier, Linearised, ModelError, Shared, dense};
 use twinlag_optimise::Scale;
 
-use crate::candidates::Search;
+use crate::candidates::{Candidate, Search};
 
 /// An effect that may be there unseen.
 struct Hidden {
@@ -25,6 +25,7 @@ impl Search<'_> {
     /// For both time constants and their difference the effect that is most probably there unseen, where all those that
     /// would move the number by more than half its interval are together more probable than the policy allows.
     ///
+    /// - `far`: effects that were fitted with quite other time constants, and not accepted
     /// - `half_s`: half the intervals, s; `None` of a number that has none
     ///
     /// # Errors
@@ -32,13 +33,15 @@ impl Search<'_> {
     pub(crate) fn hidden(
         &self,
         current: &Fitted,
+        far: &[Candidate],
         half_s: [Option<f64>; 3],
     ) -> Result<[Option<Identifier>; 3], ModelError> {
         let mut all = self.candidates(&current.model);
         all.retain(|c| !c.is_noise() && !c.about().is_narrow && c.main().is_some());
         let now = current.model.linearised(&current.theta, self.observations, self.selection);
         let each = self.each(&all, |effect| self.unseen(current, effect, &now))?;
-        let hidden: Vec<Hidden> = each.into_iter().flatten().collect();
+        let from_afar = far.iter().filter_map(|candidate| self.unseen_afar(current, candidate));
+        let hidden: Vec<Hidden> = each.into_iter().flatten().chain(from_afar).collect();
         Ok([0, 1, 2].map(|i| {
             let half_s = half_s[i]?;
             let decisive = || hidden.iter().filter(|h| h.shift_s[i] > half_s);
@@ -62,10 +65,7 @@ impl Search<'_> {
         let gain = (current.chi2 - dense::dot(&lin.residual, &lin.residual) + taken) / energy;
         let at = current.theta.len() + main;
         let variance = inverse[at][at] * energy;
-        let usual = match effect.parameters()[main].variable.scale {
-            Scale::Linear { typical } => typical,
-            Scale::Logarithmic => start[main],
-        };
+        let usual = usual_size(effect, main, &start);
         // Other parameters of the effect take off one each by chance.
         let z2 = (gain - (start.len() - 1) as f64).max(0.0);
         let seen = usual * usual / (usual * usual + variance);
@@ -75,5 +75,32 @@ impl Search<'_> {
         let shift_s = [per_size(0), per_size(1), per_size(1) - per_size(0)].map(|slope| (slope * size).abs());
         let is_usable = variance > 0.0 && odds.is_finite() && shift_s.iter().all(|s| s.is_finite());
         is_usable.then(|| Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
+    }
+
+    /// How probable an effect is that was fitted with quite other time constants.
+    fn unseen_afar(&self, current: &Fitted, candidate: &Candidate) -> Option<Hidden> {
+        let Candidate { effect, fitted, .. } = candidate;
+        let main = effect.main()?;
+        let gain = candidate.white_gain.min(candidate.robust_gain) - (candidate.added - 1) as f64;
+        if gain <= 0.0 || !fitted.end.is_usable() || !candidate.is_clear_of_bounds() {
+            return None;
+        }
+        let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
+        let usual = usual_size(effect, main, &start);
+        // So many standard errors make the gain.
+        let error = fitted.theta[current.theta.len() + main].abs() / gain.sqrt();
+        let odds = self.policy.prior_effect_probability * error / error.hypot(usual) * (0.5 * gain).exp();
+        let apart = |theta: &[f64]| [theta[0], theta[1], theta[1] - theta[0]];
+        let (here, there) = (apart(&current.theta), apart(&fitted.theta));
+        let shift_s = [0, 1, 2].map(|i| (there[i] - here[i]).abs());
+        Some(Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
+    }
+}
+
+/// The size that counts as typical of an effect: that of its scale, or the largest that a search begins with.
+fn usual_size(effect: &Shared, main: usize, start: &[f64]) -> f64 {
+    match effect.parameters()[main].variable.scale {
+        Scale::Linear { typical } => typical,
+        Scale::Logarithmic => start[main],
     }
 }

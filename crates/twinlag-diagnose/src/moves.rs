@@ -149,6 +149,8 @@ pub(crate) struct State<'a> {
     pub(crate) current: Fitted,
     pub(crate) taken: Vec<Taken>,
     pub(crate) moves: Vec<Move>,
+    /// Effects with time constants far from those that there are, of which none was accepted.
+    pub(crate) far: Vec<Candidate>,
 }
 
 impl<'a> State<'a> {
@@ -156,7 +158,7 @@ impl<'a> State<'a> {
     pub(crate) fn new(mut prepared: Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
         let base = prepared.base(settings);
         let current = base.clone();
-        Self { prepared, settings, watch, base, current, taken: Vec::new(), moves: Vec::new() }
+        Self { prepared, settings, watch, base, current, taken: Vec::new(), moves: Vec::new(), far: Vec::new() }
     }
 
     pub(crate) fn search(&self) -> Search<'_> {
@@ -213,11 +215,14 @@ impl<'a> State<'a> {
         Ok(self.addition(&search, &candidates))
     }
 
-    /// Adds the effect that explains the record best with time constants far from those that there are.
-    pub(crate) fn add_from_afar(&self) -> Result<Option<Proposal>, ModelError> {
+    /// Adds the effect that explains the record best with time constants far from those that there are; where none is
+    /// accepted, keeps what came closest.
+    pub(crate) fn add_from_afar(&mut self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
         let candidates = search.from_afar(&self.current)?;
-        Ok(self.addition(&search, &candidates))
+        let addition = self.addition(&search, &candidates);
+        self.far = if addition.is_none() { candidates } else { Vec::new() };
+        Ok(addition)
     }
 
     fn addition(&self, search: &Search<'_>, candidates: &[Candidate]) -> Option<Proposal> {
