@@ -45,6 +45,9 @@ const MAX_SCORE_DEFICIT: f64 = 15.0;
 /// Behind the best by less than this, parts of other kinds are nearly as likely: odds of `e³`, twenty
 /// to one.
 const MAX_ALTERNATIVE_DEFICIT: f64 = 6.0;
+/// Probability before the readings that the gas ends at half the sampling rate. It would be chance unless
+/// somebody has filtered it, so one in ten; chosen.
+const ENDS_BEFORE: f64 = 0.1;
 /// Priors beside the best one, at most.
 const MAX_ALTERNATIVES: usize = 4;
 
@@ -62,6 +65,9 @@ pub struct Learned {
     pub alternatives: Vec<(f64, Prior)>,
     /// Factors on the standard deviations of both channels' noise; 1 if these are known.
     pub noise_factor: [f64; 2],
+    /// Probability that the gas ends at half the sampling rate instead of going on as the prior does,
+    /// by what folds back from beyond. Zero if learned quickly, and where lines bridge readings.
+    pub ends: f64,
 }
 
 /// Estimates the prior that `readings` of `rig` support. The covariance of its numbers is the
@@ -123,14 +129,17 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let search = Search { periodogram: &periodogram, limits, room, ask };
     let (best, mut others) = search.run();
     let score = best.score();
-    let mut parts = best.parts;
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
-    if missing > MAX_MISSING_SHARE || is_uneven {
+    let is_bridged = missing > MAX_MISSING_SHARE || is_uneven;
+    let (ends, ended) = if is_bridged || ask == Ask::GasQuickly { (0.0, Vec::new()) } else { search.ended(&best) };
+    let mut parts = if ends > 0.5 { ended } else { best.parts };
+    if is_bridged {
         parts.retain(|part| part.noise().is_none());
         parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
         others.clear();
     }
+    let sigma_parts = search.sigma_points(&parts);
     let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
     // Kinds were equally probable before the readings.
     let weights: Vec<f64> = others.iter().map(|o| (0.5 * (score - o.score())).exp()).collect();
@@ -138,9 +147,10 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let alternatives = weights.iter().zip(&others).map(|(weight, other)| (weight / all, prior(&other.parts))).collect();
     Ok(Learned {
         prior: prior(&parts),
-        sigma_priors: search.sigma_points(&parts).iter().map(|p| prior(p)).collect(),
+        sigma_priors: sigma_parts.iter().map(|p| prior(p)).collect(),
         alternatives,
         noise_factor: parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt)),
+        ends,
     })
 }
 
@@ -203,6 +213,15 @@ impl Search<'_> {
         });
         seen.truncate(MAX_ALTERNATIVES);
         (current, seen)
+    }
+
+    /// Probability that the gas ends at half the sampling rate, and the parts of `best` as they are then: their
+    /// numbers fitted again with nothing that folds back.
+    fn ended(&self, best: &Fitted) -> (f64, Vec<Part>) {
+        let periodogram = self.periodogram.of_ending_gas();
+        let ended = Search { periodogram: &periodogram, ..*self }.jointly(Fitted::unknown(best.parts.clone()));
+        let odds_against = (1.0 / ENDS_BEFORE - 1.0) * (0.5 * (ended.score() - best.score())).exp();
+        (1.0 / (1.0 + odds_against), ended.parts)
     }
 
     /// `from`, and then with more parts, as long as each gains more than it costs.

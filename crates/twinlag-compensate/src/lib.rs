@@ -50,6 +50,8 @@
 mod error;
 mod filter;
 #[cfg(feature = "std")]
+mod intensity;
+#[cfg(feature = "std")]
 mod learn;
 mod prior;
 #[cfg(feature = "std")]
@@ -71,6 +73,8 @@ mod tracker;
 #[cfg(feature = "std")]
 pub use error::CompensateError;
 #[cfg(feature = "std")]
+pub use intensity::{Intensity, learn_intensity};
+#[cfg(feature = "std")]
 pub use learn::{Learned, learn, learn_quickly, learn_with_noise};
 #[cfg(feature = "std")]
 pub use prior::Prior;
@@ -78,7 +82,7 @@ pub use prior::Term;
 #[cfg(feature = "std")]
 pub use readings::Readings;
 #[cfg(feature = "std")]
-pub use reconstruct::{bandwidth_hz, reconstruct};
+pub use reconstruct::{bandwidth_hz, reconstruct, reconstruct_with};
 pub use rig::{Coloured, Rig, Sensor, SensorAt, SlowPath};
 #[cfg(feature = "std")]
 pub use smooth::{Form, Gas};

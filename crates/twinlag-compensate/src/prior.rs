@@ -118,6 +118,24 @@ impl Prior {
     pub fn density_k2_per_hz(&self, frequency_hz: f64) -> f64 {
         self.terms.iter().map(|t| t.density_k2_per_hz(frequency_hz)).sum()
     }
+
+    /// Variance of the gas's motion faster than `frequency_hz`, K².
+    ///
+    /// ```
+    /// use twinlag_compensate::{Prior, Term};
+    ///
+    /// // Of first-order noise, half of the variance is above its corner.
+    /// let prior = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 4.0, corner_hz: 2.0 }] };
+    /// assert!((prior.variance_above_k2(2.0) - 8.0).abs() < 0.01);
+    /// ```
+    pub fn variance_above_k2(&self, frequency_hz: f64) -> f64 {
+        // The midpoint rule in ln f; beyond the last point first-order noise, which falls most slowly,
+        // has 1e-4 of what it has above the first.
+        const POINTS: i32 = 1000;
+        let step = 1e4_f64.ln() / f64::from(POINTS);
+        let at = |k: i32| frequency_hz * ((f64::from(k) + 0.5) * step).exp();
+        2.0 * step * (0..POINTS).map(|k| at(k) * self.density_k2_per_hz(at(k))).sum::<f64>()
+    }
 }
 
 #[cfg(all(test, feature = "std"))]

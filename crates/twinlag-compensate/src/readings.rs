@@ -125,7 +125,7 @@ impl Readings {
     }
 
     /// The median step, s.
-    pub(crate) fn period_s(&self) -> f64 {
+    pub fn period_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|t| t[1] - t[0]).collect();
         let middle = steps.len() / 2;
         if steps.is_empty() { 1.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }

@@ -1,11 +1,28 @@
 //! The gas temperature, with a state of the size that the model needs.
 
 use crate::error::CompensateError;
+use crate::intensity::Intensity;
 use crate::prior::Prior;
 use crate::readings::Readings;
 use crate::rig::Rig;
 use crate::smooth::{self, Form, Gas};
 use crate::system;
+
+/// A function of the smoother with the dimension that rig and prior need.
+macro_rules! by_size {
+    ($rig:expr, $prior:expr, $name:ident($($argument:expr),*)) => {{
+        $rig.check()?;
+        match system::states($rig, &$prior.terms) {
+            0..=4 => Ok(smooth::$name::<4>($($argument),*)),
+            5..=6 => Ok(smooth::$name::<6>($($argument),*)),
+            7..=8 => Ok(smooth::$name::<8>($($argument),*)),
+            9..=12 => Ok(smooth::$name::<12>($($argument),*)),
+            13..=16 => Ok(smooth::$name::<16>($($argument),*)),
+            17..=MAX_STATES => Ok(smooth::$name::<MAX_STATES>($($argument),*)),
+            got => Err(CompensateError::TooLarge { got, most: MAX_STATES }),
+        }
+    }};
+}
 
 /// Largest state.
 pub(crate) const MAX_STATES: usize = 24;
@@ -45,18 +62,35 @@ pub(crate) const MAX_STATES: usize = 24;
 /// [`CompensateError::NotPositive`] for a time constant or noise that is not,
 /// [`CompensateError::TooLarge`] for a prior with too many terms.
 pub fn reconstruct(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Result<Gas, CompensateError> {
-    rig.check()?;
-    let states = system::states(rig, &prior.terms);
-    let run = match states {
-        0..=4 => smooth::run::<4>,
-        5..=6 => smooth::run::<6>,
-        7..=8 => smooth::run::<8>,
-        9..=12 => smooth::run::<12>,
-        13..=16 => smooth::run::<16>,
-        17..=MAX_STATES => smooth::run::<MAX_STATES>,
-        _ => return Err(CompensateError::TooLarge { got: states, most: MAX_STATES }),
-    };
-    Ok(run(readings, rig, prior, form))
+    by_size!(rig, prior, run(readings, rig, prior, None, form))
+}
+
+/// Reconstructs the gas temperature as [`reconstruct()`] does, for a gas whose driving noise is at some
+/// instants stronger than at others.
+///
+/// The result is exact where the intensity is right.
+///
+/// # Errors
+/// As [`reconstruct()`]; [`CompensateError::Lengths`] where `intensity` is not one of these readings.
+pub fn reconstruct_with(
+    readings: &Readings,
+    rig: &Rig,
+    prior: &Prior,
+    intensity: &Intensity,
+    form: Form,
+) -> Result<Gas, CompensateError> {
+    intensity.check(readings)?;
+    by_size!(rig, prior, run(readings, rig, prior, Some(intensity.factors()), form))
+}
+
+/// How probable readings are at an intensity, and how that changes with it.
+pub(crate) fn score(
+    readings: &Readings,
+    rig: &Rig,
+    prior: &Prior,
+    factors: &[f64],
+) -> Result<smooth::Score, CompensateError> {
+    by_size!(rig, prior, score(readings, rig, prior, factors))
 }
 
 /// The highest frequency, Hz, at which readings every `period_s` determine the gas better than the

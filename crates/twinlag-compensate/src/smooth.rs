@@ -57,8 +57,9 @@ struct Event {
 
 /// What the way back needs of an event.
 struct Kept<const D: usize> {
-    /// The step that led to it.
+    /// The step that led to it, and the sample that its intensity is of.
     step: usize,
+    sample: usize,
     /// The gas, its covariance with the state, and its variance, before its readings.
     gas: f64,
     row: SVector<f64, D>,
@@ -71,7 +72,12 @@ struct Kept<const D: usize> {
 /// Runs forward over everything.
 struct Forward<const D: usize> {
     steps: Vec<Step<D>>,
+    /// What the changing part of the gas adds in each step, where its intensity changes and others add
+    /// as well.
+    by_gas: Vec<SMatrix<f64, D, D>>,
     kept: Vec<Kept<D>>,
+    /// The lines of the gas and their covariance with the state, before the readings of each event.
+    lines: Vec<(f64, SVector<f64, D>)>,
     log_likelihood: f64,
     energy: f64,
     innovations: usize,
@@ -100,12 +106,21 @@ fn events(readings: &Readings, rig: &Rig) -> Vec<Event> {
 }
 
 impl<const D: usize> Forward<D> {
-    fn run(system: &System<D>, readings: &Readings, rig: &Rig, level_c: f64) -> (Self, Vec<Event>) {
+    fn run(
+        system: &System<D>,
+        readings: &Readings,
+        rig: &Rig,
+        level_c: f64,
+        intensity: Option<&[f64]>,
+    ) -> (Self, Vec<Event>) {
         let events = events(readings, rig);
+        let has_lines = intensity.is_some() && system.has_lines();
         let mut belief = Belief { state: system.start(), covariance: system.before };
         let mut out = Self {
             steps: Vec::new(),
+            by_gas: Vec::new(),
             kept: Vec::with_capacity(events.len()),
+            lines: Vec::new(),
             log_likelihood: 0.0,
             energy: 0.0,
             innovations: 0,
@@ -114,9 +129,21 @@ impl<const D: usize> Forward<D> {
         let mut lengths: Vec<f64> = Vec::new();
         for event in &events {
             let sample = event.answers.or(event.reads[0]).or(event.reads[1]).unwrap_or(0);
-            let step = out.step(system, &mut lengths, event.time_s - last_s, readings.locals(sample, level_c));
+            let step = out.step(
+                system,
+                &mut lengths,
+                event.time_s - last_s,
+                readings.locals(sample, level_c),
+                intensity.is_some(),
+            );
             last_s = event.time_s;
             belief.predict(&out.steps[step]);
+            if let Some(intensity) = intensity {
+                belief.covariance += out.by_gas(step) * (intensity[sample] - 1.0);
+            }
+            if has_lines {
+                out.lines.push((system.lines.dot(&belief.state), belief.covariance * system.lines));
+            }
             let row = belief.covariance * system.gas;
             let (gas, variance) = (system.gas.dot(&belief.state), system.gas.dot(&row));
             let updates = [0, 1].map(|i| {
@@ -130,7 +157,7 @@ impl<const D: usize> Forward<D> {
                 Some(update)
             });
             let after = [system.gas.dot(&belief.state), system.gas.dot(&(belief.covariance * system.gas))];
-            out.kept.push(Kept { step, gas, row, variance, updates, after });
+            out.kept.push(Kept { step, sample, gas, row, variance, updates, after });
         }
         (out, events)
     }
@@ -142,18 +169,33 @@ impl<const D: usize> Forward<D> {
         lengths: &mut Vec<f64>,
         length_s: f64,
         locals: Option<[(crate::rig::SensorAt, f64); 2]>,
+        is_modulated: bool,
     ) -> usize {
         let known = lengths.iter().position(|l| locals.is_none() && (l - length_s).abs() <= SAME_STEP * length_s.abs());
         known.unwrap_or_else(|| {
             self.steps.push(system.step(length_s, locals));
+            if is_modulated && system.has_steady_drive() {
+                self.by_gas.push(system.added_by_gas(length_s, locals));
+            }
             lengths.push(length_s);
             self.steps.len() - 1
         })
     }
 
-    /// Goes from the end of `events` back to the first, and passes the gas and its variance at
-    /// each.
-    fn back(&self, reads: &[SVector<f64, D>; 2], from: usize, to: usize, mut told: impl FnMut(usize, f64, f64)) {
+    /// What the changing part of the gas adds in a step.
+    fn by_gas(&self, step: usize) -> &SMatrix<f64, D, D> {
+        self.by_gas.get(step).unwrap_or(&self.steps[step].added)
+    }
+
+    /// Goes from the end of `events` back to the first, and passes what the readings from each on say of
+    /// the state before them, `λ` and `Λ`.
+    fn back(
+        &self,
+        reads: &[SVector<f64, D>; 2],
+        from: usize,
+        to: usize,
+        mut told: impl FnMut(usize, &SVector<f64, D>, &SMatrix<f64, D, D>),
+    ) {
         let mut pull = SVector::<f64, D>::zeros();
         let mut weight = SMatrix::<f64, D, D>::zeros();
         for j in (from..=to).rev() {
@@ -169,7 +211,7 @@ impl<const D: usize> Forward<D> {
                 weight -= c * column.transpose() + column * c.transpose();
                 weight += c * c.transpose() * (both + 1.0 / update.variance);
             }
-            told(j, kept.gas - kept.row.dot(&pull), kept.variance - kept.row.dot(&(weight * kept.row)));
+            told(j, &pull, &weight);
             let transition = &self.steps[kept.step].transition;
             pull = transition.tr_mul(&pull);
             weight = around(&transition.transpose(), &weight);
@@ -177,10 +219,50 @@ impl<const D: usize> Forward<D> {
     }
 }
 
-/// The gas temperature with a state of dimension `D`.
-pub(crate) fn run<const D: usize>(readings: &Readings, rig: &Rig, prior: &Prior, form: Form) -> Gas {
+/// How probable readings are at an intensity of the gas, and how that changes.
+#[derive(Clone, Debug)]
+pub(crate) struct Score {
+    pub(crate) log_likelihood: f64,
+    /// What the driving noise that led to each sample seems to have been and what it was expected to
+    /// be seen of it, `w λ'Cλ` and `w tr(CΛ)`: half of their difference is the slope of the
+    /// logarithm of the likelihood in `ln w`.
+    pub(crate) seen: Vec<f64>,
+    pub(crate) expected: Vec<f64>,
+    /// The gas's lines, if it has any.
+    pub(crate) lines_k: Vec<f64>,
+}
+
+/// The score of an intensity, with a state of dimension `D`.
+pub(crate) fn score<const D: usize>(readings: &Readings, rig: &Rig, prior: &Prior, intensity: &[f64]) -> Score {
     let system = System::<D>::new(rig, &prior.terms);
-    let (forward, events) = Forward::run(&system, readings, rig, prior.level_c);
+    let (forward, events) = Forward::run(&system, readings, rig, prior.level_c, Some(intensity));
+    let (mut seen, mut expected) = (vec![0.0; readings.len()], vec![0.0; readings.len()]);
+    let mut lines_k = vec![0.0; if system.has_lines() { readings.len() } else { 0 }];
+    let last = events.len().saturating_sub(1);
+    if !events.is_empty() {
+        forward.back(&system.reads, 0, last, |j, pull, weight| {
+            let kept = &forward.kept[j];
+            let (added, factor) = (forward.by_gas(kept.step), intensity[kept.sample]);
+            seen[kept.sample] += factor * pull.dot(&(added * pull));
+            expected[kept.sample] += factor * added.dot(weight);
+            if let Some((before, row)) = forward.lines.get(j) {
+                lines_k[kept.sample] = before - row.dot(pull);
+            }
+        });
+    }
+    Score { log_likelihood: forward.log_likelihood, seen, expected, lines_k }
+}
+
+/// The gas temperature with a state of dimension `D`.
+pub(crate) fn run<const D: usize>(
+    readings: &Readings,
+    rig: &Rig,
+    prior: &Prior,
+    intensity: Option<&[f64]>,
+    form: Form,
+) -> Gas {
+    let system = System::<D>::new(rig, &prior.terms);
+    let (forward, events) = Forward::run(&system, readings, rig, prior.level_c, intensity);
     let mut gas_c = vec![prior.level_c; readings.len()];
     let mut std_k = vec![0.0; readings.len()];
     let mut put = |j: usize, gas: f64, variance: f64| {
@@ -189,10 +271,17 @@ pub(crate) fn run<const D: usize>(readings: &Readings, rig: &Rig, prior: &Prior,
             std_k[k] = variance.max(0.0).sqrt();
         }
     };
+    let smoothed = |j: usize, pull: &SVector<f64, D>, weight: &SMatrix<f64, D, D>| {
+        let kept = &forward.kept[j];
+        (kept.gas - kept.row.dot(pull), kept.variance - kept.row.dot(&(weight * kept.row)))
+    };
     let last = events.len().saturating_sub(1);
     match form {
         _ if events.is_empty() => {}
-        Form::Smoother => forward.back(&system.reads, 0, last, put),
+        Form::Smoother => forward.back(&system.reads, 0, last, |j, pull, weight| {
+            let (gas, variance) = smoothed(j, pull, weight);
+            put(j, gas, variance);
+        }),
         Form::Filter => {
             for (j, kept) in forward.kept.iter().enumerate() {
                 put(j, kept.after[0], kept.after[1]);
@@ -200,8 +289,9 @@ pub(crate) fn run<const D: usize>(readings: &Readings, rig: &Rig, prior: &Prior,
         }
         Form::FixedLag(lag) => {
             for j in 0..events.len() {
-                forward.back(&system.reads, j, (j + lag).min(last), |at, gas, variance| {
+                forward.back(&system.reads, j, (j + lag).min(last), |at, pull, weight| {
                     if at == j {
+                        let (gas, variance) = smoothed(j, pull, weight);
                         put(j, gas, variance);
                     }
                 });

@@ -20,6 +20,9 @@ pub(crate) const MAX_QUICK_PIECE_SAMPLES: usize = 4096;
 /// Multiples of the sampling frequency from which power folds back; what is farther away is taken
 /// as if the gas were sampled.
 const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
+/// As many of them each way where the gas is taken to end at half the sampling rate: beyond, noise that
+/// falls as `1/f²` has a twelfth of what it has above that rate.
+const ENDING_FOLDS: i32 = 6;
 /// Distance from critical damping below which both exponentials of a resonance cancel.
 const NEARLY_CRITICAL_ETA: f64 = 1e-3;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
@@ -27,6 +30,7 @@ const OVERLAPPING_WORTH: f64 = 0.947;
 
 /// A tapered periodogram of the gas, of long records the mean over pieces that overlap by half,
 /// with what noise adds to it.
+#[derive(Clone)]
 pub(crate) struct Periodogram {
     pub(crate) period_s: f64,
     /// Instants of the even grid.
@@ -126,6 +130,16 @@ impl Periodogram {
         let pieces = if count > 1 { OVERLAPPING_WORTH * count as f64 } else { 1.0 };
         let flattened = flattened.to_vec();
         Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
+    }
+
+    /// The periodogram as it would have come of a gas that does not move faster than half the sampling
+    /// rate: nothing folds back.
+    pub(crate) fn of_ending_gas(&self) -> Self {
+        let nothing = vec![1.0; self.frequency_hz.len()];
+        let flattened = (1..=ENDING_FOLDS)
+            .flat_map(|m| [-f64::from(m), f64::from(m)])
+            .map(|m| (m / self.period_s, nothing.clone()));
+        Self { flattened: flattened.collect(), ..self.clone() }
     }
 
     /// What the periodogram of a gas with these terms is expected to be:

@@ -33,10 +33,16 @@ pub(crate) struct System<const D: usize> {
     rig: Rig,
     /// Rates without those of the sensors, which may change.
     rates: SMatrix<f64, D, D>,
-    /// Intensity of the driving noise.
+    /// Intensity of the driving noise of that part of the gas whose intensity may change, and of
+    /// everything.
+    #[cfg(feature = "std")]
+    drive_of_gas: SMatrix<f64, D, D>,
     drive: SMatrix<f64, D, D>,
     /// The gas about its level.
     pub(crate) gas: SVector<f64, D>,
+    /// The gas's lines alone.
+    #[cfg(feature = "std")]
+    pub(crate) lines: SVector<f64, D>,
     /// What each channel reads.
     pub(crate) reads: [SVector<f64, D>; 2],
     /// Covariance of the state before the first reading.
@@ -91,6 +97,8 @@ impl<const D: usize> System<D> {
                 }
             }
         }
+        #[cfg(feature = "std")]
+        let (drive_of_gas, lines) = changing(terms, &drive);
         let mut layout = Layout { gas: take(0), ..Layout::default() };
         let mut reads = [SVector::<f64, D>::zeros(); 2];
         let swing = gas.dot(&(before * gas));
@@ -137,7 +145,19 @@ impl<const D: usize> System<D> {
                 before[(at, at)] = 4.0 * swing;
             }
         }
-        Self { layout, rig: *rig, rates, drive, gas, reads, before }
+        Self {
+            layout,
+            rig: *rig,
+            rates,
+            #[cfg(feature = "std")]
+            drive_of_gas,
+            drive,
+            gas,
+            #[cfg(feature = "std")]
+            lines,
+            reads,
+            before,
+        }
     }
 
     /// The state before the first reading.
@@ -150,6 +170,30 @@ impl<const D: usize> System<D> {
     /// What happens in `step_s`, with each sensor as it is then. `reading_k` is what each reads
     /// about the level, where losses are known.
     pub(crate) fn step(&self, step_s: f64, locals: Option<[(SensorAt, f64); 2]>) -> Step<D> {
+        exponential(&self.rates(locals), &self.drive, step_s)
+    }
+
+    /// What that part of the gas whose intensity may change adds to the covariance of the state in
+    /// `step_s`.
+    #[cfg(feature = "std")]
+    pub(crate) fn added_by_gas(&self, step_s: f64, locals: Option<[(SensorAt, f64); 2]>) -> SMatrix<f64, D, D> {
+        exponential(&self.rates(locals), &self.drive_of_gas, step_s).added
+    }
+
+    /// Whether the gas has lines.
+    #[cfg(feature = "std")]
+    pub(crate) fn has_lines(&self) -> bool {
+        self.lines.iter().any(|share| *share > 0.0)
+    }
+
+    /// Whether anything else is driven by noise.
+    #[cfg(feature = "std")]
+    pub(crate) fn has_steady_drive(&self) -> bool {
+        self.drive != self.drive_of_gas
+    }
+
+    /// The rates with each sensor as it is then.
+    fn rates(&self, locals: Option<[(SensorAt, f64); 2]>) -> SMatrix<f64, D, D> {
         let mut rates = self.rates;
         for i in 0..2 {
             let (local, reading_k) =
@@ -165,7 +209,7 @@ impl<const D: usize> System<D> {
             rates[(body, body)] = -rate * (1.0 + local.loss_slope);
             rates[(body, self.layout.one)] = -rate * (local.loss_k - local.loss_slope * reading_k);
         }
-        exponential(&rates, &self.drive, step_s)
+        rates
     }
 }
 
@@ -233,4 +277,31 @@ fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, 
         transition = product(&transition, &transition);
     }
     Step { transition, added }
+}
+
+/// Whether a term is a line: a movement that goes on for more than three cycles, in which the present
+/// drive has little part.
+#[cfg(feature = "std")]
+fn is_line(term: &Term) -> bool {
+    const MIN_QUALITY: f64 = 10.0;
+    matches!(term, Term::Resonance { quality, .. } if *quality > MIN_QUALITY)
+}
+
+/// Of the gas's driving noise that part whose intensity may change: of everything but lines, or of
+/// these where there is nothing else. And the lines.
+#[cfg(feature = "std")]
+fn changing<const D: usize>(terms: &[Term], drive: &SMatrix<f64, D, D>) -> (SMatrix<f64, D, D>, SVector<f64, D>) {
+    let mut changing = SMatrix::<f64, D, D>::zeros();
+    let mut lines = SVector::<f64, D>::zeros();
+    let has_lines_alone = terms.iter().all(is_line);
+    let mut first = 0;
+    for term in terms {
+        lines[first] = if is_line(term) { 1.0 } else { 0.0 };
+        let next = first + term.states();
+        for at in first..next {
+            changing[(at, at)] = if is_line(term) && !has_lines_alone { 0.0 } else { drive[(at, at)] };
+        }
+        first = next;
+    }
+    (changing, lines)
 }

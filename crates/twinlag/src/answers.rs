@@ -7,6 +7,7 @@ mod fitted;
 mod model;
 mod track;
 
+pub use crate::bands::GasFault;
 pub use characterisation::{
     Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
     SecondLag, SensorEstimate, Status,

@@ -1,11 +1,18 @@
 //! A gas temperature with everything that its bands rest on.
 //!
-//! The band of a sample adds up variances: that of the smoother, given model and prior; what the
-//! model's parameters and the prior's numbers move it by, a standard error at a time; and how far
+//! The band of a sample adds up variances: that of the smoother, given model, prior and intensity; what
+//! the model's parameters and the prior's numbers move it by, a standard error at a time; and how far
 //! priors apart that fit as well put it.
 
-use twinlag_compensate::{Gas, Learned, Prior, Readings, Rig, learn, learn_with_noise, reconstruct};
+use twinlag_compensate::{
+    Form, Gas, Intensity, Learned, Prior, Readings, Rig, learn, learn_intensity, learn_with_noise, reconstruct,
+    reconstruct_with,
+};
 use twinlag_diagnose::{Extended, ModelFit};
+
+mod faults;
+
+pub use faults::GasFault;
 
 use crate::error::Error;
 use crate::parallel::in_parallel;
@@ -18,6 +25,9 @@ const MAX_INNOVATION_EXCESS: f64 = 4.0;
 const NOISE_INFLATION_STEP: f64 = 1.05;
 /// Most steps by which noise is made louder.
 const MAX_NOISE_INFLATIONS: usize = 6;
+/// What is left at least of a variance when the motion beyond half the sampling rate is taken off: there
+/// rounding and changing intensity may make that larger than the whole.
+const LEAST_VARIANCE_SHARE: f64 = 0.05;
 
 /// The gas with everything that its bands rest on.
 pub(crate) struct Banded {
@@ -26,8 +36,10 @@ pub(crate) struct Banded {
     pub(crate) prior: Prior,
     pub(crate) gas: Gas,
     pub(crate) std_k: Vec<f64>,
-    pub(crate) parameter_std_k: f64,
+    /// The share of the model's parameters in it, K.
+    pub(crate) parameter_std_k: Vec<f64>,
     pub(crate) widened_by: f64,
+    pub(crate) faults: Vec<GasFault>,
 }
 
 /// How the gas is reconstructed by the model of a fit.
@@ -56,12 +68,17 @@ impl<'a> Reconstruction<'a> {
         self.stop.say("what the gas is like", 0, 1);
         self.stop.check()?;
         let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
-        let Learned { prior, sigma_priors, alternatives, mut noise_factor } = learned;
-        let mut gas = self.gas(theta, &prior, noise_factor)?;
+        let Learned { prior, sigma_priors, alternatives, mut noise_factor, ends } = learned;
+        let mut gas = self.gas(theta, &Motion { prior: &prior, intensity: None, ends }, noise_factor)?;
         if is_found && is_excessive(&gas) {
-            (noise_factor, gas) = self.louder(&prior, noise_factor, gas)?;
+            (noise_factor, gas) = self.louder(&Motion { prior: &prior, intensity: None, ends }, noise_factor, gas)?;
         }
         let (_, rig) = self.rig(theta, noise_factor)?;
+        let intensity = self.intensity(&readings, &rig, &prior)?;
+        let intensity = intensity.as_ref();
+        if intensity.is_some() {
+            gas = self.gas(theta, &Motion { prior: &prior, intensity, ends }, noise_factor)?;
+        }
         let columns = self.fit.covariance.as_deref().map(columns).unwrap_or_default();
         let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
         let of_model = moved.map(|moved: Vec<f64>| (moved, &prior));
@@ -69,19 +86,42 @@ impl<'a> Reconstruction<'a> {
         let of_alternative = alternatives.iter().map(|(_, prior)| (theta.to_vec(), prior));
         let cases: Vec<(Vec<f64>, &Prior)> = of_model.chain(of_prior).chain(of_alternative).collect();
         let task = "how model and prior move the gas temperature";
-        let others = in_parallel(&cases, task, self.stop, |(theta, prior)| self.gas(theta, prior, noise_factor).ok());
+        let of_case = |(theta, prior): &(Vec<f64>, &Prior)| {
+            self.gas(theta, &Motion { prior, intensity, ends }, noise_factor).ok()
+        };
+        let others = in_parallel(&cases, task, self.stop, of_case);
         self.stop.check()?;
         let (of_model, rest) = others.split_at(columns.len());
         let (of_prior, of_alternative) = rest.split_at(sigma_priors.len());
         let (of_model, of_prior) = (moved_by(&gas, of_model), moved_by(&gas, of_prior));
         let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
-        let parameter_std_k = (of_model.iter().sum::<f64>() / of_model.len().max(1) as f64).sqrt();
+        let parameter_std_k = of_model.iter().map(|v| widened_by * v.sqrt()).collect();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it
-        // is, by as much as it moves it.
-        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + 2.0 * prior);
-        let gas = averaged(&gas, alternatives.iter().map(|(weight, _)| *weight).zip(of_alternative));
-        let std_k = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
-        Ok(Banded { readings, rig, prior, gas, std_k, parameter_std_k, widened_by })
+        // is, by as much as it moves it. Beside an intensity, which would take most of it back, once.
+        let times = if intensity.is_some() { 1.0 } else { 2.0 };
+        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + times * prior);
+        let weights = alternatives.iter().map(|(weight, _)| *weight);
+        let weights = if intensity.is_some() { judged(&gas, weights, of_alternative) } else { weights.collect() };
+        let gas = averaged(&gas, weights.into_iter().zip(of_alternative));
+        let std_k: Vec<f64> = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
+        let scale = self.scale(theta);
+        let faults = faults::of(&readings, &rig, scale, &gas.gas_c, &std_k, widened_by);
+        Ok(Banded { readings, rig, prior, gas, std_k, parameter_std_k, widened_by, faults })
+    }
+
+    /// How the gas's intensity changes. It is learned from the whole record, so a filter, which may not
+    /// know what comes, keeps a constant one, and so does a fixed lag.
+    fn intensity(&self, readings: &Readings, rig: &Rig, prior: &Prior) -> Result<Option<Intensity>, Error> {
+        if self.options.form != Form::Smoother {
+            return Ok(None);
+        }
+        self.stop.check()?;
+        Ok(learn_intensity(readings, rig, prior)?)
+    }
+
+    /// What makes a temperature of the first channel's scale one of the trusted channel's: a gain and an offset, K.
+    fn scale(&self, theta: &[f64]) -> [f64; 2] {
+        if self.options.trusted == 1 { self.extended.calibration(theta) } else { [1.0, 0.0] }
     }
 
     fn rig(&self, theta: &[f64], noise_factor: [f64; 2]) -> Result<(Readings, Rig), Error> {
@@ -90,31 +130,56 @@ impl<'a> Reconstruction<'a> {
         Ok((readings, Rig { clock: self.options.trusted, ..rig }))
     }
 
-    fn gas(&self, theta: &[f64], prior: &Prior, noise_factor: [f64; 2]) -> Result<Gas, Error> {
+    fn gas(&self, theta: &[f64], motion: &Motion<'_>, noise_factor: [f64; 2]) -> Result<Gas, Error> {
         let (readings, rig) = self.rig(theta, noise_factor)?;
-        let mut gas = reconstruct(&readings, &rig, prior, self.options.form)?;
-        if self.options.trusted == 1 {
-            let [gain, offset_k] = self.extended.calibration(theta);
-            gas.gas_c.iter_mut().for_each(|c| *c = gain * *c + offset_k);
-            gas.std_k.iter_mut().for_each(|k| *k *= gain.abs());
-        }
+        let form = self.options.form;
+        let mut gas = match motion.intensity {
+            Some(intensity) => reconstruct_with(&readings, &rig, motion.prior, intensity, form)?,
+            None => reconstruct(&readings, &rig, motion.prior, form)?,
+        };
+        motion.take_off_what_is_beyond(&mut gas, 0.5 / readings.period_s());
+        let [gain, offset_k] = self.scale(theta);
+        gas.gas_c.iter_mut().for_each(|c| *c = gain * *c + offset_k);
+        gas.std_k.iter_mut().for_each(|k| *k *= gain.abs());
         Ok(gas)
     }
 
     /// Noise made louder as long as readings become more probable. Where the prior's spectrum does
     /// not end as the gas's does, it has pushed the noise aside: it comes back as far as the
     /// readings say.
-    fn louder(&self, prior: &Prior, noise_factor: [f64; 2], gas: Gas) -> Result<([f64; 2], Gas), Error> {
+    fn louder(&self, motion: &Motion<'_>, noise_factor: [f64; 2], gas: Gas) -> Result<([f64; 2], Gas), Error> {
         let mut best = (noise_factor, gas);
         for _ in 0..MAX_NOISE_INFLATIONS {
             let louder = best.0.map(|factor| factor * NOISE_INFLATION_STEP);
-            let other = self.gas(self.extended.parameters(), prior, louder)?;
+            let other = self.gas(self.extended.parameters(), motion, louder)?;
             if other.log_likelihood <= best.1.log_likelihood {
                 break;
             }
             best = (louder, other);
         }
         Ok(best)
+    }
+}
+
+/// How the gas moves.
+struct Motion<'a> {
+    prior: &'a Prior,
+    intensity: Option<&'a Intensity>,
+    /// Probability that it ends at half the sampling rate.
+    ends: f64,
+}
+
+impl Motion<'_> {
+    /// Takes the motion beyond half the sampling rate off the variance, as likely as it is not there. It is independent of what
+    /// is slower, and hardly read.
+    fn take_off_what_is_beyond(&self, gas: &mut Gas, half_rate_hz: f64) {
+        let beyond = self.ends * self.prior.variance_above_k2(half_rate_hz);
+        let factors = self.intensity.map(Intensity::factors);
+        for (k, std_k) in gas.std_k.iter_mut().enumerate() {
+            let variance = *std_k * *std_k;
+            let left = variance - beyond * factors.map_or(1.0, |factors| factors[k]);
+            *std_k = left.max(LEAST_VARIANCE_SHARE * variance).sqrt();
+        }
     }
 }
 
@@ -139,6 +204,19 @@ fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
     let given = &options.diagnose.characterise;
     let is_white = rig.mismatch.is_none() && rig.sensors.iter().all(|s| s.coloured.is_none());
     is_white && options.model.is_none() && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
+}
+
+/// The weights of other priors, which were those of a constant intensity, with the likelihood that they have with a changing
+/// one.
+fn judged(gas: &Gas, weights: impl Iterator<Item = f64>, others: &[Option<Gas>]) -> Vec<f64> {
+    let weights: Vec<f64> = weights.collect();
+    let own = 1.0 - weights.iter().sum::<f64>();
+    let gain =
+        |other: &Option<Gas>| other.as_ref().map_or(f64::NEG_INFINITY, |o| o.log_likelihood - gas.log_likelihood);
+    let most = others.iter().map(gain).fold(0.0, f64::max);
+    let of_others: Vec<f64> = weights.iter().zip(others).map(|(w, other)| w * (gain(other) - most).exp()).collect();
+    let all = own * (-most).exp() + of_others.iter().sum::<f64>();
+    of_others.iter().map(|weight| weight / all).collect()
 }
 
 /// The mean of `gas` and of those by other priors, with the variance of the mixture.

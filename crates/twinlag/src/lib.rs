@@ -84,8 +84,8 @@ mod watch;
 
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, EffectNumber, ErrorBeforeAfter, Estimated,
-    FreeParameters, IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio, RecordSummary,
-    Residual, SecondLag, SensorEstimate, Status, Track,
+    FreeParameters, GasFault, IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio,
+    RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track,
 };
 pub use error::Error;
 pub use options::Options;

@@ -6,6 +6,7 @@ use twinlag_diagnose::{Judgement, Verdict};
 
 use crate::answers::diagnosis::explained;
 use crate::answers::{Characterisation, NamedEffect, Status};
+use crate::bands::GasFault;
 use crate::reference::AgainstReference;
 
 /// How good a gas temperature is.
@@ -15,7 +16,8 @@ pub struct Quality {
     /// Median of its standard deviation, K.
     #[serde(rename = "median_std_K")]
     pub median_std_k: f64,
-    /// Root mean square of the part of it that is due to the model's parameters, K.
+    /// Median of the part of it that is due to the model's parameters, K, which at no instant is more
+    /// than the whole.
     #[serde(rename = "parameter_std_K")]
     pub parameter_std_k: f64,
     /// Highest frequency of which the readings say more than the prior, Hz: above it the answer is
@@ -27,6 +29,9 @@ pub struct Quality {
     pub innovation_energy: f64,
     /// What the bands were multiplied by where the innovation energy is too large.
     pub widened_by: f64,
+    /// What in the gas temperature shows that the model is wrong.
+    #[serde(default)]
+    pub faults: Vec<GasFault>,
     /// What the gas is like, learned from the readings.
     pub prior: Prior,
     /// Errors against the reference; `None` without one.

@@ -5,7 +5,7 @@ use twinlag_diagnose::{Grade, Judgement, ModelFit, Reason, Verdict};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
-use crate::bands::{Banded, Reconstruction};
+use crate::bands::{Banded, GasFault, Reconstruction};
 use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::Rows;
@@ -131,27 +131,34 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows) {
             found.widened_by
         ));
     }
+    let is_said = |fault: &&GasFault| matches!(fault, GasFault::Widened { .. });
+    out.warnings.extend(found.faults.iter().filter(|fault| !is_said(fault)).map(ToString::to_string));
     out.warnings.push(
         "errors that both sensors share (a gain, an offset, a delay, a second lag) remain in the \
          gas temperature, and no band covers them"
             .into(),
     );
-    let mut sorted = found.std_k.clone();
-    sorted.sort_by(f64::total_cmp);
     let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
     let reference = Reference::of(record, &rows.of_sample);
     out.status = Status::Ok;
     out.gas = Some(Quality {
-        median_std_k: sorted.get(sorted.len() / 2).copied().unwrap_or(0.0),
-        parameter_std_k: found.parameter_std_k,
+        median_std_k: median(&found.std_k),
+        parameter_std_k: median(&found.parameter_std_k),
         bandwidth_hz: bandwidth_hz(&found.rig, &found.prior, out.last.record.sample_period_s),
         innovation_energy: found.gas.innovation_energy,
         widened_by: found.widened_by,
+        faults: found.faults,
         reference: reference.and_then(|r| r.against(&found.gas.gas_c, &found.std_k, faster)),
         prior: found.prior,
     });
     out.time_s = found.readings.time_s().to_vec();
     (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.std_k, Some(found.rig));
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The model, and where it comes from.
