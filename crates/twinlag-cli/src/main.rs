@@ -16,6 +16,7 @@ mod diagnose;
 mod explain;
 mod failure;
 mod grades;
+mod if_known;
 mod live;
 mod output;
 mod print;

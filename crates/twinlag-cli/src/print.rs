@@ -16,6 +16,7 @@ use twinlag_pages::parameter_in_words;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades::graded;
+use crate::if_known;
 use crate::settings::usage;
 
 /// Prints exactly one JSON object on standard output.
@@ -265,6 +266,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     lines.extend(difference_line(&answer.last));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
+    lines.extend(answer.if_known.iter().flat_map(if_known::lines));
     lines.push(String::new());
     if let Some(left) = &answer.unexplained {
         lines.push(format!("left over: {}", left.description));
@@ -422,6 +424,7 @@ fn time_constant(sensor: &SensorEstimate) -> String {
     let number = match (sensor.time_constant_s, sensor.interval_95_s) {
         (Some(value), Some([low, high])) => Some(interval(value, low, high, " s")),
         (Some(value), None) if sensor.known => return format!("{} s (given)", digits(value, 5)),
+        (None, Some([0.0, most_s])) => return format!("at most {} s (95 %)", digits(most_s, 2)),
         _ => None,
     };
     graded(number, &sensor.judgement)
@@ -461,7 +464,7 @@ fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
 }
 
 /// Decimals of the ends of an interval: two digits more than its width has.
-fn decimals_of([low, high]: [f64; 2]) -> usize {
+pub(crate) fn decimals_of([low, high]: [f64; 2]) -> usize {
     let width = (high - low).abs();
     if width > 0.0 { (2.0 - width.log10().floor()).clamp(0.0, 12.0) as usize } else { 6 }
 }

@@ -5,7 +5,8 @@ use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, 
 
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
-use crate::grade::{Basis, Excess, Reason, excess};
+use crate::grade::{Basis, Excess, Grade, Reason, excess};
+use crate::if_known::if_known;
 use crate::judge::Circumstances;
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
@@ -90,6 +91,13 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
             found
         })
         .collect();
+    let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
+    let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
+    let if_known = if is_refused || (is_whole && is_given) {
+        None
+    } else {
+        if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
+    };
     if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
         remarks.push(Remark::BiasUnknown);
     }
@@ -109,6 +117,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         base_judgements,
         not_testable: not_testable(&state.prepared.observations, tones, policy),
         limits,
+        if_known,
         remarks,
         moves: state.moves,
         policy: policy.clone(),

@@ -5,6 +5,7 @@ use twinlag_model::{Identifier, ModelFit, Observations, Policy, Value};
 
 use crate::evidence::Evidence;
 use crate::grade::Judgement;
+use crate::if_known::IfKnown;
 use crate::judge::Judgements;
 use crate::moves::Move;
 use crate::remark::Remark;
@@ -183,6 +184,9 @@ pub struct Diagnosis {
     pub not_testable: Vec<String>,
     /// Detection limits of the effects that were not found; none where something is left over, since that may hide them.
     pub limits: Vec<Limit>,
+    /// What each value of the first time constant would make of the record; `None` where both are
+    /// given and only noise is left over, or where one was known.
+    pub if_known: Option<IfKnown>,
     /// Why the record was refused, or what to know before using the numbers.
     pub remarks: Vec<Remark>,
     /// What the loop did, in order.

@@ -42,6 +42,7 @@ mod evidence;
 mod excitation;
 mod grade;
 mod hidden;
+mod if_known;
 mod judge;
 mod left_over;
 mod limits;
@@ -55,6 +56,7 @@ pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, U
 pub use evidence::Evidence;
 pub use excitation::is_single_tone;
 pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, excess};
+pub use if_known::{Held, HeldEffect, IfKnown};
 pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
 pub use moves::Move;

@@ -115,3 +115,71 @@ fn check(known: &KnownEffect, parameter: &Parameter) -> Result<(), ModelError> {
     let (effect, name, expected) = (known.effect.name(), parameter.name, parameter.domain.expected());
     Err(ModelError::Parameter { effect, name, got, expected })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::model::KnownTimeConstant;
+    use crate::observations::Stretch;
+
+    /// Standard normal numbers enough like it: sums of twelve uniform ones, from a linear congruential generator.
+    fn normal(state: &mut u64) -> f64 {
+        let mut uniform = || {
+            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Tones through two lags in closed form, sampled every 10 s or so, and noise. The shortest period is 13 steps long, so that the
+    /// spline is off by `(ωh)⁴/180`, 3e-4 of a time constant.
+    fn record(tau_s: [f64; 2], noise_k: f64) -> Observations {
+        let time_s: Vec<f64> = (0..400).map(|k| 10.0 * f64::from(k) + 3.0 * (1.7 * f64::from(k)).sin()).collect();
+        let mut state = 1;
+        let reading_c = tau_s.map(|tau_s| {
+            let at = |t: f64| -> f64 {
+                let through = |period_s: f64| {
+                    let x: f64 = TAU / period_s * tau_s;
+                    (TAU / period_s * t - x.atan()).sin() / x.hypot(1.0)
+                };
+                [131.0, 173.0, 241.0, 317.0, 470.0].into_iter().map(through).sum()
+            };
+            time_s.iter().map(|t| 20.0 + at(*t) + noise_k * normal(&mut state)).collect()
+        });
+        Observations::new(vec![Stretch::new(time_s, reading_c)], None).expect("a record")
+    }
+
+    fn taus(observations: &Observations, noise_k: f64, known: KnownTimeConstant) -> [crate::fitted::TimeConstant; 2] {
+        let settings = Settings { known: vec![known], noise_std_k: Some([noise_k; 2]), ..Settings::default() };
+        fit_with(observations, &settings, &[]).expect("a fit").fit.time_constants
+    }
+
+    /// Failed: a time constant of 0.5 ± 0.1 s ended at a tenth of the sample period, 1 s, and neither was determined.
+    #[test]
+    fn what_is_known_need_not_be_resolved_by_the_samples() {
+        let observations = record([0.5, 6.0], 0.02);
+        for std_s in [None, Some(0.1)] {
+            let known = KnownTimeConstant { sensor: 0, value_s: 0.5, std_s };
+            let [first, second] = taus(&observations, 0.02, known);
+            let first_s = first.value_s.expect("known");
+            // The readings add the difference alone, so what is known of the first stays.
+            assert!((first_s - 0.5).abs() < 4.0 * std_s.unwrap_or(1e-12), "got {first_s} s, known {std_s:?}");
+            let (second_s, error_s) = (second.value_s.expect("given"), second.standard_error_s.expect("given"));
+            assert!((second_s - 6.0).abs() < 4.0 * error_s, "got {second_s} ± {error_s} s, want 6 s");
+        }
+    }
+
+    /// A sensor that follows faster than the noise shows, beside one that is known: no value, and an upper limit. The noise of a
+    /// difference, 0.28 K, over the slopes of 0.05 K/s and the root of 400 samples is 0.28 s: a limit above 2 s would be seven times it.
+    #[test]
+    fn what_is_too_fast_to_see_has_an_upper_limit_beside_what_is_known() {
+        let observations = record([0.5, 0.01], 0.2);
+        let known = KnownTimeConstant { sensor: 0, value_s: 0.5, std_s: None };
+        let [_, second] = taus(&observations, 0.2, known);
+        assert_eq!(second.value_s, None);
+        let [low_s, high_s] = second.interval_95_s.expect("a limit");
+        assert!(low_s <= 0.01 && 0.01 < high_s && high_s < 2.0, "got [{low_s}, {high_s}] s");
+    }
+}

@@ -4,7 +4,7 @@ use std::fmt;
 
 use twinlag_optimise::Variable;
 
-use crate::effect::{Parameter, Shared};
+use crate::effect::{Identifier, Parameter, Shared};
 use crate::implied::Evaluation;
 use crate::number::Number;
 use crate::observations::Observations;
@@ -14,6 +14,13 @@ use crate::plant::Plant;
 pub(crate) const MAX_TAU_SPANS: f64 = 4.0;
 /// Shortest time constant beside a sample period: what happens within a tenth of it leaves no trace.
 const MIN_TAU_STEPS: f64 = 0.1;
+/// Shortest beside one that is known, beside a sample period. The readings show by how much one sensor lags behind the other, to
+/// the noise over the slope of the gas and not to a sample period, so nothing but this keeps a time constant from being none: less
+/// than any noise shows.
+const MIN_TAU_STEPS_BESIDE_KNOWN: f64 = 1e-3;
+/// Factor by which a fit may move a time constant that is known with a standard deviation, either way, wherever the samples end:
+/// further off than any data sheet.
+const KNOWN_TAU_FACTOR: f64 = 10.0;
 
 /// Prior knowledge of a time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -138,6 +145,19 @@ impl Model {
         self.known.iter().any(|k| k.sensor == sensor && k.std_s.is_none())
     }
 
+    /// Whether something is known of a time constant beforehand: its value, or one with a standard deviation.
+    ///
+    /// ```
+    /// use twinlag_model::{KnownTimeConstant, Model};
+    ///
+    /// let data_sheet = KnownTimeConstant { sensor: 0, value_s: 0.5, std_s: Some(0.1) };
+    /// let model = Model::new(&[data_sheet], [0.1, 0.2]);
+    /// assert!(model.knows_of(0) && !model.knows(0) && !model.knows_of(1));
+    /// ```
+    pub fn knows_of(&self, sensor: usize) -> bool {
+        self.known.iter().any(|k| k.sensor == sensor)
+    }
+
     /// Where the parameters of effect `index` are.
     pub fn range(&self, index: usize) -> std::ops::Range<usize> {
         let from = 2 + self.effects[..index].iter().map(|e| e.parameters().len()).sum::<usize>();
@@ -221,13 +241,23 @@ impl Model {
         self.plant(theta, observations).evaluate(observations)
     }
 
+    /// Shortest and longest that a fit takes a time constant to be, s.
+    fn tau_bounds_s(&self, sensor: usize, observations: &Observations) -> [f64; 2] {
+        let steps = if self.knows_of(1 - sensor) { MIN_TAU_STEPS_BESIDE_KNOWN } else { MIN_TAU_STEPS };
+        let (shortest_s, longest_s) = (steps * observations.step_s(), MAX_TAU_SPANS * observations.span_s());
+        match self.known.iter().find(|k| k.sensor == sensor) {
+            Some(KnownTimeConstant { value_s, .. }) => {
+                [shortest_s.min(value_s / KNOWN_TAU_FACTOR), longest_s.max(KNOWN_TAU_FACTOR * value_s)]
+            }
+            None => [shortest_s, longest_s],
+        }
+    }
+
     /// Variables of the fit. Noise is held: its likelihood is another.
     pub(crate) fn variables(&self, theta: &[f64], observations: &Observations) -> Vec<Variable> {
         let tau = |i: usize| {
-            let name = ["tau 1", "tau 2"][i];
-            let (shortest_s, longest_s) =
-                (MIN_TAU_STEPS * observations.step_s(), MAX_TAU_SPANS * observations.span_s());
-            let variable = Variable::logarithmic(name, shortest_s, longest_s);
+            let [shortest_s, longest_s] = self.tau_bounds_s(i, observations);
+            let variable = Variable::logarithmic(["tau 1", "tau 2"][i], shortest_s, longest_s);
             match self.known.iter().find(|k| k.sensor == i) {
                 Some(known) if known.std_s.is_none() => variable.held_at(known.value_s),
                 _ => variable,
@@ -239,6 +269,13 @@ impl Model {
             if effect.is_noise() || (self.is_frozen && !effect.is_of_the_record()) {
                 for i in self.range(index) {
                     out[i] = out[i].clone().held_at(theta[i]);
+                }
+            } else if effect.identifier() == Identifier::SECOND_ORDER {
+                // Of two lags the time constant is the longer, so what is known of it is an end to the other.
+                let known = self.known.iter().find(|k| Some(k.sensor) == effect.channel());
+                for i in self.range(index) {
+                    let longest_s = known.map_or(f64::INFINITY, |k| k.value_s).max(out[i].lower);
+                    out[i].upper = out[i].upper.min(longest_s);
                 }
             }
         }

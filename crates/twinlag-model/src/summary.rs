@@ -16,11 +16,19 @@ use crate::policy::Policy;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
 
-/// Whether a time constant is shorter than the samples resolve, or as long as the record.
+/// Whether a time constant is shorter than the samples resolve, or as long as the record. One that is known need not be
+/// resolved, and beside it the other may be as short as its interval allows: it is how far one sensor lags behind the other.
 pub fn is_unresolved(fitted: &Fitted, observations: &Observations, policy: &Policy) -> bool {
-    let longest_s = policy.longest_resolved_share * MAX_TAU_SPANS * observations.span_s();
-    let seen = policy.shortest_resolved_periods * observations.step_s()..longest_s;
-    (0..2).any(|i| !fitted.model.knows(i) && !seen.contains(&fitted.theta[i]))
+    let is_known = [0, 1].map(|i| fitted.model.knows_of(i));
+    let shortest_s = policy.shortest_resolved_periods * observations.step_s();
+    let shortest_s = if is_known == [false; 2] { shortest_s } else { 0.0 };
+    let seen = shortest_s..longest_resolved_s(observations, policy);
+    (0..2).any(|i| !is_known[i] && !seen.contains(&fitted.theta[i]))
+}
+
+/// Beyond this a time constant is as good as on the bound of a fit, s.
+fn longest_resolved_s(observations: &Observations, policy: &Policy) -> f64 {
+    policy.longest_resolved_share * MAX_TAU_SPANS * observations.span_s()
 }
 
 /// Whether half or twice a time constant fits as well, the other parameters free: then it is not determined, whatever the curvature
@@ -33,7 +41,7 @@ fn is_flat(
     policy: &Policy,
 ) -> bool {
     // One that is known ties the other down.
-    if (0..2).any(|i| fitted.model.knows(i)) {
+    if (0..2).any(|i| fitted.model.knows_of(i)) {
         return false;
     }
     let tau_s = fitted.theta[0];
@@ -161,12 +169,15 @@ fn time_constants(
     let unresolved =
         is_unresolved(fitted, observations, policy) || is_flat(fitted, observations, selection, variance(0), policy);
     let both = [0, 1].map(|i| {
-        if unresolved && !fitted.model.knows(i) {
-            TimeConstant::default()
-        } else {
-            let scatter = influence.and_then(|i_of| i_of.scatter(&[(i, 1.0)]));
-            TimeConstant { scatter, ..time_constant(theta[i], variance(i), policy) }
+        if unresolved && !fitted.model.knows_of(i) {
+            return TimeConstant::default();
         }
+        let scatter = influence.and_then(|i_of| i_of.scatter(&[(i, 1.0)]));
+        let found = TimeConstant { scatter, ..time_constant(theta[i], variance(i), policy) };
+        if found.value_s.is_none() && fitted.model.knows_of(1 - i) {
+            return at_most(theta[i], variance(i), longest_resolved_s(observations, policy));
+        }
+        found
     });
     // Where the time constants cannot be distinguished from a delay, the total lag of channel 2 is reported.
     let delay = fitted.model.parameters().position(|p| p.is_lateness);
@@ -181,6 +192,15 @@ fn time_constants(
     let interval_95_s = standard_error_s.map(|se| [value - Z_975 * se, value + Z_975 * se]);
     let scatter = influence.and_then(|influence| influence.scatter(&lag));
     (both, TimeConstant { value_s: Some(value), standard_error_s, interval_95_s, scatter })
+}
+
+/// What is known of a time constant that is as uncertain as it is large, beside one that is known: no value, and an interval,
+/// mostly down to nothing. The disagreement is linear in it, so it is itself normal, and not its logarithm.
+///
+/// - `longest_s`: an interval that reaches further says nothing
+fn at_most(value_s: f64, variance: Option<f64>, longest_s: f64) -> TimeConstant {
+    let around = standard_error(variance).map(|se| [(value_s - Z_975 * se).max(0.0), value_s + Z_975 * se]);
+    TimeConstant { interval_95_s: around.filter(|[_, most_s]| *most_s < longest_s), ..TimeConstant::default() }
 }
 
 /// A time constant, whose logarithm is normal. An interval that spans a factor of seven is no estimate; one that is held has none.

@@ -2,6 +2,7 @@
 //! open, with pictures.
 
 mod evidence;
+mod if_known;
 mod limits;
 mod numbers;
 mod series;
@@ -34,6 +35,7 @@ pub fn diagnosis_report(record: &Record, answer: &Diagnosis, command: &str) -> R
     document = page.residual(document)?;
     document = page.evidence(document);
     document = page.numbers(document)?;
+    document = page.if_known(document)?;
     document = page.errors(document);
     document = page.tests(document);
     document = page.unexplained(document);

@@ -96,7 +96,10 @@ pub(crate) fn apart(of: &Difference) -> String {
 }
 
 pub(crate) fn interval(ends_s: Option<[f64; 2]>) -> String {
-    ends_s.map_or(ABSENT.into(), |ends| with_unit(&between(ends), "s"))
+    ends_s.map_or(ABSENT.into(), |ends| match ends {
+        [0.0, most_s] => format!("at most {}", with_unit(&rounded(most_s, 2), "s")),
+        ends => with_unit(&between(ends), "s"),
+    })
 }
 
 /// The interval of a time constant; one that was given has none.

@@ -17,8 +17,6 @@ pub(crate) struct Rows {
     /// The row of each sample through all stretches; `None` for one that is missing from the
     /// record.
     pub(crate) of_sample: Vec<Option<usize>>,
-    /// Whether samples are evenly spaced.
-    pub(crate) is_even: bool,
 }
 
 impl Rows {
@@ -34,7 +32,7 @@ impl Rows {
             }
         });
         let observations = Observations::new(stretches.collect(), grid.period_s)?;
-        Ok(Self { observations, of_sample, is_even: grid.period_s.is_some() })
+        Ok(Self { observations, of_sample })
     }
 
     /// Puts lines of the file and stamps in the place of samples.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, Judgement, Limit, Masked, Move,
-    Policy, Unexplained, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, IfKnown, Judgement, Limit, Masked,
+    Move, Policy, Unexplained, Verdict,
 };
 
 use crate::answers::{Characterisation, Model, ModelEffect};
@@ -128,6 +128,10 @@ pub struct Diagnosis {
     pub not_testable: Vec<String>,
     /// What would have been seen of the effects that were not found.
     pub limits: Vec<NamedLimit>,
+    /// What each value of the first time constant would make of the record; `None` where both are
+    /// given and only noise is left over, or where one was known.
+    #[serde(default)]
+    pub if_known: Option<IfKnown<String>>,
     /// What to know before using the numbers.
     pub remarks: Vec<String>,
     /// Effects that were not considered, as asked.

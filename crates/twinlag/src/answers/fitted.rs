@@ -20,8 +20,6 @@ pub(crate) struct FittedAnswer<'a> {
     pub(crate) record: &'a Record,
     pub(crate) fit: &'a ModelFit,
     pub(crate) options: &'a Options,
-    /// Whether samples are evenly spaced.
-    pub(crate) is_even: bool,
     /// Whether the levels of the noise were given, by the options or a model.
     pub(crate) is_noise_given: bool,
     /// Whether the difference of the time constants is a total delay, the same wherever on its valley the fit ends.
@@ -46,7 +44,7 @@ impl FittedAnswer<'_> {
             record: RecordSummary::of(record),
             estimator: ESTIMATOR.into(),
             optimiser: fit.fit.optimiser.clone(),
-            hold: if self.is_even { "cubic-spline" } else { "bilinear" }.into(),
+            hold: "cubic-spline".into(),
             hold_sensitivity: None,
             sensors: [self.sensor(0), self.sensor(1)],
             time_constant_difference_s: Difference {

@@ -181,7 +181,7 @@ impl Modelled {
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
         let effects = named(record, &core, &rows, options.diagnose.characterise.best_effort);
         Ok(Self {
-            last: with_effects(record, &options.diagnose, &rows, &core, &effects),
+            last: with_effects(record, &options.diagnose, &core, &effects),
             verdict: Some(core.verdict),
             effects,
             warnings: core.remarks.iter().map(ToString::to_string).collect(),

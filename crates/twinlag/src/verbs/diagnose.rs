@@ -77,15 +77,16 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
     let named = named(record, &core, &rows, best_effort);
     Ok(Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
-        base: base(record, options, &rows, &core),
+        base: base(record, options, &core),
         verdict: core.verdict,
         error,
-        last: with_effects(record, options, &rows, &core, &named),
+        last: with_effects(record, options, &core, &named),
         effects: named,
         unexplained: core.unexplained.clone(),
         explained_to: core.explained_to,
         not_testable: core.not_testable.clone(),
         limits: core.limits.iter().map(|l| l.named(&record.channels)).collect(),
+        if_known: core.if_known.as_ref().map(|values| values.named(&record.channels)),
         remarks,
         without: options.without.clone(),
         has_flow: record.flow.is_some(),
@@ -117,8 +118,8 @@ impl Diagnosed {
 }
 
 /// The two-lag model that the effects were added to.
-fn base(record: &Record, options: &DiagnoseOptions, rows: &Rows, core: &Core) -> Characterisation {
-    let fitted = fitted(record, options, rows, &core.base, &core.base_judgements);
+fn base(record: &Record, options: &DiagnoseOptions, core: &Core) -> Characterisation {
+    let fitted = fitted(record, options, &core.base, &core.base_judgements);
     let lacks_an_effect = core.base.is_contradicted() || core.effects.iter().any(|e| e.evidence.is_some());
     let status = if core.verdict == Verdict::Refused || !fitted.is_determined() {
         Status::NotIdentifiable
@@ -148,12 +149,11 @@ pub(crate) fn named(record: &Record, core: &Core, rows: &Rows, best_effort: bool
 pub(crate) fn with_effects(
     record: &Record,
     options: &DiagnoseOptions,
-    rows: &Rows,
     core: &Core,
     effects: &[NamedEffect],
 ) -> Characterisation {
     let is_total_delay = core.remarks.contains(&Remark::LagAlone);
-    let fitted = FittedAnswer { is_total_delay, ..fitted(record, options, rows, &core.last, &core.judgements) };
+    let fitted = FittedAnswer { is_total_delay, ..fitted(record, options, &core.last, &core.judgements) };
     let status = match (core.verdict, fitted.is_determined()) {
         (Verdict::Refused, _) | (_, false) => Status::NotIdentifiable,
         (Verdict::Adequate | Verdict::Explained, _) => Status::Ok,
@@ -168,7 +168,6 @@ pub(crate) fn with_effects(
 fn fitted<'a>(
     record: &'a Record,
     options: &'a DiagnoseOptions,
-    rows: &Rows,
     fit: &'a ModelFit,
     judgements: &Judgements,
 ) -> FittedAnswer<'a> {
@@ -177,7 +176,6 @@ fn fitted<'a>(
         record,
         fit,
         options,
-        is_even: rows.is_even,
         is_noise_given: options.noise_std_k.is_some(),
         is_total_delay: false,
         judgements: judgements.clone(),

@@ -94,7 +94,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     options.characterise.check_not_fitted("tracking")?;
     options.model.as_ref().map_or(Ok(()), |model| model.check(record))?;
     let effects = options.model.as_ref().map(Model::known_effects).unwrap_or_default();
-    let Rows { observations, is_even, .. } = Rows::of(record)?;
+    let Rows { observations, .. } = Rows::of(record)?;
     let settings = Settings {
         noise_std_k: options.characterise.noise_std_k,
         known: known_time_constants(&options.characterise),
@@ -117,7 +117,6 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         record,
         fit: &found.fit,
         options: &options.characterise,
-        is_even,
         is_noise_given: settings.noise_std_k.is_some(),
         is_total_delay: false,
         judgements,

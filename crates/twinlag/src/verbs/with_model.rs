@@ -42,7 +42,7 @@ pub(crate) fn with_model(
 ) -> Result<(Characterisation, ModelFit), Error> {
     options.check()?;
     model.map_or(Ok(()), |model| model.check(record))?;
-    let Rows { observations, is_even, .. } = Rows::of(record)?;
+    let Rows { observations, .. } = Rows::of(record)?;
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let noisy = model.filter(|m| m.effects.iter().any(|e| e.effect.is_noise()));
     let noise_std_k = options.noise_std_k.or(noisy.and_then(|m| m.noise_std_k));
@@ -57,7 +57,6 @@ pub(crate) fn with_model(
         record,
         fit: &known.fit,
         options,
-        is_even,
         is_noise_given: noise_std_k.is_some(),
         is_total_delay: false,
         judgements,

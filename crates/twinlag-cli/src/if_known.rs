@@ -1,0 +1,70 @@
+//! What each value of the first time constant would make of the record, as a table.
+
+use twinlag::diagnosis::{Held, IfKnown};
+use twinlag_pages::parameter_in_words;
+
+use crate::print::{decimals_of, digits};
+
+/// Rows at most.
+const MAX_ROWS: usize = 8;
+/// Parameters of effects, which are columns, at most.
+const MAX_PARAMETERS: usize = 2;
+
+/// The table, after an empty line.
+pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
+    let IfKnown { held, fitted, values, .. } = answer;
+    let excludes = if values.iter().any(|v| v.is_excluded.is_none()) {
+        "something else is left over, so none is excluded"
+    } else {
+        "x: the record excludes it"
+    };
+    let mut lines =
+        vec![String::new(), format!("if the time constant of {held} were known, with these effects ({excludes}):")];
+    let header = ["deviance", "its 95 % interval", "gas moves by"].map(str::to_owned);
+    let [deviance, interval, gas] = header;
+    let mut header = vec![held.clone(), deviance, fitted.clone(), interval, gas];
+    let first = values.first();
+    let of_effects = |v: &Held<String>| -> Vec<(String, String)> {
+        let parameters = v.effects.iter().filter(|e| !e.effect.is_noise()).filter_map(|e| e.parameters.first());
+        parameters
+            .take(MAX_PARAMETERS)
+            .map(|p| {
+                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+                (parameter_in_words(&p.name), format!("{}{unit}", digits(p.value, 3)))
+            })
+            .collect()
+    };
+    header.extend(first.iter().flat_map(|v| of_effects(v)).map(|(name, _)| name));
+    let every = values.len().div_ceil(MAX_ROWS).max(1);
+    let rows = values.iter().step_by(every).map(|v| {
+        let mut row = vec![
+            format!("{} s", digits(v.time_constant_s, 2)),
+            digits(v.deviance, 2),
+            v.other.value_s.map_or("-".into(), |t| format!("{} s", digits(t, 3))),
+            v.other.interval_95_s.map_or("-".into(), interval),
+            format!("{} K", digits(v.gas_change_k, 2)),
+        ];
+        row.extend(of_effects(v).into_iter().map(|(_, value)| value));
+        (if v.is_excluded == Some(true) { "x" } else { " " }, row)
+    });
+    let rows: Vec<(&str, Vec<String>)> = [(" ", header)].into_iter().chain(rows).collect();
+    let width = |i: usize| rows.iter().filter_map(|(_, row)| row.get(i)).map(|c| c.chars().count()).max().unwrap_or(0);
+    for (mark, row) in &rows {
+        let cells = row.iter().enumerate().map(|(i, cell)| format!("{cell:>0$}", width(i)));
+        lines.push(format!("  {mark} {}", cells.collect::<Vec<_>>().join("  ")));
+    }
+    lines.push(
+        "  a value from a data sheet settles it, for half a second with --known T1.time_constant_s=0.5, or =0.5+-0.1"
+            .into(),
+    );
+    lines
+}
+
+/// From where to where, or how much at most, in seconds.
+fn interval([low, high]: [f64; 2]) -> String {
+    if low == 0.0 {
+        return format!("at most {} s", digits(high, 2));
+    }
+    let decimals = decimals_of([low, high]);
+    format!("{low:.decimals$} to {high:.decimals$} s")
+}
