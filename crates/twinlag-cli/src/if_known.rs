@@ -20,9 +20,8 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
     };
     let mut lines =
         vec![String::new(), format!("if the time constant of {held} were known, with these effects ({excludes}):")];
-    let header = ["deviance", "its 95 % interval", "gas moves by"].map(str::to_owned);
-    let [deviance, interval, gas] = header;
-    let mut header = vec![held.clone(), deviance, fitted.clone(), interval, gas];
+    let mut header = vec![held.clone(), "deviance".into(), fitted.clone()];
+    header.extend(["its 95 % interval", "gas moves by"].map(str::to_owned));
     let first = values.first();
     let of_effects = |v: &Held<String>| -> Vec<(String, String)> {
         let parameters = v.effects.iter().filter(|e| !e.effect.is_noise()).filter_map(|e| e.parameters.first());
@@ -53,10 +52,7 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
         let cells = row.iter().enumerate().map(|(i, cell)| format!("{cell:>0$}", width(i)));
         lines.push(format!("  {mark} {}", cells.collect::<Vec<_>>().join("  ")));
     }
-    lines.push(
-        "  a value from a data sheet settles it, for half a second with --known T1.time_constant_s=0.5, or =0.5+-0.1"
-            .into(),
-    );
+    lines.push("  a value from a data sheet settles it, as with --known T1=0.5s, or --known T1=0.5s+-20%".into());
     lines
 }
 

@@ -199,14 +199,14 @@ mod tests {
     use super::*;
     use crate::diagnose::diagnose;
 
-    /// Tones through two lags in closed form, 10 s or so apart, and uniform noise of 20 mK: periods of 13 steps and more, to which
+    /// Tones through two lags in closed form, 10 s or so apart, and uniform noise of 0.1 K: periods of 13 steps and more, to which
     /// half a second and six are as good as delays.
     fn observations(tau_s: [f64; 2]) -> Observations {
         let time_s: Vec<f64> = (0..600).map(|k| 10.0 * f64::from(k) + 2.0 * (1.7 * f64::from(k)).sin()).collect();
         let mut state = 7_u64;
         let mut noise_k = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            0.02 * 12.0_f64.sqrt() * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+            0.1 * 12.0_f64.sqrt() * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
         };
         let tones = [131.0, 157.0, 173.0, 199.0, 241.0, 277.0, 317.0, 389.0, 470.0, 1010.0];
         let reading_c = tau_s.map(|tau_s| {
@@ -219,8 +219,8 @@ mod tests {
         Observations::new(vec![Stretch::new(time_s, reading_c)], None).expect("a record")
     }
 
-    /// Half a second and six seconds, read every ten: the difference is determined, and for each value of the first that is short
-    /// beside the tones the second is as much longer. A first of many minutes leaves nothing of the tones, which the record excludes.
+    /// Half a second and six seconds, read every ten: the difference is determined, and for each value of the first that the
+    /// record allows the second is as much longer. A first of many minutes leaves nothing of the tones, which the record excludes.
     #[test]
     fn the_difference_is_right_wherever_the_record_allows_the_first() {
         let watch = |_: &str, _, _| ControlFlow::Continue(());
@@ -229,18 +229,18 @@ mod tests {
         assert!(answer.last.time_constants[0].value_s.is_none(), "{:?}", answer.last.time_constants);
         let table = answer.if_known.expect("not determined");
         assert_eq!(table.values.len(), POINTS);
-        let short = table.values.iter().filter(|v| v.time_constant_s < 2.0);
+        let allowed = table.values.iter().filter(|v| v.is_excluded == Some(false));
         let mut seen = 0;
-        for value in short {
+        for value in allowed {
             let [low_s, high_s] = value.difference.interval_95_s.expect("determined");
-            // The 95 % interval, doubled: 4 standard errors. Beside it the attenuation, of second order in the lag over a period: 2 s
-            // over 131 s / 2π, squared, of 6 s is 0.05 s.
+            // The 95 % interval, doubled: 4 standard errors. Beside it the attenuation, of second order in the lag over a period: 2 s over
+            // 131 s / 2π, squared, of 6 s is 0.05 s.
             let slack_s = 0.5 * (high_s - low_s) + 0.05;
             assert!(low_s - slack_s < 5.5 && 5.5 < high_s + slack_s, "{value:?}");
-            assert_eq!(value.is_excluded, Some(false), "{value:?}");
-            seen += 1;
+            seen += usize::from(value.time_constant_s < 1.0);
         }
-        assert!(seen >= 3, "{table:?}");
+        // Half a second is between two of them.
+        assert!(seen >= 2, "{table:?}");
         let longest = &table.values[POINTS - 1];
         assert_eq!(longest.is_excluded, Some(true), "{longest:?}");
         // With one of them known there is nothing to ask.

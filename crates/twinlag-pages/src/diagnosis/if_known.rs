@@ -33,8 +33,8 @@ impl Page<'_> {
             None => document,
         };
         Ok(document
-            .paragraph("A value from a data sheet settles it. For half a second, known to a tenth, the option is")
-            .command("--known T1.time_constant_s=0.5+-0.1"))
+            .paragraph("A value from a data sheet settles it. For half a second, known to a fifth of it, the option is")
+            .command("--known T1=0.5s+-20%"))
     }
 }
 
