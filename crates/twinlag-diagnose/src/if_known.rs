@@ -239,8 +239,8 @@ mod tests {
             assert!(low_s - slack_s < 5.5 && 5.5 < high_s + slack_s, "{value:?}");
             seen += usize::from(value.time_constant_s < 1.0);
         }
-        // Half a second is between two of them.
-        assert!(seen >= 2, "{table:?}");
+        // Half a second is between two of them, and nearer to one.
+        assert!(seen >= 1, "{table:?}");
         let longest = &table.values[POINTS - 1];
         assert_eq!(longest.is_excluded, Some(true), "{longest:?}");
         // With one of them known there is nothing to ask.
