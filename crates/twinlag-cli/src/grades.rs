@@ -15,20 +15,36 @@ pub(crate) fn exit_code(asked: &[Grade], others: &[Grade], is_partial: bool, str
     if is_usable && is_whole { 0 } else { 4 }
 }
 
-/// A number with its grade; in its place, of one that is not given, why.
+/// A number with its grade.
 pub(crate) fn graded(number: Option<String>, judgement: &Judgement) -> String {
-    let Judgement { grade, because, .. } = judgement;
-    match (number, grade) {
-        (None, Grade::NoGo) => format!("not given: {because}"),
-        (None, _) => "not determined by this record".into(),
+    match (number, judgement.grade) {
+        (None, _) => "not given".into(),
         (Some(number), Grade::Go) => format!("{number}  go"),
-        (Some(number), Grade::Conditional) => format!("{number}  conditional: {because}"),
-        (Some(number), _) => format!("{number}  NO-GO, do not use: {because}"),
+        (Some(number), Grade::Conditional) => format!("{number}  conditional"),
+        (Some(number), _) => format!("{number}  NO-GO"),
     }
+}
+
+/// Why numbers are not simply `go`, each reason once with the names of the numbers that it is of.
+pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgement)>, indent: &str) -> Vec<String> {
+    let mut groups: Vec<(&Judgement, Vec<String>)> = Vec::new();
+    for (name, judgement) in numbers.into_iter().filter(|(_, judgement)| judgement.grade != Grade::Go) {
+        match groups.iter_mut().find(|(other, _)| *other == judgement) {
+            Some((_, names)) => names.push(name),
+            None => groups.push((judgement, vec![name])),
+        }
+    }
+    let line = |(judgement, names): (&Judgement, Vec<String>)| {
+        let grade = if judgement.grade == Grade::NoGo { "no-go" } else { "conditional" };
+        format!("{indent}{grade} ({}): {}", names.join(", "), judgement.because)
+    };
+    groups.into_iter().map(line).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use twinlag::diagnosis::Reason;
+
     use super::*;
 
     #[test]
@@ -39,5 +55,16 @@ mod tests {
         assert_eq!(exit_code(&[Go, Conditional], &[], false, true), 4);
         assert_eq!(exit_code(&[Go, Conditional], &[], true, false), 4);
         assert_eq!(exit_code(&[Go, Go], &[Go], true, true), 0);
+    }
+
+    #[test]
+    fn a_reason_is_said_once() {
+        let left = Judgement::of(&[Reason::LeftOver]);
+        let given = Judgement::of(&[Reason::Given { what: "T1 = 2 s".into() }]);
+        let numbers = [("T1".to_owned(), &left), ("T2".to_owned(), &given), ("difference".to_owned(), &left)];
+        let lines = reasons(numbers, "  ");
+        assert_eq!(lines.len(), 2);
+        assert!(lines[0].starts_with("  no-go (T1, difference): the model leaves more than noise"), "{lines:?}");
+        assert_eq!(lines[1], "  conditional (T2): right if T1 = 2 s, as given");
     }
 }

@@ -4,7 +4,7 @@ use std::io::{Write, stdout};
 use std::path::Path;
 
 use serde::Serialize;
-use twinlag::diagnosis::{Masked, NEVER_TESTABLE, Verdict};
+use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Verdict};
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::{Note, Record};
 use twinlag::{
@@ -15,7 +15,7 @@ use twinlag_pages::parameter_in_words;
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::grades::graded;
+use crate::grades::{graded, reasons};
 use crate::if_known;
 use crate::settings::usage;
 
@@ -80,6 +80,7 @@ fn text(answer: &Characterisation) -> String {
             lines.push(format!("  {channel}: {name} {}", graded(Some(number), &e.judgement)));
         }
     }
+    lines.extend(reasons(asked(answer).chain(free(answer)), "  "));
     lines.push(String::new());
     let white = if answer.residual.white { "white" } else { "not white" };
     lines.push(match answer.residual.chi2_per_dof {
@@ -112,6 +113,27 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// Both time constants, their second lags and the difference, as they are called here.
+fn asked(answer: &Characterisation) -> impl Iterator<Item = (String, &Judgement)> {
+    let [one, two] = &answer.sensors;
+    let sensors = [one, two].into_iter().flat_map(|sensor| {
+        let lag = sensor.second_time_constant_s.as_ref().filter(|lag| lag.value.is_some());
+        let lag = lag.map(|lag| (format!("second lag of {}", sensor.channel), &lag.judgement));
+        [Some((sensor.channel.clone(), &sensor.judgement)), lag].into_iter().flatten()
+    });
+    let difference = &answer.time_constant_difference_s;
+    // What is not known of both is not known of the difference, and is said once.
+    let is_news = difference.value.is_some() || sensors.clone().all(|(_, judgement)| judgement.grade == Grade::Go);
+    let name = if difference.includes_delay { "total delay" } else { "difference" };
+    sensors.chain(is_news.then(|| (name.to_owned(), &difference.judgement)))
+}
+
+/// Gain and offset, where they were fitted.
+fn free(answer: &Characterisation) -> impl Iterator<Item = (String, &Judgement)> {
+    let both = [("gain", &answer.free.gain), ("offset", &answer.free.offset_k)];
+    both.into_iter().filter_map(|(name, e)| Some((name.to_owned(), &e.as_ref()?.judgement)))
 }
 
 /// How much later channel 2 is, where that is given.
@@ -167,6 +189,7 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     for sensor in &answer.last.sensors {
         lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
     }
+    lines.extend(reasons(asked(&answer.last), "  "));
     if let Some(gas) = &answer.gas {
         lines.push(String::new());
         let written = format!("written to {}, {} samples", out.display(), answer.gas_c.len());
@@ -264,6 +287,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
         lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
     }
     lines.extend(difference_line(&answer.last));
+    lines.extend(reasons(asked(&answer.last), "  "));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
     lines.extend(answer.if_known.iter().flat_map(if_known::lines));
@@ -313,6 +337,8 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         });
         lines.push(format!("    {} {}", parameter_in_words(&p.name), graded(number, &p.judgement)));
     }
+    let shown = effect.parameters.iter().take(MAX_PARAMETERS);
+    lines.extend(reasons(shown.map(|p| (parameter_in_words(&p.name), &p.judgement)), "    "));
     if effect.parameters.len() > MAX_PARAMETERS {
         lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
     }

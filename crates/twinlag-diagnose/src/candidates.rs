@@ -271,7 +271,7 @@ impl<'a> Search<'a> {
 
     /// Candidates that turn phases, from a grid of time constants: with them the time constants may lie where no step
     /// from `current` leads. None where the model is far off, since every candidate was fitted from there.
-    pub(crate) fn from_afar(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
+    pub(crate) fn far_away(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
         if self.is_far_off(current) {
             return Ok(Vec::new());
         }

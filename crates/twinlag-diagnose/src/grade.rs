@@ -5,6 +5,7 @@
 //! [`Grade::Conditional`] and the reason says on which; where nothing says how far the number may be off it is
 //! [`Grade::NoGo`], and is not given. Each reason has its grade, and the worst one counts.
 
+use std::cmp::Ordering;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -86,8 +87,17 @@ pub enum Reason {
         /// What was given, as `T1 = 0.5 s`.
         what: String,
     },
+    /// The gas is a single tone, and two time constants absorb whatever is missing.
+    SingleTone,
     /// The estimator has a bias that noise makes.
     Biased,
+    /// A check of the number itself finds a fault.
+    Fault {
+        /// What it finds.
+        what: String,
+        /// The best grade that a number can have with it.
+        grade: Grade,
+    },
     /// What the number follows from has no better grade.
     Follows {
         /// What it follows from.
@@ -109,7 +119,7 @@ impl Reason {
             | Self::PartOfTotal
             | Self::NoInterval
             | Self::LeftOver => Grade::NoGo,
-            Self::Follows { grade, .. } => *grade,
+            Self::Follows { grade, .. } | Self::Fault { grade, .. } => *grade,
             _ => Grade::Conditional,
         }
     }
@@ -156,7 +166,11 @@ impl fmt::Display for Reason {
                  out of its interval"
             ),
             Self::Given { what } => write!(f, "right if {what}, as given"),
+            Self::SingleTone => {
+                f.write_str("right if nothing is missing: of a single tone two time constants absorb any effect")
+            }
             Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
+            Self::Fault { what, .. } => f.write_str(what),
             Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),
         }
     }
@@ -193,6 +207,17 @@ impl Judgement {
         let said = reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string).collect::<Vec<_>>();
         let because = if said.is_empty() { WHY_GO.to_owned() } else { said.join("; ") };
         Self { grade, because }
+    }
+
+    /// This judgement with one reason more.
+    #[must_use]
+    pub fn and(self, reason: &Reason) -> Self {
+        let more = Self::of(std::slice::from_ref(reason));
+        match self.grade.cmp(&more.grade) {
+            Ordering::Less => more,
+            Ordering::Equal => Self { because: format!("{}; {}", self.because, more.because), ..self },
+            Ordering::Greater => self,
+        }
     }
 
     /// The judgement of what was given beforehand.

@@ -219,7 +219,7 @@ impl<'a> State<'a> {
     /// accepted, keeps what came closest.
     pub(crate) fn add_from_afar(&mut self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
-        let candidates = search.from_afar(&self.current)?;
+        let candidates = search.far_away(&self.current)?;
         let addition = self.addition(&search, &candidates);
         self.far = if addition.is_none() { candidates } else { Vec::new() };
         Ok(addition)

@@ -113,19 +113,21 @@ impl Study for Plan {
         };
         let holed = self.holed(&simulated, index);
         let known = [Parameter::Tau1, Parameter::Tau2].into_iter().zip(self.tau_s);
+        // What is found is judged here, and not what of it is given.
+        let found = Options { best_effort: true, ..Options::default() };
         let all_known = Options {
             noise_std_k: Some([*noise_std_k; 2]),
             known: known
                 .map(|(parameter, value)| Known { parameter, value, std: Some(AS_GOOD_AS_EXACT * value) })
                 .collect(),
-            ..Options::default()
+            ..found.clone()
         };
         let forms = [Form::Smoother, Form::Smoother, Form::Smoother, Form::FixedLag(self.lag), Form::Filter];
         for (case, form) in forms.into_iter().enumerate() {
             let of = if case == 2 { &holed } else { &simulated };
             let record = super::record_of(of.clone())?;
             let model = Some(Model::of_two_lags(record.channels.clone()));
-            let characterise = if case == 0 { all_known.clone() } else { Options::default() };
+            let characterise = if case == 0 { all_known.clone() } else { found.clone() };
             let diagnose = DiagnoseOptions { characterise, ..DiagnoseOptions::default() };
             let options = CompensateOptions { diagnose, model, form, trusted: 0 };
             let answer = compensate(&record, &options)?;

@@ -13,7 +13,7 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use serde::{Deserialize, Serialize};
 use twinlag::signal::{Record as Sampling, Rig};
-use twinlag::{CompensateOptions, Estimator, Model, Options, characterise, compensate};
+use twinlag::{CompensateOptions, DiagnoseOptions, Estimator, Model, Options, characterise, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 use twinlag_transform::{Complex64, Forward, Inverse};
 
@@ -185,8 +185,11 @@ impl Study for Reconstruction {
         outcome.value(0, mean_square(&by_oracle));
         let faster = simulated.t1_c.clone();
         let record = super::record_of(simulated)?;
+        // What is found is judged here, and not what of it is given.
+        let found = Options { best_effort: true, ..Options::default() };
         let options = CompensateOptions {
             model: Some(Model::of_two_lags(record.channels.clone())),
+            diagnose: DiagnoseOptions { characterise: found.clone(), ..DiagnoseOptions::default() },
             ..CompensateOptions::default()
         };
         let answer = compensate(&record, &options)?;
@@ -198,7 +201,7 @@ impl Study for Reconstruction {
         if let Some(tau_s) = answer.last.sensors[0].time_constant_s {
             outcome.value(2, mean_square(&inverse(&faster, tau_s, self.plan.sample_period_s)));
         }
-        let compensated = Options { estimator: Estimator::BiasCompensated, ..Options::default() };
+        let compensated = Options { estimator: Estimator::BiasCompensated, ..found };
         let tau_s = characterise(&record, &compensated).ok().and_then(|a| a.sensors[0].time_constant_s);
         if let Some(tau_s) = tau_s {
             outcome.value(3, mean_square(&inverse(&faster, tau_s, self.plan.sample_period_s)));

@@ -164,7 +164,10 @@ impl Answer {
         for (i, name) in ["T1.time_constant_s", "T2.time_constant_s"].into_iter().enumerate() {
             let sensor = &value["sensors"][i];
             let is_known = !sensor["time_constant_s"].is_null();
-            assert_ne!(unknown(name), is_known, "{name}: {self:#?}");
+            assert!(!(unknown(name) && is_known), "{name}: {self:#?}");
+            // What is not given says why.
+            assert_eq!(sensor["grade"] == "no-go", !is_known, "{name}: {self:#?}");
+            assert!(sensor["because"].as_str().is_some_and(|why| !why.is_empty()), "{name}: {self:#?}");
             for field in ["standard_error_s", "interval_95_s"] {
                 assert!(is_known || sensor[field].is_null(), "{name} is unknown, its {field} is not: {self:#?}");
             }

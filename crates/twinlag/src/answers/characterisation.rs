@@ -273,6 +273,14 @@ impl Characterisation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.characterisation/1";
 
+    /// Puts down one more reason for both time constants and their difference.
+    pub(crate) fn rest_on(&mut self, reason: &Reason) {
+        let sensors = self.sensors.iter_mut().filter(|s| !s.known).map(|s| &mut s.judgement);
+        for judgement in sensors.chain([&mut self.time_constant_difference_s.judgement]) {
+            *judgement = std::mem::take(judgement).and(reason);
+        }
+    }
+
     /// Takes out what may not be used.
     pub(crate) fn withhold(&mut self) {
         for sensor in self.sensors.iter_mut().filter(|s| s.judgement.grade == Grade::NoGo) {

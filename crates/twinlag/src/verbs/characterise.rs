@@ -10,7 +10,7 @@ mod fill;
 mod judge;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
-use twinlag_diagnose::{Policy, Remark, is_single_tone};
+use twinlag_diagnose::{Policy, Reason, Remark, is_single_tone};
 use twinlag_estimate::{
     ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, Intervals, NoiseColour, NoiseKnowledge, RunAtRest,
     Solved, Task, WhitenedFit, other_hold,
@@ -93,6 +93,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     let mut answer = answer?;
     if Rows::of(record).is_ok_and(|rows| is_single_tone(&rows.observations, &Policy::default())) {
         answer.warnings.push(Remark::SingleTone.to_string());
+        answer.rest_on(&Reason::SingleTone);
     }
     Ok(answer)
 }

@@ -108,7 +108,7 @@ pub fn compensate_watched(
     let stop = Stop::new(watch);
     let found = Reconstruction::of(&fit, options, &stop)?.banded()?;
     stop.check()?;
-    fill(&mut out, found, record, &rows);
+    fill(&mut out, found, record, &rows, options.diagnose.characterise.best_effort);
     Ok(out)
 }
 
@@ -123,13 +123,18 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>) -> Judgement {
 }
 
 /// Writes the gas temperature into the answer.
-fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows) {
+fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows, best_effort: bool) {
     if found.widened_by > 1.0 {
         out.warnings.push(format!(
             "readings deviate from their predictions {:.2} times as far as noise explains; the \
              bands are widened by this factor",
             found.widened_by
         ));
+    }
+    for fault in &found.faults {
+        let grade = if matches!(fault, GasFault::Widened { .. }) { Grade::Conditional } else { Grade::NoGo };
+        let reason = Reason::Fault { what: fault.to_string(), grade };
+        out.judgement = std::mem::take(&mut out.judgement).and(&reason);
     }
     let is_said = |fault: &&GasFault| matches!(fault, GasFault::Widened { .. });
     out.warnings.extend(found.faults.iter().filter(|fault| !is_said(fault)).map(ToString::to_string));
@@ -138,6 +143,10 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows) {
          gas temperature, and no band covers them"
             .into(),
     );
+    if out.judgement.grade == Grade::NoGo && !best_effort {
+        out.status = Status::ModelRejected;
+        return;
+    }
     let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
     let reference = Reference::of(record, &rows.of_sample);
     out.status = Status::Ok;

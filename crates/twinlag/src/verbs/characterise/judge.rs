@@ -112,6 +112,9 @@ impl<'c, const P: usize> Scattering<'c, P> {
                 }
             }
         }
+        for prior in conclusion.fit.knowledge() {
+            products[prior.index][prior.index] += prior.std.powi(-2);
+        }
         let residual = jacobian.iter().map(|run| run.iter().map(|(r, _)| *r).collect()).collect();
         let derivatives = jacobian.into_iter().map(|run| run.into_iter().map(|(_, d)| d).collect()).collect();
         let inverse = sandwich(&products, &products, &conclusion.fit.free());
