@@ -71,8 +71,11 @@ fn digital_plateaus(seed: u64, ramp: f64, step_k: f64, change: impl FnOnce(&mut 
     saturation(record.time_s, [rounded(record.t1_c, step_k), rounded(record.t2_c, step_k)], PERIOD_S)
 }
 
+/// A change of the sensors, with its name.
+type Wrong = (&'static str, fn(&mut [Sensor; 2]));
+
 /// Changes of the sensors by which a two-lag model is wrong.
-const WRONGS: [(&str, fn(&mut [Sensor; 2])); 5] = [
+const WRONGS: [Wrong; 5] = [
     ("nothing", |_| ()),
     ("offset", |s| s[1].offset_k = 2.0),
     ("gain", |s| s[0].gain = 1.05),

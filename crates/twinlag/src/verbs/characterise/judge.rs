@@ -31,9 +31,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                     judged(sensor.time_constant_s, sensor.interval_95_s, of(&[(i, 1.0)]), true, most_s);
             }
             if let Some(lag) = &mut sensor.second_time_constant_s {
-                (lag.judgement, lag.interval_95) = match lag.known {
-                    true => (Judgement::given(), lag.interval_95),
-                    false => judged(lag.value, lag.interval_95, of(&[(4 + i, 1.0)]), true, most_s),
+                (lag.judgement, lag.interval_95) = if lag.known {
+                    (Judgement::given(), lag.interval_95)
+                } else {
+                    judged(lag.value, lag.interval_95, of(&[(4 + i, 1.0)]), true, most_s)
                 };
             }
         }
