@@ -4,13 +4,15 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write, stdin, stdout};
 use std::path::Path;
 
+use twinlag::diagnosis::Grade;
 use twinlag::record::{Record, RecordError, RowReader, Table};
-use twinlag::{Live, LiveAnswer, LiveOptions};
+use twinlag::{Live, LiveAnswer, LiveOptions, SensorEstimate};
 
 use crate::arguments::Track;
 use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::grades;
 use crate::print;
 
 const HEADER: &str = "time_s,gas_C,gas_std_K,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s";
@@ -38,7 +40,10 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     print::notes(&record, console);
     let reader = RowReader::after(&table, &selection)?;
     let mut live = Live::start(&record, &options)?;
-    let mut out = Out::open(&command.out, to_stdout)?;
+    let starts = [0, 1].map(|i| live.start.sensors[i].judgement.grade);
+    let code = grades::exit_code(&starts, &[], false, command.input.method.strict);
+    let marked = command.input.method.best_effort().then(|| starts.into_iter().max()).flatten();
+    let mut out = Out::open(&command.out, to_stdout, marked)?;
     console.note(|| started(&live));
     for warning in &live.start.warnings {
         console.note(|| format!("warning: {warning}"));
@@ -47,7 +52,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     for k in 0..record.len() {
         let reading_c = [missing(record.t1_c[k]), missing(record.t2_c[k])];
         if !out.answer(live.push(Some(record.time_s[k]), reading_c))? {
-            return Ok(0);
+            return Ok(code);
         }
     }
     // What was read so far is out before the next row is waited for.
@@ -101,19 +106,18 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
             });
         }
         if !out.answer(answer)? || !out.flush()? {
-            return Ok(0);
+            return Ok(code);
         }
     }
     bad.sum(console);
-    Ok(0)
+    Ok(code)
 }
 
 fn started(live: &Live) -> String {
-    let sensor = |i: usize| {
-        let sensor = &live.start.sensors[i];
-        format!("{} {:.4} s", sensor.channel, sensor.time_constant_s.unwrap_or(f64::NAN))
-    };
-    format!("started: time constants {}, {}; rows are now processed as they arrive", sensor(0), sensor(1))
+    let line =
+        |sensor: &SensorEstimate| format!("  {}: time constant {}\n", sensor.channel, print::time_constant(sensor));
+    let sensors: String = live.start.sensors.iter().map(line).collect();
+    format!("started:\n{sensors}rows are now processed as they arrive")
 }
 
 /// Lines of a file or of standard input, as they arrive.
@@ -176,10 +180,12 @@ impl Lines {
 struct Out {
     to: Box<dyn Write>,
     name: String,
+    /// The grade of the start, where rows show it.
+    grade: Option<Grade>,
 }
 
 impl Out {
-    fn open(path: &Path, to_stdout: bool) -> Result<Self, Failure> {
+    fn open(path: &Path, to_stdout: bool, grade: Option<Grade>) -> Result<Self, Failure> {
         let name = if to_stdout { "standard output".to_owned() } else { path.display().to_string() };
         let to: Box<dyn Write> = if to_stdout {
             Box::new(BufWriter::new(stdout()))
@@ -187,8 +193,8 @@ impl Out {
             let file = File::create(path).map_err(|e| Failure::Other(format!("{name}: cannot be written: {e}")))?;
             Box::new(BufWriter::new(file))
         };
-        let mut out = Self { to, name };
-        out.line(HEADER)?;
+        let mut out = Self { to, name, grade };
+        out.line(&format!("{HEADER}{}", if grade.is_some() { ",grade" } else { "" }))?;
         Ok(out)
     }
 
@@ -210,8 +216,8 @@ impl Out {
             let [low, high] = now.tau_95_s[i].map_or([None; 2], |band| band.map(Some));
             [now.tau_s[i], low, high]
         });
-        let cells: Vec<String> =
-            gas.into_iter().chain(tau).map(|v| v.map_or(String::new(), |v| v.to_string())).collect();
+        let numbers = gas.into_iter().chain(tau).map(|v| v.map_or(String::new(), |v| v.to_string()));
+        let cells: Vec<String> = numbers.chain(self.grade.map(|grade| grade.to_string())).collect();
         self.line(&cells.join(","))
     }
 

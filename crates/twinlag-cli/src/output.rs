@@ -83,8 +83,14 @@ pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failu
 
 /// A table of numbers with one column more, the same in each row.
 pub(crate) fn with_column(text: &[u8], name: &str, value: &str) -> Vec<u8> {
+    with_cells(text, name, std::iter::repeat(value))
+}
+
+/// A table of numbers with one column more, a cell for each row.
+pub(crate) fn with_cells<T: ToString>(text: &[u8], name: &str, cells: impl IntoIterator<Item = T>) -> Vec<u8> {
     let text = String::from_utf8_lossy(text);
-    let rows = text.lines().enumerate().map(|(k, row)| format!("{row},{}\n", if k == 0 { name } else { value }));
+    let cells = std::iter::once(name.to_owned()).chain(cells.into_iter().map(|cell| cell.to_string()));
+    let rows = text.lines().zip(cells).map(|(row, cell)| format!("{row},{cell}\n"));
     rows.collect::<String>().into_bytes()
 }
 

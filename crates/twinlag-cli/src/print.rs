@@ -8,8 +8,8 @@ use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Verdict};
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::{Note, Record};
 use twinlag::{
-    Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag, SensorEstimate,
-    Status, Track,
+    Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag,
+    SensorEstimate, Status, Track,
 };
 use twinlag_pages::parameter_in_words;
 
@@ -231,7 +231,8 @@ fn track_text(answer: &Track, out: &Path) -> String {
     let record = &answer.last.record;
     let mut lines =
         vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
-    lines.push(match (answer.change.as_str(), answer.coefficients, &answer.step) {
+    let is_given = !answer.time_s.is_empty();
+    let change = match (answer.change.as_str(), answer.coefficients, &answer.step) {
         ("smooth", Some(size), _) => format!("both time constants change smoothly: {size} coefficients"),
         ("step", _, Some(step)) => format!(
             "both time constants change by a factor of {} at {}",
@@ -240,29 +241,43 @@ fn track_text(answer: &Track, out: &Path) -> String {
         ),
         ("windows", _, _) => format!("{} windows", answer.time_s.len()),
         _ => "no change of the time constants is detected".into(),
-    });
-    for (i, sensor) in answer.last.sensors.iter().enumerate() {
-        let range = answer.range_s.map(|r| format!(", from {} to {} s", digits(r[i][0], 4), digits(r[i][1], 4)));
-        let (of, place) =
-            if answer.change == "windows" { (" of the whole record", " in the windows") } else { ("", "") };
-        lines.push(format!(
-            "  {}: time constant{of} {}{}",
-            sensor.channel,
-            time_constant(sensor),
-            range.map_or(String::new(), |range| range + place)
-        ));
+    };
+    let change = graded(is_given.then_some(change), &answer.judgement);
+    lines.push(if is_given { change } else { format!("time constants along the record: {change}") });
+    let of = match answer.change.as_str() {
+        "windows" => "time constant of the whole record",
+        "smooth" => "mean time constant",
+        "step" => "time constant before",
+        _ => "time constant",
+    };
+    for (sensor, along) in answer.last.sensors.iter().zip(&answer.sensors) {
+        // What is wrong with the whole is said once.
+        if is_given || sensor.judgement != answer.judgement {
+            lines.push(format!("  {}: {of} {}", sensor.channel, time_constant(sensor)));
+        }
+        if let Some([least, most]) = extremes(along).filter(|_| answer.change != "constant") {
+            lines.push(format!("    from {least} to {most}"));
+        }
     }
-    if let Some(ratio) = &answer.ratio {
-        let stays = if ratio.stays { "shows no change" } else { "changes" };
-        lines.push(format!("  their ratio {stays}: p = {:.2e}", ratio.test.p_value));
+    // That nothing changes is not claimed under a model that is contradicted.
+    if let Some(ratio) = answer.ratio.filter(|ratio| ratio.stays && answer.judgement.grade != Grade::NoGo) {
+        lines.push(format!("  their ratio shows no change: p = {:.2e}", ratio.test.p_value));
     }
     lines.push(format!("status: {}", status(answer.status)));
-    if !answer.time_s.is_empty() {
+    if is_given {
         lines.push(format!("time constants written to {}: {} instants", out.display(), answer.time_s.len()));
     }
     lines.extend(answer.warnings.iter().map(|w| format!("warning: {w}")));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// The smallest and the largest time constant along a record, each with its interval; `None` where there are none.
+fn extremes(along: &Along) -> Option<[String; 2]> {
+    let given = || (0..along.tau_s.len()).filter(|&k| along.tau_s[k].is_finite());
+    let by_size = |a: &usize, b: &usize| along.tau_s[*a].total_cmp(&along.tau_s[*b]);
+    let ends = [given().min_by(by_size)?, given().max_by(by_size)?];
+    Some(ends.map(|k| interval(along.tau_s[k], along.low_s[k], along.high_s[k], " s")))
 }
 
 /// Prints a summary of data: on standard output if the data are in a file, else on standard error.
@@ -446,7 +461,8 @@ fn status(status: Status) -> &'static str {
     }
 }
 
-fn time_constant(sensor: &SensorEstimate) -> String {
+/// A time constant with its interval and its grade, or why it is not given.
+pub(crate) fn time_constant(sensor: &SensorEstimate) -> String {
     let number = match (sensor.time_constant_s, sensor.interval_95_s) {
         (Some(value), Some([low, high])) => Some(interval(value, low, high, " s")),
         (Some(value), None) if sensor.known => return format!("{} s (given)", digits(value, 5)),

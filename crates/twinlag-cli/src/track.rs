@@ -7,6 +7,7 @@ use crate::arguments::Track;
 use crate::characterise::{model, read};
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::grades;
 use crate::live;
 use crate::output::{self, Views};
 use crate::print;
@@ -30,8 +31,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         twinlag::track_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
             .map_err(|error| Failure::in_file(error, &record.source))?
     };
-    let is_answered = answer.status != Status::NotIdentifiable;
-    if is_answered {
+    if !answer.time_s.is_empty() {
         let [one, two] = &answer.sensors;
         let columns: [(&str, &[f64]); 7] = [
             ("time_s", &answer.time_s),
@@ -44,6 +44,9 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         ];
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+        if command.input.method.best_effort() {
+            text = output::with_cells(&text, "grade", &answer.grades);
+        }
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::track_picture(&answer)?)?;
@@ -54,5 +57,6 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         output::write(path, report)?;
     }
     print::track(&answer, &command.out, to_stdout, console)?;
-    Ok(if answer.status == Status::NotIdentifiable { 4 } else { 0 })
+    let is_partial = answer.status == Status::ModelRejected;
+    Ok(grades::exit_code(&[answer.judgement.grade], &[], is_partial, command.input.method.strict))
 }

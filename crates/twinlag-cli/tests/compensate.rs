@@ -89,7 +89,8 @@ fn outputs_are_never_lost_and_never_mixed() {
     bench.refuses(1, &["track", "run.csv", "--out", "nowhere/tau.csv"], &["nowhere/tau.csv", "cannot be written"]);
     bench.refuses(2, &["compensate", "run.csv", "--out", "o.csv", "--form", "best"], &["smoother, filter, or lag:N"]);
     assert_eq!(bench.read("gas.csv"), b"precious");
-    let answer = bench.run(&["track", "run.csv", "--out", "-", "--quiet"]);
+    let steady = Bench::simulated("piped", &RIG.replace("offset_k = 2.0\n", ""));
+    let answer = steady.run(&["track", "run.csv", "--out", "-", "--quiet"]);
     assert_eq!(answer.code, 0, "{answer:#?}");
     assert!(answer.stdout.starts_with("time_s,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s\n"));
 }
@@ -160,4 +161,49 @@ fn windows_that_contradict_the_model_say_so() {
     let value = answer.json();
     assert_eq!(value["status"], "model-rejected", "{value:#}");
     assert!(value["warnings"].to_string().contains("windows the residual is more than noise"), "{value:#}");
+}
+
+/// The common rig without its offset, whose second sensor is slower from 15 s on: both do not change by one factor.
+fn replaced() -> String {
+    let other = "replaced = { at_s = 15.0, time_constant_s = 0.65 }\n";
+    RIG.replace("offset_k = 2.0\n", other)
+}
+
+/// Failed: "no change of the time constants is detected", and two lines on that their ratio changes; the table was written.
+#[test]
+fn a_track_that_the_ratio_contradicts_is_not_given() {
+    let bench = Bench::simulated("replaced", &replaced());
+    let arguments = ["track", "run.csv", "--out", "tau.csv", "--report", "tau.html", "--quiet"];
+    let said = bench.run(&arguments);
+    assert_eq!(said.code, 4, "{said:#?}");
+    for what in ["not given: the ratio of both time constants changes", "status: model-rejected"] {
+        assert!(said.stdout.contains(what), "does not say {what:?}: {said:#?}");
+    }
+    for claim in ["no change", "coefficients", "by a factor of"] {
+        assert!(!said.stdout.contains(claim), "claims {claim:?}: {said:#?}");
+    }
+    assert!(!bench.has("tau.csv"), "wrote a table");
+    let page = String::from_utf8(bench.read("tau.html")).expect("text");
+    assert!(page.contains("the ratio of both time constants changes") && !page.contains("No change"));
+    let answer = bench.run(&[&arguments[..], &["--force", "--json"]].concat());
+    let value = answer.json();
+    assert_eq!((value["grade"].as_str(), value["change"].as_str()), (Some("no-go"), Some("unknown")), "{value:#}");
+    assert!(value["range_s"].is_null() && value["step"].is_null(), "{value:#}");
+    assert!((0..2).all(|i| value["final"]["sensors"][i]["time_constant_s"].is_null()), "{value:#}");
+}
+
+/// What is asked for all the same is marked in each row; of a steady flow each row may be used.
+#[test]
+fn rows_of_a_track_have_grades_if_all_is_asked_for() {
+    for (name, rig, grade, code) in
+        [("marked", replaced(), "no-go", 4), ("steady", RIG.replace("offset_k = 2.0\n", ""), "go", 0)]
+    {
+        let bench = Bench::simulated(name, &rig);
+        let answer = bench.run(&["track", "run.csv", "--out", "tau.csv", "--best-effort", "--quiet"]);
+        assert_eq!(answer.code, code, "{answer:#?}");
+        let text = String::from_utf8(bench.read("tau.csv")).expect("text");
+        let mut lines = text.lines();
+        assert_eq!(lines.next(), Some(format!("{HEADER},grade").as_str()));
+        assert!(lines.clone().count() == 3000 && lines.all(|line| line.ends_with(&format!(",{grade}"))), "{name}");
+    }
 }

@@ -42,7 +42,7 @@ fn the_numbers_are_those_of_the_rig() {
     let (bench, text) = record("numbers");
     let answer = bench.run_with_input(&LIVE, text.as_bytes());
     assert_eq!(answer.code, 0, "{answer:#?}");
-    answer.says(&["started: time constants T1 0.1"]);
+    answer.says(&["started:", "T1: time constant 0.1", "(95 %)  go"]);
     let gas_c: Vec<f64> =
         text.lines().skip(1).map(|l| l.split(',').nth(3).and_then(|c| c.parse().ok()).expect("Tref")).collect();
     let rows = rows(&answer.stdout);

@@ -89,6 +89,11 @@ pub enum Reason {
     },
     /// The gas is a single tone, and two time constants absorb whatever is missing.
     SingleTone,
+    /// Time constants that are taken to change by one factor do not.
+    RatioChanges {
+        /// Probability of such a change of their ratio if it stays.
+        p_value: f64,
+    },
     /// The estimator has a bias that noise makes.
     Biased,
     /// A check of the number itself finds a fault.
@@ -118,7 +123,8 @@ impl Reason {
             | Self::TooLong { .. }
             | Self::PartOfTotal
             | Self::NoInterval
-            | Self::LeftOver => Grade::NoGo,
+            | Self::LeftOver
+            | Self::RatioChanges { .. } => Grade::NoGo,
             Self::Follows { grade, .. } | Self::Fault { grade, .. } => *grade,
             _ => Grade::Conditional,
         }
@@ -169,6 +175,11 @@ impl fmt::Display for Reason {
             Self::SingleTone => {
                 f.write_str("right if nothing is missing: of a single tone two time constants absorb any effect")
             }
+            Self::RatioChanges { p_value } => write!(
+                f,
+                "the ratio of both time constants changes along the record (p = {p_value:.0e}), so the two sensors do not \
+                 follow one flow, or the model lacks an effect that looks like it"
+            ),
             Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
             Self::Fault { what, .. } => f.write_str(what),
             Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),
@@ -240,6 +251,12 @@ impl Judgement {
         let worst = reasons.iter().map(Reason::grade).max();
         // One of them says enough.
         Self::of(&reasons.into_iter().find(|r| Some(r.grade()) == worst).into_iter().collect::<Vec<_>>())
+    }
+
+    /// The judgement of what follows from numbers with the judgement `numbers`, and rests on what has this one itself.
+    #[must_use]
+    pub fn and_following(self, numbers: Self) -> Self {
+        if self.grade == Grade::NoGo || self.grade > numbers.grade { self } else { numbers }
     }
 }
 

@@ -52,7 +52,7 @@ impl<'a> Circumstances<'a> {
     }
 
     /// What all numbers rest on, what was given among it.
-    pub(crate) fn whole_basis(&self) -> Basis {
+    pub fn whole_basis(&self) -> Basis {
         let mut out = self.basis.clone();
         out.reasons.extend(self.given());
         out

@@ -81,7 +81,12 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
 /// As [`gas_report`].
 pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<String, ReportError> {
     let lead = match (answer.change.as_str(), answer.coefficients, &answer.step) {
-        _ if answer.time_s.is_empty() => "This record does not determine both time constants.".into(),
+        _ if answer.time_s.is_empty() => {
+            format!("There are no time constants along this record to use: {}.", answer.judgement.because)
+        }
+        _ if answer.judgement.grade == Grade::NoGo => {
+            format!("No go, and drawn only since it was asked for: {}.", answer.judgement.because)
+        }
         ("smooth", Some(size), _) => {
             format!("Both time constants change smoothly along the record: {size} coefficients describe it.")
         }
@@ -100,15 +105,13 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
-    if let Some(ratio) = &answer.ratio {
-        let stays = if ratio.stays { "shows no change" } else { "changes" };
-        let text = format!(
-            "{stays} (p = {}, {} degrees of freedom)",
-            probability(ratio.test.p_value),
-            ratio.test.degrees_of_freedom
-        );
-        document = document.facts([("The ratio of both", text)]);
+    let mut facts = vec![("Grade", grade(&answer.judgement))];
+    // That nothing changes is not claimed under a model that is contradicted.
+    if let Some(ratio) = answer.ratio.filter(|ratio| ratio.stays && answer.judgement.grade != Grade::NoGo) {
+        let (p, count) = (probability(ratio.test.p_value), ratio.test.degrees_of_freedom);
+        facts.push(("The ratio of both", format!("shows no change (p = {p}, {count} degrees of freedom)")));
     }
+    document = document.facts(facts);
     if !answer.time_s.is_empty() {
         document = document.figure(track_picture(answer)?, "Both time constants with their pointwise 95 % bands.");
     }

@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use twinlag::signal::{Flow, FlowSine, FlowStep, Record as Sampling, Rig, Simulated};
-use twinlag::{Track, TrackOptions, track};
+use twinlag::{Options, Track, TrackOptions, track};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
 use super::pair::{self, Named};
@@ -183,7 +183,9 @@ impl Tracking {
         let rig = |noise_std_k: Option<f64>| self.plan.rig(100 + cell as u64, gas, flow, noise_std_k);
         let clean = rig(None)?.simulate_trial(index)?;
         let record = super::record_of(rig(Some(noise_std_k))?.simulate_trial(index)?)?;
-        let answer = track(&record, &TrackOptions::default())?;
+        // It is the estimator that is judged, also where its answer may not be used.
+        let characterise = Options { best_effort: true, ..Options::default() };
+        let answer = track(&record, &TrackOptions { characterise, ..TrackOptions::default() })?;
         Ok(Trial { clean, noise_std_k, flow, answer })
     }
 }

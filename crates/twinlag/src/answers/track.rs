@@ -1,7 +1,7 @@
 //! Time constants along a record: schema `twinlag.track/1`.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{ChangePoint, RatioTest};
+use twinlag_diagnose::{ChangePoint, Grade, Judgement, RatioTest};
 
 use crate::answers::{Characterisation, Status};
 
@@ -9,11 +9,11 @@ use crate::answers::{Characterisation, Status};
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Along {
-    /// Time constant, s; NaN where the readings do not determine it.
+    /// Time constant, s; NaN where it is not given.
     pub tau_s: Vec<f64>,
-    /// Lower ends of the pointwise 95 % band, s; NaN where the readings do not determine it.
+    /// Lower ends of the pointwise 95 % band, s; NaN where it is not given.
     pub low_s: Vec<f64>,
-    /// Upper ends of the pointwise 95 % band, s; NaN where the readings do not determine it.
+    /// Upper ends of the pointwise 95 % band, s; NaN where it is not given.
     pub high_s: Vec<f64>,
 }
 
@@ -35,9 +35,12 @@ pub struct Track {
     /// `twinlag.track/1`.
     pub schema: String,
     /// `ok`, `model-rejected` where something is left over (of windows, in more than
-    /// chance explains), `not-identifiable` where the record determines time constants nowhere.
+    /// chance explains) or the ratio changes, `not-identifiable` where the record determines time constants nowhere.
     pub status: Status,
-    /// `constant`, `smooth`, `step` or `windows`.
+    /// Whether the track may be used: no better than the fit that it is of; of windows the worst of those that are given.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
+    /// `constant`, `smooth`, `step` or `windows`; `unknown` of a track that is not given.
     pub change: String,
     /// Coefficients of a smooth change.
     pub coefficients: Option<usize>,
@@ -47,7 +50,10 @@ pub struct Track {
     /// Both time constants.
     #[serde(skip)]
     pub sensors: [Along; 2],
-    /// Smallest and largest time constant of each sensor, s.
+    /// Whether the time constants at each instant may be used; those that may not are NaN, unless they were asked for.
+    #[serde(skip)]
+    pub grades: Vec<Grade>,
+    /// Smallest and largest time constant of each sensor that are given, s.
     pub range_s: Option<[[f64; 2]; 2]>,
     /// The step that explains most, if a step was taken.
     pub step: Option<ChangePoint>,

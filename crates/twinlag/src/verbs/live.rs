@@ -4,7 +4,7 @@ use std::fmt;
 
 use twinlag_compensate::{TrackerFn, learn, tracker};
 use twinlag_cross_relation::Z_975;
-use twinlag_diagnose::Identifier;
+use twinlag_diagnose::{Grade, Identifier};
 use twinlag_estimate::spans_too_much;
 use twinlag_record::{Record, SamplingKind};
 
@@ -91,7 +91,8 @@ impl Live {
     /// # Errors
     /// As [`crate::characterise_with`]; [`Error::LiveEffect`] for a model with an effect that a
     /// stream cannot undo, [`Error::LiveStart`] where the start does not determine both time
-    /// constants, or is not evenly spaced.
+    /// constants, or they may not be used and [`Options::best_effort`] does not ask for them all the same, or is not
+    /// evenly spaced.
     ///
     /// ```
     #[doc = include_str!("../example.txt")]
@@ -119,6 +120,16 @@ impl Live {
             });
         };
         let tau_s = [tau1_s, tau2_s];
+        let withheld = start.sensors.iter().find(|s| s.judgement.grade == Grade::NoGo);
+        if let Some(sensor) = withheld.filter(|_| !options.characterise.best_effort) {
+            let (channel, because) = (&sensor.channel, &sensor.judgement.because);
+            return Err(Error::LiveStart {
+                why: format!(
+                    "rows whose time constants may be used, and that of {channel} may not: {because}. A diagnosis of these rows \
+                     looks for what is missing, and its model can be used here; or give a known time constant"
+                ),
+            });
+        }
         let (readings, rig) = extended.rig(extended.parameters())?;
         let [gain, offset_k] = extended.calibration(extended.parameters());
         let prior = learn(&readings, &rig)?.prior;

@@ -4,11 +4,13 @@ use std::ops::Range;
 
 use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
-use twinlag_diagnose::{Basis, Change, Circumstances, Settings, excess, track as follow};
+use twinlag_diagnose::{
+    Basis, Change, Circumstances, Grade, Judgement, Reason, Settings, TimeConstant, excess, track as follow,
+};
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
 
-use crate::answers::{Along, FittedAnswer, Model, Ratio, Status, Track};
+use crate::answers::{Along, Characterisation, FittedAnswer, Model, Ratio, Status, Track};
 use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, known_time_constants};
@@ -102,17 +104,43 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     };
     let mut found = follow(&observations, &settings, &effects, watch)?;
     let is_left = found.fit.is_contradicted();
-    let sensors = found.log_error.as_ref().map(|errors| [0, 1].map(|i| along(&found.tau_s[i], &errors[i])));
-    let sensors = sensors.filter(is_any);
-    let status = match (&sensors, is_left) {
-        (None, _) => Status::NotIdentifiable,
-        (Some(_), true) => Status::ModelRejected,
-        (Some(_), false) => Status::Ok,
-    };
+    let stays = found.ratio.p_value >= RATIO_CHANGES;
     let policy = &settings.policy;
-    let basis = Basis::of(excess(&found.fit, false), !settings.known.is_empty(), policy);
+    let mut basis = Basis::of(excess(&found.fit, false), !settings.known.is_empty(), policy);
+    if found.log_error.is_some() && !stays {
+        basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
+    }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
+    let narrow = found.fit.time_constants.clone();
     let judgements = circumstances.judge(&mut found.fit);
+    let widened_by = widening(&narrow, &found.fit.time_constants);
+    let sensors = |widened_by: f64| {
+        let sensors = found.log_error.as_ref().map(|e| [0, 1].map(|i| along(&found.tau_s[i], &e[i], widened_by)));
+        sensors.filter(is_any)
+    };
+    let (is_determined, sensors) = (sensors(1.0).is_some(), sensors(widened_by));
+    let named = [0, 1].map(|i| (format!("the time constant of {}", record.channels[i]), &judgements.time_constants[i]));
+    let numbers = Judgement::following(named.iter().map(|(name, judgement)| (name.as_str(), *judgement)));
+    let mut judgement = Judgement::of(&circumstances.whole_basis().reasons).and_following(numbers);
+    if !is_determined || (sensors.is_none() && judgement.grade != Grade::NoGo) {
+        judgement = Judgement::of(&[Reason::NotDetermined]);
+    }
+    let status = match (is_determined, is_left || !stays) {
+        (false, _) => Status::NotIdentifiable,
+        (true, true) => Status::ModelRejected,
+        (true, false) => Status::Ok,
+    };
+    let is_given = options.characterise.best_effort || judgement.grade != Grade::NoGo;
+    let mut warnings = left_over(is_left && is_given, status == Status::ModelRejected && !is_given);
+    let mut sensors = sensors.filter(|_| is_given);
+    warnings.extend(sensors.as_ref().and_then(|sensors| undetermined(sensors, 0, "instants")));
+    let mut grades = vec![judgement.grade; sensors.as_ref().map_or(0, |s| s[0].tau_s.len())];
+    let most_s = policy.longest_given_share * observations.span_s();
+    if let Some(sensors) = &mut sensors {
+        let is_held = |i: usize| settings.known.iter().any(|k| k.sensor == i && k.std_s.is_none());
+        let estimated = (0..2).zip(sensors).filter(|(i, _)| !is_held(*i)).map(|(_, along)| along);
+        warnings.extend(keep_short(estimated, &mut grades, most_s, options.characterise.best_effort));
+    }
     let fitted = FittedAnswer {
         record,
         fit: &found.fit,
@@ -121,25 +149,8 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         is_total_delay: false,
         judgements,
     };
-    let last = fitted.characterisation(status);
-    let mut warnings = Vec::new();
-    if is_left {
-        warnings.push(
-            "the residual is more than noise: the bands follow from its spectrum and cover no missing effect. A diagnosis \
-             looks for one"
-                .into(),
-        );
-    }
-    let stays = found.ratio.p_value >= RATIO_CHANGES;
-    if !stays {
-        warnings.push(
-            "the ratio of the time constants changes: the two sensors do not follow the same \
-            flow"
-                .into(),
-        );
-    }
-    warnings.extend(sensors.as_ref().and_then(|sensors| undetermined(sensors, "instants")));
     let (change, coefficients) = match found.change {
+        _ if sensors.is_none() => ("unknown", None),
         Change::Smooth(size) => ("smooth", Some(size)),
         Change::Step => ("step", None),
         _ => ("constant", None),
@@ -147,30 +158,82 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     Ok(Track {
         schema: Track::SCHEMA.into(),
         status,
+        judgement,
         change: change.into(),
         coefficients,
         range_s: sensors.as_ref().map(range),
         time_s: if sensors.is_some() { found.time_s } else { Vec::new() },
+        step: found.step.filter(|_| change == "step"),
         sensors: sensors.unwrap_or_default(),
-        step: found.step.filter(|_| found.change == Change::Step),
+        grades,
         ratio: Some(Ratio { stays, test: found.ratio }),
-        last,
+        last: fitted.characterisation(status),
         warnings,
     })
 }
 
-/// A time constant with its band, whose logarithm is normal; NaN where it is not determined.
-fn along(tau_s: &[f64], log_error: &[f64]) -> Along {
+/// What to know of a track of a model that is contradicted.
+///
+/// - `is_bounded`: whether bands are given in spite of what is left over
+/// - `is_withheld`: whether nothing is given because of it
+fn left_over(is_bounded: bool, is_withheld: bool) -> Vec<String> {
+    let bounded = "the residual is more than noise: the bands follow from its spectrum and cover no missing effect. A diagnosis \
+                   looks for one";
+    let withheld = "time constants along this record are not given, since it contradicts that both change by one factor and \
+                    nothing else does. A diagnosis looks for what else there is, and its model can be used here";
+    let said = [(is_bounded, bounded), (is_withheld, withheld)];
+    said.into_iter().filter(|(is_so, _)| *is_so).map(|(_, text)| text.to_owned()).collect()
+}
+
+/// By how much the intervals of both time constants had to be widened: the larger factor, since they change together.
+fn widening(narrow: &[TimeConstant; 2], wide: &[TimeConstant; 2]) -> f64 {
+    let length =
+        |of: &TimeConstant| of.interval_95_s.filter(|[low, _]| *low > 0.0).map(|[low, high]| (high / low).ln());
+    let factors = narrow.iter().zip(wide).filter_map(|(narrow, wide)| Some(length(wide)? / length(narrow)?));
+    factors.filter(|factor| factor.is_finite()).fold(1.0, f64::max)
+}
+
+/// A time constant with its band, whose logarithm is normal, widened by a factor; NaN where it is not determined.
+fn along(tau_s: &[f64], log_error: &[f64], widened_by: f64) -> Along {
     let by = |sign: f64| {
-        let pairs = tau_s.iter().zip(log_error);
+        let pairs = tau_s.iter().zip(log_error).map(|(tau, e)| (tau, widened_by * e));
         pairs
-            .map(|(tau, e)| if *e <= MAX_LOG_STANDARD_ERROR { tau * (sign * Z_975 * e).exp() } else { f64::NAN })
+            .map(|(tau, e)| if e <= MAX_LOG_STANDARD_ERROR { tau * (sign * Z_975 * e).exp() } else { f64::NAN })
             .collect()
     };
     Along { tau_s: by(0.0), low_s: by(-1.0), high_s: by(1.0) }
 }
 
-/// Whether both time constants are determined anywhere.
+/// Takes out what is longer than `most_s`, or grades it where it was asked for all the same, and says so.
+fn keep_short<'a>(
+    estimated: impl Iterator<Item = &'a mut Along>,
+    grades: &mut [Grade],
+    most_s: f64,
+    best_effort: bool,
+) -> Option<String> {
+    let mut is_long = vec![false; grades.len()];
+    for along in estimated {
+        for k in (0..grades.len()).filter(|&k| along.tau_s[k] > most_s).collect::<Vec<_>>() {
+            is_long[k] = true;
+            if best_effort {
+                grades[k] = Grade::NoGo;
+            } else {
+                [along.tau_s[k], along.low_s[k], along.high_s[k]] = [f64::NAN; 3];
+            }
+        }
+    }
+    let count = is_long.iter().filter(|is_long| **is_long).count();
+    (count > 0).then(|| {
+        let given = if best_effort { "do not use it" } else { "it is not given" };
+        format!(
+            "at {count} of {} instants a time constant is longer than {most_s:.3} s, the longest that a record of this length \
+             can show: {given}",
+            grades.len()
+        )
+    })
+}
+
+/// Whether both time constants are given anywhere.
 fn is_any(sensors: &[Along; 2]) -> bool {
     sensors.iter().all(|s| s.tau_s.iter().any(|t| t.is_finite()))
 }
@@ -185,9 +248,11 @@ fn are_too_many(rejected: usize, answered: usize) -> bool {
 }
 
 /// Says at how many places a time constant is not determined; `None` if at none.
-fn undetermined(sensors: &[Along; 2], what: &str) -> Option<String> {
+///
+/// - `withheld`: places at which one is determined, and left out for another reason
+fn undetermined(sensors: &[Along; 2], withheld: usize, what: &str) -> Option<String> {
     let pairs = || sensors[0].tau_s.iter().zip(&sensors[1].tau_s);
-    let empty = pairs().filter(|(a, b)| a.is_nan() || b.is_nan()).count();
+    let empty = pairs().filter(|(a, b)| a.is_nan() || b.is_nan()).count().saturating_sub(withheld);
     (empty > 0)
         .then(|| format!("at {empty} of {} {what} the readings do not determine both time constants", pairs().count()))
 }
@@ -227,10 +292,9 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
             also: Vec::new(),
         });
     }
+    let mut out = Windows::default();
     let hop_s = window_s / OVERLAP;
     let count = ((span_s - window_s) / hop_s).floor() as usize + 1;
-    let (mut time_s, mut sensors) = (Vec::new(), [Along::default(), Along::default()]);
-    let (mut answered, mut rejected) = (0, 0);
     for k in 0..count {
         if watch("windows", k, count).is_break() {
             return Err(Error::Cancelled);
@@ -244,44 +308,92 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
             Err(Error::Record(_) | Error::Cost(_) | Error::Noise(_) | Error::Estimate(_)) => None,
             Err(error) => return Err(error),
         };
-        answered += usize::from(answer.is_some());
-        rejected += usize::from(answer.as_ref().is_some_and(|a| a.status == Status::ModelRejected));
-        time_s.push(from_s + 0.5 * window_s);
-        for (i, along) in sensors.iter_mut().enumerate() {
+        out.push(from_s + 0.5 * window_s, answer);
+    }
+    Ok(out.track(last))
+}
+
+/// What windows answer, one after another.
+#[derive(Default)]
+struct Windows {
+    time_s: Vec<f64>,
+    sensors: [Along; 2],
+    grades: Vec<Grade>,
+    /// The judgement of each time constant, with what it is of and whether it is given.
+    judged: Vec<(String, Judgement, bool)>,
+    answered: usize,
+    rejected: usize,
+    /// Windows that are rejected and lack a time constant for that reason.
+    withheld: usize,
+}
+
+impl Windows {
+    /// Adds the answer of the window around `time_s`; `None` of one that has none.
+    fn push(&mut self, time_s: f64, answer: Option<Characterisation>) {
+        let is_rejected = answer.as_ref().is_some_and(|a| a.status == Status::ModelRejected);
+        let is_empty = answer.as_ref().is_some_and(|a| a.sensors.iter().any(|s| s.time_constant_s.is_none()));
+        self.answered += usize::from(answer.is_some());
+        self.rejected += usize::from(is_rejected);
+        self.withheld += usize::from(is_rejected && is_empty);
+        self.time_s.push(time_s);
+        let mut grade = None;
+        for (i, along) in self.sensors.iter_mut().enumerate() {
             let sensor = answer.as_ref().map(|a| &a.sensors[i]);
             let [low, high] = sensor.and_then(|s| s.interval_95_s).unwrap_or([f64::NAN; 2]);
-            along.tau_s.push(sensor.and_then(|s| s.time_constant_s).unwrap_or(f64::NAN));
+            let tau_s = sensor.and_then(|s| s.time_constant_s);
+            along.tau_s.push(tau_s.unwrap_or(f64::NAN));
             along.low_s.push(low);
             along.high_s.push(high);
+            if let Some(sensor) = sensor {
+                let name = format!("the time constant of {} around {time_s:.2} s", sensor.channel);
+                self.judged.push((name, sensor.judgement.clone(), tau_s.is_some()));
+                grade = grade.max(tau_s.map(|_| sensor.judgement.grade));
+            }
+        }
+        self.grades.push(grade.unwrap_or(Grade::NoGo));
+    }
+
+    fn track(mut self, last: Characterisation) -> Track {
+        let is_any = is_any(&self.sensors);
+        let judged = self.judged.iter().filter(|(_, _, is_given)| *is_given || !is_any);
+        let judgement = match self.answered {
+            0 => Judgement::of(&[Reason::NotDetermined]),
+            _ => Judgement::following(judged.map(|(name, judgement, _)| (name.as_str(), judgement))),
+        };
+        let (answered, rejected, withheld) = (self.answered, self.rejected, self.withheld);
+        let mut warnings: Vec<String> = undetermined(&self.sensors, withheld, "windows").into_iter().collect();
+        if rejected > 0 {
+            let numbers = match withheld {
+                0 => "their numbers are the best fit of a model that they contradict".into(),
+                _ => format!("{withheld} of them have a time constant that is not given"),
+            };
+            warnings.push(format!(
+                "in {rejected} of {answered} windows the residual is more than noise: {numbers}. A diagnosis looks for what is \
+                 missing"
+            ));
+        }
+        let status = match (is_any, are_too_many(rejected, answered)) {
+            (_, true) => Status::ModelRejected,
+            (false, false) => Status::NotIdentifiable,
+            (true, false) => Status::Ok,
+        };
+        if !is_any {
+            (self.time_s, self.sensors, self.grades) = Default::default();
+        }
+        Track {
+            schema: Track::SCHEMA.into(),
+            status,
+            judgement,
+            change: "windows".into(),
+            coefficients: None,
+            range_s: is_any.then(|| range(&self.sensors)),
+            time_s: self.time_s,
+            sensors: self.sensors,
+            grades: self.grades,
+            step: None,
+            ratio: None,
+            last,
+            warnings,
         }
     }
-    let mut warnings: Vec<String> = undetermined(&sensors, "windows").into_iter().collect();
-    if rejected > 0 {
-        warnings.push(format!(
-            "in {rejected} of {answered} windows the residual is more than noise: their numbers are the best fit of a model \
-             that they contradict. A diagnosis looks for what is missing"
-        ));
-    }
-    let is_any = is_any(&sensors);
-    let status = match (is_any, are_too_many(rejected, answered)) {
-        (false, _) => Status::NotIdentifiable,
-        (true, true) => Status::ModelRejected,
-        (true, false) => Status::Ok,
-    };
-    if !is_any {
-        (time_s, sensors) = Default::default();
-    }
-    Ok(Track {
-        schema: Track::SCHEMA.into(),
-        status,
-        change: "windows".into(),
-        coefficients: None,
-        range_s: is_any.then(|| range(&sensors)),
-        time_s,
-        sensors,
-        step: None,
-        ratio: None,
-        last,
-        warnings,
-    })
 }
