@@ -263,6 +263,8 @@ fn track_text(answer: &Track, out: &Path) -> String {
     if let Some(ratio) = answer.ratio.filter(|ratio| ratio.stays && answer.judgement.grade != Grade::NoGo) {
         lines.push(format!("  their ratio shows no change: p = {:.2e}", ratio.test.p_value));
     }
+    let whole = [("time constants along the record".to_owned(), &answer.judgement)];
+    lines.extend(reasons(whole.into_iter().chain(asked(&answer.last)), "  "));
     lines.push(format!("status: {}", status(answer.status)));
     if is_given {
         lines.push(format!("time constants written to {}: {} instants", out.display(), answer.time_s.len()));

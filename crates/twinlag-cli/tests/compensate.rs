@@ -176,7 +176,7 @@ fn a_track_that_the_ratio_contradicts_is_not_given() {
     let arguments = ["track", "run.csv", "--out", "tau.csv", "--report", "tau.html", "--quiet"];
     let said = bench.run(&arguments);
     assert_eq!(said.code, 4, "{said:#?}");
-    for what in ["not given: the ratio of both time constants changes", "status: model-rejected"] {
+    for what in ["along the record: not given", "the ratio of both time constants changes", "status: model-rejected"] {
         assert!(said.stdout.contains(what), "does not say {what:?}: {said:#?}");
     }
     for claim in ["no change", "coefficients", "by a factor of"] {
