@@ -44,6 +44,9 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     let code = grades::exit_code(&starts, &[], false, command.input.method.strict);
     let marked = command.input.method.best_effort().then(|| starts.into_iter().max()).flatten();
     let mut out = Out::open(&command.out, to_stdout, marked)?;
+    if let Some(caution) = print::caution(&live.start) {
+        console.note(|| caution);
+    }
     console.note(|| started(&live));
     for warning in &live.start.warnings {
         console.note(|| format!("warning: {warning}"));

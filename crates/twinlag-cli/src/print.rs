@@ -50,7 +50,7 @@ pub(crate) fn characterisation(answer: &Characterisation, console: Console) -> R
 }
 
 fn text(answer: &Characterisation) -> String {
-    let mut lines = Vec::new();
+    let mut lines: Vec<String> = caution(answer).into_iter().collect();
     let record = &answer.record;
     lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
     lines.push(format!("{} estimate, {}, {}", answer.estimator, answer.optimiser, answer.hold));
@@ -113,6 +113,11 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// What speaks against the use of the model that was given: the first line of an answer.
+pub(crate) fn caution(answer: &Characterisation) -> Option<String> {
+    (!answer.model_remarks.is_empty()).then(|| format!("caution: {}", answer.model_remarks.join("; ")))
 }
 
 /// Both time constants, their second lags and the difference, as they are called here.
@@ -179,8 +184,8 @@ pub(crate) fn compensation(
 
 fn compensation_text(answer: &Compensation, out: &Path) -> String {
     let record = &answer.last.record;
-    let mut lines =
-        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
+    let mut lines: Vec<String> = caution(&answer.last).into_iter().collect();
+    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
     lines.extend(answer.verdict.map(|v| format!("model: {}", verdict(v))));
     for effect in &answer.effects {
         let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
@@ -229,8 +234,8 @@ pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, console: Consol
 
 fn track_text(answer: &Track, out: &Path) -> String {
     let record = &answer.last.record;
-    let mut lines =
-        vec![format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4))];
+    let mut lines: Vec<String> = caution(&answer.last).into_iter().collect();
+    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
     let is_given = !answer.time_s.is_empty();
     let change = match (answer.change.as_str(), answer.coefficients, &answer.step) {
         ("smooth", Some(size), _) => format!("both time constants change smoothly: {size} coefficients"),

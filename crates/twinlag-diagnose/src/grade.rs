@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{PartScatter, Z_975};
 use twinlag_model::{Identifier, ModelFit, Policy};
 
+use crate::diagnosis::Verdict;
+
 /// Whether a number may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -103,6 +105,32 @@ pub enum Reason {
         /// The best grade that a number can have with it.
         grade: Grade,
     },
+    /// Effects are held at the numbers of a model, which are taken as exact.
+    HeldAtModel {
+        /// The record that the model was found in, where that is known.
+        source: Option<String>,
+        /// Whether that is the record at hand.
+        is_own: bool,
+    },
+    /// A model is used that did not explain its own record.
+    ModelNotExplained {
+        /// What was said of that record.
+        verdict: Verdict,
+        /// The record.
+        source: String,
+    },
+    /// A model is used of which nothing says how well it explained its own record.
+    ModelUnjudged,
+    /// A model is used that holds numbers which may not be used.
+    ModelNoGo {
+        /// These numbers.
+        what: String,
+    },
+    /// A model is used outside the data that it was found in.
+    OutsideRange {
+        /// What is outside, and what was inside.
+        what: String,
+    },
     /// What the number follows from has no better grade.
     Follows {
         /// What it follows from.
@@ -128,6 +156,33 @@ impl Reason {
             Self::Follows { grade, .. } | Self::Fault { grade, .. } => *grade,
             _ => Grade::Conditional,
         }
+    }
+
+    /// What speaks against the use of a model, as a clause by itself; `None` of any other reason.
+    ///
+    /// ```
+    /// use twinlag_diagnose::{Reason, Verdict};
+    ///
+    /// let reason = Reason::ModelNotExplained { verdict: Verdict::PartlyExplained, source: "run.csv".into() };
+    /// let caution = "the model leaves more than noise in its own record, run.csv (partly-explained)";
+    /// assert_eq!(reason.caution().as_deref(), Some(caution));
+    /// assert_eq!(reason.to_string(), format!("right if this does no harm: {caution}"));
+    /// assert_eq!(Reason::LeftOver.caution(), None);
+    /// ```
+    pub fn caution(&self) -> Option<String> {
+        Some(match self {
+            Self::ModelNotExplained { verdict: Verdict::Refused, source } => {
+                format!("the record of the model, {source}, could not be diagnosed")
+            }
+            Self::ModelNotExplained { verdict, source } => {
+                let name = if *verdict == Verdict::PartlyExplained { "partly-explained" } else { "unexplained" };
+                format!("the model leaves more than noise in its own record, {source} ({name})")
+            }
+            Self::ModelUnjudged => "the model does not say how well it explains its own record".into(),
+            Self::ModelNoGo { what } => format!("the model holds numbers that its own record did not give: {what}"),
+            Self::OutsideRange { what } => format!("the model is used outside the data that it was found in: {what}"),
+            _ => return None,
+        })
     }
 }
 
@@ -183,6 +238,20 @@ impl fmt::Display for Reason {
             Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
             Self::Fault { what, .. } => f.write_str(what),
             Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),
+            Self::HeldAtModel { is_own: true, .. } => f.write_str(
+                "right if the numbers of the model, found in this record, are exact: the interval does not cover that",
+            ),
+            Self::HeldAtModel { source, .. } => write!(
+                f,
+                "right if the sensors are those of {} and the numbers of the model exact: the interval does not cover that",
+                source.as_deref().unwrap_or("the model")
+            ),
+            Self::ModelNotExplained { .. }
+            | Self::ModelUnjudged
+            | Self::ModelNoGo { .. }
+            | Self::OutsideRange { .. } => {
+                write!(f, "right if this does no harm: {}", self.caution().unwrap_or_default())
+            }
         }
     }
 }

@@ -18,7 +18,8 @@ use twinlag::{Characterisation, Compensation, Track};
 /// [`ReportError`], if something cannot be drawn. Where there is no gas temperature the page says
 /// why, and that is no error.
 pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
-    let mut document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
+    let document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
+    let mut document = cautions(document, &answer.last);
     document = match &answer.gas {
         None => document.lead(format!("There is no gas temperature to use: {}.", answer.judgement.because)),
         Some(_) if answer.judgement.grade == Grade::NoGo => {
@@ -99,9 +100,9 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
         ("windows", _, _) => format!("Each of {} windows is characterised separately.", answer.time_s.len()),
         _ => "No change of the time constants is detected.".into(),
     };
-    let mut document = Document::new(format!("Time constants along {}", record.source))
-        .heading("Time constants along the record")
-        .lead(lead);
+    let document = Document::new(format!("Time constants along {}", record.source));
+    let document = document.heading("Time constants along the record");
+    let mut document = cautions(document, &answer.last).lead(lead);
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
@@ -116,6 +117,11 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
         document = document.figure(track_picture(answer)?, "Both time constants with their pointwise 95 % bands.");
     }
     Ok(end(numbers(document, &answer.last), &answer.last, command))
+}
+
+/// What speaks against the use of the model that was given, before all else.
+fn cautions(document: Document, last: &Characterisation) -> Document {
+    last.model_remarks.iter().fold(document, |document, remark| document.warning(sentence(remark)))
 }
 
 fn numbers(document: Document, last: &Characterisation) -> Document {

@@ -4,6 +4,7 @@ mod characterisation;
 mod compensation;
 mod diagnosis;
 mod fitted;
+mod found_in;
 mod model;
 mod track;
 
@@ -14,7 +15,8 @@ pub use characterisation::{
 };
 pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit};
-pub use model::{Model, ModelEffect};
+pub use found_in::FoundIn;
+pub use model::{Model, ModelEffect, ModelNumber};
 pub use track::{Along, Ratio, Track};
 
 pub(crate) use characterisation::is_on_bound_of_time_constant;

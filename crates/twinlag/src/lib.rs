@@ -83,9 +83,9 @@ mod verbs;
 mod watch;
 
 pub use answers::{
-    Along, Characterisation, Compensation, Diagnosis, Difference, EffectNumber, ErrorBeforeAfter, Estimated,
-    FreeParameters, GasFault, IntervalMethod, MadeBy, Model, ModelEffect, NamedEffect, NamedLimit, Quality, Ratio,
-    RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track,
+    Along, Characterisation, Compensation, Diagnosis, Difference, EffectNumber, ErrorBeforeAfter, Estimated, FoundIn,
+    FreeParameters, GasFault, IntervalMethod, MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit,
+    Quality, Ratio, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track,
 };
 pub use error::Error;
 pub use options::Options;

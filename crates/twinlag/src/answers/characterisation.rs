@@ -248,6 +248,10 @@ pub struct Characterisation {
     pub status: Status,
     /// What this record does not determine.
     pub not_identifiable: Vec<String>,
+    /// What speaks against the use of the model that was given, if one was: it did not explain its own record, holds numbers
+    /// that are no-go, or was found in other data than these.
+    #[serde(default)]
+    pub model_remarks: Vec<String>,
     /// What to know before using the numbers.
     pub warnings: Vec<String>,
     /// Settings that may help where there is no answer, the most likely first.
@@ -273,11 +277,20 @@ impl Characterisation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.characterisation/1";
 
-    /// Puts down one more reason for both time constants and their difference.
+    /// Puts down one more reason for all numbers that were found.
     pub(crate) fn rest_on(&mut self, reason: &Reason) {
-        let sensors = self.sensors.iter_mut().filter(|s| !s.known).map(|s| &mut s.judgement);
-        for judgement in sensors.chain([&mut self.time_constant_difference_s.judgement]) {
-            *judgement = std::mem::take(judgement).and(reason);
+        let rest = |judgement: &mut Judgement| *judgement = std::mem::take(judgement).and(reason);
+        for sensor in &mut self.sensors {
+            if !sensor.known {
+                rest(&mut sensor.judgement);
+            }
+            if let Some(lag) = sensor.second_time_constant_s.as_mut().filter(|lag| !lag.known) {
+                rest(&mut lag.judgement);
+            }
+        }
+        rest(&mut self.time_constant_difference_s.judgement);
+        for free in [&mut self.free.gain, &mut self.free.offset_k].into_iter().flatten() {
+            rest(&mut free.judgement);
         }
     }
 

@@ -6,7 +6,7 @@ use twinlag_diagnose::{
     Move, Policy, Unexplained, Verdict,
 };
 
-use crate::answers::{Characterisation, Model, ModelEffect};
+use crate::answers::{Characterisation, FoundIn, Model, ModelEffect};
 
 /// A number of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -136,6 +136,9 @@ pub struct Diagnosis {
     pub remarks: Vec<String>,
     /// Effects that were not considered, as asked.
     pub without: Vec<Identifier>,
+    /// The data that it is of; `None` in answers of earlier versions.
+    #[serde(default)]
+    pub found_in: Option<FoundIn>,
     /// Whether a measured flow was there, with which time constants may go.
     pub has_flow: bool,
     /// What the loop did to the model, move by move; channels are counted from 0.
@@ -188,6 +191,10 @@ impl Diagnosis {
             time_constants_s: [0, 1].map(|i| self.last.sensors[i].time_constant_s.or_else(|| of_core(i))),
             noise_std_k: Some([0, 1].map(|i| self.last.sensors[i].noise_std_k)),
             effects,
+            verdict: Some(self.verdict),
+            explained_to: self.explained_to,
+            time_constant_grades: Some([0, 1].map(|i| self.last.sensors[i].judgement.clone())),
+            found_in: self.found_in.clone(),
             made_by: self.last.made_by.clone(),
         }
     }

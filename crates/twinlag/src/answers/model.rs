@@ -1,10 +1,10 @@
 //! A model that was found in one record, to be used on others: schema `twinlag.model/1`.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{Found, Identifier, KnownEffect, Value};
+use twinlag_diagnose::{Found, Grade, Identifier, Judgement, KnownEffect, Reason, Value, Verdict};
 use twinlag_record::Record;
 
-use crate::answers::{EffectNumber, MadeBy, NamedEffect};
+use crate::answers::{EffectNumber, FoundIn, MadeBy, NamedEffect};
 use crate::error::Error;
 use crate::options::Options;
 
@@ -23,6 +23,18 @@ pub struct Model {
     pub noise_std_k: Option<[f64; 2]>,
     /// The effects.
     pub effects: Vec<ModelEffect>,
+    /// What the diagnosis said of its record; `None` in a model that is of no record, and in files of earlier versions.
+    #[serde(default)]
+    pub verdict: Option<Verdict>,
+    /// Energy that it leaves over beside that of the noise, as a share of it, where it counts as complete.
+    #[serde(default)]
+    pub explained_to: Option<f64>,
+    /// Whether its time constants may be used; `None` as in [`Self::verdict`].
+    #[serde(default)]
+    pub time_constant_grades: Option<[Judgement; 2]>,
+    /// The data that it was found in; `None` as in [`Self::verdict`].
+    #[serde(default)]
+    pub found_in: Option<FoundIn>,
     /// What made it.
     pub made_by: MadeBy,
 }
@@ -36,21 +48,44 @@ pub struct ModelEffect {
     /// Name of its channel; `None` where it is of both.
     pub channel: Option<String>,
     /// Its parameters.
-    pub parameters: Vec<Value>,
+    pub parameters: Vec<ModelNumber>,
+}
+
+/// A number of an effect of a [`Model`]: there also where it may not be used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ModelNumber {
+    /// The number.
+    #[serde(flatten)]
+    pub value: Value,
+    /// Whether it may be used; `None` in files of earlier versions.
+    #[serde(default)]
+    pub grade: Option<Grade>,
+    /// Why.
+    #[serde(default)]
+    pub because: String,
+}
+
+impl ModelNumber {
+    fn of(value: Value, judgement: &Judgement) -> Self {
+        Self { value, grade: Some(judgement.grade), because: judgement.because.clone() }
+    }
 }
 
 impl ModelEffect {
     /// An effect as the loop found it.
     pub(crate) fn found(found: &Found, channels: &[String; 2]) -> Self {
         let channel = found.fitted_in.map(|i| channels[i].clone());
-        Self { effect: found.effect, channel, parameters: found.parameters.clone() }
+        let numbers = found.parameters.iter().zip(&found.judgements);
+        let parameters = numbers.map(|(value, judgement)| ModelNumber::of(value.clone(), judgement)).collect();
+        Self { effect: found.effect, channel, parameters }
     }
 
     /// An effect with the numbers that an answer gives of it.
     pub(crate) fn given(effect: &NamedEffect) -> Self {
         let values = effect.parameters.iter().filter_map(|p| {
-            let EffectNumber { name, value, standard_error, interval_95, unit, .. } = p.clone();
-            Some(Value { name, value: value?, standard_error, interval_95, unit })
+            let EffectNumber { name, value, standard_error, interval_95, unit, judgement } = p.clone();
+            Some(ModelNumber::of(Value { name, value: value?, standard_error, interval_95, unit }, &judgement))
         });
         Self { effect: effect.effect, channel: effect.fitted_in.clone(), parameters: values.collect() }
     }
@@ -78,6 +113,10 @@ impl Model {
             time_constants_s: [None; 2],
             noise_std_k: None,
             effects: Vec::new(),
+            verdict: None,
+            explained_to: None,
+            time_constant_grades: None,
+            found_in: None,
             made_by: MadeBy::with(&Options::default()),
         }
     }
@@ -105,8 +144,76 @@ impl Model {
         let known = self.effects.iter().map(|e| KnownEffect {
             effect: e.effect,
             channel: e.channel.as_ref().and_then(place),
-            parameters: e.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
+            parameters: e.parameters.iter().map(|p| (p.value.name.clone(), p.value.value)).collect(),
         });
         known.collect()
     }
+
+    /// What numbers rest on that are found in `record` with this model, the gravest first.
+    ///
+    /// - `fitted_again`: effects that are not held at its numbers
+    pub(crate) fn reasons(&self, record: &Record, fitted_again: &[Identifier]) -> Vec<Reason> {
+        let mut out: Vec<Reason> = self.incomplete().into_iter().collect();
+        let held: Vec<&ModelEffect> =
+            self.effects.iter().filter(|e| e.is_of_the_rig() && !fitted_again.contains(&e.effect)).collect();
+        if held.is_empty() {
+            return out;
+        }
+        let no_go: Vec<String> =
+            numbers(&held).filter(|(_, p)| p.grade == Some(Grade::NoGo)).map(|(e, p)| p.of_effect(e)).collect();
+        if !no_go.is_empty() {
+            out.push(Reason::ModelNoGo { what: no_go.join(", ") });
+        }
+        let times =
+            numbers(&held).filter(|(_, p)| p.value.unit == "s").map(|(_, p)| (&p.value.name, p.value.value.abs()));
+        let shortest = times.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(name, time_s)| (name.replace('_', " "), time_s));
+        let shortest = shortest.as_ref().map(|(name, time_s)| (name.as_str(), *time_s));
+        let outside = self.found_in.as_ref().map_or_else(Vec::new, |data| data.outside(record, shortest));
+        if !outside.is_empty() {
+            out.push(Reason::OutsideRange { what: outside.join(", ") });
+        }
+        out.push(Reason::HeldAtModel {
+            source: self.found_in.as_ref().map(|data| data.source.clone()),
+            is_own: self.found_in.as_ref().is_some_and(|data| data.is(record)),
+        });
+        // One of them says enough.
+        let conditional = numbers(&held).find(|(_, p)| p.grade == Some(Grade::Conditional));
+        out.extend(conditional.map(|(effect, p)| Reason::Follows {
+            from: format!("the {} in the model", p.of_effect(effect)),
+            grade: Grade::Conditional,
+            because: p.because.clone(),
+        }));
+        out
+    }
+
+    /// Why it may lack something, where that is so.
+    fn incomplete(&self) -> Option<Reason> {
+        let source = || self.found_in.as_ref().map_or("unknown".into(), |data| data.source.clone());
+        match self.verdict {
+            Some(Verdict::Adequate | Verdict::Explained) => None,
+            Some(verdict) => Some(Reason::ModelNotExplained { verdict, source: source() }),
+            // A model of no record has no noise.
+            None => self.noise_std_k.map(|_| Reason::ModelUnjudged),
+        }
+    }
+}
+
+impl ModelEffect {
+    /// Whether it may be held at its numbers in another record: defects of the data and a line in the spectrum belong to one.
+    fn is_of_the_rig(&self) -> bool {
+        let about = self.effect.about();
+        !(about.is_defect || about.is_narrow)
+    }
+}
+
+impl ModelNumber {
+    /// Its name, with that of its effect.
+    fn of_effect(&self, effect: Identifier) -> String {
+        format!("{} of {effect}", self.value.name.replace('_', " "))
+    }
+}
+
+/// All numbers of these effects.
+fn numbers<'a>(effects: &'a [&ModelEffect]) -> impl Iterator<Item = (Identifier, &'a ModelNumber)> {
+    effects.iter().flat_map(|e| e.parameters.iter().map(|p| (e.effect, p)))
 }

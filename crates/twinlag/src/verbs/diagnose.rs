@@ -8,7 +8,7 @@ use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FreeParameters, NamedEffect, Status,
+    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, NamedEffect, Status,
 };
 use crate::error::Error;
 use crate::options::Options;
@@ -89,6 +89,7 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
         if_known: core.if_known.as_ref().map(|values| values.named(&record.channels)),
         remarks,
         without: options.without.clone(),
+        found_in: Some(FoundIn::of(record)),
         has_flow: record.flow.is_some(),
         moves: core.moves.clone(),
         policy: core.policy.clone(),

@@ -216,7 +216,7 @@ fn streamable(model: &Model) -> Result<Model, Error> {
     model.effects.retain(|e| !is_of_the_record(e.effect));
     let is_curved = |name: &str| name.starts_with("curvature");
     for e in &model.effects {
-        if !e.effect.about().is_streamable || e.parameters.iter().any(|p| is_curved(&p.name)) {
+        if !e.effect.about().is_streamable || e.parameters.iter().any(|p| is_curved(&p.value.name)) {
             return Err(Error::LiveEffect { effect: e.effect.name() });
         }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{
-    Basis, Change, Circumstances, Grade, Judgement, Reason, Settings, TimeConstant, excess, track as follow,
+    Basis, Change, Circumstances, Grade, Identifier, Judgement, Reason, Settings, TimeConstant, excess, track as follow,
 };
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
@@ -107,6 +107,10 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let stays = found.ratio.p_value >= RATIO_CHANGES;
     let policy = &settings.policy;
     let mut basis = Basis::of(excess(&found.fit, false), !settings.known.is_empty(), policy);
+    let followed: Vec<Identifier> =
+        effects.iter().map(|e| e.effect).filter(|e| e.about().changes_time_constants).collect();
+    let reasons = options.model.as_ref().map_or_else(Vec::new, |model| model.reasons(record, &followed));
+    basis.reasons.extend(reasons.iter().cloned());
     if found.log_error.is_some() && !stays {
         basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
     }
@@ -149,6 +153,8 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         is_total_delay: false,
         judgements,
     };
+    let mut last = fitted.characterisation(status);
+    last.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
     let (change, coefficients) = match found.change {
         _ if sensors.is_none() => ("unknown", None),
         Change::Smooth(size) => ("smooth", Some(size)),
@@ -167,7 +173,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         sensors: sensors.unwrap_or_default(),
         grades,
         ratio: Some(Ratio { stays, test: found.ratio }),
-        last: fitted.characterisation(status),
+        last,
         warnings,
     })
 }
@@ -310,7 +316,11 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
         };
         out.push(from_s + 0.5 * window_s, answer);
     }
-    Ok(out.track(last))
+    let mut track = out.track(last);
+    if options.model.is_some() {
+        track.warnings.push("the model is not used: windows are characterised as two first-order lags".into());
+    }
+    Ok(track)
 }
 
 /// What windows answer, one after another.

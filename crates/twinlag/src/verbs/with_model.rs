@@ -1,6 +1,6 @@
 //! A record with the effects of a model that was found in another one.
 
-use twinlag_diagnose::{Basis, Circumstances, Identifier, ModelFit, Settings, excess, fit_with};
+use twinlag_diagnose::{Basis, Circumstances, Identifier, ModelFit, Reason, Settings, excess, fit_with};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, FittedAnswer, Model, Status};
@@ -28,6 +28,9 @@ pub fn characterise_with(record: &Record, model: &Model, options: &Options) -> R
     if model.effects.is_empty() {
         model.check(record)?;
         let mut out = characterise(record, options)?;
+        let reasons = model.reasons(record, &[]);
+        out.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
+        reasons.iter().for_each(|reason| out.rest_on(reason));
         out.warnings.push("the model has no effects: it is two first-order lags".into());
         return Ok(out);
     }
@@ -50,7 +53,10 @@ pub(crate) fn with_model(
     let effects = model.map(Model::known_effects).unwrap_or_default();
     let mut known = fit_with(&observations, &settings, &effects)?;
     let policy = &settings.policy;
-    let basis = Basis::of(excess(&known.fit, noisy.is_some()), !settings.known.is_empty(), policy);
+    let excess = excess(&known.fit, noisy.is_some());
+    let mut basis = Basis::of(excess, !settings.known.is_empty(), policy);
+    let reasons = model.map_or_else(Vec::new, |model| model.reasons(record, &known.fitted_again));
+    basis.reasons.extend(reasons.iter().cloned());
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
     let judgements = circumstances.judge(&mut known.fit);
     let fitted = FittedAnswer {
@@ -61,12 +67,14 @@ pub(crate) fn with_model(
         is_total_delay: false,
         judgements,
     };
-    let status = match (fitted.is_determined(), known.fit.is_contradicted()) {
+    let is_explained = excess.is_some_and(|excess| excess.share <= policy.explained_excess_share);
+    let status = match (fitted.is_determined(), is_explained) {
         (false, _) => Status::NotIdentifiable,
-        (true, true) => Status::ModelRejected,
-        (true, false) => Status::Ok,
+        (true, false) => Status::ModelRejected,
+        (true, true) => Status::Ok,
     };
     let mut out = fitted.characterisation(status);
+    out.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
     let listed = |effects: &mut dyn Iterator<Item = Identifier>| -> String {
         effects.map(Identifier::name).collect::<Vec<_>>().join(", ")
     };

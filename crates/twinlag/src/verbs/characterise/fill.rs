@@ -43,6 +43,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             interval_method: IntervalMethod::None,
             status,
             not_identifiable: Vec::new(),
+            model_remarks: Vec::new(),
             warnings: Vec::new(),
             advice: Vec::new(),
             fit: self.best.clone(),
