@@ -31,7 +31,8 @@ fn hotter(bench: &Bench, by_k: [f64; 2]) {
         for (cell, by_k) in cells[1..].iter_mut().zip(by_k) {
             *cell = (cell.parse::<f64>().expect("a number") + by_k).to_string();
         }
-        out += &format!("{}\n", cells.join(","));
+        out.push_str(&cells.join(","));
+        out.push('\n');
     }
     bench.write("other.csv", out);
 }

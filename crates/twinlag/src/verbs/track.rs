@@ -115,7 +115,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
     }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
-    let narrow = found.fit.time_constants.clone();
+    let narrow = found.fit.time_constants;
     let judgements = circumstances.judge(&mut found.fit);
     let widened_by = widening(&narrow, &found.fit.time_constants);
     let sensors = |widened_by: f64| {
@@ -314,7 +314,7 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
             Err(Error::Record(_) | Error::Cost(_) | Error::Noise(_) | Error::Estimate(_)) => None,
             Err(error) => return Err(error),
         };
-        out.push(from_s + 0.5 * window_s, answer);
+        out.push(from_s + 0.5 * window_s, answer.as_ref());
     }
     let mut track = out.track(last);
     if options.model.is_some() {
@@ -339,16 +339,16 @@ struct Windows {
 
 impl Windows {
     /// Adds the answer of the window around `time_s`; `None` of one that has none.
-    fn push(&mut self, time_s: f64, answer: Option<Characterisation>) {
-        let is_rejected = answer.as_ref().is_some_and(|a| a.status == Status::ModelRejected);
-        let is_empty = answer.as_ref().is_some_and(|a| a.sensors.iter().any(|s| s.time_constant_s.is_none()));
+    fn push(&mut self, time_s: f64, answer: Option<&Characterisation>) {
+        let is_rejected = answer.is_some_and(|a| a.status == Status::ModelRejected);
+        let is_empty = answer.is_some_and(|a| a.sensors.iter().any(|s| s.time_constant_s.is_none()));
         self.answered += usize::from(answer.is_some());
         self.rejected += usize::from(is_rejected);
         self.withheld += usize::from(is_rejected && is_empty);
         self.time_s.push(time_s);
         let mut grade = None;
         for (i, along) in self.sensors.iter_mut().enumerate() {
-            let sensor = answer.as_ref().map(|a| &a.sensors[i]);
+            let sensor = answer.map(|a| &a.sensors[i]);
             let [low, high] = sensor.and_then(|s| s.interval_95_s).unwrap_or([f64::NAN; 2]);
             let tau_s = sensor.and_then(|s| s.time_constant_s);
             along.tau_s.push(tau_s.unwrap_or(f64::NAN));
