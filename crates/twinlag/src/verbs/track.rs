@@ -91,6 +91,14 @@ pub fn track_watched(record: &Record, options: &TrackOptions, watch: Watch<'_>) 
     }
 }
 
+/// What a track rests on with a model, whose effects on the time constants are what is followed.
+fn of_model(record: &Record, options: &TrackOptions) -> Vec<Reason> {
+    let Some(model) = &options.model else { return Vec::new() };
+    let effects = model.effects.iter().map(|e| e.effect);
+    let followed: Vec<Identifier> = effects.filter(|e| e.about().changes_time_constants).collect();
+    model.reasons(record, &followed)
+}
+
 fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Track, Error> {
     options.characterise.check()?;
     options.characterise.check_not_fitted("tracking")?;
@@ -107,9 +115,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let stays = found.ratio.p_value >= RATIO_CHANGES;
     let policy = &settings.policy;
     let mut basis = Basis::of(excess(&found.fit, false), !settings.known.is_empty(), policy);
-    let followed: Vec<Identifier> =
-        effects.iter().map(|e| e.effect).filter(|e| e.about().changes_time_constants).collect();
-    let reasons = options.model.as_ref().map_or_else(Vec::new, |model| model.reasons(record, &followed));
+    let reasons = of_model(record, options);
     basis.reasons.extend(reasons.iter().cloned());
     if found.log_error.is_some() && !stays {
         basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
