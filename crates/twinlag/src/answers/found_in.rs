@@ -136,16 +136,17 @@ mod tests {
         Record::from_channels(channels, SamplingChoice::Auto).expect("a sound record")
     }
 
-    const T1_C: [f64; 8] = [20.0, 21.0, 22.5, f64::NAN, 19.0, 20.0, 20.5, 21.0];
+    const T1_C: [f64; 16] =
+        [20.0, 21.0, 22.5, f64::NAN, 19.0, 20.0, 20.5, 21.0, 20.0, 21.0, 22.5, 20.5, 19.0, 20.0, 20.5, 21.0];
 
     /// The hash is that which Python's `hashlib.sha256` gives of the same bytes, packed by `struct.pack('<d', value)`.
     #[test]
     fn the_data_of_a_model_are_summarised_as_read() {
         let record = record(0.5, &T1_C);
         let data = FoundIn::of(&record);
-        assert_eq!(data.sha256, "0799b32b7c0d2a9eda35fde5300710725af91536bf26ee25027d8072cf4ac803");
+        assert_eq!(data.sha256, "134c95e971dbc9ea79be6d3ac63a0c26ec6665107c02f0931cdebf82fc027734");
         assert_eq!(data.temperatures_c, [[19.0, 22.5], [20.0, 21.5]]);
-        assert_eq!((data.samples, data.sample_period_s, data.length_s), (8, 0.5, 3.5));
+        assert_eq!((data.samples, data.sample_period_s, data.length_s), (16, 0.5, 7.5));
         assert!(data.is(&record));
     }
 
@@ -173,7 +174,7 @@ mod tests {
     /// One reading in 2000 may be anywhere.
     #[test]
     fn a_spike_is_no_other_range() {
-        let mut t1_c = T1_C.repeat(250);
+        let mut t1_c = T1_C.repeat(125);
         let data = FoundIn::of(&record(0.5, &t1_c));
         t1_c[1000] = 500.0;
         assert_eq!(data.outside(&record(0.5, &t1_c), None), Vec::<String>::new());
