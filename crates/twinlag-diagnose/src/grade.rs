@@ -429,8 +429,9 @@ pub struct Excess {
 
 /// What `fit` leaves over beside noise; `None` where nothing but the residual says what the noise is.
 ///
-/// Bands count with what is more than two standard errors above the noise; what a test sees elsewhere has at least the energy at
-/// which a test of one degree of freedom rejects.
+/// The noise is that of the assumed levels, but no more than a quarter of the residual has: levels that took the gas for
+/// noise would hide what is left over. Bands count with what is more than two standard errors above it; what a test sees
+/// elsewhere has at least the energy at which a test of one degree of freedom rejects.
 ///
 /// - `has_noise`: whether a noise that was found in the residual is part of the model
 pub fn excess(fit: &ModelFit, has_noise: bool) -> Option<Excess> {
@@ -442,10 +443,24 @@ pub fn excess(fit: &ModelFit, has_noise: bool) -> Option<Excess> {
     }
     let bands = &fit.trace.bands;
     let count: f64 = bands.iter().map(|[_, _, dof]| dof).sum();
-    let above = |[_, power, dof]: &[f64; 3]| ((power - 1.0 - 2.0 * (2.0 / dof).sqrt()) * dof).max(0.0);
+    let noise = quietest_quarter(bands).min(1.0);
+    let above = |[_, power, dof]: &[f64; 3]| ((power / noise - 1.0 - 2.0 * (2.0 / dof).sqrt()) * dof).max(0.0);
     let of_bands: f64 = bands.iter().map(above).sum();
     let energy = of_bands.max((fit.chi2_per_dof - 1.0) * count).max(LEAST_EXCESS);
-    (count > 0.0).then_some(Excess { energy, share: energy / count })
+    (count > 0.0 && noise > 0.0).then_some(Excess { energy, share: energy / count })
+}
+
+/// The power that a quarter of the degrees of freedom of `bands` does not exceed.
+fn quietest_quarter(bands: &[[f64; 3]]) -> f64 {
+    let mut sorted: Vec<&[f64; 3]> = bands.iter().collect();
+    sorted.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    let quarter = 0.25 * bands.iter().map(|[_, _, dof]| dof).sum::<f64>();
+    let mut below = 0.0;
+    let reaches = sorted.into_iter().find(|[_, _, dof]| {
+        below += dof;
+        below >= quarter
+    });
+    reaches.map_or(0.0, |[_, power, _]| *power)
 }
 
 /// Quantile of the chi-square distribution with one degree of freedom at which a test rejects, `p = 10⁻⁴`.
@@ -472,6 +487,13 @@ mod tests {
         let (_, interval) = number(2.0, [1.9, 2.1], false).judged(Vec::new(), &basis, &policy);
         let [low, high] = interval.expect("it had one");
         assert!((low - 1.7).abs() < 1e-12 && (high - 2.3).abs() < 1e-12, "{low} {high}");
+    }
+
+    /// Of bands with 10, 30 and 60 degrees of freedom the two quietest hold the first quarter.
+    #[test]
+    fn the_quietest_quarter_counts_degrees_of_freedom() {
+        assert_eq!(quietest_quarter(&[[1.0, 3.0, 60.0], [2.0, 0.5, 10.0], [3.0, 0.8, 30.0]]), 0.8);
+        assert_eq!(quietest_quarter(&[]), 0.0);
     }
 
     /// A number whose sign or size is lost in a wider interval is not given.

@@ -38,9 +38,10 @@ impl Search<'_> {
     ) -> Result<[Option<Identifier>; 3], ModelError> {
         let mut all = self.candidates(&current.model);
         all.retain(|c| !c.is_noise() && !c.about().is_narrow && c.main().is_some());
+        let prior = self.policy.prior_effect_probability / all.len().max(1) as f64;
         let now = current.model.linearised(&current.theta, self.observations, self.selection);
-        let each = self.each(&all, |effect| self.unseen(current, effect, &now))?;
-        let from_afar = far.iter().filter_map(|candidate| self.unseen_afar(current, candidate));
+        let each = self.each(&all, |effect| self.unseen(current, effect, prior, &now))?;
+        let from_afar = far.iter().filter_map(|candidate| unseen_afar(current, candidate, prior));
         let hidden: Vec<Hidden> = each.into_iter().flatten().chain(from_afar).collect();
         Ok([0, 1, 2].map(|i| {
             let half_s = half_s[i]?;
@@ -52,7 +53,7 @@ impl Search<'_> {
     }
 
     /// How probable an effect is, from the largest size that a search begins with.
-    fn unseen(&self, current: &Fitted, effect: &Shared, now: &Linearised) -> Option<Hidden> {
+    fn unseen(&self, current: &Fitted, effect: &Shared, prior: f64, now: &Linearised) -> Option<Hidden> {
         let main = effect.main()?;
         let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
         let model = current.model.with(effect.clone());
@@ -69,32 +70,32 @@ impl Search<'_> {
         // Other parameters of the effect take off one each by chance.
         let z2 = (gain - (start.len() - 1) as f64).max(0.0);
         let seen = usual * usual / (usual * usual + variance);
-        let odds = self.policy.prior_effect_probability * (1.0 - seen).sqrt() * (0.5 * z2 * seen).exp();
+        let odds = prior * (1.0 - seen).sqrt() * (0.5 * z2 * seen).exp();
         let size = (z2 * variance * seen * seen + variance * seen).sqrt();
         let per_size = |i: usize| inverse[i][at] / inverse[at][at];
         let shift_s = [per_size(0), per_size(1), per_size(1) - per_size(0)].map(|slope| (slope * size).abs());
         let is_usable = variance > 0.0 && odds.is_finite() && shift_s.iter().all(|s| s.is_finite());
         is_usable.then(|| Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
     }
+}
 
-    /// How probable an effect is that was fitted with quite other time constants.
-    fn unseen_afar(&self, current: &Fitted, candidate: &Candidate) -> Option<Hidden> {
-        let Candidate { effect, fitted, .. } = candidate;
-        let main = effect.main()?;
-        let gain = candidate.white_gain.min(candidate.robust_gain) - (candidate.added - 1) as f64;
-        if gain <= 0.0 || !fitted.end.is_usable() || !candidate.is_clear_of_bounds() {
-            return None;
-        }
-        let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
-        let usual = usual_size(effect, main, &start);
-        // So many standard errors make the gain.
-        let error = fitted.theta[current.theta.len() + main].abs() / gain.sqrt();
-        let odds = self.policy.prior_effect_probability * error / error.hypot(usual) * (0.5 * gain).exp();
-        let apart = |theta: &[f64]| [theta[0], theta[1], theta[1] - theta[0]];
-        let (here, there) = (apart(&current.theta), apart(&fitted.theta));
-        let shift_s = [0, 1, 2].map(|i| (there[i] - here[i]).abs());
-        Some(Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
+/// How probable an effect is that was fitted with quite other time constants.
+fn unseen_afar(current: &Fitted, candidate: &Candidate, prior: f64) -> Option<Hidden> {
+    let Candidate { effect, fitted, .. } = candidate;
+    let main = effect.main()?;
+    let gain = candidate.white_gain.min(candidate.robust_gain) - (candidate.added - 1) as f64;
+    if gain <= 0.0 || !fitted.end.is_usable() || !candidate.is_clear_of_bounds() {
+        return None;
     }
+    let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
+    let usual = usual_size(effect, main, &start);
+    // So many standard errors make the gain.
+    let error = fitted.theta[current.theta.len() + main].abs() / gain.sqrt();
+    let odds = prior * error / error.hypot(usual) * (0.5 * gain).exp();
+    let apart = |theta: &[f64]| [theta[0], theta[1], theta[1] - theta[0]];
+    let (here, there) = (apart(&current.theta), apart(&fitted.theta));
+    let shift_s = [0, 1, 2].map(|i| (there[i] - here[i]).abs());
+    Some(Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift_s })
 }
 
 /// The size that counts as typical of an effect: that of its scale, or the largest that a search begins with.

@@ -159,9 +159,9 @@ policy! {
     /// Probability that parts of a record seem to disagree on a number of a right model: of the three that are asked most, in
     /// three records of a thousand.
     parts_rejection_probability: f64 = 1e-3,
-    /// Probability, before the record is seen, that it has a certain effect in a certain channel: of some twenty kinds and seats
-    /// one in every other record. Chosen.
-    prior_effect_probability: f64 = 0.025,
+    /// Probability that a record has an effect that the search has not named, all kinds and channels together: chosen, one
+    /// in four, of which each candidate has its share.
+    prior_effect_probability: f64 = 0.25,
     /// Probability that an effect is there unseen which moves a number out of its interval, from which on the number
     /// is right only if there is none: the one in twenty that the interval leaves open itself.
     hidden_effect_probability: f64 = 0.05,
