@@ -116,8 +116,13 @@ An effect is named if it explains the residual whatever the colour of the noise,
 left out of the fit. The errors before and after are measured on other blocks, used neither to choose effects nor to fit.
 Other effects that explain the record equally well are named as alternatives.
 
-Exit codes: 0 diagnosed, 4 the record was refused or does not determine both time constants, 2 wrong usage, 3 the file
-cannot be used, 1 any other error.")]
+Grade of each number:
+  go                may be used, with its interval
+  conditional       right if the assumption holds that is printed with it
+  not given         nothing says how far it may be off (--best-effort prints it all the same)
+
+Exit codes: 0 diagnosed, 4 the record was refused, a time constant is not given, or something is left over and a number is
+not go (with --strict also where a number is conditional), 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
 pub(crate) struct Diagnose {
     #[command(flatten)]
     pub(crate) input: Input,
@@ -509,7 +514,7 @@ pub(crate) struct Simulate {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 NAME is an effect (delay), a verdict (partly-explained), a status (model-rejected), a test of the residual (coherence), or
-two-sensors, which is what two sensors alone can never reveal. A name that is none of these is answered with the list.")]
+two-sensors, which is what two sensors alone can never reveal. Any other name is answered with the list.")]
 pub(crate) struct Explain {
     /// What to explain.
     pub(crate) name: String,

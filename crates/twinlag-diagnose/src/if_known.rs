@@ -72,7 +72,7 @@ pub struct HeldEffect<Channel = usize> {
 }
 
 impl IfKnown {
-    /// The same numbers with the names of the channels.
+    /// What each value would make of the record, with the names of the channels.
     pub fn named(&self, channels: &[String; 2]) -> IfKnown<String> {
         let of_effect = |e: &HeldEffect| HeldEffect {
             effect: e.effect,

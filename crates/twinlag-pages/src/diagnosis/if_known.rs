@@ -33,8 +33,7 @@ impl Page<'_> {
             None => document,
         };
         Ok(document
-            .paragraph("A value from a data sheet settles it. For half a second, known to a fifth of it, the option is")
-            .command("--known T1=0.5s+-20%"))
+            .paragraph("A value from a data sheet, given as known with its deviation, narrows this down to one row."))
     }
 }
 
