@@ -6,13 +6,9 @@
 //! `S₀ = (z + 4 + z⁻¹)/6`, `S₁ = (z − z⁻¹)/(2 Ts)`, so that `S₁/S₀ = s (1 − (ω Ts)⁴/180 + …)`:
 //!
 //! a factor gives `S₀ v + τ S₁ v = S₀ (v + τ v')`. `S₀` cannot be taken off (its inverse is not local), so both
-//! sensors' chains get the same number of factors and are compared with all their `S₀` on. On uneven samples, steps
-//! `h` before and `h'` after each, the spline's own condition that its slope changes smoothly gives both operators:
-//!
-//! `S₀ = (h' z⁻¹ + 2 (h + h') + h z)/(3 (h + h'))`, `S₁ = (h' d + h d')/(h + h')`, `d` and `d'` the slopes of the steps.
-//!
-//! Every value is a local function of a few readings; its derivatives with respect to them are the [`Rows`] that carry
-//! the noise.
+//! sensors' chains get the same number of factors and are compared with all their `S₀` on. On uneven samples the
+//! operators are the mean and the slope of each interval. Every value is a local function of a few readings; its
+//! derivatives with respect to them are the [`Rows`] that carry the noise.
 //!
 //! Chains are computed in plain numbers or in numbers with a derivative ([`crate::Number`]), and keep their memory
 //! from one evaluation to the next.
@@ -24,14 +20,8 @@ use crate::rows::Rows;
 /// How many samples a delay may reach where they are uneven.
 pub(crate) const UNEVEN_REACH: usize = 3;
 
-/// Taps of a factor: a sample and its neighbours.
-const FACTOR_TAPS: usize = 3;
-
 /// Taps of the spline that a delay needs.
 pub(crate) const DELAY_TAPS: usize = 4;
-
-/// Samples that a delay needs where they are uneven: four splines about an instant, the neighbours of each.
-pub(crate) const UNEVEN_DELAY_TAPS: usize = 5;
 
 /// A number that may change along the record.
 #[derive(Clone, Copy)]
@@ -118,14 +108,20 @@ impl<T: Real> Chain<T> {
         &self.time_s[self.skipped..self.skipped + self.len()]
     }
 
+    /// Taps of a factor.
+    fn length(&self) -> usize {
+        if self.period_s.is_some() { 3 } else { 2 }
+    }
+
     /// Values after another factor.
     pub(crate) fn after_factor(&self) -> usize {
-        self.len() + 1 - FACTOR_TAPS
+        self.len() + 1 - self.length()
     }
 
     /// The instant of value `k` after another factor, s.
     pub(crate) fn time_after_factor_s(&self, k: usize) -> f64 {
-        self.times_s()[k + 1]
+        let times_s = self.times_s();
+        if self.period_s.is_some() { times_s[k + 1] } else { 0.5 * (times_s[k] + times_s[k + 1]) }
     }
 
     /// Adds to every value what depends on time alone.
@@ -156,24 +152,37 @@ impl<T: Real> Chain<T> {
 
     /// `S₀ F(v) + τ S₁ G(v)`.
     pub(crate) fn factor(&mut self, tau_s: Along<'_, T>, curves: Curves<'_>) {
-        let count = self.after_factor();
-        if let (Along::Same(tau), None, None, Some(period_s)) = (tau_s, curves.value, curves.slope, self.period_s) {
-            let (mean, difference) = even_operators(period_s);
+        let (count, length) = (self.after_factor(), self.length());
+        let even = self.period_s.map(|t| ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5 / t, 0.0, 0.5 / t]));
+        if let (Along::Same(tau), None, None, Some((mean, difference))) = (tau_s, curves.value, curves.slope, even) {
             let taps = [0, 1, 2].map(|j| T::from(mean[j]) + tau * difference[j]);
             for k in 0..count {
-                let v = &mut self.value[k..k + FACTOR_TAPS];
+                let v = &mut self.value[k..k + 3];
                 v[0] = taps[0] * v[0] + taps[1] * v[1] + taps[2] * v[2];
             }
             self.rows.combine_same(&taps);
         } else {
-            self.factor_each(count, tau_s, curves);
+            self.factor_each(count, length, even, tau_s, curves);
         }
         self.value.truncate(count);
-        self.skipped += 1;
+        if self.period_s.is_some() {
+            self.skipped += 1;
+        } else {
+            for k in 0..count {
+                self.time_s[k] = 0.5 * (self.time_s[k] + self.time_s[k + 1]);
+            }
+        }
     }
 
     /// A factor whose weights change from value to value.
-    fn factor_each(&mut self, count: usize, tau_s: Along<'_, T>, curves: Curves<'_>) {
+    fn factor_each(
+        &mut self,
+        count: usize,
+        length: usize,
+        even: Option<([f64; 3], [f64; 3])>,
+        tau_s: Along<'_, T>,
+        curves: Curves<'_>,
+    ) {
         let Memory { curves: [of_f, of_g], taps } = &mut self.memory;
         for (out, curve) in [(&mut *of_f, curves.value), (&mut *of_g, curves.slope)] {
             out.clear();
@@ -182,30 +191,31 @@ impl<T: Real> Chain<T> {
             }
         }
         taps.clear();
-        let even = self.period_s.map(even_operators);
         for k in 0..count {
             let tau = tau_s.at(k);
-            // Weights of F and of G in value k.
-            let (mean, difference) = even.unwrap_or_else(|| {
-                let times_s = &self.time_s[self.skipped + k..];
-                operators(times_s[1] - times_s[0], times_s[2] - times_s[1])
-            });
             let mut sum = T::from(0.0);
-            for j in 0..FACTOR_TAPS {
+            for j in 0..length {
+                // Weights of F and of G in value k.
+                let (mean, difference) = if let Some((mean, difference)) = even {
+                    (mean[j], difference[j])
+                } else {
+                    let step_s = self.time_s[k + 1] - self.time_s[k];
+                    (0.5, if j == 0 { -1.0 / step_s } else { 1.0 / step_s })
+                };
                 let plain = (self.value[k + j], T::from(1.0));
                 let (f, df) = of_f.get(k + j).copied().unwrap_or(plain);
                 let (g, dg) = of_g.get(k + j).copied().unwrap_or(plain);
-                sum += f * mean[j] + tau * g * difference[j];
-                taps.push(df * mean[j] + tau * dg * difference[j]);
+                sum += f * mean + tau * g * difference;
+                taps.push(df * mean + tau * dg * difference);
             }
             // Later values need those from the next one on.
             self.value[k] = sum;
         }
-        self.rows.combine_each(count, FACTOR_TAPS, taps);
+        self.rows.combine_each(count, length, taps);
     }
 
     /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the
-    /// spline's own values between the samples. On uneven samples the reach is three.
+    /// spline's own values between the samples. On uneven samples other cubics stand in, and the reach is three.
     pub(crate) fn advance(&mut self, delay_s: T, reach: usize) {
         let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
         let shift = delay_s / period_s;
@@ -229,40 +239,42 @@ impl<T: Real> Chain<T> {
         self.skipped += reach + 1;
     }
 
-    /// `S₀` on uneven samples, later by `delay_s`: the cubic B-splines on the samples as knots, which smooth alike wherever between
-    /// the samples an instant lies. Their coefficients are the values at the means of three knots (Schoenberg), which lie beside the
-    /// samples and are taken there along the slope, so that a straight line stays one.
+    /// The values in the middle of each interval, later by `delay_s`: on cubics with the slopes of Catmull and Rom
+    /// between the samples, so that they change smoothly with the delay.
     fn advance_uneven(&mut self, delay_s: T) {
         let reach = UNEVEN_REACH;
-        let span = 2 * reach + UNEVEN_DELAY_TAPS;
-        let middle = reach + 2;
-        let count = self.len() + 1 - span;
-        let times_s = &self.time_s[self.skipped..];
+        let span = 2 * reach + DELAY_TAPS;
+        let count = self.len() - span + 1;
+        let middle_s = |times_s: &[f64], k: usize| 0.5 * (times_s[k + reach + 1] + times_s[k + reach + 2]);
         // The interval that an instant lies in, counted from sample k.
-        let interval = |k: usize| {
-            let at_s = times_s[k + middle] + delay_s.value();
-            times_s[k..k + span].partition_point(|t| *t <= at_s).clamp(3, span - 3) - 1
+        let interval = |times_s: &[f64], k: usize| {
+            let at_s = middle_s(times_s, k) + delay_s.value();
+            times_s[k..k + span].partition_point(|t| *t <= at_s).clamp(2, span - 2) - 1
         };
-        let [low, high] = (0..count).map(interval).fold([span, 0], |[low, high], j| [low.min(j), high.max(j)]);
-        // Samples that any of them reaches: six, and as many more as the intervals differ.
-        let (first, length) = (low - 2, high - low + 6);
+        let intervals = (0..count).map(|k| interval(&self.time_s, k));
+        let [low, high] = intervals.fold([span, 0], |[low, high], j| [low.min(j), high.max(j)]);
+        // Samples that any of them reaches: four, and as many more as the intervals differ.
+        let (first, length) = (low - 1, high - low + DELAY_TAPS);
         let taps = &mut self.memory.taps;
         taps.clear();
         taps.resize(count * length, T::from(0.0));
         for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
-            let j = interval(k) - first;
-            let window = &times_s[k + first..k + first + length];
-            let mut at = delay_s + times_s[k + middle];
-            if at.value() < window[j] || at.value() > window[j + 1] {
-                at = T::from(at.value().clamp(window[j], window[j + 1]));
+            let j = interval(&self.time_s, k) - first;
+            let window = &self.time_s[k + first..k + first + length];
+            let at = delay_s + middle_s(&self.time_s, k);
+            let step_s = window[j + 1] - window[j];
+            let mut u = (at - window[j]) / step_s;
+            if u.value() < 0.0 || u.value() > 1.0 {
+                u = T::from(u.value().clamp(0.0, 1.0));
             }
-            for (c, weight) in (j - 1..).zip(b_splines(at, &window[j - 2..j + 4])) {
-                let (before_s, after_s) = (window[c] - window[c - 1], window[c + 1] - window[c]);
-                let (_, slope) = operators(before_s, after_s);
-                taps[c] += weight;
-                for (tap, per_s) in taps[c - 1..].iter_mut().zip(slope) {
-                    *tap += weight * (per_s * (after_s - before_s) / 3.0);
-                }
+            let one = T::from(1.0);
+            taps[j] += (one + u * 2.0) * (one - u) * (one - u);
+            taps[j + 1] += (T::from(3.0) - u * 2.0) * u * u;
+            // The slope at a sample is that from the one before it to the one after it.
+            for (i, weight) in [(j, u * (one - u) * (one - u)), (j + 1, -(u * u * (one - u)))] {
+                let per_k = weight * (step_s / (window[i + 1] - window[i - 1]));
+                taps[i + 1] += per_k;
+                taps[i - 1] -= per_k;
             }
         }
         for (k, taps) in taps.chunks_exact(length).enumerate() {
@@ -272,7 +284,10 @@ impl<T: Real> Chain<T> {
             }
             self.value[k] = sum;
         }
-        self.skipped += middle;
+        for k in 0..count {
+            // Instants before this one are needed no more.
+            self.time_s[k] = middle_s(&self.time_s, k);
+        }
         self.value.truncate(count);
         self.rows.skip(first);
         self.rows.combine_each(count, length, taps);
@@ -288,34 +303,6 @@ impl<T: Real> Chain<T> {
         self.rows.difference(rho, count);
         self.skipped += 1;
     }
-}
-
-/// `S₀` and `S₁` at a sample `before_s` after one and `after_s` before the other of its neighbours.
-fn operators(before_s: f64, after_s: f64) -> ([f64; FACTOR_TAPS], [f64; FACTOR_TAPS]) {
-    let both_s = before_s + after_s;
-    let (first, last) = (after_s / (before_s * both_s), before_s / (after_s * both_s));
-    ([after_s / (3.0 * both_s), 2.0 / 3.0, before_s / (3.0 * both_s)], [-first, first - last, last])
-}
-
-/// `S₀` and `S₁` on even samples.
-fn even_operators(period_s: f64) -> ([f64; FACTOR_TAPS], [f64; FACTOR_TAPS]) {
-    ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5 / period_s, 0.0, 0.5 / period_s])
-}
-
-/// The four cubic B-splines that reach the instant `at_s` between the third and the fourth of six knots (de Boor and Cox).
-fn b_splines<T: Real>(at_s: T, knots_s: &[f64]) -> [T; 4] {
-    let mut out = [T::from(1.0), T::from(0.0), T::from(0.0), T::from(0.0)];
-    for degree in 1..4 {
-        let mut carried = T::from(0.0);
-        for (i, spline) in out.iter_mut().enumerate().take(degree) {
-            let (from_s, to_s) = (knots_s[3 + i - degree], knots_s[3 + i]);
-            let share = *spline * (1.0 / (to_s - from_s));
-            *spline = carried + (T::from(to_s) - at_s) * share;
-            carried = (at_s - from_s) * share;
-        }
-        out[degree] = carried;
-    }
-    out
 }
 
 fn through<T: Real>(curve: &Curve, v: T) -> (T, T) {
@@ -346,30 +333,6 @@ mod tests {
         for (v, t) in got.value.iter().zip(got.times_s()) {
             let want = smooth * ((omega * t).sin() + omega * tau_s * (omega * t).cos());
             assert!((v - want).abs() < 2e-7, "at {t}: got {v}, want {want}");
-        }
-    }
-
-    /// A cubic is a spline on any samples, so its slope is the one that `S₁` takes for it: `S₀ v + τ S₁ v = S₀ (v + τ v')`. Values of
-    /// some 4e5 at most lose 1e-16 of themselves in each of ten operations, and `S₁` divides by half a step: 2e-9 with all of one
-    /// sign.
-    #[test]
-    fn a_factor_is_exact_for_cubics_on_uneven_samples() {
-        let times: Vec<f64> = (0..60).map(|k| f64::from(k) + 0.3 * f64::from(k % 3)).collect();
-        let (value, slope) = (|t: f64| t * (t * (2.0 * t - 5.0) + 7.0), |t: f64| t * (6.0 * t - 10.0) + 7.0);
-        let tau_s = 1.7;
-        let mut got = chain(value, times.clone(), None);
-        got.factor(Along::Same(tau_s), Curves::default());
-        let mut want = chain(|t| value(t) + tau_s * slope(t), times.clone(), None);
-        want.factor(Along::Same(0.0), Curves::default());
-        assert_eq!(got.times_s(), &times[1..59]);
-        for ((got, want), t) in got.value.iter().zip(&want.value).zip(&times[1..]) {
-            assert!((got - want).abs() < 2e-9, "at {t}: got {got}, want {want}");
-        }
-        // And S₀ takes a line to itself.
-        let mut line = chain(|t| 3.0 - 0.5 * t, times, None);
-        line.factor(Along::Same(0.0), Curves::default());
-        for (got, t) in line.value.iter().zip(line.times_s()) {
-            assert!((got - (3.0 - 0.5 * t)).abs() < 1e-13, "at {t}: got {got}");
         }
     }
 

@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use crate::chain::{Chain, DELAY_TAPS, UNEVEN_DELAY_TAPS, UNEVEN_REACH};
+use crate::chain::{Chain, DELAY_TAPS, UNEVEN_REACH};
 use crate::number::{Curve, Number, TimeFunction};
 use crate::observations::{Observations, Stretch};
 
@@ -184,9 +184,9 @@ impl Plant {
     pub fn consumed(&self, is_even: bool) -> usize {
         let of_sensor = |s: &Sensor| usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some());
         let factors: usize = self.sensors.iter().map(of_sensor).sum();
-        let (reach, taps) = if is_even { (self.reach, DELAY_TAPS) } else { (UNEVEN_REACH, UNEVEN_DELAY_TAPS) };
-        let delay = if self.delay_s.is_some() { 2 * reach + taps - 1 } else { 0 };
-        2 * (1 + factors) + delay + self.extra.len()
+        let (each, delay) = if is_even { (2, 2 * self.reach) } else { (1, 2 * UNEVEN_REACH) };
+        let delay = if self.delay_s.is_some() { delay + DELAY_TAPS - 1 } else { 0 };
+        each * (1 + factors) + delay + self.extra.len()
     }
 
     /// The temperatures of both sensors: readings without what calibration, lines and crosstalk make of them, °C.

@@ -3,7 +3,7 @@
 use twinlag_cross_relation::{Parameter, TestName};
 use twinlag_diagnose::{Identifier, Judgements, ModelFit, TimeConstant};
 use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
-use twinlag_record::Record;
+use twinlag_record::{Record, SamplingKind};
 
 use crate::answers::{
     Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, NamedEffect, RecordSummary,
@@ -44,7 +44,7 @@ impl FittedAnswer<'_> {
             record: RecordSummary::of(record),
             estimator: ESTIMATOR.into(),
             optimiser: fit.fit.optimiser.clone(),
-            hold: "cubic-spline".into(),
+            hold: if record.sampling.kind == SamplingKind::Irregular { "bilinear" } else { "cubic-spline" }.into(),
             hold_sensitivity: None,
             sensors: [self.sensor(0), self.sensor(1)],
             time_constant_difference_s: Difference {
