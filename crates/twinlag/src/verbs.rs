@@ -7,9 +7,17 @@ mod live;
 mod track;
 mod with_model;
 
+use twinlag_diagnose::Judgement;
+
 pub use characterise::{characterise, characterise_watched, readings};
 pub use compensate::{CompensateOptions, compensate, compensate_watched};
 pub use diagnose::{DiagnoseOptions, diagnose, diagnose_watched};
 pub use live::{Live, LiveAnswer, LiveOptions};
 pub use track::{TrackOptions, track, track_watched};
 pub use with_model::characterise_with;
+
+/// The judgement of what follows from both time constants.
+fn following_both(channels: &[String; 2], judgements: [&Judgement; 2]) -> Judgement {
+    let names = channels.each_ref().map(|channel| format!("the time constant of {channel}"));
+    Judgement::following(names.iter().map(String::as_str).zip(judgements))
+}

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::Rows;
 use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, with_effects};
+use crate::verbs::following_both;
 use crate::verbs::with_model::with_model;
 use crate::watch::{Stop, UNWATCHED, Watch};
 
@@ -117,9 +118,7 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>) -> Judgement {
     if verdict == Some(Verdict::Refused) {
         return Judgement::of(&[Reason::Refused]);
     }
-    let sensors = last.sensors.iter().map(|s| (format!("the time constant of {}", s.channel), &s.judgement));
-    let named: Vec<(String, &Judgement)> = sensors.collect();
-    Judgement::following(named.iter().map(|(name, judgement)| (name.as_str(), *judgement)))
+    following_both(&last.record.channels, last.sensors.each_ref().map(|sensor| &sensor.judgement))
 }
 
 /// Writes the gas temperature into the answer.

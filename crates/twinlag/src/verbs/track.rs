@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, known_time_constants};
 use crate::setting::Setting;
-use crate::verbs::characterise;
+use crate::verbs::{characterise, following_both};
 use crate::watch::{UNWATCHED, Watch};
 
 /// Below this chance the ratio does not stay.
@@ -129,8 +129,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         sensors.filter(is_any)
     };
     let (is_determined, sensors) = (sensors(1.0).is_some(), sensors(widened_by));
-    let named = [0, 1].map(|i| (format!("the time constant of {}", record.channels[i]), &judgements.time_constants[i]));
-    let numbers = Judgement::following(named.iter().map(|(name, judgement)| (name.as_str(), *judgement)));
+    let numbers = following_both(&record.channels, judgements.time_constants.each_ref());
     let mut judgement = Judgement::of(&circumstances.whole_basis().reasons).and_following(numbers);
     if !is_determined || (sensors.is_none() && judgement.grade != Grade::NoGo) {
         judgement = Judgement::of(&[Reason::NotDetermined]);
@@ -161,12 +160,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     };
     let mut last = fitted.characterisation(status);
     last.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
-    let (change, coefficients) = match found.change {
-        _ if sensors.is_none() => ("unknown", None),
-        Change::Smooth(size) => ("smooth", Some(size)),
-        Change::Step => ("step", None),
-        _ => ("constant", None),
-    };
+    let (change, coefficients) = if sensors.is_some() { name_of(found.change) } else { ("unknown", None) };
     Ok(Track {
         schema: Track::SCHEMA.into(),
         status,
@@ -182,6 +176,15 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
         last,
         warnings,
     })
+}
+
+/// The name of a change, and its coefficients where it is smooth.
+fn name_of(change: Change) -> (&'static str, Option<usize>) {
+    match change {
+        Change::Smooth(size) => ("smooth", Some(size)),
+        Change::Step => ("step", None),
+        _ => ("constant", None),
+    }
 }
 
 /// What to know of a track of a model that is contradicted.

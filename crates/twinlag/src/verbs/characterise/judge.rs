@@ -1,7 +1,7 @@
 //! Whether the numbers of a characterisation may be used.
 
 use twinlag_cross_relation::{Parameter, PartScatter, sandwich};
-use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
+use twinlag_diagnose::{Basis, Judgement, Number, Policy, Reason};
 use twinlag_estimate::{Estimator, Known};
 
 use super::conclude::Conclusion;
@@ -132,12 +132,5 @@ impl<'c, const P: usize> Scattering<'c, P> {
         let influences: Vec<Vec<f64>> =
             self.derivatives.iter().map(|run| run.iter().map(influence).collect()).collect();
         PartScatter::of(&self.residual, &influences, variance.max(0.0).sqrt())
-    }
-}
-
-impl Characterisation {
-    /// Whether a number that was asked for is not given.
-    pub fn has_no_go(&self) -> bool {
-        self.sensors.iter().any(|s| s.judgement.grade == Grade::NoGo)
     }
 }
