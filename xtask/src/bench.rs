@@ -10,7 +10,6 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use twinlag::signal::Rig;
 use twinlag::signal::undeclared::{Kind, undeclared};
 use twinlag::{DiagnoseOptions, diagnose};
 use twinlag_experiment::{Experiment, Plan};
@@ -159,13 +158,7 @@ fn closed_loop() -> Result<()> {
         let drawn = undeclared(&[kind], 1.0, None, 1)?;
         let mut sampled = drawn.rig.record().clone();
         sampled.samples = LONG;
-        let mut rig = Rig::new(drawn.rig.seed(), sampled, drawn.rig.gas().clone(), drawn.rig.sensors().clone())?;
-        if let Some(flow) = drawn.rig.flow() {
-            rig = rig.with_flow(*flow)?;
-        }
-        if let Some(mismatch) = drawn.rig.mismatch() {
-            rig = rig.with_mismatch(mismatch.clone())?;
-        }
+        let rig = drawn.rig.with_record(sampled)?;
         // Without the reference: that it is scored against costs two smoothers more.
         let mut record = record_of(rig.simulate()?)?;
         record.reference_c = None;

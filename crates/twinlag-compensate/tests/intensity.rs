@@ -125,7 +125,8 @@ fn case(signal: Signal, seed: u64) -> Case {
     Case { readings, rig: Rig::new(tau_s.map(|tau_s| Sensor::new(tau_s, NOISE_K))), gas_c: record.gas_c }
 }
 
-/// Between plunges the gas rests: both error and band become smaller, and jumps are no longer outside.
+/// Between plunges the gas rests: with the intensity of rest its error is smaller than with a constant one, and more of the jumps lie
+/// inside their bands.
 #[test]
 fn a_gas_that_rests_and_jumps_has_an_intensity() {
     let case = case(Signal::Plunge(Plunge { amplitude_k: 17.0, dwell_s: 0.3, rise_s: 0.02 }), 4);

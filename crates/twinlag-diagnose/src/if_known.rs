@@ -14,8 +14,6 @@ use crate::naming::name;
 
 /// The shortest value, in sample periods: a thermistor of half a second that is read every ten or twenty.
 const SHORTEST_STEPS: f64 = 0.02;
-/// The longest value, in lengths of the record: of what lasts longer the record shows no more than the beginning.
-const LONGEST_SPANS: f64 = 0.1;
 /// Values of the grid: four for each decade from a fiftieth of a sample period to a tenth of a record of a thousand samples, less
 /// of a longer one. Chosen, each costs a fit.
 const POINTS: usize = 15;
@@ -97,9 +95,10 @@ impl IfKnown {
     }
 }
 
-/// The values of the grid, s.
-fn grid_s(observations: &Observations) -> Vec<f64> {
-    let (shortest_s, longest_s) = (SHORTEST_STEPS * observations.step_s(), LONGEST_SPANS * observations.span_s());
+/// The values of the grid, s: up to the longest time constant that is given.
+fn grid_s(observations: &Observations, policy: &Policy) -> Vec<f64> {
+    let shortest_s = SHORTEST_STEPS * observations.step_s();
+    let longest_s = policy.longest_given_share * observations.span_s();
     (0..POINTS).map(|i| shortest_s * (longest_s / shortest_s).powf(i as f64 / (POINTS - 1) as f64)).collect()
 }
 
@@ -118,7 +117,7 @@ pub(crate) fn if_known(
     if (0..2).any(|i| free.model.knows_of(i)) {
         return None;
     }
-    let grid_s = grid_s(&state.prepared.observations);
+    let grid_s = grid_s(&state.prepared.observations, policy);
     // From where the free fit is outwards, each from its neighbour.
     let middle = grid_s.partition_point(|tau_s| *tau_s < free.theta[0]);
     let (below, above) = grid_s.split_at(middle);

@@ -1,6 +1,6 @@
 //! In which unit a column of time counts, where its header names none.
 //!
-//! Seconds are assumed, as ever, unless the numbers cannot be seconds: instants of today in
+//! Seconds are assumed unless the numbers cannot be seconds: instants of today in
 //! milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and MATLAB
 //! count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
 //! stay, with a question; where none fits, the column is refused. A factor of 1000 in time is a

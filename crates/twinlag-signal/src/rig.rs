@@ -106,6 +106,22 @@ impl Rig {
         Self { flow: Some(flow), ..self }.checked()
     }
 
+    /// This rig, recorded with other numbers: how long, how often.
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_record(self, record: Record) -> Result<Self, SignalError> {
+        Self { record, ..self }.checked()
+    }
+
+    /// This rig with other sensors in the place of its own.
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_sensors(self, sensors: [Sensor; 2]) -> Result<Self, SignalError> {
+        Self { sensors, ..self }.checked()
+    }
+
     /// This rig with a different gas for one of the sensors.
     ///
     /// # Errors

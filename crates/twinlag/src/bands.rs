@@ -25,8 +25,8 @@ const MAX_INNOVATION_EXCESS: f64 = 4.0;
 const NOISE_INFLATION_STEP: f64 = 1.05;
 /// Most steps by which noise is made louder.
 const MAX_NOISE_INFLATIONS: usize = 6;
-/// What is left at least of a variance when the motion beyond half the sampling rate is taken off: there
-/// rounding and changing intensity may make that larger than the whole.
+/// Share of a variance that is left at least when the motion beyond half the sampling rate is taken off, which
+/// rounding or a changing intensity may make larger than the whole. Chosen.
 const LEAST_VARIANCE_SHARE: f64 = 0.05;
 
 /// The gas with everything that its bands rest on.

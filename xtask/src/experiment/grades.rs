@@ -12,7 +12,6 @@ use serde::{Deserialize, Serialize};
 use twinlag::cross_relation::Z_975;
 use twinlag::diagnosis::{Grade, Judgement};
 use twinlag::record::Record;
-use twinlag::signal::Rig;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{Characterisation, DiagnoseOptions, NamedEffect, Options, characterise, diagnose};
 use twinlag_report::{Axis, Chart, Figure, Reference, Series};
@@ -124,14 +123,7 @@ impl Group {
         for noise in sensors.iter_mut().filter_map(|s| s.noise.as_mut()) {
             noise.std_k *= self.noise_factor.unwrap_or(1.0);
         }
-        let mut rig = Rig::new(drawn.rig.seed(), record, drawn.rig.gas().clone(), sensors)?;
-        if let Some(flow) = drawn.rig.flow() {
-            rig = rig.with_flow(*flow)?;
-        }
-        if let Some(mismatch) = drawn.rig.mismatch() {
-            rig = rig.with_mismatch(mismatch.clone())?;
-        }
-        drawn.rig = rig;
+        drawn.rig = drawn.rig.with_record(record)?.with_sensors(sensors)?;
         Ok(drawn)
     }
 }
