@@ -101,7 +101,8 @@ impl Known {
     /// Short names in texts, in the order of [`Parameter::ALL`].
     pub const SHORT_NAMES: [&'static str; 6] = ["T1", "T2", "gain", "offset", "T1.second", "T2.second"];
 
-    fn name(&self) -> &'static str {
+    /// The name of its parameter, one of [`Known::NAMES`].
+    pub fn name(&self) -> &'static str {
         Self::NAMES[Parameter::ALL.iter().position(|p| *p == self.parameter).unwrap_or(0)]
     }
 

@@ -1,6 +1,6 @@
 //! Whether the numbers of a characterisation may be used.
 
-use twinlag_cross_relation::{Parameter, PartScatter, sandwich};
+use twinlag_cross_relation::{PartScatter, sandwich};
 use twinlag_diagnose::{Basis, Judgement, Number, Policy, Reason};
 use twinlag_estimate::{Estimator, Known};
 
@@ -87,9 +87,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
 
 /// What was given, for the reader.
 fn given(known: &Known) -> String {
-    let name = Parameter::ALL.iter().position(|p| *p == known.parameter).map_or("it", |i| Known::NAMES[i]);
     let spread = known.std.map_or(String::new(), |std| format!(" ± {std}"));
-    format!("{name} = {}{spread}", known.value)
+    format!("{} = {}{spread}", known.name(), known.value)
 }
 
 /// What each residual does to the parameters.
