@@ -207,7 +207,7 @@ fn readings_at_a_limit_are_listed_by_their_lines_and_times() {
     assert!(shown.contains(&format!("left out of T1: rows {first}")), "{shown}");
 }
 
-/// While something is left over, no effect is excluded; and what no record reveals is told by another command.
+/// While something is left over, no effect is excluded; and another command says what no record reveals.
 #[test]
 fn nothing_is_excluded_while_something_is_left_over() {
     let bench = offset("excluded");

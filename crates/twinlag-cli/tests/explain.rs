@@ -24,7 +24,7 @@ fn names_of_every_kind_are_explained() {
     }
 }
 
-/// `calibration` is an effect and a test: both are told.
+/// `calibration` is an effect and a test: both are explained.
 #[test]
 fn a_name_of_two_things_is_explained_twice() {
     let answer = Bench::new("two_things").run(&["explain", "calibration"]);
