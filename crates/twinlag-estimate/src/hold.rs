@@ -8,10 +8,6 @@ use crate::fitting::polish;
 use crate::task::Task;
 use crate::whitened::WhitenedFit;
 
-/// The other hold is clearly better where it lowers the sum of squares by this many times the
-/// residual's energy per degree of freedom: a likelihood ratio of `exp(5)`, 150.
-const CLEARLY_BETTER_CHI2: f64 = 10.0;
-
 /// The hold to compare with: a straight line between samples, or none where that is the one there
 /// is.
 pub fn other_hold(hold: Discretisation) -> Discretisation {
@@ -33,8 +29,8 @@ impl<const P: usize> WhitenedFit<'_, P> {
     /// let task = Task::new(&readings);
     /// let fit = WhitenedFit::<2>::find(&task)?;
     /// let other = fit.with_hold(other_hold(task.hold))?;
-    /// // The gas of this record is held between samples, and straight lines explain it worse.
-    /// assert!(!other.is_clearly_better_than(&fit) && fit.energy() < other.energy());
+    /// // The gas of this record moves little between samples, which do not show what it does there.
+    /// assert!((0.1..0.9).contains(&other.probability_beside(&fit)));
     /// # Ok::<(), twinlag_estimate::EstimateError>(())
     /// ```
     pub fn with_hold(&self, hold: Discretisation) -> Result<Self, EstimateError> {
@@ -53,9 +49,11 @@ impl<const P: usize> WhitenedFit<'_, P> {
         })
     }
 
-    /// Whether this fit explains the record clearly better than `other` does, one with another hold
-    /// at the same noise.
-    pub fn is_clearly_better_than(&self, other: &Self) -> bool {
-        self.value() + CLEARLY_BETTER_CHI2 * other.energy_of_assumed_noise().max(1.0) < other.value()
+    /// Probability that the hold of this fit is the right one and not that of `other`, a fit at the same noise:
+    /// `1/(1 + exp(½ (χ² − χ²_other)/e))`, with `e` the energy per degree of freedom that the fit of `other` leaves, at
+    /// least one. Both are equally probable before the readings.
+    pub fn probability_beside(&self, other: &Self) -> f64 {
+        let energy = other.energy_of_assumed_noise().max(1.0);
+        (1.0 + (0.5 * (self.value() - other.value()) / energy).exp()).recip()
     }
 }

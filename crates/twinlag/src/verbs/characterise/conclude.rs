@@ -5,7 +5,7 @@ use twinlag_cross_relation::{ResidualTest, ScoreVariance};
 use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
 use twinlag_optimise::{End, Fit};
 
-use super::{Asked, bootstrap};
+use super::{Asked, OtherHold, bootstrap};
 use crate::answers::{Characterisation, IntervalMethod, Status};
 use crate::error::Error;
 
@@ -32,7 +32,7 @@ pub(super) struct Conclusion<'q, 'a, const P: usize> {
     pub(super) best: Fit,
     pub(super) levels: NoiseLevels,
     pub(super) judged: Judged,
-    pub(super) hold_sensitivity: Option<[f64; 2]>,
+    pub(super) other_hold: Option<OtherHold>,
     pub(super) warnings: Vec<String>,
 }
 
@@ -42,7 +42,7 @@ pub(super) fn conclude<const P: usize>(
     fit: &WhitenedFit<'_, P>,
     solved: Solved<P>,
     judged: Judged,
-    hold_sensitivity: Option<[f64; 2]>,
+    other_hold: Option<OtherHold>,
     warnings: Vec<String>,
 ) -> Result<Characterisation, Error> {
     let best = solved.fit.clone().unwrap_or_else(|| Fit {
@@ -59,7 +59,7 @@ pub(super) fn conclude<const P: usize>(
         (Some(_), Some(std_k)) => fit.levels().profiled(std_k),
         _ => *fit.levels(),
     };
-    Conclusion { asked, fit, solved, best, levels, judged, hold_sensitivity, warnings }.answer()
+    Conclusion { asked, fit, solved, best, levels, judged, other_hold, warnings }.answer()
 }
 
 impl<const P: usize> Conclusion<'_, '_, P> {

@@ -5,6 +5,7 @@ use twinlag_diagnose::Judgement;
 use twinlag_estimate::{Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals};
 use twinlag_sensor::Discretisation;
 
+use super::OtherHold;
 use super::conclude::Conclusion;
 use crate::answers::{
     Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
@@ -31,7 +32,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             estimator: self.asked.options.estimator.name().into(),
             optimiser: self.best.optimiser.clone(),
             hold: hold_name(self.fit.whitened().hold()).into(),
-            hold_sensitivity: self.hold_sensitivity,
+            hold_sensitivity: self.other_hold.map(|other| other.moved),
             sensors: [self.unknown_sensor(0), self.unknown_sensor(1)],
             time_constant_difference_s: Difference::default(),
             free: FreeParameters::default(),
@@ -82,10 +83,11 @@ impl<const P: usize> Conclusion<'_, '_, P> {
 
     /// Estimates and intervals of both time constants and of their difference.
     pub(super) fn fill(&mut self, out: &mut Characterisation, covariance: &[[f64; P]; P], intervals: &TauIntervals) {
-        let (theta, hold_sensitivity) = (self.solved.theta, self.hold_sensitivity);
-        // The two holds bracket what the gas does between samples: half their difference counts as
-        // a standard error.
-        let from_hold: [f64; 2] = hold_sensitivity.map_or([0.0; 2], |m| [0.5 * m[0] * theta[0], 0.5 * m[1] * theta[1]]);
+        let theta = self.solved.theta;
+        // The mean square error that the hold makes is that of the other one times its probability.
+        let from_hold: [f64; 2] = self.other_hold.map_or([0.0; 2], |OtherHold { moved, probability }| {
+            [0, 1].map(|i| probability.sqrt() * moved[i] * theta[i])
+        });
         for i in 0..2 {
             let sensor = &mut out.sensors[i];
             sensor.time_constant_s = Some(theta[i]);
@@ -106,7 +108,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                     "{}: the assumption about the gas between samples changes the time constant by \
                      {:.2} %, which is part of the interval; sample faster",
                     sensor.channel,
-                    100.0 * hold_sensitivity.map_or(0.0, |m| m[i]).abs()
+                    100.0 * self.other_hold.map_or(0.0, |other| other.moved[i]).abs()
                 ));
             }
         }

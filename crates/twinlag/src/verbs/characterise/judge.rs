@@ -13,7 +13,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     /// - `covariance`: that the intervals rest on; `None` where there is none
     pub(super) fn judge(&self, out: &mut Characterisation, covariance: Option<&[[f64; P]; P]>) {
         let policy = Policy::default();
-        let basis = self.basis(out, &policy);
+        let basis = self.basis(out);
         let most_s = policy.longest_given_share * self.span_s();
         let scatter = covariance.filter(|_| self.is_whitened()).map(|c| Scattering::of(self, c));
         let of = |sum: &[(usize, f64)]| scatter.as_ref().and_then(|s| s.between_parts(sum));
@@ -52,21 +52,12 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     }
 
     /// What all numbers rest on.
-    fn basis(&self, out: &Characterisation, policy: &Policy) -> Basis {
+    fn basis(&self, out: &Characterisation) -> Basis {
         let mut basis = Basis::default();
         let options = self.asked.options;
         if self.judged.is_rejected || out.status == Status::ModelRejected {
-            let count: f64 = self.fit.whitened().terms(&self.solved.theta) as f64;
-            let share = out.residual.chi2_per_dof.filter(|_| self.levels.energy_as_found.is_none()).map(|e| e - 1.0);
-            // Of a residual that is louder than noise by little the interval covers all.
-            match share.filter(|share| (0.0..=policy.explained_excess_share).contains(share)) {
-                Some(share) => {
-                    basis.excess_energy = share * count;
-                    basis.reasons.push(Reason::LeavesSome { share });
-                }
-                None if options.known.is_empty() => basis.reasons.push(Reason::LeftOver),
-                None => basis.reasons.push(Reason::LeftOverAside),
-            }
+            // What is missing and goes with a time constant is not in the residual, so that bounds nothing here.
+            basis.reasons.push(if options.known.is_empty() { Reason::LeftOver } else { Reason::LeftOverAside });
         }
         let is_biased = matches!(
             options.estimator,
