@@ -31,28 +31,17 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut base = base_fit(&state, unmasked.as_ref(), policy);
     let with_effects = to_the_end(&state.current, &state);
     let mut last = summary(&with_effects, &state, policy);
-    let mut remarks: Vec<Remark> = Vec::new();
-    for remark in state.moves.iter().filter_map(Move::remark) {
-        if !remarks.contains(&remark) {
-            remarks.push(remark);
-        }
-    }
+    let mut remarks = remarks_of(&state.moves);
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
-    // Each with its place in the model, if it is in there.
-    let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, &last)));
-    let mut found: Vec<(Option<usize>, Found)> = defects.collect();
-    let named = state.taken.iter().enumerate();
-    found.extend(named.map(|(index, taken)| (Some(index), name(index, taken, &with_effects, &last))));
+    let mut found = found(&state, &with_effects, &last);
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
         remarks.push(Remark::LagAlone);
     }
     let is_refused = tones == Some(SINGLE);
-    if is_refused {
-        remarks.push(Remark::SingleTone);
-    }
+    remarks.extend(is_refused.then_some(Remark::SingleTone));
     let is_coherent =
         last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
     if is_coherent && found.iter().any(|(_, f)| f.effect.is_noise()) {
@@ -65,10 +54,11 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let excess = excess(&last, has_noise).filter(|excess| excess.share <= policy.explained_excess_share);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
     let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
+    let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
     let basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
     let span_s = state.prepared.observations.span_s();
-    let hidden = if matches!(verdict, Verdict::Adequate | Verdict::Explained) {
+    let hidden = if is_whole {
         state.search().beside(&state.current).hidden(&state.current, &state.far, half_intervals(&last))?
     } else {
         [None; 3]
@@ -81,38 +71,28 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     } else {
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
     };
-    let found: Vec<Found> = found
-        .into_iter()
-        .map(|(index, mut found)| {
-            if let Some(index) = index {
-                let scatter = &last.scatter[with_effects.model.range(index)];
-                judge_effect(&mut found, with_effects.model.effects[index].parameters(), scatter, &circumstances);
-            }
-            found
-        })
-        .collect();
-    let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
+    let effects = judged(found, &with_effects, &last, &circumstances);
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
     let if_known = if is_refused || (is_whole && is_given) {
         None
     } else {
         if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
     };
-    if matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained) && left.is_some() {
+    let unexplained = left.filter(|_| !is_whole && !is_refused);
+    if unexplained.is_some() {
         remarks.push(Remark::BiasUnknown);
     }
     remarks.sort_by_key(Remark::importance);
     // What is left over may hide an effect of any size.
-    let can_exclude = matches!(verdict, Verdict::Adequate | Verdict::Explained);
-    let limits = if can_exclude { state.search().limits(&state.current)? } else { Vec::new() };
+    let limits = if is_whole { state.search().limits(&state.current)? } else { Vec::new() };
     Ok(Diagnosis {
         verdict,
-        effects: found,
+        effects,
         error: errors(&state, unmasked.as_ref(), [&base, &last]),
         base,
         last,
-        unexplained: left.filter(|_| matches!(verdict, Verdict::PartlyExplained | Verdict::Unexplained)),
-        explained_to: excess.filter(|_| matches!(verdict, Verdict::Adequate | Verdict::Explained)).map(|e| e.share),
+        unexplained,
+        explained_to: excess.filter(|_| is_whole).map(|e| e.share),
         judgements,
         base_judgements,
         not_testable: not_testable(&state.prepared.observations, tones, policy),
@@ -162,6 +142,41 @@ fn whole_ties<'a>(state: &'a State<'_>) -> Vec<Tie<'a>> {
 /// Effects that are no noise.
 fn effects(state: &State<'_>) -> usize {
     state.taken.iter().filter(|t| !t.candidate.effect.is_noise()).count()
+}
+
+/// What the moves of the search ask to be said, once each.
+fn remarks_of(moves: &[Move]) -> Vec<Remark> {
+    let mut out: Vec<Remark> = Vec::new();
+    for remark in moves.iter().filter_map(Move::remark) {
+        if !out.contains(&remark) {
+            out.push(remark);
+        }
+    }
+    out
+}
+
+/// Defects and effects, each with its place in the model `last`, if it is in there.
+fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
+    let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, fit)));
+    let named = state.taken.iter().enumerate();
+    defects.chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
+}
+
+/// Effects with the grades of their numbers, by their places in the model `last`.
+fn judged(
+    found: Vec<(Option<usize>, Found)>,
+    last: &Fitted,
+    fit: &ModelFit,
+    circumstances: &Circumstances<'_>,
+) -> Vec<Found> {
+    let of_place = |(index, mut found): (Option<usize>, Found)| {
+        if let Some(index) = index {
+            let scatter = &fit.scatter[last.model.range(index)];
+            judge_effect(&mut found, last.model.effects[index].parameters(), scatter, circumstances);
+        }
+        found
+    };
+    found.into_iter().map(of_place).collect()
 }
 
 /// Half the intervals of both time constants and of their difference, s.
