@@ -79,23 +79,7 @@ impl<const D: usize> System<D> {
         for term in terms {
             let at = take(term.states());
             gas[at] = 1.0;
-            match *term {
-                Term::Rough { std_k, corner_hz } => {
-                    let rate = core::f64::consts::TAU * corner_hz;
-                    rates[(at, at)] = -rate;
-                    drive[(at, at)] = 2.0 * rate * std_k * std_k;
-                    before[(at, at)] = std_k * std_k;
-                }
-                Term::Resonance { std_k, frequency_hz, quality } => {
-                    let rate = core::f64::consts::TAU * frequency_hz;
-                    rates[(at, at + 1)] = rate;
-                    rates[(at + 1, at)] = -rate;
-                    rates[(at + 1, at + 1)] = -rate / quality;
-                    drive[(at + 1, at + 1)] = 2.0 * rate / quality * std_k * std_k;
-                    before[(at, at)] = std_k * std_k;
-                    before[(at + 1, at + 1)] = std_k * std_k;
-                }
-            }
+            move_gas(term, at, [&mut rates, &mut drive, &mut before]);
         }
         #[cfg(feature = "std")]
         let (drive_of_gas, lines) = changing(terms, &drive);
@@ -277,6 +261,27 @@ fn exponential<const D: usize>(rates: &SMatrix<f64, D, D>, drive: &SMatrix<f64, 
         transition = product(&transition, &transition);
     }
     Step { transition, added }
+}
+
+/// Adds a term of the gas whose first state is `at` to the rates, the drive and the covariance before the first reading.
+fn move_gas<const D: usize>(term: &Term, at: usize, [rates, drive, before]: [&mut SMatrix<f64, D, D>; 3]) {
+    match *term {
+        Term::Rough { std_k, corner_hz } => {
+            let rate = core::f64::consts::TAU * corner_hz;
+            rates[(at, at)] = -rate;
+            drive[(at, at)] = 2.0 * rate * std_k * std_k;
+            before[(at, at)] = std_k * std_k;
+        }
+        Term::Resonance { std_k, frequency_hz, quality } => {
+            let rate = core::f64::consts::TAU * frequency_hz;
+            rates[(at, at + 1)] = rate;
+            rates[(at + 1, at)] = -rate;
+            rates[(at + 1, at + 1)] = -rate / quality;
+            drive[(at + 1, at + 1)] = 2.0 * rate / quality * std_k * std_k;
+            before[(at, at)] = std_k * std_k;
+            before[(at + 1, at + 1)] = std_k * std_k;
+        }
+    }
 }
 
 /// Whether a term is a line: a movement that goes on for more than three cycles, in which the present
