@@ -69,7 +69,7 @@ pub(crate) enum Command {
     /// results.
     #[command(subcommand)]
     Study(Study),
-    /// Explain an effect, a verdict, a status or a test in plain words, or what two sensors can never reveal.
+    /// Explain an effect, a verdict, a status, a grade or a test in plain words, or what two sensors can never reveal.
     Explain(Explain),
     /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no
     /// file.
@@ -92,7 +92,7 @@ Two thermometers rarely agree at rest. If the model is rejected, try --free gain
 A data-sheet value for one sensor often settles the rest: --known T1=0.5s+-10%. If the gas temperature is
 steady for a while, say when: --quiet-segment 0..2.5.
 
-Exit codes: 0 status ok, 4 any other status, 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
+Exit codes: 0 status ok and both time constants given, 4 otherwise (with --strict also where one of them is conditional), 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
 pub(crate) struct Characterise {
     #[command(flatten)]
     pub(crate) input: Input,
@@ -119,7 +119,10 @@ Other effects that explain the record equally well are named as alternatives.
 Grade of each number:
   go                may be used, with its interval
   conditional       right if the assumption holds that is printed with it
-  not given         nothing says how far it may be off (--best-effort prints it all the same)
+  not given         no-go: nothing says how far it may be off (--best-effort prints it all the same)
+
+A time constant that is known exactly (--known T1=0.5s) counts as go. What is found with it is conditional at best, so the
+exit code is 0, and 4 with --strict; where the record contradicts it nothing is given, and the exit code is 4.
 
 Exit codes: 0 diagnosed, 4 the record was refused, a time constant is not given, or something is left over and a number is
 not go (with --strict also where a number is conditional), 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
@@ -143,7 +146,7 @@ pub(crate) struct Diagnose {
 /// Reconstruct the gas temperature of a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The output has the columns time_s, gas_C and gas_std_K (with --best-effort also the grade), with a row for every sample and, on an even grid, for every missing
+The output has the columns time_s, gas_C, gas_std_K and grade, with a row for every sample and, on an even grid, for every missing
 one. The standard deviation covers the noise, the high frequencies that the readings do not determine, and the uncertainty
 of the model's parameters.
 

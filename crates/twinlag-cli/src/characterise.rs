@@ -33,7 +33,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
         None => characterise(&record, &options, console)?,
     };
     print::characterisation(&answer, console)?;
-    Ok(exit_code(&answer, command.input.method.strict))
+    Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
 }
 
 pub(crate) fn model(path: &Path) -> Result<Model, Failure> {

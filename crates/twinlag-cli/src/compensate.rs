@@ -38,9 +38,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
             [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
-        if command.input.method.best_effort() {
-            text = output::with_column(&text, "grade", &answer.judgement.grade.to_string());
-        }
+        text = output::with_column(&text, "grade", &answer.judgement.grade.to_string());
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
@@ -52,6 +50,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     }
     print::compensation(&answer, &command.out, to_stdout, console)?;
     let is_partial = matches!(answer.verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained));
-    let code = grades::exit_code(&[answer.judgement.grade], &[], is_partial, command.input.method.strict);
+    let code = |strict| grades::exit_code(&[answer.judgement.grade], &[], is_partial, strict);
+    let code = grades::strictly(command.input.method.strict && answer.status == Status::Ok, code);
     Ok(if answer.status == Status::Ok { code } else { 4 })
 }

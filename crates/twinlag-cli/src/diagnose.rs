@@ -35,7 +35,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         output::write(path, &diagnosis_report(&record, &answer, &output::command_line())?)?;
     }
     print::diagnosis(&answer, console)?;
-    Ok(exit_code(&answer, command.input.method.strict))
+    Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
 }
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {

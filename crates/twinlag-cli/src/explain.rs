@@ -1,4 +1,4 @@
-//! `twinlag explain NAME`: an effect, a status, a verdict or a test in plain words.
+//! `twinlag explain NAME`: an effect, a status, a verdict, a grade or a test in plain words.
 
 use std::io::{Write, stdout};
 
@@ -32,6 +32,27 @@ const STATUSES: [(&str, &str); 4] = [
          'twinlag diagnose' looks for what it lacks",
     ),
 ];
+
+/// Whether a number may be used.
+const GRADES: [(&str, &str); 3] = [
+    (
+        "go",
+        "the number and its 95 % interval may be used: what is left over is noise, and nothing else speaks against it",
+    ),
+    (
+        "conditional",
+        "the number and its interval are right if an assumption holds that the record cannot check: it is printed beside them. \
+         Whoever knows that it holds, from a data sheet or from the rig, may use them; the exit code is 0, with --strict 4",
+    ),
+    (
+        "no-go",
+        "nothing says how far the number may be off, so it is not given, null in JSON, and what speaks against it is printed \
+         instead; the exit code is 4 where it was asked for. --best-effort prints it all the same, marked",
+    ),
+];
+
+const GRADE: &str =
+    "each number is go (use it), conditional (right if what is printed beside it holds) or no-go (not given, and why)";
 
 const VERDICTS: [(&str, &str); 5] = [
     (
@@ -118,8 +139,9 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     let found: Vec<&Explanation> = all.iter().filter(|e| e.name == command.name).collect();
     if found.is_empty() {
         let of = |kind: &str| all.iter().filter(|e| e.kind == kind).map(|e| e.name).collect::<Vec<_>>().join(", ");
-        let known: Vec<String> =
-            ["effect", "verdict", "status", "test", "limit"].map(|kind| format!("\n  {kind}: {}", of(kind))).to_vec();
+        let known: Vec<String> = ["effect", "verdict", "status", "grade", "test", "limit"]
+            .map(|kind| format!("\n  {kind}: {}", of(kind)))
+            .to_vec();
         return Err(Failure::Usage(format!("nothing is called '{}'; there are{}", command.name, known.concat())));
     }
     if console.json {
@@ -146,6 +168,8 @@ fn explanations() -> Vec<Explanation> {
     effects
         .chain(VERDICTS.map(worded("verdict")))
         .chain(STATUSES.map(worded("status")))
+        .chain(GRADES.map(worded("grade")))
+        .chain([("grades", GRADE)].map(worded("grade")))
         .chain(tests.map(worded("test")))
         .chain([two_sensors])
         .collect()

@@ -15,6 +15,17 @@ pub(crate) fn exit_code(asked: &[Grade], others: &[Grade], is_partial: bool, str
     if is_usable && is_whole { 0 } else { 4 }
 }
 
+/// Says on standard error why `--strict` makes the exit code of an answer 4 where it would be 0.
+///
+/// - `code`: the exit code, of whether it is strict
+pub(crate) fn strictly(strict: bool, code: impl Fn(bool) -> u8) -> u8 {
+    let asked = code(strict);
+    if strict && asked != code(false) {
+        eprintln!("twinlag: exit code {asked}: with --strict every number has to be go, and one is conditional");
+    }
+    asked
+}
+
 /// A number with its grade.
 pub(crate) fn graded(number: Option<String>, judgement: &Judgement) -> String {
     match (number, judgement.grade) {
@@ -27,16 +38,17 @@ pub(crate) fn graded(number: Option<String>, judgement: &Judgement) -> String {
 
 /// Why numbers are not simply `go`, each reason once with the names of the numbers that it is of.
 pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgement)>, indent: &str) -> Vec<String> {
-    let mut groups: Vec<(&Judgement, Vec<String>)> = Vec::new();
+    let mut groups: Vec<(Grade, &str, Vec<String>)> = Vec::new();
     for (name, judgement) in numbers.into_iter().filter(|(_, judgement)| judgement.grade != Grade::Go) {
-        match groups.iter_mut().find(|(other, _)| *other == judgement) {
-            Some((_, names)) => names.push(name),
-            None => groups.push((judgement, vec![name])),
+        for reason in judgement.because.split("; ") {
+            match groups.iter_mut().find(|(grade, other, _)| (*grade, *other) == (judgement.grade, reason)) {
+                Some((_, _, names)) => names.push(name.clone()),
+                None => groups.push((judgement.grade, reason, vec![name.clone()])),
+            }
         }
     }
-    let line = |(judgement, names): (&Judgement, Vec<String>)| {
-        let grade = if judgement.grade == Grade::NoGo { "no-go" } else { "conditional" };
-        format!("{indent}{grade} ({}): {}", names.join(", "), judgement.because)
+    let line = |(grade, reason, names): (Grade, &str, Vec<String>)| {
+        format!("{indent}{grade} ({}): {reason}", names.join(", "))
     };
     groups.into_iter().map(line).collect()
 }
@@ -66,5 +78,10 @@ mod tests {
         assert_eq!(lines.len(), 2);
         assert!(lines[0].starts_with("  no-go (T1, difference): the model leaves more than noise"), "{lines:?}");
         assert_eq!(lines[1], "  conditional (T2): right if T1 = 2 s, as given");
+        // Failed: a reason that is one of several was said again for each number that has others.
+        let both = Judgement::of(&[Reason::Given { what: "T1 = 2 s".into() }, Reason::Biased]);
+        let lines = reasons([("T2".to_owned(), &given), ("gain".to_owned(), &both)], "");
+        assert_eq!(lines[0], "conditional (T2, gain): right if T1 = 2 s, as given");
+        assert!(lines[1].starts_with("conditional (gain): ") && lines.len() == 2, "{lines:?}");
     }
 }

@@ -21,7 +21,7 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
     let mut lines =
         vec![String::new(), format!("if the time constant of {held} were known, with these effects ({excludes}):")];
     let mut header = vec![held.clone(), "deviance".into(), fitted.clone()];
-    header.extend(["its 95 % interval", "gas moves by"].map(str::to_owned));
+    header.extend(["its 95 % interval", "grade", "gas moves by"].map(str::to_owned));
     let first = values.first();
     let of_effects = |v: &Held<String>| -> Vec<(String, String)> {
         let parameters = v.effects.iter().filter(|e| !e.effect.is_noise()).filter_map(|e| e.parameters.first());
@@ -41,6 +41,7 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
             digits(v.deviance, 2),
             v.other.value_s.map_or("-".into(), |t| format!("{} s", digits(t, 3))),
             v.other.interval_95_s.map_or("-".into(), interval),
+            v.judgement.grade.to_string(),
             format!("{} K", digits(v.gas_change_k, 2)),
         ];
         row.extend(of_effects(v).into_iter().map(|(_, value)| value));
@@ -52,7 +53,7 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
         let cells = row.iter().enumerate().map(|(i, cell)| format!("{cell:>0$}", width(i)));
         lines.push(format!("  {mark} {}", cells.collect::<Vec<_>>().join("  ")));
     }
-    lines.push("  a value from a data sheet settles it, as with --known T1=0.5s, or --known T1=0.5s+-20%".into());
+    lines.push("  a value from a data sheet settles it if its row is not no-go, as with --known T1=0.5s, or --known T1=0.5s+-20%".into());
     lines
 }
 

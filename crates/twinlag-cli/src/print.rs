@@ -154,6 +154,10 @@ fn difference_line(answer: &Characterisation) -> Option<String> {
     };
     let [low, high] = difference.interval_95_s?;
     let ends = if value < 0.0 { [-high, -low] } else { [low, high] };
+    // Which of both is slower is not known.
+    if low <= 0.0 && high >= 0.0 && !difference.includes_delay {
+        return Some(format!("  {a} − {b}: {}", graded(Some(interval(value, low, high, " s")), &difference.judgement)));
+    }
     let what = if difference.includes_delay { " in all, time constants and delay together" } else { "" };
     let number = interval(size, ends[0], ends[1], " s");
     Some(format!("  {a} {how} {b} by {}{what}", graded(Some(number), &difference.judgement)))
@@ -309,7 +313,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
         lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
     }
     lines.extend(difference_line(&answer.last));
-    lines.extend(reasons(asked(&answer.last), "  "));
+    lines.extend(reasons(asked(&answer.last).chain(of_effects(&answer.effects)), "  "));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
     lines.extend(answer.if_known.iter().flat_map(if_known::lines));
@@ -330,6 +334,14 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     lines.push("what two sensors can never reveal: twinlag explain two-sensors".into());
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// The parameters of effects that are printed, as they are called beside the time constants.
+fn of_effects(effects: &[NamedEffect]) -> impl Iterator<Item = (String, &Judgement)> {
+    effects.iter().flat_map(|effect| {
+        let name = |p: &str| format!("{} of {}", parameter_in_words(p), effect.effect);
+        effect.parameters.iter().take(MAX_PARAMETERS).map(move |p| (name(&p.name), &p.judgement))
+    })
 }
 
 /// What is said of an effect, after an empty line.
@@ -359,8 +371,6 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         });
         lines.push(format!("    {} {}", parameter_in_words(&p.name), graded(number, &p.judgement)));
     }
-    let shown = effect.parameters.iter().take(MAX_PARAMETERS);
-    lines.extend(reasons(shown.map(|p| (parameter_in_words(&p.name), &p.judgement)), "    "));
     if effect.parameters.len() > MAX_PARAMETERS {
         lines.push(format!("    and {} more parameters (see --json)", effect.parameters.len() - MAX_PARAMETERS));
     }
@@ -435,13 +445,27 @@ fn verdict_of(answer: &Diagnosis) -> String {
     match answer.explained_to.filter(|share| *share > 0.0) {
         Some(share) => {
             let name = if answer.verdict == Verdict::Adequate { "adequate" } else { "explained" };
+            let but = nothing_determined(&answer.last);
             let model = if answer.verdict == Verdict::Adequate { "two first-order lags" } else { "these effects" };
             let percent = digits(100.0 * share, 2);
             format!(
-                "{name} to {percent} %: beside noise {model} leave {percent} % of its energy, which intervals cover"
+                "{name} to {percent} %{but}: beside noise {model} leave {percent} % of its energy, which intervals cover"
             )
         }
-        None => verdict(answer.verdict).into(),
+        None => match verdict(answer.verdict).split_once(": ") {
+            Some((name, meaning)) => format!("{name}{}: {meaning}", nothing_determined(&answer.last)),
+            None => verdict(answer.verdict).into(),
+        },
+    }
+}
+
+/// What to add to a verdict on the model where the record determines neither time constant.
+fn nothing_determined(answer: &Characterisation) -> &'static str {
+    let is_any = answer.sensors.iter().any(|s| s.time_constant_s.is_some());
+    match answer.time_constant_difference_s.value {
+        _ if is_any || answer.status == Status::ModelRejected => "",
+        None => ", but no time constant is determined",
+        Some(_) => ", but only the difference of the time constants is determined",
     }
 }
 
@@ -472,7 +496,7 @@ fn status(status: Status) -> &'static str {
 pub(crate) fn time_constant(sensor: &SensorEstimate) -> String {
     let number = match (sensor.time_constant_s, sensor.interval_95_s) {
         (Some(value), Some([low, high])) => Some(interval(value, low, high, " s")),
-        (Some(value), None) if sensor.known => return format!("{} s (given)", digits(value, 5)),
+        (Some(value), None) if sensor.known => return format!("{} s (known beforehand)", digits(value, 5)),
         (None, Some([0.0, most_s])) => return format!("at most {} s (95 %)", digits(most_s, 2)),
         _ => None,
     };
@@ -482,7 +506,7 @@ pub(crate) fn time_constant(sensor: &SensorEstimate) -> String {
 fn second_lag(lag: &SecondLag) -> String {
     match (lag.value, lag.interval_95) {
         (Some(value), Some([low, high])) => graded(Some(interval(value, low, high, " s")), &lag.judgement),
-        (Some(value), None) => format!("{} s (given)", digits(value, 5)),
+        (Some(value), None) => format!("{} s (known beforehand)", digits(value, 5)),
         (None, Some([0.0, high])) => format!("not detected, at most {} s", digits(high, 3)),
         (None, Some([low, high])) => format!("not determined, from {} to {} s", digits(low, 3), digits(high, 3)),
         (None, None) => "not determined by this record".into(),
@@ -498,7 +522,7 @@ fn noise(sensor: &SensorEstimate) -> String {
 
 fn noise_source(from: NoiseSource) -> &'static str {
     match from {
-        NoiseSource::Given => "given",
+        NoiseSource::Given => "known beforehand",
         NoiseSource::QuietSegment => "quiet segment",
         NoiseSource::ThirdDifferences => "third differences",
         NoiseSource::InferredInputs => "inferred inputs",

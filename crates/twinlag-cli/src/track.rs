@@ -44,9 +44,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         ];
         let mut text = Vec::new();
         write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
-        if command.input.method.best_effort() {
-            text = output::with_cells(&text, "grade", &answer.grades);
-        }
+        text = output::with_cells(&text, "grade", &answer.grades);
         output::data(&command.out, to_stdout, &text)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::track_picture(&answer)?)?;
@@ -58,5 +56,6 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     }
     print::track(&answer, &command.out, to_stdout, console)?;
     let is_partial = answer.status == Status::ModelRejected;
-    Ok(grades::exit_code(&[answer.judgement.grade], &[], is_partial, command.input.method.strict))
+    let code = |strict| grades::exit_code(&[answer.judgement.grade], &[], is_partial, strict);
+    Ok(grades::strictly(command.input.method.strict, code))
 }

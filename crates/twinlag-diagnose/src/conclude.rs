@@ -3,6 +3,7 @@
 use twinlag_cross_relation::TestName;
 use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise};
 
+use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
 use crate::grade::{Basis, Excess, Grade, Reason, excess};
@@ -56,7 +57,11 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
-    let basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
+    let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
+    if let Some(contradiction) = Contradiction::find(&state, &with_effects, settings, policy) {
+        basis.reasons.push(contradiction.reason());
+        remarks.push(contradiction.remark());
+    }
     let span_s = state.prepared.observations.span_s();
     let hidden = if is_whole {
         state.search().beside(&state.current).hidden(&state.current, &state.far, half_intervals(&last))?
@@ -80,7 +85,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     };
     let unexplained = left.filter(|_| !is_whole && !is_refused);
     if unexplained.is_some() {
-        remarks.push(Remark::BiasUnknown);
+        remarks.push(Remark::BiasUnknown { is_one_known: !settings.known.is_empty() });
     }
     remarks.sort_by_key(Remark::importance);
     // What is left over may hide an effect of any size.
@@ -171,8 +176,7 @@ fn judged(
 ) -> Vec<Found> {
     let of_place = |(index, mut found): (Option<usize>, Found)| {
         if let Some(index) = index {
-            let scatter = &fit.scatter[last.model.range(index)];
-            judge_effect(&mut found, last.model.effects[index].parameters(), scatter, circumstances);
+            judge_effect(&mut found, index, last, fit, circumstances);
         }
         found
     };

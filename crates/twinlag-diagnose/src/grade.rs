@@ -84,6 +84,17 @@ pub enum Reason {
         /// The likeliest of such effects.
         effect: Identifier,
     },
+    /// The best fit lies on a bound of it.
+    OnBound,
+    /// The record contradicts what was given beforehand.
+    Contradicted {
+        /// What was given, as `T1 = 0.5 s`.
+        what: String,
+        /// By how many standard deviations.
+        deviations: f64,
+        /// The best grade that a number can have with it.
+        grade: Grade,
+    },
     /// A value was given beforehand.
     Given {
         /// What was given, as `T1 = 0.5 s`.
@@ -152,8 +163,10 @@ impl Reason {
             | Self::PartOfTotal
             | Self::NoInterval
             | Self::LeftOver
+            | Self::OnBound
+            | Self::SingleTone
             | Self::RatioChanges { .. } => Grade::NoGo,
-            Self::Follows { grade, .. } | Self::Fault { grade, .. } => *grade,
+            Self::Follows { grade, .. } | Self::Fault { grade, .. } | Self::Contradicted { grade, .. } => *grade,
             _ => Grade::Conditional,
         }
     }
@@ -226,10 +239,20 @@ impl fmt::Display for Reason {
                 "right if there is no {effect} of a usual size: the record would hardly show one, and it would move this number \
                  out of its interval"
             ),
-            Self::Given { what } => write!(f, "right if {what}, as given"),
-            Self::SingleTone => {
-                f.write_str("right if nothing is missing: of a single tone two time constants absorb any effect")
+            Self::OnBound => f.write_str("the best fit lies on a bound of it, so it is no estimate"),
+            Self::Contradicted { what, deviations, grade } => {
+                let so = if *grade == Grade::NoGo { "" } else { "right if that is so all the same: " };
+                write!(
+                    f,
+                    "{so}the record contradicts {what}, as given, by {} standard deviations",
+                    rounded(*deviations)
+                )
             }
+            Self::Given { what } => write!(f, "right if {what}, as given"),
+            Self::SingleTone => f.write_str(
+                "of a single tone two time constants absorb any effect: which sensor is slower, and by how much at its \
+                 frequency, is all that is determined",
+            ),
             Self::RatioChanges { p_value } => write!(
                 f,
                 "the ratio of both time constants changes along the record (p = {p_value:.0e}), so the two sensors do not \
@@ -254,6 +277,11 @@ impl fmt::Display for Reason {
             }
         }
     }
+}
+
+/// A number of standard deviations for the reader.
+pub(crate) fn rounded(deviations: f64) -> String {
+    if deviations < 100.0 { format!("{deviations:.0}") } else { "more than 100".into() }
 }
 
 /// The grade of a number, and why.
@@ -302,7 +330,7 @@ impl Judgement {
 
     /// The judgement of what was given beforehand.
     pub fn given() -> Self {
-        Self { grade: Grade::Go, because: "given beforehand".into() }
+        Self { grade: Grade::Go, because: "known beforehand".into() }
     }
 
     /// The judgement of a point to which parameters refer: it is of the record as it stands, and no estimate.

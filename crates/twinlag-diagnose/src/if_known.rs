@@ -7,8 +7,12 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::CHI2_95;
-use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Observations, Policy, TimeConstant, Value, summarise};
+use twinlag_model::{
+    Effort, Fitted, Identifier, KnownTimeConstant, ModelFit, Observations, Policy, TimeConstant, Value, summarise,
+};
 
+use crate::grade::{Basis, Grade, Judgement, Reason, excess};
+use crate::judge::Circumstances;
 use crate::moves::{State, Taken};
 use crate::naming::name;
 
@@ -43,7 +47,7 @@ pub struct Held<Channel = usize> {
     pub time_constant_s: f64,
     /// The time constant of the other sensor: without a value, but mostly with an interval, where it is not determined.
     pub other: TimeConstant,
-    /// The time constant of the second channel less that of the first.
+    /// The time constant of the second channel less that of the first; without a value where the other one may not be used.
     pub difference: TimeConstant,
     /// The effects with their parameters.
     pub effects: Vec<HeldEffect<Channel>>,
@@ -55,6 +59,9 @@ pub struct Held<Channel = usize> {
     /// Whether the record excludes the value: a deviance beyond the 95 % point of chi-square with one degree of freedom. `None`
     /// where what is left over is not noise: an effect that was not found might account for it, and allow any value.
     pub is_excluded: Option<bool>,
+    /// Whether the time constant of the other sensor may be used if this value is right.
+    #[serde(default, flatten)]
+    pub judgement: Judgement,
 }
 
 /// An effect that was found, with its parameters where a time constant is held.
@@ -85,6 +92,7 @@ impl IfKnown {
             gas_change_k: held.gas_change_k,
             deviance: held.deviance,
             is_excluded: held.is_excluded,
+            judgement: held.judgement.clone(),
         };
         IfKnown {
             held: channels[self.held].clone(),
@@ -102,7 +110,8 @@ fn grid_s(observations: &Observations, policy: &Policy) -> Vec<f64> {
     (0..POINTS).map(|i| shortest_s * (longest_s / shortest_s).powf(i as f64 / (POINTS - 1) as f64)).collect()
 }
 
-/// What each value of the first time constant would make of the record; `None` where one was known beforehand.
+/// What each value of the first time constant would make of the record; `None` where one was known beforehand, and where none of
+/// the values that the record allows would give the other.
 ///
 /// - `free`: the model with the effects, both time constants free
 /// - `chi2_per_dof`: what it leaves over
@@ -129,9 +138,20 @@ pub(crate) fn if_known(
     let values = grid_s.iter().zip(&fits).map(|(tau_s, fitted)| {
         let deviance = (fitted.chi2 - best) / unit;
         let is_excluded = is_whole.then_some(deviance > CHI2_95);
-        Held { deviance, is_excluded, ..held(*tau_s, fitted, state, policy) }
+        let mut out = Held { deviance, is_excluded, ..held(*tau_s, fitted, state, policy) };
+        if is_excluded == Some(true) {
+            let what = format!("T1 = {tau_s:.2e} s");
+            out.judgement =
+                Judgement::of(&[Reason::Contradicted { what, deviations: deviance.sqrt(), grade: Grade::NoGo }]);
+        }
+        if out.judgement.grade == Grade::NoGo && out.other.value_s.is_some() {
+            (out.other, out.difference) = Default::default();
+        }
+        out
     });
-    Some(IfKnown { held: 0, fitted: 1, chi2_per_dof, values: values.collect() })
+    let values: Vec<Held> = values.collect();
+    let settles = values.iter().any(|v| v.judgement.grade != Grade::NoGo);
+    settles.then_some(IfKnown { held: 0, fitted: 1, chi2_per_dof, values })
 }
 
 /// Fits with the first time constant held at each value in turn.
@@ -161,7 +181,14 @@ fn along<'a>(values_s: impl Iterator<Item = &'a f64>, free: &Fitted, state: &Sta
 /// A fit in numbers, compared with no other.
 fn held(tau_s: f64, fitted: &Fitted, state: &State<'_>, policy: &Policy) -> Held {
     let prepared = &state.prepared;
-    let fit = summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy);
+    let mut fit = summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy);
+    let known = [KnownTimeConstant { sensor: 0, value_s: tau_s, std_s: None }];
+    let basis = Basis::of(excess(&fit, fitted.model.noise().is_some()), true, policy);
+    let judgements = Circumstances::new(basis, &known, prepared.observations.span_s(), policy).judge(&mut fit);
+    let [_, judgement] = judgements.time_constants;
+    if judgements.difference.grade == Grade::NoGo {
+        fit.difference = TimeConstant::default();
+    }
     let of_effect = |(index, taken): (usize, &Taken)| {
         let found = name(index, taken, fitted, &fit);
         HeldEffect { effect: found.effect, channel: found.fitted_in, parameters: found.parameters }
@@ -174,6 +201,7 @@ fn held(tau_s: f64, fitted: &Fitted, state: &State<'_>, policy: &Policy) -> Held
         gas_change_k: gas_change_k(fitted, &fit, &prepared.observations),
         deviance: 0.0,
         is_excluded: None,
+        judgement,
     }
 }
 
@@ -193,7 +221,7 @@ mod tests {
     use std::f64::consts::TAU;
     use std::ops::ControlFlow;
 
-    use twinlag_model::{KnownTimeConstant, Settings, Stretch};
+    use twinlag_model::{Settings, Stretch};
 
     use super::*;
     use crate::diagnose::diagnose;
@@ -238,14 +266,32 @@ mod tests {
             let slack_s = 0.5 * (high_s - low_s) + 0.15;
             assert!(low_s - slack_s < 5.5 && 5.5 < high_s + slack_s, "{value:?}");
             seen += usize::from(value.time_constant_s < 1.0);
+            assert_eq!(value.judgement.grade, Grade::Conditional, "right if the first is: {value:?}");
         }
         // Half a second is between two of them, and nearer to one.
         assert!(seen >= 1, "{table:?}");
         let longest = &table.values[POINTS - 1];
         assert_eq!(longest.is_excluded, Some(true), "{longest:?}");
+        // Failed: what the record excludes had a number, and no grade.
+        assert!(longest.other.value_s.is_none() && longest.judgement.grade == Grade::NoGo, "{longest:?}");
         // With one of them known there is nothing to ask.
         let known = vec![KnownTimeConstant { sensor: 0, value_s: 0.5, std_s: Some(0.05) }];
         let settings = Settings { known, ..Settings::default() };
         assert_eq!(diagnose(&observations, &settings, &watch).expect("a diagnosis").if_known, None);
+    }
+
+    /// Failed: of noise alone there was a table, with a difference of many minutes in it.
+    #[test]
+    fn of_noise_alone_no_value_settles_anything() {
+        let watch = |_: &str, _, _| ControlFlow::Continue(());
+        let mut observations = observations([0.5, 6.0]);
+        let mut state = 11_u64;
+        for reading in observations.stretches.iter_mut().flat_map(|s| s.reading_c.iter_mut()).flatten() {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            *reading = 20.0 + (state >> 11) as f64 / (1_u64 << 53) as f64;
+        }
+        let answer = diagnose(&observations, &Settings::default(), &watch).expect("a diagnosis");
+        assert_eq!(answer.if_known, None);
+        assert!(answer.judgements.time_constants.iter().all(|j| j.grade == Grade::NoGo), "{:?}", answer.judgements);
     }
 }

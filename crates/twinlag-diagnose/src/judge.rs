@@ -36,6 +36,13 @@ pub struct Circumstances<'a> {
     pub policy: &'a Policy,
 }
 
+/// What was given, for the reader.
+pub(crate) fn given(known: &KnownTimeConstant) -> String {
+    let KnownTimeConstant { sensor, value_s, std_s } = known;
+    let spread = std_s.map_or(String::new(), |std_s| format!(" ± {std_s}"));
+    format!("T{} = {value_s}{spread} s", sensor + 1)
+}
+
 impl<'a> Circumstances<'a> {
     /// A record of `span_s` seconds, of whose model nothing is known but what `basis` says.
     pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
@@ -44,11 +51,7 @@ impl<'a> Circumstances<'a> {
 
     /// What was given beforehand, for the reader.
     fn given(&self) -> impl Iterator<Item = Reason> {
-        self.known.iter().map(|known| {
-            let KnownTimeConstant { sensor, value_s, std_s } = known;
-            let spread = std_s.map_or(String::new(), |std_s| format!(" ± {std_s}"));
-            Reason::Given { what: format!("T{} = {value_s}{spread} s", sensor + 1) }
-        })
+        self.known.iter().map(|known| Reason::Given { what: given(known) })
     }
 
     /// What all numbers rest on, what was given among it.

@@ -36,6 +36,7 @@ mod accept;
 mod alternatives;
 mod candidates;
 mod conclude;
+mod contradiction;
 mod diagnose;
 mod diagnosis;
 mod evidence;

@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use twinlag_cross_relation::{PartScatter, Z_975, log_normal_interval_95};
+use twinlag_cross_relation::{Z_975, log_normal_interval_95};
 use twinlag_model::{
     Defect, Derived, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, covariance,
 };
-use twinlag_optimise::Scale;
+use twinlag_optimise::{End, Scale};
 
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
@@ -129,13 +129,20 @@ fn accounts_for_the_rest(channel: usize, prepared: &Prepared, last: &ModelFit) -
 
 /// Grades of the parameters of an effect, and their intervals with all that they have to cover.
 ///
-/// - `scatter`: of its parameters between parts of the record; what is derived from them has none
+/// - `effect`: its place in the model `last`
+/// - `fit`: that model in numbers
 pub(crate) fn judge_effect(
     found: &mut Found,
-    parameters: &[Parameter],
-    scatter: &[Option<PartScatter>],
+    effect: usize,
+    last: &Fitted,
+    fit: &ModelFit,
     circumstances: &Circumstances<'_>,
 ) {
+    let (parameters, range) = (last.model.effects[effect].parameters(), last.model.range(effect));
+    // What is derived from parameters has no scatter.
+    let scatter = &fit.scatter[range.clone()];
+    let is_on_bound = |index: usize| matches!(&last.end, End::OnBound(which) if which.contains(&(range.start + index)));
+    let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
     let basis = circumstances.whole_basis();
     let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });
     for (index, value) in found.parameters.iter_mut().enumerate() {
@@ -147,7 +154,9 @@ pub(crate) fn judge_effect(
         let scatter = scatter.get(index).copied().flatten();
         let number = Number { value: value.value, interval_95: value.interval_95, scatter, is_positive };
         let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
-        let own = cause.clone().into_iter().chain(is_part.then_some(Reason::PartOfTotal)).collect();
+        let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
+        let bound = is_bound.then_some(Reason::OnBound);
+        let own = cause.clone().into_iter().chain(is_part.then_some(Reason::PartOfTotal)).chain(bound).collect();
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
     }
 }

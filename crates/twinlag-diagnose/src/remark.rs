@@ -5,6 +5,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use twinlag_model::Identifier;
 
+use crate::grade::rounded;
+
 /// Something to know before using the numbers of a diagnosis. Its [`Display`](fmt::Display) is a
 /// sentence for the reader.
 ///
@@ -49,26 +51,57 @@ pub enum Remark {
     LagAlone,
     /// The gas is a single tone.
     SingleTone,
+    /// The record contradicts what was given beforehand.
+    Contradicted {
+        /// What was given, as `T1 = 0.5 s`.
+        what: String,
+        /// What the record gives instead, as `T1 = 0.4 s`.
+        instead: String,
+        /// By how many standard deviations both differ.
+        deviations: f64,
+    },
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
     /// Something is missing, and intervals do not know how far it moves the numbers.
-    BiasUnknown,
+    BiasUnknown {
+        /// Whether a time constant was known beforehand.
+        #[serde(default)]
+        is_one_known: bool,
+    },
 }
 
 impl Remark {
+    /// A time constant with its standard error, where it has one, for the reader: two digits of the error.
+    ///
+    /// ```
+    /// use twinlag_diagnose::Remark;
+    ///
+    /// assert_eq!(Remark::time_constant("T1", 0.398_21, Some(0.001_23)), "T1 = 0.3982 ± 0.0012 s");
+    /// ```
+    pub fn time_constant(name: &str, value_s: f64, error_s: Option<f64>) -> String {
+        match error_s.filter(|error_s| *error_s > 0.0 && error_s.is_finite()) {
+            Some(error_s) => {
+                let decimals = (1.0 - error_s.log10().floor()).clamp(0.0, 9.0) as usize;
+                format!("{name} = {value_s:.decimals$} ± {error_s:.decimals$} s")
+            }
+            None => format!("{name} = {value_s:.3e} s"),
+        }
+    }
+
     /// The place of the remark among several: 0 comes first. Those that forbid a use of the numbers come before those that
     /// limit it, and these before those that only say how they came about.
     pub fn importance(&self) -> u8 {
         match self {
             Self::SingleTone => 0,
-            Self::LagAlone => 1,
-            Self::BiasUnknown => 2,
-            Self::ModelErrorAsNoise => 3,
-            Self::Widened { .. } => 4,
-            Self::NoiseLowered => 5,
-            Self::Replaced { .. } => 6,
-            Self::OtherChannel { .. } => 7,
-            Self::Needless { .. } => 8,
+            Self::Contradicted { .. } => 1,
+            Self::LagAlone => 2,
+            Self::BiasUnknown { .. } => 3,
+            Self::ModelErrorAsNoise => 4,
+            Self::Widened { .. } => 5,
+            Self::NoiseLowered => 6,
+            Self::Replaced { .. } => 7,
+            Self::OtherChannel { .. } => 8,
+            Self::Needless { .. } => 9,
         }
     }
 }
@@ -82,15 +115,25 @@ impl fmt::Display for Remark {
                  constants, which absorb any missing effect without a trace: use no number of this record, and take one in \
                  which the gas changes at more than one rate",
             ),
+            Self::Contradicted { what, instead, deviations } => write!(
+                f,
+                "the record contradicts {what}, as given, by {} standard deviations: without it, it gives {instead}. Check the \
+                 value, its unit, and which channel is which",
+                rounded(*deviations)
+            ),
             Self::LagAlone => f.write_str(
                 "this record does not distinguish time constants from a delay: use the difference alone, which is the total \
                  delay of channel 2, τ2 − τ1 + delay, and the size of the delay only if you know that it is one. A known time \
                  constant, or a gas that changes faster, separates them",
             ),
-            Self::BiasUnknown => f.write_str(
-                "the intervals cover noise and the residual, but not the bias from the missing effect, so the truth may lie far \
-                 outside: give a time constant that is known, or remove the cause at the rig, before you use the numbers",
-            ),
+            Self::BiasUnknown { is_one_known } => {
+                let known = if *is_one_known { "" } else { "give a time constant that is known, or " };
+                write!(
+                    f,
+                    "the intervals cover noise and the residual, but not the bias from the missing effect, so the truth may lie \
+                     far outside: {known}remove the cause at the rig, before you use the numbers"
+                )
+            }
             Self::ModelErrorAsNoise => f.write_str(
                 "the residual is coherent with the gas temperature, so it is model error and not noise. \
                  Its spectrum weights the fit and sets the intervals; look for its cause at the rig",
@@ -144,8 +187,9 @@ mod tests {
             Remark::Widened { effects: vec![before, after] },
             Remark::LagAlone,
             Remark::SingleTone,
+            Remark::Contradicted { what: "T1 = 0.8 s".into(), instead: "T1 = 0.4 s".into(), deviations: 9.7 },
             Remark::ModelErrorAsNoise,
-            Remark::BiasUnknown,
+            Remark::BiasUnknown { is_one_known: false },
         ];
         let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();
         assert_eq!(importance.len(), all.len(), "no two remarks have one place");

@@ -9,7 +9,8 @@ use common::{
 use std::ops::ControlFlow;
 
 use twinlag_diagnose::{
-    Diagnosis, Identifier, ModelError, Observations, Remark, Settings, Stretch, Verdict, diagnose, fit_with,
+    Diagnosis, Grade, Identifier, KnownTimeConstant, ModelError, Observations, Remark, Settings, Stretch, Verdict,
+    diagnose, fit_with,
 };
 use twinlag_signal::{MultiTone, Noise, Sensor, Signal, Tone, Turbulence};
 
@@ -37,6 +38,49 @@ fn a_single_sine_is_refused_with_a_remark() {
     assert!(d.remarks.contains(&Remark::SingleTone), "{}", told(&d));
     // Failed: a line break of the source was in it, as thirteen spaces.
     assert!(d.remarks.iter().all(|r| !r.to_string().contains("  ")), "a remark is running text: {:?}", d.remarks);
+}
+
+/// Failed: with a last period that is not whole its mean counted as a second tone, and two wrong time constants were `go`.
+#[test]
+fn a_sine_of_any_number_of_periods_is_refused() {
+    for (seed, frequency_hz) in [(SEED, 5.1), (SEED + 1, 7.77)] {
+        let tone = Signal::Sine(Tone { amplitude_k: GAS_K, frequency_hz, phase_rad: 1.0 });
+        let simulated = readings(seed, tone, |sensors| {
+            second_order(sensors);
+            sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.02)));
+        });
+        let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+        assert_eq!(d.verdict, Verdict::Refused, "{frequency_hz} Hz: {}", told(&d));
+        assert!(d.judgements.time_constants.iter().all(|j| j.grade == Grade::NoGo), "{:?}", d.judgements);
+    }
+}
+
+/// The first time constant is known twice as long as it is, within 5 % or exactly: without it, two lags leave only noise, ten and
+/// more standard deviations away. Failed: nothing was said, and numbers were given under the condition that it is so.
+#[test]
+fn a_given_value_that_the_record_contradicts_is_no_condition() {
+    let observations = record(SEED, |_| ());
+    let given = |value_s: f64, std_s| {
+        let known = vec![KnownTimeConstant { sensor: 0, value_s, std_s }];
+        diagnose(&observations, &Settings { known, ..Settings::default() }, &|_, _, _| ControlFlow::Continue(()))
+            .expect("a record that can be diagnosed")
+    };
+    for std_s in [Some(0.05 * 2.0 * TAU_S[0]), None] {
+        let d = given(2.0 * TAU_S[0], std_s);
+        let said = d.remarks.iter().find_map(|r| match r {
+            Remark::Contradicted { instead, deviations, .. } => Some((instead.clone(), *deviations)),
+            _ => None,
+        });
+        let (instead, deviations) = said.unwrap_or_else(|| panic!("{}", told(&d)));
+        assert!(instead.starts_with("T1 = 0.01"), "{instead}");
+        // A standard deviation is 5 % of the double: half of it is ten of them, and the record's own error is small beside that.
+        assert!(if std_s.is_some() { (deviations - 10.0).abs() < 1.0 } else { deviations > 20.0 }, "{deviations}");
+        assert_eq!(d.judgements.time_constants[1].grade, Grade::NoGo, "{:?}", d.judgements);
+        assert!(d.judgements.time_constants[1].because.contains("contradicts T1 = 0.024"), "{:?}", d.judgements);
+    }
+    let d = given(TAU_S[0], Some(0.05 * TAU_S[0]));
+    assert!(!d.remarks.iter().any(|r| matches!(r, Remark::Contradicted { .. })), "{:?}", d.remarks);
+    assert_eq!(d.judgements.time_constants[1].grade, Grade::Conditional, "{:?}", d.judgements);
 }
 
 /// Two tones are four equations, two of which the time constants take.

@@ -128,6 +128,20 @@ impl Model {
         self
     }
 
+    /// This model with nothing known of the time constants beforehand.
+    ///
+    /// ```
+    /// use twinlag_model::Model;
+    ///
+    /// let model = Model::new(&[], [0.1, 0.2]).holding(1, 0.45).knowing_nothing();
+    /// assert!(!model.knows_of(1));
+    /// ```
+    #[must_use]
+    pub fn knowing_nothing(mut self) -> Self {
+        self.known.clear();
+        self
+    }
+
     /// This model with other white noise of the channels, K.
     #[must_use]
     pub fn with_noise(mut self, noise_std_k: [f64; 2]) -> Self {

@@ -62,7 +62,7 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
             facts.push(("Reference inside the 95 % band", with_unit(&rounded(100.0 * reference.inside_95, 3), "%")));
         }
         document = document.facts(facts).figure(
-            temperature_figure(record, answer).to_svg()?,
+            temperature_figure(record, answer, "").to_svg()?,
             "Readings, and the gas temperature with its 95 % band. Below, enlarged, the part where it moves most.",
         );
         let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 260.0).panel(spectra(record, answer));

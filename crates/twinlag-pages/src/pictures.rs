@@ -19,11 +19,12 @@ const GAP_STEPS: f64 = 2.5;
 /// # Errors
 /// [`ReportError`], if there is nothing to draw.
 pub fn gas_picture(record: &Record, answer: &Compensation) -> Result<String, ReportError> {
-    temperature_figure(record, answer).panel(spectra(record, answer)).to_svg()
+    let title = format!("gas temperature: {}", answer.judgement.grade);
+    temperature_figure(record, answer, &title).panel(spectra(record, answer)).to_svg()
 }
 
 /// Readings and gas temperature with its band, over the record and where it moves most.
-pub(crate) fn temperature_figure(record: &Record, answer: &Compensation) -> Figure {
+pub(crate) fn temperature_figure(record: &Record, answer: &Compensation, title: &str) -> Figure {
     let n = answer.time_s.len();
     let length = (n / EXCERPT).max(50).min(n);
     let swing = |from: usize| {
@@ -33,7 +34,7 @@ pub(crate) fn temperature_figure(record: &Record, answer: &Compensation) -> Figu
     };
     let starts = (0..=n - length).step_by((length / 2).max(1));
     let from = starts.max_by(|a, b| swing(*a).total_cmp(&swing(*b))).unwrap_or(0);
-    let figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    let figure = Figure::new(title).columns(1).panel_size(WIDTH_PX, 230.0);
     figure.panel(temperatures(record, answer, "The whole record", 0..n)).panel(temperatures(
         record,
         answer,
@@ -90,7 +91,8 @@ pub(crate) fn spectra(record: &Record, answer: &Compensation) -> Chart {
 /// # Errors
 /// [`ReportError`], if there is nothing to draw.
 pub fn track_picture(answer: &Track) -> Result<String, ReportError> {
-    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
+    let title = format!("time constants along the record: {}", answer.judgement.grade);
+    let mut figure = Figure::new(title).columns(1).panel_size(WIDTH_PX, 230.0);
     for (i, along) in answer.sensors.iter().enumerate() {
         let name = &answer.last.sensors[i].channel;
         let colour = [Colour::Blue, Colour::Orange][i];

@@ -12,7 +12,8 @@ use crate::plant::{Plant, SlowPath};
 pub(crate) static ABOUT: About = About::new("slow-mode", 7, candidates)
     .in_words(
         "part of one sensor's reading arrives through a slow body: conduction along the wires to the support, \
-                  the mass of the housing",
+                  the mass of the housing. The share is the part of a lasting change of the gas that the reading makes only \
+                  with the slow time constant; the rest it makes with the sensor's own",
         "use longer or thinner leads between junction and support, or a support that follows faster",
         "the same share through the same support in both sensors",
     )

@@ -33,7 +33,7 @@ impl Page<'_> {
             None => document,
         };
         Ok(document
-            .paragraph("A value from a data sheet, given as known with its deviation, narrows this down to one row."))
+            .paragraph("A value from a data sheet, given as known with its deviation, narrows this down to one row, unless that is no-go."))
     }
 }
 
@@ -42,6 +42,7 @@ fn table(answer: &IfKnown<String>) -> Table {
         answer.held.clone(),
         answer.fitted.clone(),
         "95 % interval".into(),
+        "grade".into(),
         "difference".into(),
         "gas differs from the faster sensor by".into(),
         "effects".into(),
@@ -52,6 +53,7 @@ fn table(answer: &IfKnown<String>) -> Table {
             with_unit(&rounded(v.time_constant_s, 2), "s"),
             v.other.value_s.map_or(ABSENT.into(), |t| with_unit(&rounded(t, 3), "s")),
             interval(v.other.interval_95_s),
+            v.judgement.grade.to_string(),
             interval(v.difference.interval_95_s),
             with_unit(&rounded(v.gas_change_k, 2), "K"),
             effects(v),
@@ -74,28 +76,15 @@ fn effects(held: &Held<String>) -> String {
     of_effect.collect::<Vec<_>>().join(", ")
 }
 
-/// The curve, that part of it greyed that the record excludes; `None` if there is none.
+/// The curve, where there are numbers that may be used; `None` if there is none.
 fn figure(answer: &IfKnown<String>) -> Option<Figure> {
-    let series = |name: &str, colour: Colour, is_shown: &dyn Fn(&Held<String>) -> bool| {
-        let shown = |v: &Held<String>| v.other.value_s.filter(|_| is_shown(v)).unwrap_or(f64::NAN);
-        let x: Vec<f64> = answer.values.iter().map(|v| v.time_constant_s).collect();
-        let y: Vec<f64> = answer.values.iter().map(shown).collect();
-        let ends = answer.values.iter().zip(&y).map(|(v, y)| match v.other.interval_95_s {
-            Some([low, high]) if y.is_finite() => (low, high),
-            _ => (f64::NAN, f64::NAN),
-        });
-        let (low, high): (Vec<f64>, Vec<f64>) = ends.unzip();
-        y.iter().any(|y| y.is_finite()).then(|| Series::points(name, x, y).interval(low, high).colour(colour))
-    };
+    let given = answer.values.iter().filter_map(|v| {
+        let [low, high] = v.other.interval_95_s.unwrap_or([f64::NAN; 2]);
+        Some((v.time_constant_s, v.other.value_s?, low, high))
+    });
+    let (x, y, low, high) = given.collect::<(Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>)>();
     let axes = [&answer.held, &answer.fitted]
         .map(|channel| Axis::logarithmic(format!("time constant of {} (s)", short(channel))));
-    let chart = chart(
-        "",
-        axes,
-        [
-            series("excluded by the record", Colour::Grey, &|v| v.is_excluded == Some(true)),
-            series("not excluded", Colour::Blue, &|v| v.is_excluded != Some(true)),
-        ],
-    )?;
-    Some(Figure::new("").columns(1).panel_size(WIDTH_PX, 320.0).panel(chart))
+    let series = (!x.is_empty()).then(|| Series::points("", x, y).interval(low, high).colour(Colour::Blue));
+    Some(Figure::new("").columns(1).panel_size(WIDTH_PX, 320.0).panel(chart("", axes, [series])?))
 }

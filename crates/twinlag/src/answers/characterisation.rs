@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::ResidualTest;
 use twinlag_diagnose::{Grade, Judgement, Reason};
-use twinlag_estimate::{IntervalBasis, NoiseSource};
+use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, Sampling, SamplingKind};
 
@@ -291,6 +291,16 @@ impl Characterisation {
         rest(&mut self.time_constant_difference_s.judgement);
         for free in [&mut self.free.gain, &mut self.free.offset_k].into_iter().flatten() {
             rest(&mut free.judgement);
+        }
+    }
+
+    /// Says that the time constants are not determined, whatever the fit made of them.
+    pub(crate) fn leave_undetermined(&mut self) {
+        self.status = Status::NotIdentifiable;
+        for (sensor, name) in self.sensors.iter().zip(Known::NAMES) {
+            if !sensor.known && !self.not_identifiable.iter().any(|known| known == name) {
+                self.not_identifiable.push(name.to_owned());
+            }
         }
     }
 

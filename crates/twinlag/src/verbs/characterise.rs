@@ -5,6 +5,7 @@
 
 mod bootstrap;
 mod conclude;
+mod contradiction;
 mod explain;
 mod fill;
 mod judge;
@@ -94,6 +95,10 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     if Rows::of(record).is_ok_and(|rows| is_single_tone(&rows.observations, &Policy::default())) {
         answer.warnings.push(Remark::SingleTone.to_string());
         answer.rest_on(&Reason::SingleTone);
+        answer.leave_undetermined();
+        if !options.best_effort {
+            answer.withhold();
+        }
     }
     Ok(answer)
 }

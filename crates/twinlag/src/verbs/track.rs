@@ -5,7 +5,8 @@ use std::ops::Range;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{
-    Basis, Change, Circumstances, Grade, Identifier, Judgement, Reason, Settings, TimeConstant, excess, track as follow,
+    Basis, Change, Circumstances, Grade, Identifier, Judgement, Reason, Remark, Settings, TimeConstant, excess,
+    is_single_tone, track as follow,
 };
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
@@ -120,6 +121,10 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     if found.log_error.is_some() && !stays {
         basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
     }
+    let is_single_tone = is_single_tone(&observations, policy);
+    if is_single_tone {
+        basis.reasons.push(Reason::SingleTone);
+    }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
     let narrow = found.fit.time_constants;
     let judgements = circumstances.judge(&mut found.fit);
@@ -134,13 +139,15 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     if !is_determined || (sensors.is_none() && judgement.grade != Grade::NoGo) {
         judgement = Judgement::of(&[Reason::NotDetermined]);
     }
-    let status = match (is_determined, is_left || !stays) {
+    let status = match (is_determined && !is_single_tone, is_left || !stays) {
         (false, _) => Status::NotIdentifiable,
         (true, true) => Status::ModelRejected,
         (true, false) => Status::Ok,
     };
     let is_given = options.characterise.best_effort || judgement.grade != Grade::NoGo;
-    let mut warnings = left_over(is_left && is_given, status == Status::ModelRejected && !is_given);
+    let tone = is_single_tone.then(|| Remark::SingleTone.to_string());
+    let mut warnings: Vec<String> = tone.into_iter().collect();
+    warnings.extend(left_over(is_left && is_given, status == Status::ModelRejected && !is_given));
     let mut sensors = sensors.filter(|_| is_given);
     warnings.extend(sensors.as_ref().and_then(|sensors| undetermined(sensors, 0, "instants")));
     let mut grades = vec![judgement.grade; sensors.as_ref().map_or(0, |s| s[0].tau_s.len())];

@@ -1,6 +1,8 @@
 //! A record with the effects of a model that was found in another one.
 
-use twinlag_diagnose::{Basis, Circumstances, Identifier, ModelFit, Reason, Settings, excess, fit_with};
+use twinlag_diagnose::{
+    Basis, Circumstances, Identifier, ModelFit, Reason, Remark, Settings, excess, fit_with, is_single_tone,
+};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, FittedAnswer, Model, Status};
@@ -57,6 +59,10 @@ pub(crate) fn with_model(
     let mut basis = Basis::of(excess, !settings.known.is_empty(), policy);
     let reasons = model.map_or_else(Vec::new, |model| model.reasons(record, &known.fitted_again));
     basis.reasons.extend(reasons.iter().cloned());
+    let is_single_tone = is_single_tone(&observations, policy);
+    if is_single_tone {
+        basis.reasons.push(Reason::SingleTone);
+    }
     let circumstances = Circumstances::new(basis, &settings.known, observations.span_s(), policy);
     let judgements = circumstances.judge(&mut known.fit);
     let fitted = FittedAnswer {
@@ -75,6 +81,10 @@ pub(crate) fn with_model(
     };
     let mut out = fitted.characterisation(status);
     out.model_remarks = reasons.iter().filter_map(Reason::caution).collect();
+    if is_single_tone {
+        out.warnings.push(Remark::SingleTone.to_string());
+        out.leave_undetermined();
+    }
     let listed = |effects: &mut dyn Iterator<Item = Identifier>| -> String {
         effects.map(Identifier::name).collect::<Vec<_>>().join(", ")
     };

@@ -2,6 +2,7 @@
 //! the reason.
 
 use twinlag_cross_relation::{ResidualTest, ScoreVariance};
+use twinlag_diagnose::Reason;
 use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
 use twinlag_optimise::{End, Fit};
 
@@ -34,6 +35,8 @@ pub(super) struct Conclusion<'q, 'a, const P: usize> {
     pub(super) judged: Judged,
     pub(super) other_hold: Option<OtherHold>,
     pub(super) warnings: Vec<String>,
+    /// What speaks against what was given.
+    pub(super) contradictions: Vec<Reason>,
 }
 
 /// The answer that `solved` is, `judged` by what it leaves.
@@ -59,7 +62,7 @@ pub(super) fn conclude<const P: usize>(
         (Some(_), Some(std_k)) => fit.levels().profiled(std_k),
         _ => *fit.levels(),
     };
-    Conclusion { asked, fit, solved, best, levels, judged, other_hold, warnings }.answer()
+    Conclusion { asked, fit, solved, best, levels, judged, other_hold, warnings, contradictions: Vec::new() }.answer()
 }
 
 impl<const P: usize> Conclusion<'_, '_, P> {
@@ -93,6 +96,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 out.status = Status::AtBound;
             }
         }
+        self.contradict()?;
         self.judge(&mut out, used.as_ref());
         if !self.asked.options.best_effort {
             out.withhold();

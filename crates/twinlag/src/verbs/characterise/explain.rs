@@ -50,6 +50,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         out.time_constant_difference_s =
             Difference { value, interval_95_s: Some([low, high]), ..Difference::default() };
         if low <= 0.0 && high >= 0.0 {
+            out.time_constant_difference_s.value = None;
             out.not_identifiable.push("time_constant_difference_s".into());
             self.warnings
                 .push("nothing about the time constants is determined, not even which sensor is the slower one".into());

@@ -203,7 +203,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     /// A fit that leaves what was known beforehand far behind is worth a word.
     pub(super) fn hold_against_knowledge(&mut self) {
         let theta = self.solved.theta;
-        for prior in self.fit.knowledge() {
+        // Time constants have a comparison of their own.
+        for prior in self.fit.knowledge().iter().filter(|prior| prior.index >= 2) {
             let away = (theta[prior.index] - prior.mean) / prior.std;
             if away.abs() > CONTRADICTING_STANDARD_DEVIATIONS {
                 self.warnings.push(format!(

@@ -56,8 +56,19 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let mut basis = Basis::default();
         let options = self.asked.options;
         if self.judged.is_rejected || out.status == Status::ModelRejected {
-            // What is missing and goes with a time constant is not in the residual, so that bounds nothing here.
-            basis.reasons.push(if options.known.is_empty() { Reason::LeftOver } else { Reason::LeftOverAside });
+            let energy = out.residual.chi2_per_dof.filter(|energy| *energy < 1.0 && options.noise_std_k.is_some());
+            basis.reasons.push(match energy {
+                Some(energy) => {
+                    let what = format!(
+                        "the residual has {energy:.3} of the energy of the noise that is known beforehand: these levels are too \
+                         high, and the estimate and its interval rest on them"
+                    );
+                    Reason::Fault { what, grade: Grade::NoGo }
+                }
+                // What is missing and goes with a time constant is not in the residual, so that bounds nothing here.
+                None if options.known.is_empty() => Reason::LeftOver,
+                None => Reason::LeftOverAside,
+            });
         }
         let is_biased = matches!(
             options.estimator,
@@ -66,6 +77,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         if is_biased {
             basis.reasons.push(Reason::Biased);
         }
+        basis.reasons.extend(self.contradictions.iter().cloned());
         basis.reasons.extend(options.known.iter().map(|known| Reason::Given { what: given(known) }));
         basis
     }
@@ -77,9 +89,11 @@ impl<const P: usize> Conclusion<'_, '_, P> {
 }
 
 /// What was given, for the reader.
-fn given(known: &Known) -> String {
+pub(super) fn given(known: &Known) -> String {
     let spread = known.std.map_or(String::new(), |std| format!(" ± {std}"));
-    format!("{} = {}{spread}", known.name(), known.value)
+    let name = known.name();
+    let (name, unit) = name.strip_suffix(".time_constant_s").map_or((name, ""), |sensor| (sensor, " s"));
+    format!("{name} = {}{spread}{unit}", known.value)
 }
 
 /// What each residual does to the parameters.
