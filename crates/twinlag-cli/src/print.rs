@@ -453,8 +453,10 @@ fn verdict_of(answer: &Diagnosis) -> String {
             )
         }
         None => match verdict(answer.verdict).split_once(": ") {
-            Some((name, meaning)) => format!("{name}{}: {meaning}", nothing_determined(&answer.last)),
-            None => verdict(answer.verdict).into(),
+            Some((name, meaning)) if matches!(answer.verdict, Verdict::Adequate | Verdict::Explained) => {
+                format!("{name}{}: {meaning}", nothing_determined(&answer.last))
+            }
+            _ => verdict(answer.verdict).into(),
         },
     }
 }

@@ -98,6 +98,9 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         }
         self.contradict()?;
         self.judge(&mut out, used.as_ref());
+        if !self.contradictions.is_empty() && out.status == Status::Ok {
+            out.status = Status::ModelRejected;
+        }
         if !self.asked.options.best_effort {
             out.withhold();
         }
