@@ -11,7 +11,7 @@ mod fill;
 mod judge;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
-use twinlag_diagnose::{Policy, Reason, Remark, is_single_tone};
+use twinlag_diagnose::{Grade, Policy, Reason, Remark, is_single_tone};
 use twinlag_estimate::{
     ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, Intervals, NoiseColour, NoiseKnowledge, RunAtRest,
     Solved, Task, WhitenedFit, other_hold,
@@ -94,11 +94,9 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     let mut answer = answer?;
     if Rows::of(record).is_ok_and(|rows| is_single_tone(&rows.observations, &Policy::default())) {
         answer.warnings.push(Remark::SingleTone.to_string());
-        answer.rest_on(&Reason::SingleTone);
-        answer.leave_undetermined();
-        if !options.best_effort {
-            answer.withhold();
-        }
+        // Two lags alone are what was asked for, and under them both equations determine both numbers.
+        let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
+        answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
     }
     Ok(answer)
 }

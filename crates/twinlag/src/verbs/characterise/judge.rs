@@ -1,8 +1,8 @@
 //! Whether the numbers of a characterisation may be used.
 
-use twinlag_cross_relation::{PartScatter, sandwich};
-use twinlag_diagnose::{Basis, Judgement, Number, Policy, Reason};
-use twinlag_estimate::{Estimator, Known};
+use twinlag_cross_relation::{PartScatter, TestName, sandwich};
+use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
+use twinlag_estimate::{Estimator, Known, REJECTION_P_VALUE};
 
 use super::conclude::Conclusion;
 use crate::answers::{Characterisation, Status};
@@ -56,7 +56,12 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let mut basis = Basis::default();
         let options = self.asked.options;
         if self.judged.is_rejected || out.status == Status::ModelRejected {
-            let energy = out.residual.chi2_per_dof.filter(|energy| *energy < 1.0 && options.noise_std_k.is_some());
+            let is_of_energy = out
+                .residual
+                .tests
+                .iter()
+                .any(|t| t.test == TestName::TotalEnergy && t.p_value < REJECTION_P_VALUE && t.statistic < 1.0);
+            let energy = out.residual.chi2_per_dof.filter(|_| is_of_energy && options.noise_std_k.is_some());
             basis.reasons.push(match energy {
                 Some(energy) => {
                     let what = format!(
