@@ -21,6 +21,9 @@ const SHORTEST_STEPS: f64 = 0.02;
 /// Values of the grid: four for each decade from a fiftieth of a sample period to a tenth of a record of a thousand samples, less
 /// of a longer one. Chosen, each costs a fit.
 const POINTS: usize = 15;
+/// The ends of an interval of the other time constant are within this factor where a value settles it: a factor of two either way.
+/// Of noise alone chance makes wider ones. Chosen.
+const SETTLED_FACTOR: f64 = 4.0;
 /// The other time constant where a fit begins is no less than this, in sample periods.
 const SHORTEST_START_STEPS: f64 = 0.05;
 
@@ -144,14 +147,19 @@ pub(crate) fn if_known(
             out.judgement =
                 Judgement::of(&[Reason::Contradicted { what, deviations: deviance.sqrt(), grade: Grade::NoGo }]);
         }
-        if out.judgement.grade == Grade::NoGo && out.other.value_s.is_some() {
-            (out.other, out.difference) = Default::default();
+        if out.judgement.grade == Grade::NoGo {
+            out.difference = TimeConstant::default();
+            // An upper limit without a value stays.
+            out.other = Some(out.other).filter(|other| other.value_s.is_none()).unwrap_or_default();
         }
         out
     });
     let values: Vec<Held> = values.collect();
-    let settles = values.iter().any(|v| v.judgement.grade != Grade::NoGo);
-    settles.then_some(IfKnown { held: 0, fitted: 1, chi2_per_dof, values })
+    let settles = |v: &Held| {
+        let is_narrow = v.other.interval_95_s.is_some_and(|[low, high]| high < SETTLED_FACTOR * low);
+        v.judgement.grade != Grade::NoGo && is_narrow
+    };
+    values.iter().any(settles).then_some(IfKnown { held: 0, fitted: 1, chi2_per_dof, values })
 }
 
 /// Fits with the first time constant held at each value in turn.

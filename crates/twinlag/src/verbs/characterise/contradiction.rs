@@ -19,7 +19,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     pub(super) fn contradict(&mut self) -> Result<(), Error> {
         let is_time_constant = |k: &Known| matches!(k.parameter, Parameter::Tau1 | Parameter::Tau2);
         let (of_time_constants, others): (Vec<Known>, Vec<Known>) =
-            self.asked.options.known.iter().cloned().partition(is_time_constant);
+            self.asked.options.known.iter().copied().partition(is_time_constant);
         if of_time_constants.is_empty() {
             return Ok(());
         }
