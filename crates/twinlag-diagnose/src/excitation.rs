@@ -20,7 +20,7 @@ pub fn is_single_tone(observations: &Observations, policy: &Policy) -> bool {
 
 /// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples
 /// are uneven or the power is spread. Each tone gives two equations, and two time constants take
-/// two. The level of the record, what drifts in it, and what a start out of balance leaves are none.
+/// two. The level of the record, what drifts in it, and what a start out of balance leaves do not count.
 pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usize> {
     observations.period_s?;
     let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
