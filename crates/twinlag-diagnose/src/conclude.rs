@@ -58,18 +58,22 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
+    if let Some(index) = with_effects.model.noise().filter(|_| is_whole) {
+        basis.reasons.push(Reason::FoundAsNoise { effect: with_effects.model.effects[index].identifier() });
+    }
     if let Some(contradiction) = Contradiction::find(&state, &with_effects, settings, policy) {
         basis.reasons.push(contradiction.reason());
         remarks.push(contradiction.remark());
     }
     let span_s = state.prepared.observations.span_s();
-    let hidden = if is_whole {
-        state.search().beside(&state.current).hidden(&state.current, &state.far, half_intervals(&last))?
-    } else {
-        [None; 3]
-    };
-    let circumstances =
-        Circumstances { is_total_delay, causes, hidden, ..Circumstances::new(basis, &settings.known, span_s, policy) };
+    let mut circumstances =
+        Circumstances { is_total_delay, causes, ..Circumstances::new(basis, &settings.known, span_s, policy) };
+    if is_whole {
+        let half = half_intervals(&last, &found, &with_effects);
+        let hidden = state.search().beside(&state.current).hidden(&state.current, &state.far, &half)?;
+        circumstances.hidden = [0, 1, 2].map(|i| hidden[i]);
+        circumstances.hidden_from_parameters = hidden[3..].to_vec();
+    }
     let judgements = circumstances.judge(&mut last);
     let base_judgements = if verdict == Verdict::Adequate {
         circumstances.judge(&mut base)
@@ -183,10 +187,20 @@ fn judged(
     found.into_iter().map(of_place).collect()
 }
 
-/// Half the intervals of both time constants and of their difference, s.
-fn half_intervals(fit: &ModelFit) -> [Option<f64>; 3] {
+/// Half the intervals of both time constants, of their difference, and of the parameters of effects, by their places in the
+/// model `last`.
+fn half_intervals(fit: &ModelFit, found: &[(Option<usize>, Found)], last: &Fitted) -> Vec<Option<f64>> {
+    let half = |interval: Option<[f64; 2]>| interval.map(|[low, high]| 0.5 * (high - low));
     let [one, two] = &fit.time_constants;
-    [one, two, &fit.difference].map(|number| number.interval_95_s.map(|[low, high]| 0.5 * (high - low)))
+    let mut out: Vec<Option<f64>> = [one, two, &fit.difference].map(|number| half(number.interval_95_s)).to_vec();
+    out.resize(1 + last.theta.len(), None);
+    for (place, effect) in found {
+        let Some(range) = place.map(|index| last.model.range(index)) else { continue };
+        for (at, value) in range.zip(&effect.parameters) {
+            out[1 + at] = half(value.interval_95);
+        }
+    }
+    out
 }
 
 /// What all numbers of the model rest on.

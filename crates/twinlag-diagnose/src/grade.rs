@@ -95,6 +95,11 @@ pub enum Reason {
         /// The best grade that a number can have with it.
         grade: Grade,
     },
+    /// A noise that was found in the residual accounts for what is left over, whatever that is.
+    FoundAsNoise {
+        /// The noise.
+        effect: Identifier,
+    },
     /// A value was given beforehand.
     Given {
         /// What was given, as `T1 = 0.5 s`.
@@ -248,6 +253,10 @@ impl fmt::Display for Reason {
                     rounded(*deviations)
                 )
             }
+            Self::FoundAsNoise { effect } => write!(
+                f,
+                "right if the {effect} that was found is noise: it would account for a response that the model lacks as well"
+            ),
             Self::Given { what } => write!(f, "right if {what}, as given"),
             Self::SingleTone => f.write_str(
                 "of a single tone two time constants absorb any effect: which sensor is slower, and by how much at its \

@@ -32,6 +32,8 @@ pub struct Circumstances<'a> {
     pub causes: [Option<Identifier>; 3],
     /// The effect that may be there unseen and would move the number, for both time constants and their difference.
     pub hidden: [Option<Identifier>; 3],
+    /// The effect that may be there unseen and would move the number, for each parameter of the effects in the model.
+    pub hidden_from_parameters: Vec<Option<Identifier>>,
     /// The numbers that decide.
     pub policy: &'a Policy,
 }
@@ -46,7 +48,8 @@ pub(crate) fn given(known: &KnownTimeConstant) -> String {
 impl<'a> Circumstances<'a> {
     /// A record of `span_s` seconds, of whose model nothing is known but what `basis` says.
     pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
-        Self { basis, known, span_s, is_total_delay: false, causes: [None; 3], hidden: [None; 3], policy }
+        let (causes, hidden, hidden_from_parameters) = ([None; 3], [None; 3], Vec::new());
+        Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, policy }
     }
 
     /// What was given beforehand, for the reader.

@@ -57,6 +57,7 @@ pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, U
 pub use evidence::Evidence;
 pub use excitation::is_single_tone;
 pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, excess};
+pub use hidden::unseen;
 pub use if_known::{Held, HeldEffect, IfKnown};
 pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;

@@ -143,6 +143,7 @@ pub(crate) fn judge_effect(
     let scatter = &fit.scatter[range.clone()];
     let is_on_bound = |index: usize| matches!(&last.end, End::OnBound(which) if which.contains(&(range.start + index)));
     let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
+    let hidden = |index: usize| circumstances.hidden_from_parameters.get(range.start - 2 + index).copied().flatten();
     let basis = circumstances.whole_basis();
     let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });
     for (index, value) in found.parameters.iter_mut().enumerate() {
@@ -155,8 +156,11 @@ pub(crate) fn judge_effect(
         let number = Number { value: value.value, interval_95: value.interval_95, scatter, is_positive };
         let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
         let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
-        let bound = is_bound.then_some(Reason::OnBound);
-        let own = cause.clone().into_iter().chain(is_part.then_some(Reason::PartOfTotal)).chain(bound).collect();
+        let hidden = if index < parameters.len() { hidden(index) } else { (0..parameters.len()).find_map(hidden) };
+        let mut own: Vec<Reason> = cause.clone().into_iter().collect();
+        own.extend(hidden.map(|effect| Reason::Hidden { effect }));
+        own.extend(is_part.then_some(Reason::PartOfTotal));
+        own.extend(is_bound.then_some(Reason::OnBound));
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
     }
 }
