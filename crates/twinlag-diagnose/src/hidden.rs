@@ -14,8 +14,8 @@ use twinlag_optimise::Scale;
 
 use crate::candidates::{Candidate, Search};
 
-/// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen, where all
-/// those that would move the number out of its interval are together more probable than the policy allows.
+/// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen,
+/// where all those that would move the number out of its interval are together more probable than the policy allows.
 ///
 /// ```
 /// use twinlag_diagnose::{Observations, Settings, Stretch, unseen};
@@ -34,12 +34,13 @@ use crate::candidates::{Candidate, Search};
 /// let observations = Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.01))?;
 /// let half_s = [Some(0.0005), Some(0.003), Some(0.003)];
 /// let watch = |_: &str, _, _| std::ops::ControlFlow::Continue(());
-/// let hidden = unseen(&observations, &Settings::default(), [0.05, 0.3], half_s, &watch)?;
+/// let hidden = unseen(&observations, &Settings::default(), [0.05, 0.3], &[], half_s, &watch)?;
 /// assert_eq!(hidden, [None; 3]);
 /// # Ok::<(), twinlag_diagnose::ModelError>(())
 /// ```
 ///
 /// - `tau_s`: where to begin the fit of the two lags, s
+/// - `beside`: effects that are in the model beside these, each with its channel
 /// - `half_s`: half the intervals, s; `None` of a number that has none
 ///
 /// # Errors
@@ -48,12 +49,21 @@ pub fn unseen(
     observations: &Observations,
     settings: &Settings,
     tau_s: [f64; 2],
+    beside: &[(Identifier, usize)],
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Option<Identifier>; 3], ModelError> {
     let prepared = Prepared::new(observations, settings)?;
-    let model = Model::new(&settings.known, prepared.levels.std_k);
-    let fitted = model.fit(&tau_s, &prepared.observations, &prepared.searched, Effort::Finish);
+    let fit =
+        |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);
+    let mut fitted = fit(&Model::new(&settings.known, prepared.levels.std_k), &tau_s);
+    for (identifier, channel) in beside {
+        let search = Search::of(&prepared, settings, watch).beside(&fitted);
+        let is_it = |effect: &Shared| effect.identifier() == *identifier && effect.channel() == Some(*channel);
+        let Some(effect) = search.candidates(&fitted.model).into_iter().find(is_it) else { continue };
+        let start = effect.starts().into_iter().next().unwrap_or_default();
+        fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
+    }
     let search = Search::of(&prepared, settings, watch).beside(&fitted);
     let hidden = search.hidden(&fitted, &[], &half_s)?;
     Ok([0, 1, 2].map(|i| hidden[i]))

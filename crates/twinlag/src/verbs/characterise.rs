@@ -9,6 +9,7 @@ mod contradiction;
 mod explain;
 mod fill;
 mod judge;
+mod unseen;
 
 use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, ScoreVariance, Segment, Steps};
 use twinlag_diagnose::{Grade, Policy, Reason, Remark, is_single_tone};
@@ -92,11 +93,14 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     };
     stop.check()?;
     let mut answer = answer?;
-    if Rows::of(record).is_ok_and(|rows| is_single_tone(&rows.observations, &Policy::default())) {
+    let Ok(rows) = Rows::of(record) else { return Ok(answer) };
+    if is_single_tone(&rows.observations, &Policy::default()) {
         answer.warnings.push(Remark::SingleTone.to_string());
         // Two lags alone are what was asked for, and under them both equations determine both numbers.
         let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
         answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
+    } else {
+        unseen::judge_unseen(&mut answer, &rows, options, watch)?;
     }
     Ok(answer)
 }

@@ -1,0 +1,51 @@
+//! Effects that two lags may hide, which their residual does not show.
+
+use twinlag_diagnose::{Identifier, ModelError, Reason, Settings, unseen};
+
+use crate::answers::{Characterisation, Status};
+use crate::error::Error;
+use crate::options::Options;
+use crate::rows::{Rows, known_time_constants};
+use crate::watch::Watch;
+
+/// Puts down for each number of `answer` the effect that may be there unseen and would move it out of its interval.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub(super) fn judge_unseen(
+    answer: &mut Characterisation,
+    rows: &Rows,
+    options: &Options,
+    watch: Watch<'_>,
+) -> Result<(), Error> {
+    let [Some(one_s), Some(two_s)] = answer.sensors.each_ref().map(|sensor| sensor.time_constant_s) else {
+        return Ok(());
+    };
+    if answer.status != Status::Ok {
+        return Ok(());
+    }
+    let settings =
+        Settings { noise_std_k: options.noise_std_k, known: known_time_constants(options), ..Settings::default() };
+    let calibration = options.calibrates().then_some((Identifier::CALIBRATION, 1));
+    let lags = (0..2).filter(|i| options.has_second_lag()[*i]).map(|i| (Identifier::SECOND_ORDER, i));
+    let beside: Vec<(Identifier, usize)> = calibration.into_iter().chain(lags).collect();
+    let half = |interval: Option<[f64; 2]>| interval.map(|[low, high]| 0.5 * (high - low));
+    let [one, two] = answer.sensors.each_ref().map(|sensor| half(sensor.interval_95_s));
+    let half_s = [one, two, half(answer.time_constant_difference_s.interval_95_s)];
+    let hidden = match unseen(&rows.observations, &settings, [one_s, two_s], &beside, half_s, watch) {
+        Ok(hidden) => hidden,
+        Err(ModelError::Cancelled) => return Err(Error::Cancelled),
+        // What the model of a diagnosis cannot take, it cannot judge.
+        Err(_) => return Ok(()),
+    };
+    let [sensor_1, sensor_2] = &mut answer.sensors;
+    let judgements =
+        [&mut sensor_1.judgement, &mut sensor_2.judgement, &mut answer.time_constant_difference_s.judgement];
+    let is_known = [sensor_1.known, sensor_2.known, false];
+    for ((judgement, effect), is_known) in judgements.into_iter().zip(hidden).zip(is_known) {
+        if let Some(effect) = effect.filter(|_| !is_known) {
+            *judgement = std::mem::take(judgement).and(&Reason::Hidden { effect });
+        }
+    }
+    Ok(())
+}
