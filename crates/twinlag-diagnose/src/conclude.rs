@@ -1,14 +1,16 @@
 //! From the last state of the loop to the answer.
 
 use twinlag_cross_relation::TestName;
-use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, Weighting, summarise};
+use twinlag_model::{
+    Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, Weighting, summarise,
+};
 
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
-use crate::grade::{Basis, Excess, Grade, Reason, excess};
-use crate::if_known::if_known;
-use crate::judge::Circumstances;
+use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
+use crate::if_known::{IfKnown, if_known};
+use crate::judge::{Circumstances, Judgements};
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
 use crate::moves::{Move, State, Taken};
@@ -43,14 +45,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     }
     let is_refused = tones == Some(SINGLE);
     remarks.extend(is_refused.then_some(Remark::SingleTone));
-    let is_coherent =
-        last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
-    if is_coherent && found.iter().any(|(_, f)| f.effect.is_noise()) {
-        // What goes with the gas is no noise; its spectrum is what the fit is weighted by all the
-        // same.
-        found.retain(|(_, f)| !f.effect.is_noise());
-        remarks.push(Remark::ModelErrorAsNoise);
-    }
+    remarks.extend(drop_coherent_noise(&mut found, &last, policy));
     let has_noise = with_effects.model.noise().is_some();
     let excess = excess(&last, has_noise).filter(|excess| excess.share <= policy.explained_excess_share);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
@@ -58,9 +53,6 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
-    if let Some(index) = with_effects.model.noise().filter(|_| is_whole) {
-        basis.reasons.push(Reason::FoundAsNoise { effect: with_effects.model.effects[index].identifier() });
-    }
     if let Some(contradiction) = Contradiction::find(&state, &with_effects, settings, policy) {
         basis.reasons.push(contradiction.reason());
         remarks.push(contradiction.remark());
@@ -71,11 +63,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     if is_whole {
         let half = half_intervals(&last, &found, &with_effects);
         let hidden = state.search().beside(&state.current).hidden(&state.current, &state.far, &half)?;
-        circumstances.hidden = [0, 1, 2].map(|i| hidden[i]);
-        circumstances.hidden_from_parameters = hidden[3..].to_vec();
+        circumstances.hide(&hidden);
     }
-    let judgements = circumstances.judge(&mut last);
-    let base_judgements = if verdict == Verdict::Adequate {
+    let mut judgements = circumstances.judge(&mut last);
+    let mut base_judgements = if verdict == Verdict::Adequate {
         circumstances.judge(&mut base)
     } else {
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
@@ -87,6 +78,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     } else {
         if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
     };
+    if !is_total_delay {
+        withhold_from_valley(&mut last, &mut judgements, if_known.as_ref());
+        withhold_from_valley(&mut base, &mut base_judgements, if_known.as_ref());
+    }
     let unexplained = left.filter(|_| !is_whole && !is_refused);
     if unexplained.is_some() {
         remarks.push(Remark::BiasUnknown { is_one_known: !settings.known.is_empty() });
@@ -171,6 +166,16 @@ fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>
     defects.chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
 }
 
+/// Takes a noise out of what is named where the residual goes with the gas, which no noise does; its spectrum is what the fit is
+/// weighted by all the same.
+fn drop_coherent_noise(found: &mut Vec<(Option<usize>, Found)>, last: &ModelFit, policy: &Policy) -> Option<Remark> {
+    let is_coherent =
+        last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
+    let named = found.len();
+    found.retain(|(_, f)| !(is_coherent && f.effect.is_noise()));
+    (found.len() < named).then_some(Remark::ModelErrorAsNoise)
+}
+
 /// Effects with the grades of their numbers, by their places in the model `last`.
 fn judged(
     found: Vec<(Option<usize>, Found)>,
@@ -185,6 +190,16 @@ fn judged(
         found
     };
     found.into_iter().map(of_place).collect()
+}
+
+/// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley,
+/// unless it is the same for all values that the record allows, as `table` says.
+fn withhold_from_valley(fit: &mut ModelFit, judgements: &mut Judgements, table: Option<&IfKnown>) {
+    let is_neither_determined = fit.time_constants.iter().all(|t| t.value_s.is_none());
+    if is_neither_determined && !table.is_some_and(|table| table.holds(&fit.difference)) {
+        fit.difference = TimeConstant::default();
+        judgements.difference = Judgement::of(&[Reason::NotDetermined]);
+    }
 }
 
 /// Half the intervals of both time constants, of their difference, and of the parameters of effects, by their places in the
@@ -219,6 +234,11 @@ fn basis(
         Verdict::Refused => basis.reasons = vec![Reason::Refused],
         Verdict::PartlyExplained if excess.is_some() => {
             basis.reasons.push(Reason::ManyEffects { count: effects(state) });
+        }
+        Verdict::Adequate | Verdict::Explained => {
+            let model = &state.current.model;
+            let noise = model.noise().map(|index| model.effects[index].identifier());
+            basis.reasons.extend(noise.map(|effect| Reason::FoundAsNoise { effect }));
         }
         _ => {}
     }

@@ -52,6 +52,12 @@ impl<'a> Circumstances<'a> {
         Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, policy }
     }
 
+    /// Puts down the effects that may be there unseen: for both time constants, their difference, and each parameter.
+    pub(crate) fn hide(&mut self, hidden: &[Option<Identifier>]) {
+        self.hidden = [0, 1, 2].map(|i| hidden[i]);
+        self.hidden_from_parameters = hidden[3..].to_vec();
+    }
+
     /// What was given beforehand, for the reader.
     fn given(&self) -> impl Iterator<Item = Reason> {
         self.known.iter().map(|known| Reason::Given { what: given(known) })
