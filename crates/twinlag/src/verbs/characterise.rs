@@ -100,7 +100,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
         answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
     } else {
-        unseen::judge_unseen(&mut answer, &rows, options, watch)?;
+        unseen::judge_unseen(&mut answer, &rows, options, &stop)?;
     }
     Ok(answer)
 }

@@ -1,12 +1,14 @@
 //! Effects that two lags may hide, which their residual does not show.
 
+use std::ops::ControlFlow;
+
 use twinlag_diagnose::{Identifier, ModelError, Reason, Settings, unseen};
 
 use crate::answers::{Characterisation, Status};
 use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, known_time_constants};
-use crate::watch::Watch;
+use crate::watch::Stop;
 
 /// Puts down for each number of `answer` the effect that may be there unseen and would move it out of its interval.
 ///
@@ -16,7 +18,7 @@ pub(super) fn judge_unseen(
     answer: &mut Characterisation,
     rows: &Rows,
     options: &Options,
-    watch: Watch<'_>,
+    stop: &Stop<'_>,
 ) -> Result<(), Error> {
     let [Some(one_s), Some(two_s)] = answer.sensors.each_ref().map(|sensor| sensor.time_constant_s) else {
         return Ok(());
@@ -32,7 +34,8 @@ pub(super) fn judge_unseen(
     let half = |interval: Option<[f64; 2]>| interval.map(|[low, high]| 0.5 * (high - low));
     let [one, two] = answer.sensors.each_ref().map(|sensor| half(sensor.interval_95_s));
     let half_s = [one, two, half(answer.time_constant_difference_s.interval_95_s)];
-    let hidden = match unseen(&rows.observations, &settings, [one_s, two_s], &beside, half_s, watch) {
+    let watch = |_: &str, _, _| if stop.is_wanted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let hidden = match unseen(&rows.observations, &settings, [one_s, two_s], &beside, half_s, &watch) {
         Ok(hidden) => hidden,
         Err(ModelError::Cancelled) => return Err(Error::Cancelled),
         // What the model of a diagnosis cannot take, it cannot judge.
