@@ -14,6 +14,11 @@ use twinlag_optimise::Scale;
 
 use crate::candidates::{Candidate, Search};
 
+/// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each. What is resolved in
+/// them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
+const PIECES: usize = 4;
+const PIECE_SAMPLES: usize = 32_768;
+
 /// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen,
 /// where all those that would move the number out of its interval are together more probable than the policy allows.
 ///
@@ -39,6 +44,8 @@ use crate::candidates::{Candidate, Search};
 /// # Ok::<(), twinlag_diagnose::ModelError>(())
 /// ```
 ///
+/// A record of more than 131 072 samples is judged by four pieces of it.
+///
 /// - `tau_s`: where to begin the fit of the two lags, s
 /// - `beside`: effects that are in the model beside these, each with its channel
 /// - `half_s`: half the intervals, s; `None` of a number that has none
@@ -53,7 +60,11 @@ pub fn unseen(
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Option<Identifier>; 3], ModelError> {
-    let prepared = Prepared::new(observations, settings)?;
+    let samples = observations.samples();
+    let excerpt = (samples > PIECES * PIECE_SAMPLES).then(|| {
+        observations.excerpt((0..PIECES).map(|i| i * (samples - PIECE_SAMPLES) / (PIECES - 1)), PIECE_SAMPLES)
+    });
+    let prepared = Prepared::new(excerpt.as_ref().unwrap_or(observations), settings)?;
     let fit =
         |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);
     let mut fitted = fit(&Model::new(&settings.known, prepared.levels.std_k), &tau_s);
