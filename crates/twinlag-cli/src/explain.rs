@@ -28,8 +28,8 @@ const STATUSES: [(&str, &str); 4] = [
     ),
     (
         "model-rejected",
-        "what the model leaves over is more than noise, so its time constants need not be those of the sensors: \
-         'twinlag diagnose' looks for what it lacks",
+        "what the model leaves over is more than noise, or the record contradicts a known time constant, so the time constants \
+         need not be those of the sensors: 'twinlag diagnose' looks for what the model lacks",
     ),
 ];
 
@@ -42,7 +42,8 @@ const GRADES: [(&str, &str); 3] = [
     (
         "conditional",
         "the number and its interval are right if an assumption holds that the record cannot check: it is printed beside them. \
-         Whoever knows that it holds, from a data sheet or from the rig, may use them; the exit code is 0, with --strict 4",
+         Whoever knows that it holds, from a data sheet or from the rig, may use them. The exit code is 4 with --strict, and where a \
+         diagnosis leaves something over",
     ),
     (
         "no-go",

@@ -15,9 +15,9 @@ pub(crate) fn exit_code(asked: &[Grade], others: &[Grade], is_partial: bool, str
     if is_usable && is_whole { 0 } else { 4 }
 }
 
-/// Says on standard error why `--strict` makes the exit code of an answer 4 where it would be 0.
+/// The exit code of an answer. Where `--strict` changes it, standard error says why.
 ///
-/// - `code`: the exit code, of whether it is strict
+/// - `code`: the exit code, from whether a condition is as bad
 pub(crate) fn strictly(strict: bool, code: impl Fn(bool) -> u8) -> u8 {
     let asked = code(strict);
     if strict && asked != code(false) {

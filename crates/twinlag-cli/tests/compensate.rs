@@ -6,10 +6,9 @@ mod common;
 use common::{Bench, RIG, interval, number};
 use serde_json::Value;
 
-/// Columns of a table that the program wrote.
 const GRADES: [&str; 3] = ["go", "conditional", "no-go"];
 
-/// The columns of a table, without the last one, in which each row has a grade.
+/// The columns of a table that the program wrote, without the last one, in which each row has a grade.
 fn columns(bench: &Bench, file: &str, header: &str) -> Vec<Vec<f64>> {
     let text = String::from_utf8(bench.read(file)).expect("text");
     let mut lines = text.lines();
@@ -100,7 +99,7 @@ fn outputs_are_never_lost_and_never_mixed() {
     assert!(answer.stdout.starts_with("time_s,tau1_s,tau1_low_s,tau1_high_s,tau2_s,tau2_low_s,tau2_high_s,grade\n"));
 }
 
-/// Equal sensors tell no time constant: exit code 4, the JSON all the same, and no table.
+/// Equal sensors determine no time constant: exit code 4, the JSON all the same, and no table.
 #[test]
 fn equal_sensors_have_no_gas_temperature() {
     let bench = Bench::simulated("equal", &RIG.replace("0.45", "0.12").replace("offset_k = 2.0\n", ""));

@@ -1,8 +1,9 @@
 //! Whether the record contradicts what was given of the time constants.
 //!
-//! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is asked without it:
-//! where the fit alone leaves only noise, the deviance that what was given costs is a chi-square with as many degrees of freedom as
-//! there are values. Where the fit alone leaves more, what is missing may account for the deviance, and nothing is said.
+//! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is fitted without it.
+//! Where two lags then leave only noise, the deviance that what was given costs is a chi-square with as many degrees of freedom as
+//! there are values. Where they leave more, the last model is fitted without it in their place: its effects may be wrong, so numbers
+//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance, and nothing is said.
 
 use twinlag_model::{Effort, Fitted, ModelFit, Policy, Settings, summarise};
 
@@ -26,7 +27,7 @@ pub(crate) struct Contradiction {
 }
 
 impl Contradiction {
-    /// What the record, without what was given, says of it.
+    /// What a fit without what was given says of that; `None` where nothing was given, or the record does not contradict it.
     ///
     /// - `with_effects`: the last model
     pub(crate) fn find(state: &State<'_>, with_effects: &Fitted, settings: &Settings, policy: &Policy) -> Option<Self> {
@@ -57,12 +58,12 @@ impl Contradiction {
         })
     }
 
-    /// What numbers rest on.
+    /// The reason that each number has for it.
     pub(crate) fn reason(&self) -> Reason {
         Reason::Contradicted { what: self.what.clone(), deviations: self.deviations, grade: self.grade }
     }
 
-    /// What to say of it.
+    /// The remark that says it.
     pub(crate) fn remark(self) -> Remark {
         Remark::Contradicted { what: self.what, instead: self.instead, deviations: self.deviations }
     }

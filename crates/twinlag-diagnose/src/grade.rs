@@ -247,11 +247,8 @@ impl fmt::Display for Reason {
             Self::OnBound => f.write_str("the best fit lies on a bound of it, so it is no estimate"),
             Self::Contradicted { what, deviations, grade } => {
                 let so = if *grade == Grade::NoGo { "" } else { "right if that is so all the same: " };
-                write!(
-                    f,
-                    "{so}the record contradicts {what}, as given, by {} standard deviations",
-                    rounded(*deviations)
-                )
+                let by = rounded(*deviations);
+                write!(f, "{so}the record contradicts {what}, as given, by {by} standard deviations")
             }
             Self::FoundAsNoise { effect } => write!(
                 f,

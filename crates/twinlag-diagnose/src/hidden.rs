@@ -1,7 +1,7 @@
 //! Which numbers an effect that nobody has seen could move.
 //!
 //! A search names an effect where it stands out from chance. One that does not may be there all the same, and where the record
-//! hardly shows it, it may move a time constant by more than its interval. How probable that is follows from Bayes'
+//! hardly shows it, it may move a number by more than its interval. How probable that is follows from Bayes'
 //! rule with two ingredients from outside the record: how often an effect is there at all, and how large it then usually is
 //! (a normal of zero mean whose standard deviation `s₀` is what counts as typical of it). With `σ` the standard error
 //! that the size would have, and `z` how many of these it seems to be, the odds of the effect against its absence are those

@@ -143,6 +143,7 @@ pub(crate) fn judge_effect(
     let scatter = &fit.scatter[range.clone()];
     let is_on_bound = |index: usize| matches!(&last.end, End::OnBound(which) if which.contains(&(range.start + index)));
     let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
+    // Both time constants come first in a model.
     let hidden = |index: usize| circumstances.hidden_from_parameters.get(range.start - 2 + index).copied().flatten();
     let basis = circumstances.whole_basis();
     let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });

@@ -102,9 +102,9 @@ pub(crate) fn interval(ends_s: Option<[f64; 2]>) -> String {
     })
 }
 
-/// The interval of a time constant; one that was given has none.
+/// The interval of a time constant; one that is known exactly has none.
 pub(crate) fn interval_of(of: &SensorEstimate) -> String {
-    if of.known { "given".into() } else { interval(of.interval_95_s) }
+    if of.known { "known beforehand".into() } else { interval(of.interval_95_s) }
 }
 
 /// Where an effect sits.

@@ -1,6 +1,6 @@
 //! The rows of a record as the model of a rig takes them.
 
-use twinlag_diagnose::{KnownTimeConstant, Masked, Observations, Stretch};
+use twinlag_diagnose::{KnownTimeConstant, Masked, Observations, Settings, Stretch};
 use twinlag_record::Record;
 
 use twinlag_cross_relation::Parameter;
@@ -46,8 +46,8 @@ impl Rows {
     }
 }
 
-/// What the options say of the time constants beforehand.
-pub(crate) fn known_time_constants(options: &Options) -> Vec<KnownTimeConstant> {
+/// What the options say of noise and time constants beforehand, as settings of a diagnosis.
+pub(crate) fn settings_of(options: &Options) -> Settings {
     let known = options.known.iter().filter_map(|k| {
         let sensor = match k.parameter {
             Parameter::Tau1 => 0,
@@ -56,5 +56,5 @@ pub(crate) fn known_time_constants(options: &Options) -> Vec<KnownTimeConstant> 
         };
         Some(KnownTimeConstant { sensor, value_s: k.value, std_s: k.std })
     });
-    known.collect()
+    Settings { noise_std_k: options.noise_std_k, known: known.collect(), ..Settings::default() }
 }

@@ -22,8 +22,7 @@ pub enum Status {
     /// The record does not determine the time constants apart;
     /// [`Characterisation::not_identifiable`] names what it does not.
     NotIdentifiable,
-    /// The time constants are the best of a model that the record contradicts: the residual is not
-    /// noise.
+    /// The record contradicts the model, whose residual is not noise, or a time constant that was known beforehand.
     ModelRejected,
 }
 

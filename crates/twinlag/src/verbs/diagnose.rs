@@ -13,7 +13,7 @@ use crate::answers::{
 use crate::error::Error;
 use crate::options::Options;
 use crate::reference::Reference;
-use crate::rows::{Rows, known_time_constants};
+use crate::rows::{Rows, settings_of};
 use crate::setting::{Setting, listed};
 use crate::watch::{UNWATCHED, Watch};
 
@@ -108,10 +108,9 @@ impl Diagnosed {
         options.characterise.check()?;
         let rows = Rows::of(record)?;
         let settings = Settings {
-            noise_std_k: options.characterise.noise_std_k,
-            known: known_time_constants(&options.characterise),
             effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
             policy: options.policy.clone(),
+            ..settings_of(&options.characterise)
         };
         let core = close_the_loop(&rows.observations, &settings, watch)?;
         Ok(Self { rows, core })

@@ -5,8 +5,8 @@ use std::ops::Range;
 use statrs::distribution::{Binomial, DiscreteCDF};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{
-    Basis, Change, Circumstances, Grade, Identifier, Judgement, Reason, Remark, Settings, TimeConstant, excess,
-    is_single_tone, track as follow,
+    Basis, Change, Circumstances, Grade, Identifier, Judgement, Reason, Remark, TimeConstant, excess, is_single_tone,
+    track as follow,
 };
 use twinlag_estimate::MAX_LOG_STANDARD_ERROR;
 use twinlag_record::{Channels, Record, SamplingChoice};
@@ -14,7 +14,7 @@ use twinlag_record::{Channels, Record, SamplingChoice};
 use crate::answers::{Along, Characterisation, FittedAnswer, Model, Ratio, Status, Track};
 use crate::error::Error;
 use crate::options::Options;
-use crate::rows::{Rows, known_time_constants};
+use crate::rows::{Rows, settings_of};
 use crate::setting::Setting;
 use crate::verbs::{characterise, following_both};
 use crate::watch::{UNWATCHED, Watch};
@@ -106,11 +106,7 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     options.model.as_ref().map_or(Ok(()), |model| model.check(record))?;
     let effects = options.model.as_ref().map(Model::known_effects).unwrap_or_default();
     let Rows { observations, .. } = Rows::of(record)?;
-    let settings = Settings {
-        noise_std_k: options.characterise.noise_std_k,
-        known: known_time_constants(&options.characterise),
-        ..Settings::default()
-    };
+    let settings = settings_of(&options.characterise);
     let mut found = follow(&observations, &settings, &effects, watch)?;
     let is_left = found.fit.is_contradicted();
     let stays = found.ratio.p_value >= RATIO_CHANGES;

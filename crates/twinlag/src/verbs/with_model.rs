@@ -8,7 +8,7 @@ use twinlag_record::Record;
 use crate::answers::{Characterisation, FittedAnswer, Model, Status};
 use crate::error::Error;
 use crate::options::Options;
-use crate::rows::{Rows, known_time_constants};
+use crate::rows::{Rows, settings_of};
 use crate::verbs::characterise;
 
 /// Estimates both time constants of `record`, with the effects of `model` held fixed.
@@ -51,7 +51,7 @@ pub(crate) fn with_model(
     // Coloured noise was found beside white noise of these levels: third differences see both.
     let noisy = model.filter(|m| m.effects.iter().any(|e| e.effect.is_noise()));
     let noise_std_k = options.noise_std_k.or(noisy.and_then(|m| m.noise_std_k));
-    let settings = Settings { noise_std_k, known: known_time_constants(options), ..Settings::default() };
+    let settings = Settings { noise_std_k, ..settings_of(options) };
     let effects = model.map(Model::known_effects).unwrap_or_default();
     let mut known = fit_with(&observations, &settings, &effects)?;
     let policy = &settings.policy;

@@ -13,9 +13,9 @@ use crate::error::Error;
 const CONTRADICTING_DEVIATIONS: f64 = 3.89;
 
 impl<const P: usize> Conclusion<'_, '_, P> {
-    /// What speaks against each time constant that was given. The record is asked without them: where two lags then leave only
-    /// noise, a value that differs from what was given by far more than both may be off is a contradiction. Where they leave more,
-    /// what is missing may account for it.
+    /// Puts down what speaks against each time constant that was given. The record is fitted without them: where two lags then leave
+    /// only noise, a value that differs from what was given by far more than both may be off is a contradiction. Where they leave
+    /// more, what is missing may account for it.
     pub(super) fn contradict(&mut self) -> Result<(), Error> {
         let is_time_constant = |k: &Known| matches!(k.parameter, Parameter::Tau1 | Parameter::Tau2);
         let (of_time_constants, others): (Vec<Known>, Vec<Known>) =

@@ -2,12 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use twinlag_diagnose::{Identifier, ModelError, Reason, Settings, unseen};
+use twinlag_diagnose::{Identifier, ModelError, Reason, unseen};
 
 use crate::answers::{Characterisation, Status};
 use crate::error::Error;
 use crate::options::Options;
-use crate::rows::{Rows, known_time_constants};
+use crate::rows::{Rows, settings_of};
 use crate::watch::Stop;
 
 /// Puts down for each number of `answer` the effect that may be there unseen and would move it out of its interval.
@@ -26,8 +26,6 @@ pub(super) fn judge_unseen(
     if answer.status != Status::Ok {
         return Ok(());
     }
-    let settings =
-        Settings { noise_std_k: options.noise_std_k, known: known_time_constants(options), ..Settings::default() };
     let calibration = options.calibrates().then_some((Identifier::CALIBRATION, 1));
     let lags = (0..2).filter(|i| options.has_second_lag()[*i]).map(|i| (Identifier::SECOND_ORDER, i));
     let beside: Vec<(Identifier, usize)> = calibration.into_iter().chain(lags).collect();
@@ -35,7 +33,7 @@ pub(super) fn judge_unseen(
     let [one, two] = answer.sensors.each_ref().map(|sensor| half(sensor.interval_95_s));
     let half_s = [one, two, half(answer.time_constant_difference_s.interval_95_s)];
     let watch = |_: &str, _, _| if stop.is_wanted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-    let hidden = match unseen(&rows.observations, &settings, [one_s, two_s], &beside, half_s, &watch) {
+    let hidden = match unseen(&rows.observations, &settings_of(options), [one_s, two_s], &beside, half_s, &watch) {
         Ok(hidden) => hidden,
         Err(ModelError::Cancelled) => return Err(Error::Cancelled),
         // What the model of a diagnosis cannot take, it cannot judge.
