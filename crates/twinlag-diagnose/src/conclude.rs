@@ -55,7 +55,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
     if let Some(contradiction) = Contradiction::find(&state, &with_effects, settings, policy) {
         basis.reasons.push(contradiction.reason());
-        remarks.push(contradiction.remark());
+        remarks.extend(contradiction.remark());
     }
     let span_s = state.prepared.observations.span_s();
     let mut circumstances =

@@ -3,9 +3,10 @@
 //! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is fitted without it.
 //! Where two lags then leave only noise, the deviance that what was given costs is a chi-square with as many degrees of freedom as
 //! there are values. Where they leave more, the last model is fitted without it in their place: its effects may be wrong, so numbers
-//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance, and nothing is said.
+//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance; only a fit that has left behind what was
+//! given with a deviation is none to use.
 
-use twinlag_model::{Effort, Fitted, ModelFit, Policy, Settings, summarise};
+use twinlag_model::{Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Settings, summarise};
 
 use crate::grade::{Grade, Reason};
 use crate::judge::given;
@@ -15,13 +16,16 @@ use crate::remark::Remark;
 /// Quantiles of the chi-square distribution with one and with two degrees of freedom that chance exceeds once in 10⁴, as a test of
 /// the residual does.
 const CONTRADICTING_DEVIANCES: [f64; 2] = [15.14, 18.42];
+/// Standard deviations of what was given beyond which the fit leaves it behind: by chance once in 370.
+const LEFT_BEHIND_DEVIATIONS: f64 = 3.0;
 /// Points of the grid of time constants from which the record is fitted without what was given.
 const STARTS: usize = 3;
 
 /// What speaks against what was given.
 pub(crate) struct Contradiction {
     what: String,
-    instead: String,
+    /// The time constants without what was given, for the reader, where they are to be had.
+    instead: Option<String>,
     deviations: f64,
     grade: Grade,
 }
@@ -42,7 +46,7 @@ impl Contradiction {
             let beyond = CONTRADICTING_DEVIANCES[known.len().min(2) - 1];
             (!fit.is_contradicted() && deviance > beyond).then(|| Self {
                 what: known.iter().map(given).collect::<Vec<_>>().join(" and "),
-                instead: instead(settings, &fit, free),
+                instead: Some(instead(settings, &fit, free)),
                 deviations: deviance.sqrt(),
                 grade,
             })
@@ -51,21 +55,38 @@ impl Contradiction {
         let alone = state.base.model.clone().knowing_nothing();
         let alone = alone.fit_over_grid(&[], STARTS, observations, everything);
         let held = state.base.model.fit(&state.base.theta, observations, everything, Effort::Finish);
-        of(&held, &alone, Grade::NoGo).or_else(|| {
-            let free = with_effects.model.clone().knowing_nothing();
-            let free = free.fit(&with_effects.theta, observations, everything, Effort::Finish);
-            of(with_effects, &free, Grade::Conditional)
-        })
+        of(&held, &alone, Grade::NoGo)
+            .or_else(|| {
+                let free = with_effects.model.clone().knowing_nothing();
+                let free = free.fit(&with_effects.theta, observations, everything, Effort::Finish);
+                of(with_effects, &free, Grade::Conditional)
+            })
+            .or_else(|| Self::left_behind(with_effects, settings))
+    }
+
+    /// What was given with a deviation, where the last model is far from it: what is missing drags the fit away.
+    fn left_behind(with_effects: &Fitted, settings: &Settings) -> Option<Self> {
+        let deviations =
+            |known: &KnownTimeConstant| Some((with_effects.theta[known.sensor] - known.value_s).abs() / known.std_s?);
+        let far = settings.known.iter().filter_map(|known| Some((known, deviations(known)?)));
+        let (known, deviations) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let is_far = deviations > LEFT_BEHIND_DEVIATIONS;
+        is_far.then(|| Self { what: given(known), instead: None, deviations, grade: Grade::NoGo })
     }
 
     /// The reason that each number has for it.
     pub(crate) fn reason(&self) -> Reason {
-        Reason::Contradicted { what: self.what.clone(), deviations: self.deviations, grade: self.grade }
+        let Self { what, deviations, grade, .. } = self;
+        if self.instead.is_none() {
+            return Reason::LeftBehind { what: what.clone(), deviations: *deviations };
+        }
+        Reason::Contradicted { what: what.clone(), deviations: *deviations, grade: *grade }
     }
 
-    /// The remark that says it.
-    pub(crate) fn remark(self) -> Remark {
-        Remark::Contradicted { what: self.what, instead: self.instead, deviations: self.deviations }
+    /// The remark that says it, where there are other time constants to name.
+    pub(crate) fn remark(self) -> Option<Remark> {
+        let Self { what, instead, deviations, .. } = self;
+        Some(Remark::Contradicted { what, instead: instead?, deviations })
     }
 }
 

@@ -95,6 +95,13 @@ pub enum Reason {
         /// The best grade that a number can have with it.
         grade: Grade,
     },
+    /// The fit departs from what was given: what the model lacks drags it away.
+    LeftBehind {
+        /// What was given, as `T1 = 0.5 ± 0.1 s`.
+        what: String,
+        /// By how many of its standard deviations.
+        deviations: f64,
+    },
     /// A noise that was found in the residual accounts for what is left over, whatever that is.
     FoundAsNoise {
         /// The noise.
@@ -168,6 +175,7 @@ impl Reason {
             | Self::PartOfTotal
             | Self::NoInterval
             | Self::LeftOver
+            | Self::LeftBehind { .. }
             | Self::OnBound
             | Self::SingleTone
             | Self::RatioChanges { .. } => Grade::NoGo,
@@ -250,6 +258,12 @@ impl fmt::Display for Reason {
                 let by = rounded(*deviations);
                 write!(f, "{so}the record contradicts {what}, as given, by {by} standard deviations")
             }
+            Self::LeftBehind { what, deviations } => write!(
+                f,
+                "the fit departs from {what}, as given, by {} of its standard deviations: something that the model lacks drags \
+                 it away",
+                rounded(*deviations)
+            ),
             Self::FoundAsNoise { effect } => write!(
                 f,
                 "right if the {effect} that was found is noise: it would account for a response that the model lacks as well"

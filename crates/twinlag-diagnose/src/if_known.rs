@@ -81,11 +81,12 @@ pub struct HeldEffect<Channel = usize> {
 
 impl IfKnown {
     /// Whether `difference` holds whichever of the values is the right one: that of each value that the record allows lies in
-    /// its interval.
+    /// its interval, and there is one.
     pub(crate) fn holds(&self, difference: &TimeConstant) -> bool {
         let Some([low, high]) = difference.interval_95_s else { return false };
         let allowed = self.values.iter().filter(|held| held.is_excluded != Some(true));
-        allowed.filter_map(|held| held.difference.value_s).all(|value_s| low <= value_s && value_s <= high)
+        let values_s: Vec<f64> = allowed.filter_map(|held| held.difference.value_s).collect();
+        !values_s.is_empty() && values_s.iter().all(|value_s| low <= *value_s && *value_s <= high)
     }
 
     /// What each value would make of the record, with the names of the channels.

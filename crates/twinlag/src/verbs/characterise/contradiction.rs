@@ -5,6 +5,7 @@ use twinlag_diagnose::{Grade, Reason, Remark};
 use twinlag_estimate::{Known, Task, WhitenedFit};
 
 use super::conclude::Conclusion;
+use super::fill::CONTRADICTING_STANDARD_DEVIATIONS;
 use super::judge::given;
 use crate::error::Error;
 
@@ -28,7 +29,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         alone.lower_levels_to_residual();
         let theta = alone.theta();
         let is_noise = alone.fit().end.is_usable() && !alone.is_rejected_by(&self.asked.tests(&alone, &theta)?);
-        let Some(covariance) = alone.covariance(ScoreVariance::WhiteNoise).filter(|_| is_noise) else { return Ok(()) };
+        let Some(covariance) = alone.covariance(ScoreVariance::WhiteNoise).filter(|_| is_noise) else {
+            self.leave_behind(&of_time_constants);
+            return Ok(());
+        };
         for known in &of_time_constants {
             let index = usize::from(known.parameter == Parameter::Tau2);
             let (own_s, error_s) = (theta[index], covariance[index][index].max(0.0).sqrt());
@@ -41,5 +45,17 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             }
         }
         Ok(())
+    }
+
+    /// What speaks against the numbers where what is missing drags a time constant away from what was given of it.
+    fn leave_behind(&mut self, given_of_time_constants: &[Known]) {
+        for known in given_of_time_constants {
+            let Some(std) = known.std else { continue };
+            let index = usize::from(known.parameter == Parameter::Tau2);
+            let deviations = (self.solved.theta[index] - known.value).abs() / std;
+            if deviations > CONTRADICTING_STANDARD_DEVIATIONS {
+                self.contradictions.push(Reason::LeftBehind { what: given(known), deviations });
+            }
+        }
     }
 }

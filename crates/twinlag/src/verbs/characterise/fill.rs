@@ -16,9 +16,12 @@ use crate::setting::Setting;
 /// Share of a standard error that the choice of hold may cost without a word: half of one widens
 /// the interval by an eighth.
 const NOTICEABLE_STANDARD_ERRORS: f64 = 0.5;
+/// Share of the difference between both holds that counts as a standard error at least: they bracket what a gas does between
+/// samples.
+const LEAST_HOLD_SHARE: f64 = 0.5;
 /// Standard deviations from a known value beyond which the record contradicts it: by chance once in
 /// 370.
-const CONTRADICTING_STANDARD_DEVIATIONS: f64 = 3.0;
+pub(super) const CONTRADICTING_STANDARD_DEVIATIONS: f64 = 3.0;
 
 impl<const P: usize> Conclusion<'_, '_, P> {
     /// Everything but the estimates.
@@ -84,9 +87,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     /// Estimates and intervals of both time constants and of their difference.
     pub(super) fn fill(&mut self, out: &mut Characterisation, covariance: &[[f64; P]; P], intervals: &TauIntervals) {
         let theta = self.solved.theta;
-        // The mean square error that the hold makes is that of the other one times its probability.
+        // The mean square error that the hold makes is that of the other one times its probability. The gas may do
+        // neither, so half the difference counts at least.
         let from_hold: [f64; 2] = self.other_hold.map_or([0.0; 2], |OtherHold { moved, probability }| {
-            [0, 1].map(|i| probability.sqrt() * moved[i] * theta[i])
+            [0, 1].map(|i| probability.sqrt().max(LEAST_HOLD_SHARE) * moved[i] * theta[i])
         });
         for i in 0..2 {
             let sensor = &mut out.sensors[i];
