@@ -3,8 +3,8 @@
 //! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is fitted without it.
 //! Where two lags then leave only noise, the deviance that what was given costs is a chi-square with as many degrees of freedom as
 //! there are values. Where they leave more, the last model is fitted without it in their place: its effects may be wrong, so numbers
-//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance; only a fit that has left behind what was
-//! given with a deviation is none to use.
+//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance. A fit that has
+//! then left behind what was given with a deviation may not be used.
 
 use twinlag_model::{Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Settings, summarise};
 
