@@ -43,7 +43,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             }
             return;
         };
-        if self.judged.is_rejected {
+        if self.judged.is_rejected && !self.asked.options.best_effort {
             out.not_identifiable.push("time_constant_difference_s".into());
             self.warnings.push(
                 "the model leaves more than noise beside time constants that are not determined: what is missing may go with \
@@ -69,7 +69,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let [low, high] = ridge.other;
         // With a residual that is noise, a time constant that stays put whatever the other does is
         // determined all the same.
-        if is_free(other) && low > 0.0 && !spans_too_much([low, high]) {
+        if !self.judged.is_rejected && is_free(other) && low > 0.0 && !spans_too_much([low, high]) {
             let sensor = &mut out.sensors[other];
             sensor.time_constant_s = Some(self.best.x[other]);
             sensor.interval_95_s = Some(ridge.other);
