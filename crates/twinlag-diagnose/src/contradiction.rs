@@ -8,14 +8,14 @@
 
 use twinlag_model::{Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Settings, summarise};
 
-use crate::grade::{Grade, Reason};
+use crate::grade::{Grade, REJECTING_CHI2, Reason};
 use crate::judge::given;
 use crate::moves::State;
 use crate::remark::Remark;
 
 /// Quantiles of the chi-square distribution with one and with two degrees of freedom that chance exceeds once in 10⁴, as a test of
 /// the residual does.
-const CONTRADICTING_DEVIANCES: [f64; 2] = [15.14, 18.42];
+const CONTRADICTING_DEVIANCES: [f64; 2] = [REJECTING_CHI2, 18.42];
 /// Standard deviations of what was given beyond which the fit leaves it behind: by chance once in 370.
 const LEFT_BEHIND_DEVIATIONS: f64 = 3.0;
 /// Points of the grid of time constants from which the record is fitted without what was given.

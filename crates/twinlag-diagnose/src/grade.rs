@@ -494,7 +494,7 @@ pub fn excess(fit: &ModelFit, has_noise: bool) -> Option<Excess> {
     let noise = quietest_quarter(bands).min(1.0);
     let above = |[_, power, dof]: &[f64; 3]| ((power / noise - 1.0 - 2.0 * (2.0 / dof).sqrt()) * dof).max(0.0);
     let of_bands: f64 = bands.iter().map(above).sum();
-    let energy = of_bands.max((fit.chi2_per_dof - 1.0) * count).max(LEAST_EXCESS);
+    let energy = of_bands.max((fit.chi2_per_dof - 1.0) * count).max(REJECTING_CHI2);
     (count > 0.0 && noise > 0.0).then_some(Excess { energy, share: energy / count })
 }
 
@@ -512,7 +512,7 @@ fn quietest_quarter(bands: &[[f64; 3]]) -> f64 {
 }
 
 /// Quantile of the chi-square distribution with one degree of freedom at which a test rejects, `p = 10⁻⁴`.
-const LEAST_EXCESS: f64 = 15.14;
+pub(crate) const REJECTING_CHI2: f64 = 15.14;
 
 #[cfg(test)]
 mod tests {

@@ -277,10 +277,9 @@ mod tests {
         let mut seen = 0;
         for value in allowed {
             let [low_s, high_s] = value.difference.interval_95_s.expect("determined");
-            // The 95 % interval, doubled: 4 standard errors. Beside it what the shortest period of 131 s, ω = 0.048/s, may be off by: the
-            // attenuation, of second order in the lag, (2 s ω)² of 6 s, 0.05 s; and the mean and the slope of a sample period h,
-            // (ωh)²/12 of 5.5 s, 0.1 s.
-            let slack_s = 0.5 * (high_s - low_s) + 0.15;
+            // The 95 % interval, doubled: 4 standard errors. Beside it the attenuation, of second order in the lag over a period: 2 s over
+            // 131 s / 2π, squared, of 6 s is 0.05 s.
+            let slack_s = 0.5 * (high_s - low_s) + 0.05;
             assert!(low_s - slack_s < 5.5 && 5.5 < high_s + slack_s, "{value:?}");
             seen += usize::from(value.time_constant_s < 1.0);
             assert_eq!(value.judgement.grade, Grade::Conditional, "right if the first is: {value:?}");

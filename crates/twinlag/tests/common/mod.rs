@@ -14,6 +14,11 @@ pub(crate) fn record(seed: u64, samples: usize, period_s: f64, gas: &str, sensor
          [[sensors]]\nchannel = \"T1\"\n{first}\n[[sensors]]\nchannel = \"T2\"\n{second}\n"
     );
     let rig: Rig = toml::from_str(&text).expect("a rig");
+    read(&rig)
+}
+
+/// What the two sensors of `rig` read.
+pub(crate) fn read(rig: &Rig) -> Record {
     let simulated = rig.simulate().expect("a sound rig");
     let channels = Channels {
         source: "a rig".into(),
