@@ -88,7 +88,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     }
     remarks.sort_by_key(Remark::importance);
     // What is left over may hide an effect of any size.
-    let limits = if is_whole { state.search().limits(&state.current)? } else { Vec::new() };
+    let limits = if is_whole { state.search().beside(&state.current).limits(&state.current)? } else { Vec::new() };
     Ok(Diagnosis {
         verdict,
         effects,

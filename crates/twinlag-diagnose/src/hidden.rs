@@ -3,21 +3,21 @@
 //! A search names an effect where it stands out from chance. One that does not may be there all the same, and where the record
 //! hardly shows it, it may move a number by more than its interval. How probable that is follows from Bayes'
 //! rule with two ingredients from outside the record: how often an effect is there at all, and how large it then usually is
-//! (a normal of zero mean whose standard deviation `s₀` is what counts as typical of it). With `σ` the standard error
-//! that the size would have, and `z` how many of these it seems to be, the odds of the effect against its absence are those
-//! from outside times `σ/√(σ² + s₀²) exp(½ z² s₀²/(s₀² + σ²))`: what the record shows well, and does not show, is not there.
+//! (a normal of zero mean whose standard deviation is [`Effect::usual_size`](twinlag_model::Effect::usual_size)). What the record
+//! shows well, and does not show, is not there.
 
-use twinlag_model::{
-    Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Prepared, Settings, Shared, Watch, dense,
-};
-use twinlag_optimise::Scale;
+use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch};
 
 use crate::candidates::{Candidate, Search};
+use crate::size::{Around, none};
 
 /// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each. What is resolved in
 /// them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
 const PIECES: usize = 4;
-const PIECE_SAMPLES: usize = 32_768;
+const PIECE_SAMPLES: usize = 16_384;
+
+/// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise.
+const NEGLIGIBLE_SHARE: f64 = 0.1;
 
 /// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen,
 /// where all those that would move the number out of its interval are together more probable than the policy allows.
@@ -44,7 +44,7 @@ const PIECE_SAMPLES: usize = 32_768;
 /// # Ok::<(), twinlag_diagnose::ModelError>(())
 /// ```
 ///
-/// A record of more than 131 072 samples is judged by four pieces of it.
+/// A record of more than 65 536 samples is judged by four pieces of it.
 ///
 /// - `tau_s`: where to begin the fit of the two lags, s
 /// - `beside`: effects that are in the model beside these, each with its channel
@@ -107,10 +107,10 @@ impl Search<'_> {
     ) -> Result<Vec<Option<Identifier>>, ModelError> {
         let mut all = self.candidates(&current.model);
         all.retain(|c| !c.is_noise() && !c.about().is_narrow && c.main().is_some());
-        let prior = self.policy.prior_effect_probability / all.len().max(1) as f64;
-        let now = current.model.linearised(&current.theta, self.observations, self.selection);
-        let each = self.each(&all, |effect| self.unseen(current, effect, prior, &now))?;
-        let from_afar = far.iter().filter_map(|candidate| unseen_afar(current, candidate, prior));
+        let around = self.around(current);
+        let prior = |effect: &Shared| self.prior_probability(effect, &all);
+        let each: Vec<Vec<Hidden>> = self.each(&all, |effect| self.unseen(&around, effect, prior(effect)))?;
+        let from_afar = far.iter().filter_map(|candidate| unseen_afar(current, candidate, prior(&candidate.effect)));
         let hidden: Vec<Hidden> = each.into_iter().flatten().chain(from_afar).collect();
         let of = |(i, half): (usize, &Option<f64>)| {
             let half = (*half)?;
@@ -122,31 +122,43 @@ impl Search<'_> {
         Ok(half.iter().enumerate().map(of).collect())
     }
 
-    /// How probable an effect is, from the largest size that a search begins with.
-    fn unseen(&self, current: &Fitted, effect: &Shared, prior: f64, now: &Linearised) -> Option<Hidden> {
-        let main = effect.main()?;
-        let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
-        let model = current.model.with(effect.clone());
-        let theta = [&current.theta[..], &start].concat();
-        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
-        let inverse = dense::inverse(&dense::gram(&lin.columns))?;
-        let slope = lin.slope();
-        let energy = current.mean_energy().max(1.0);
-        let taken = dense::dot(&slope, &dense::times(&inverse, &slope));
-        let gain = (current.chi2 - dense::dot(&lin.residual, &lin.residual) + taken) / energy;
-        let at = current.theta.len() + main;
-        let variance = inverse[at][at] * energy;
-        let usual = usual_size(effect, main, &start);
-        // Other parameters of the effect take off one each by chance.
-        let z2 = (gain - (start.len() - 1) as f64).max(0.0);
-        let seen = usual * usual / (usual * usual + variance);
-        let odds = prior * (1.0 - seen).sqrt() * (0.5 * z2 * seen).exp();
-        let size = (z2 * variance * seen * seen + variance * seen).sqrt();
-        let per_size: Vec<f64> = (0..current.theta.len()).map(|i| inverse[i][at] / inverse[at][at]).collect();
-        let shift: Vec<f64> = with_difference(&per_size).iter().map(|slope| (slope * size).abs()).collect();
-        let is_usable = variance > 0.0 && odds.is_finite() && shift.iter().all(|s| s.is_finite());
-        is_usable.then(|| Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift })
+    /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, and the places
+    /// and forms that it may have share that.
+    fn prior_probability(&self, effect: &Shared, all: &[Shared]) -> f64 {
+        let is_first = |(i, e): &(usize, &Shared)| all[..*i].iter().all(|o| o.identifier() != e.identifier());
+        let kinds = all.iter().enumerate().filter(is_first).count();
+        let forms = all.iter().filter(|o| o.identifier() == effect.identifier()).count();
+        self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
     }
+
+    /// How probable an effect is, and what it would do, for each set of values that its other parameters may begin with.
+    fn unseen(&self, around: &Around<'_>, effect: &Shared, prior: f64) -> Vec<Hidden> {
+        let Some((main, usual)) = effect.main().zip(effect.usual_size()) else { return Vec::new() };
+        let parameters = effect.parameters();
+        let mut starts = effect.starts();
+        if (0..parameters.len()).all(|i| i == main || parameters[i].neutral().is_some()) {
+            starts.truncate(1);
+        }
+        let (count, prior) = (around.fitted.theta.len(), prior / starts.len() as f64);
+        let is_positive = none(&parameters[main]) - parameters[main].variable.lower < NEGLIGIBLE_SHARE * usual;
+        let of = |start: &Vec<f64>| {
+            let (bayes_factor, shift) = self.near_none(around, effect, main, start).map_or_else(
+                // Nothing is known of it, and it may move everything.
+                || (1.0, vec![f64::INFINITY; count + 1]),
+                |along| {
+                    let posterior = along.posterior(usual, is_positive);
+                    let shift = with_difference(&along.follow[..count]);
+                    (posterior.bayes_factor, shift.iter().map(|x| (x * posterior.rms).abs()).collect())
+                },
+            );
+            Hidden { effect: effect.identifier(), probability: probability_of(prior * bayes_factor), shift }
+        };
+        starts.iter().map(of).collect()
+    }
+}
+
+fn probability_of(odds: f64) -> f64 {
+    if odds.is_finite() { odds / (1.0 + odds) } else { 1.0 }
 }
 
 /// How probable an effect is that was fitted with quite other time constants.
@@ -157,25 +169,16 @@ fn unseen_afar(current: &Fitted, candidate: &Candidate, prior: f64) -> Option<Hi
     if gain <= 0.0 || !fitted.end.is_usable() || !candidate.is_clear_of_bounds() {
         return None;
     }
-    let start = effect.starts().into_iter().max_by(|a, b| a[main].abs().total_cmp(&b[main].abs()))?;
-    let usual = usual_size(effect, main, &start);
+    let usual = effect.usual_size()?;
     // So many standard errors make the gain.
     let error = fitted.theta[current.theta.len() + main].abs() / gain.sqrt();
     let odds = prior * error / error.hypot(usual) * (0.5 * gain).exp();
     let (here, there) = (with_difference(&current.theta), with_difference(&fitted.theta[..current.theta.len()]));
     let shift = here.iter().zip(&there).map(|(here, there)| (there - here).abs()).collect();
-    Some(Hidden { effect: effect.identifier(), probability: odds / (1.0 + odds), shift })
+    Some(Hidden { effect: effect.identifier(), probability: probability_of(odds), shift })
 }
 
 /// Both time constants, their difference, and the parameters of effects, from the parameters of a model.
 fn with_difference(theta: &[f64]) -> Vec<f64> {
     [&[theta[0], theta[1], theta[1] - theta[0]], &theta[2..]].concat()
-}
-
-/// The size that counts as typical of an effect: that of its scale, or the largest that a search begins with.
-fn usual_size(effect: &Shared, main: usize, start: &[f64]) -> f64 {
-    match effect.parameters()[main].variable.scale {
-        Scale::Linear { typical } => typical,
-        Scale::Logarithmic => start[main],
-    }
 }

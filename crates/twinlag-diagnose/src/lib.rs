@@ -51,6 +51,7 @@ mod moves;
 mod naming;
 mod rank;
 mod remark;
+mod size;
 
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};

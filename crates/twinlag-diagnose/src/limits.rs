@@ -1,10 +1,11 @@
 //! What a search would have seen, and what no search can.
 
-use twinlag_model::{Fitted, Linearised, ModelError, Observations, Policy, Shared, dense};
+use twinlag_model::{Fitted, ModelError, Observations, Policy, Shared};
 
 use crate::candidates::Search;
 use crate::diagnosis::Limit;
 use crate::rank::threshold;
+use crate::size::Around;
 
 impl Search<'_> {
     /// For each candidate that the model lacks, the smallest size that the search would have seen:
@@ -17,8 +18,8 @@ impl Search<'_> {
         let mut all = self.candidates(&current.model);
         let probability = self.policy.round_false_alarm_probability / all.len().max(1) as f64;
         all.retain(|c| !c.is_noise() && c.main().is_some());
-        let now = current.model.linearised(&current.theta, self.observations, self.selection);
-        let found = self.each(&all, |effect| self.limit(current, effect, &now, probability))?;
+        let around = self.around(current);
+        let found = self.each(&all, |effect| self.limit(&around, effect, probability))?;
         let mut out: Vec<Limit> = Vec::new();
         for limit in found.into_iter().flatten() {
             let is_same = |o: &Limit| o.effect == limit.effect && o.channel == limit.channel;
@@ -29,15 +30,10 @@ impl Search<'_> {
         Ok(out)
     }
 
-    fn limit(&self, current: &Fitted, effect: &Shared, now: &Linearised, probability: f64) -> Option<Limit> {
+    fn limit(&self, around: &Around<'_>, effect: &Shared, probability: f64) -> Option<Limit> {
         let main = effect.main()?;
-        let model = current.model.with(effect.clone());
-        let mut theta = current.theta.clone();
-        theta.extend_from_slice(effect.starts().first()?);
-        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
-        let index = current.theta.len() + main;
-        let variance = dense::inverse(&dense::gram(&lin.columns))?[index][index] * current.mean_energy().max(1.0);
-        let size = variance.sqrt() * threshold(effect.parameters().len(), probability).sqrt();
+        let along = self.near_none(around, effect, main, effect.starts().first()?)?;
+        let size = along.variance().sqrt() * threshold(effect.parameters().len(), probability).sqrt();
         let parameter = &effect.parameters()[main];
         (size > 0.0 && size.is_finite()).then(|| Limit {
             effect: effect.identifier(),

@@ -322,7 +322,7 @@ mod tests {
             let two_lags = Model::new(&[], [0.05, 0.07]);
             let want = two_lags.linearised(&TAU_S, &observations, &selection).residual;
             for effect in effects(&context).into_iter().filter(|e| !adds_factors.contains(&e.identifier().name())) {
-                let neutral = |p: &Parameter| f64::from(u8::from(p.name == "gain"));
+                let neutral = |p: &Parameter| p.neutral().unwrap_or(0.0);
                 let theta: Vec<f64> = TAU_S.into_iter().chain(effect.parameters().iter().map(neutral)).collect();
                 let model = two_lags.with(effect.clone());
                 let got = model.linearised(&theta, &observations, &selection).residual;

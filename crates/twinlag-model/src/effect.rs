@@ -29,6 +29,8 @@ mod parameter;
 
 use std::sync::Arc;
 
+use twinlag_optimise::Scale;
+
 pub use about::About;
 pub use context::Context;
 pub use identifier::Identifier;
@@ -77,6 +79,17 @@ pub trait Effect: Send + Sync {
     /// time.
     fn main(&self) -> Option<usize> {
         Some(0)
+    }
+
+    /// How large the effect usually is where there is one: the standard deviation beforehand of [`Self::main`] about where it
+    /// changes nothing, in its unit. By default what counts as typical of its scale, or the largest of [`Self::starts`] where
+    /// that is logarithmic. An effect that has no such parameter has no usual size either, and is not looked for unseen.
+    fn usual_size(&self) -> Option<f64> {
+        let main = self.main()?;
+        Some(match self.parameters()[main].variable.scale {
+            Scale::Linear { typical } => typical,
+            Scale::Logarithmic => self.starts().iter().map(|start| start[main]).fold(0.0, f64::max),
+        })
     }
 
     /// Forms of this effect with more or fewer parameters, tried once it is chosen.
@@ -170,6 +183,9 @@ fn check_one(effect: &Shared) -> Result<(), ModelError> {
     }
     if let Some(main) = effect.main().filter(|main| *main >= parameters.len()) {
         return wrong("a main parameter that it has, counted from 0", main as f64);
+    }
+    if let Some(usual) = effect.usual_size().filter(|usual| !(usual.is_finite() && *usual > 0.0)) {
+        return wrong("a usual size that is finite and above 0", usual);
     }
     if starts.is_empty() {
         return wrong("at least one set of values to start from", 0.0);

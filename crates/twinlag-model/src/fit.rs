@@ -163,6 +163,58 @@ impl Model {
         out
     }
 
+    /// Half the second derivatives of the energy at `theta`, symmetric, in units of the parameters; averages over a part of a
+    /// standard error either way. Of a parameter that is held, or whose column is zero, they are zero.
+    ///
+    /// Products of first derivatives, [`dense::gram`] of the columns, count the noise that is in these as information on
+    /// the parameters. In quiet records there is little of it; where the noise is a tenth of what the gas does, it can make up most
+    /// of them.
+    ///
+    /// - `lin`: the residual at `theta` with its derivatives
+    /// - `known`: this matrix of the first parameters alone, if the residual is theirs still and an effect of no size was added; or
+    ///   nothing
+    pub fn second_derivatives(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        lin: &Linearised,
+        known: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
+        let (p, first) = (theta.len(), known.len());
+        let cost = ResidualCost::new(self, theta, observations, selection);
+        let products = dense::gram(&lin.columns);
+        let end = p.min(first + MAX_EXACT_CURVATURES);
+        let is_still = |i: usize| cost.variables[i].lower == cost.variables[i].upper || products[i][i] <= 0.0;
+        let row = |i: usize| {
+            let variable = &cost.variables[i];
+            if is_still(i) {
+                return vec![0.0; p];
+            }
+            let step = CURVATURE_STEP_SE / products[i][i].sqrt();
+            let moved = |by: f64| {
+                let mut at = theta.to_vec();
+                at[i] = (at[i] + by).clamp(variable.lower, variable.upper);
+                (at[i] - theta[i], cost.linearised(&at, 0).slope())
+            };
+            let ((up, above), (down, below)) = (moved(step), moved(-step));
+            above.iter().zip(&below).map(|(above, below)| (above - below) / (up - down)).collect()
+        };
+        let exact: Vec<Vec<f64>> = (first..end).map(row).collect();
+        let of = |i: usize, j: usize| {
+            let exact_row = |i: usize| (first..end).contains(&i).then(|| &exact[i - first]);
+            match (exact_row(i), exact_row(j)) {
+                _ if is_still(i) || is_still(j) => 0.0,
+                (Some(a), Some(b)) => 0.5 * (a[j] + b[i]),
+                (Some(row), None) => row[j],
+                (None, Some(row)) => row[i],
+                (None, None) if i < first && j < first => known[i][j],
+                (None, None) => products[i][j],
+            }
+        };
+        (0..p).map(|i| (0..p).map(|j| of(i, j)).collect()).collect()
+    }
+
     /// Inverse of half the second derivatives of the energy; of the products of first ones where those are not positive
     /// definite.
     pub(crate) fn curvature(
@@ -172,34 +224,7 @@ impl Model {
         selection: &Selection,
         lin: &Linearised,
     ) -> Option<Vec<Vec<f64>>> {
-        let p = theta.len();
-        let cost = ResidualCost::new(self, theta, observations, selection);
-        let variables = &cost.variables;
-        let products = dense::gram(&lin.columns);
-        let exact = p.min(MAX_EXACT_CURVATURES);
-        let mut second = products.clone();
-        for i in 0..exact {
-            if variables[i].lower == variables[i].upper {
-                second[i].fill(0.0);
-                continue;
-            }
-            let step = CURVATURE_STEP_SE / products[i][i].max(f64::MIN_POSITIVE).sqrt();
-            let moved = |by: f64| {
-                let mut at = theta.to_vec();
-                at[i] = (at[i] + by).clamp(variables[i].lower, variables[i].upper);
-                (at[i] - theta[i], cost.linearised(&at, 0).slope())
-            };
-            let ((up, above), (down, below)) = (moved(step), moved(-step));
-            for j in 0..p {
-                second[i][j] = (above[j] - below[j]) / (up - down);
-            }
-        }
-        let between = |i: usize, j: usize| match (i < exact, j < exact) {
-            (true, false) => second[i][j],
-            (false, true) => second[j][i],
-            _ => 0.5 * (second[i][j] + second[j][i]),
-        };
-        let symmetric: Vec<Vec<f64>> = (0..p).map(|i| (0..p).map(|j| between(i, j)).collect()).collect();
-        dense::inverse(&symmetric).or_else(|| dense::inverse(&products))
+        let second = self.second_derivatives(theta, observations, selection, lin, &[]);
+        dense::inverse(&second).or_else(|| dense::inverse(&dense::gram(&lin.columns)))
     }
 }

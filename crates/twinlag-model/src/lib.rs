@@ -61,7 +61,7 @@ pub use selection::Selection;
 pub use settings::{Settings, Watch, report};
 pub use spectrum::{Bands, fit_noise, runs, white_deviance};
 pub use spline::Spline;
-pub use summary::{covariance, is_unresolved, summarise};
+pub use summary::{covariance, is_unresolved, score_covariance, summarise};
 pub use track::{Change, ChangePoint, RatioTest, Track, track};
 pub use twinlag_optimise::Variable;
 pub use weighting::Weighting;

@@ -159,8 +159,8 @@ policy! {
     /// Probability that parts of a record seem to disagree on a number of a right model: of the three that are asked most, in
     /// three records of a thousand.
     parts_rejection_probability: f64 = 1e-3,
-    /// Probability that a record has an effect that the search has not named, all kinds and channels together: chosen, one
-    /// in four, of which each candidate has its share.
+    /// Probability that a record has an effect that the search has not named: chosen, one in four, of which each kind of effect
+    /// that has a size has an equal share, and its places, forms and starts share that.
     prior_effect_probability: f64 = 0.25,
     /// Probability that an effect is there unseen which moves a number out of its interval, from which on the number
     /// is right only if there is none: the one in twenty that the interval leaves open itself.

@@ -3,6 +3,7 @@
 use twinlag_cross_relation::{CHI2_95, Z_975, log_normal_interval_95, residual_tests};
 
 use crate::blocks;
+use crate::cost::Linearised;
 use crate::defects::ChannelNoise;
 use crate::dense;
 use crate::extended::Extended;
@@ -59,6 +60,17 @@ fn is_flat(
     })
 }
 
+/// Covariance of half the first derivatives of the energy, [`Linearised::slope`], for white noise: products of the columns, each
+/// filtered once more, since the noise is that of the residual before its filter; prior knowledge has unit variance.
+pub fn score_covariance(lin: &Linearised, selection: &Selection) -> Vec<Vec<f64>> {
+    let n = lin.samples.len();
+    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|c| selection.weighting.apply(&c[..n])).collect();
+    let of = |a: usize, b: usize| {
+        dense::dot(&filtered[a], &filtered[b]) + dense::dot(&lin.columns[a][n..], &lin.columns[b][n..])
+    };
+    (0..filtered.len()).map(|a| (0..filtered.len()).map(|b| of(a, b)).collect()).collect()
+}
+
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
 /// ones, for white noise or, where the residual is not that, with its own autocorrelation.
 pub fn covariance(
@@ -71,15 +83,7 @@ pub fn covariance(
     let p = lin.columns.len();
     let inverse = fitted.model.curvature(&fitted.theta, observations, selection, &lin)?;
     let n = lin.samples.len();
-    // Filtered once more: the score is that of the residual before the filter.
-    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|c| selection.weighting.apply(&c[..n])).collect();
-    let mut middle: Vec<Vec<f64>> =
-        (0..p).map(|a| (0..p).map(|b| dense::dot(&filtered[a], &filtered[b])).collect()).collect();
-    for (a, row) in middle.iter_mut().enumerate() {
-        for (b, m) in row.iter_mut().enumerate() {
-            *m += dense::dot(&lin.columns[a][n..], &lin.columns[b][n..]);
-        }
-    }
+    let mut middle = score_covariance(&lin, selection);
     if by_residual {
         // Bartlett's window over the lags in which the residual remembers.
         let lags = (2.0 * (n as f64).sqrt()) as usize;

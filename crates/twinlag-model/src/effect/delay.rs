@@ -23,17 +23,23 @@ pub(crate) static ABOUT: About = About::new("delay", 5, candidates)
     .imitating(&["second-order", "slow-mode"])
     .turning_phases();
 
+/// Usual delays: as a share of the faster time constant, as of a second lag, and in sample periods. Chosen.
+const USUAL_SHARE: f64 = 0.3;
+const USUAL_PERIODS: f64 = 0.5;
+
 struct Delay {
     seat: Seat,
     step_s: f64,
+    faster_s: f64,
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
     let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 } * context.step_s;
-    let variable = Variable::linear("delay", 0.5 * context.step_s, -longest, longest);
+    let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest, longest);
     let delay = Parameter::new("delay", "s", variable).as_lateness();
     let seat = Seat::new(Identifier::DELAY, Some(1), vec![delay]);
-    vec![Arc::new(Delay { seat, step_s: context.step_s })]
+    let faster_s = context.tau_s[0].min(context.tau_s[1]);
+    vec![Arc::new(Delay { seat, step_s: context.step_s, faster_s })]
 }
 
 impl Effect for Delay {
@@ -43,6 +49,12 @@ impl Effect for Delay {
 
     fn starts(&self) -> Vec<Vec<f64>> {
         [0.3, -3.0, 3.0].map(|steps| inside(&self.seat.parameters, &[steps * self.step_s])).to_vec()
+    }
+
+    /// A gas that comes to one sensor later than to the other does so by a part of what the sensors resolve, and a scan by a
+    /// part of a sample period.
+    fn usual_size(&self) -> Option<f64> {
+        Some((USUAL_SHARE * self.faster_s).max(USUAL_PERIODS * self.step_s))
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

@@ -42,6 +42,24 @@ impl Parameter {
         Self { determines: Some(freedom), ..self }
     }
 
+    /// The value at which it changes nothing; `None` where none of its values does.
+    ///
+    /// ```
+    /// use twinlag_model::{Domain, Parameter};
+    /// use twinlag_optimise::Variable;
+    ///
+    /// let gain = Parameter::new("gain", "1", Variable::linear("gain", 0.03, 0.2, 5.0)).within(Domain::NotZero);
+    /// assert_eq!(gain.neutral(), Some(1.0)); // a factor
+    /// let lag = Parameter::new("second_time_constant", "s", Variable::logarithmic("second time constant", 1e-4, 10.0));
+    /// assert_eq!(lag.neutral(), None); // positive, however small
+    /// ```
+    pub fn neutral(&self) -> Option<f64> {
+        let neutral = if self.domain == Domain::NotZero { 1.0 } else { 0.0 };
+        let is_possible =
+            self.domain.contains(neutral) && (self.variable.lower..=self.variable.upper).contains(&neutral);
+        is_possible.then_some(neutral)
+    }
+
     /// A parameter that is how much later channel 2 is, s.
     #[must_use]
     pub fn as_lateness(self) -> Self {

@@ -1,0 +1,208 @@
+//! What a record says of the size of an effect that a model lacks.
+//!
+//! Near a size `s` the energy of the residual, all other parameters at their best, is `E + 2 g (s' − s) + h (s' − s)²`. The
+//! curvature `h` is not that of the linearised residual: derivatives of a residual with noise have noise in them, whose products say
+//! nothing of the parameters, and in loud records are most of it. The variance of the estimate `s − g/h` is `b/h²`, where `b` is the
+//! variance of `g` under white noise.
+
+use std::f64::consts::{SQRT_2, TAU};
+
+use statrs::distribution::{Continuous, ContinuousCDF, Normal};
+use twinlag_model::{Fitted, Linearised, Parameter, Selection, Shared, dense, score_covariance};
+
+use crate::candidates::Search;
+
+/// Difference of two whitened residuals, which are of order one, up to which they are the same: that of rounding.
+const SAME_RESIDUAL: f64 = 1e-9;
+/// Standard deviations below zero at which a truncated normal is as an exponential distribution.
+const FAR_BELOW_ZERO: f64 = -8.0;
+
+/// A fitted model near its best fit.
+pub(crate) struct Around<'a> {
+    pub(crate) fitted: &'a Fitted,
+    pub(crate) lin: Linearised,
+    /// Half the second derivatives of its energy.
+    pub(crate) second: Vec<Vec<f64>>,
+}
+
+impl Search<'_> {
+    /// What a fitted model is like near its best fit.
+    pub(crate) fn around<'a>(&self, fitted: &'a Fitted) -> Around<'a> {
+        let Fitted { model, theta, .. } = fitted;
+        let lin = model.linearised(theta, self.observations, self.selection);
+        let second = model.second_derivatives(theta, self.observations, self.selection, &lin, &[]);
+        Around { fitted, lin, second }
+    }
+
+    /// The energy along the size of an effect, from where it changes nothing, or from the least size that it can have; `None`
+    /// where the other parameters are not determined.
+    ///
+    /// - `start`: values of the parameters that have no neutral one, beside the size; they are held
+    pub(crate) fn near_none(
+        &self,
+        around: &Around<'_>,
+        effect: &Shared,
+        main: usize,
+        start: &[f64],
+    ) -> Option<Profile> {
+        let Around { fitted, lin: now, second } = around;
+        let (observations, selection, count) = (self.observations, self.selection, fitted.theta.len());
+        let parameters = effect.parameters();
+        let is_held = |i: usize| i != main && parameters[i].neutral().is_none();
+        let mut theta = fitted.theta.clone();
+        theta.extend((0..start.len()).map(|i| if is_held(i) { start[i] } else { none(&parameters[i]) }));
+        let model = fitted.model.with(effect.clone());
+        let mut lin = model.linearised_beside(&theta, observations, selection, Some(now));
+        // A delay takes samples away, and a second lag filters the residual once more.
+        let is_same = lin.samples == now.samples
+            && lin.residual.iter().zip(&now.residual).all(|(a, b)| (a - b).abs() < SAME_RESIDUAL);
+        if !is_same {
+            lin = model.linearised(&theta, observations, selection);
+        }
+        (0..start.len()).filter(|i| is_held(*i)).for_each(|i| lin.columns[count + i].fill(0.0));
+        let known = if is_same { &second[..] } else { &[] };
+        let second = model.second_derivatives(&theta, observations, selection, &lin, known);
+        Profile::along(count + main, &lin, &second, selection, fitted.mean_energy().max(1.0))
+    }
+}
+
+/// The size of a parameter where it changes nothing, or as little as it can.
+pub(crate) fn none(parameter: &Parameter) -> f64 {
+    parameter.neutral().unwrap_or(parameter.variable.lower)
+}
+
+/// The energy of a residual along the size of an effect, the other parameters at their best, in units of that of the noise.
+pub(crate) struct Profile {
+    /// Half its first derivative.
+    slope: f64,
+    /// Half its second one.
+    curvature: f64,
+    /// Variance of `slope`, where the noise is white.
+    slope_variance: f64,
+    /// How far each parameter goes with the size; of the size itself 1.
+    pub(crate) follow: Vec<f64>,
+}
+
+impl Profile {
+    /// Along the parameter `at`; `None` where the others are not determined beside it.
+    ///
+    /// - `lin`: the residual with its derivatives
+    /// - `second`: half the second derivatives of its energy
+    /// - `noise`: energy of the noise for each residual
+    fn along(at: usize, lin: &Linearised, second: &[Vec<f64>], selection: &Selection, noise: f64) -> Option<Self> {
+        let products = dense::gram(&lin.columns);
+        let is_convex = (0..products.len()).all(|i| i == at || products[i][i] <= 0.0 || second[i][i] > 0.0);
+        let without = |matrix: &[Vec<f64>]| {
+            let mut out = matrix.to_vec();
+            for i in 0..out.len() {
+                out[i][at] = 0.0;
+                out[at][i] = 0.0;
+            }
+            dense::inverse(&out)
+        };
+        // As the covariance of a fit does.
+        let inverse = without(second).filter(|_| is_convex).or_else(|| without(&products))?;
+        let mut follow: Vec<f64> = dense::times(&inverse, &second[at]).iter().map(|x| -x).collect();
+        follow[at] = 1.0;
+        Some(Self {
+            slope: dense::dot(&follow, &lin.slope()) / noise,
+            curvature: dense::dot(&follow, &second[at]) / noise,
+            slope_variance: dense::dot(&follow, &dense::times(&score_covariance(lin, selection), &follow)) / noise,
+            follow,
+        })
+    }
+
+    /// Variance of the estimated size; infinite where the energy has no minimum.
+    pub(crate) fn variance(&self) -> f64 {
+        if self.curvature > 0.0 { self.slope_variance / self.curvature.powi(2) } else { f64::INFINITY }
+    }
+
+    /// What is known of the size, which was normal beforehand, with zero mean.
+    ///
+    /// - `usual`: standard deviation beforehand
+    /// - `is_positive`: whether it is known to be positive
+    pub(crate) fn posterior(&self, usual: f64, is_positive: bool) -> Posterior {
+        let is_seen = self.curvature > 0.0 && self.slope_variance > 0.0;
+        let weight = if is_seen { self.curvature / self.slope_variance } else { 0.0 };
+        let precision = weight * self.curvature + usual.powi(-2);
+        let mean = -weight * self.slope / precision;
+        let (root, in_std) = (precision.sqrt(), mean * precision.sqrt());
+        let bayes_factor = (0.5 * in_std * in_std).exp() / (usual * root);
+        if !is_positive {
+            return Posterior { bayes_factor, rms: mean.hypot(root.recip()) };
+        }
+        if in_std < FAR_BELOW_ZERO {
+            let density = 1.0 / (in_std.abs() * TAU.sqrt());
+            return Posterior { bayes_factor: 2.0 * density / (usual * root), rms: SQRT_2 / (in_std.abs() * root) };
+        }
+        let normal = Normal::standard();
+        let share = normal.cdf(in_std);
+        let square = (in_std * in_std + 1.0 + in_std * normal.pdf(in_std) / share).max(0.0);
+        Posterior { bayes_factor: 2.0 * share * bayes_factor, rms: square.sqrt() / root }
+    }
+}
+
+/// What is known of the size of an effect after a record.
+pub(crate) struct Posterior {
+    /// How much more probable the record is with an effect of such sizes than without one.
+    pub(crate) bayes_factor: f64,
+    /// Root of the mean square of the size.
+    pub(crate) rms: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn profile([slope, curvature, slope_variance]: [f64; 3]) -> Profile {
+        Profile { slope, curvature, slope_variance, follow: Vec::new() }
+    }
+
+    /// Bayes factor and root mean square by a sum over sizes, of an estimate −g/h with variance b/h².
+    fn summed(usual: f64, is_positive: bool, [slope, curvature, slope_variance]: [f64; 3]) -> [f64; 2] {
+        let weight = curvature / slope_variance;
+        let step = 1e-4 * usual;
+        let first = if is_positive { 0 } else { -100_000 };
+        let (mut sum, mut square, mut prior) = (0.0, 0.0, 0.0);
+        for k in first..100_000 {
+            let size = step * (f64::from(k) + 0.5);
+            let before = (-0.5 * (size / usual).powi(2)).exp();
+            let likelihood = (-weight * (slope * size + 0.5 * curvature * size * size)).exp();
+            prior += before;
+            sum += before * likelihood;
+            square += before * likelihood * size * size;
+        }
+        [sum / prior, (square / sum).sqrt()]
+    }
+
+    /// Sums over steps of a ten-thousandth of the usual size are exact to its square, far beyond the bound.
+    #[test]
+    fn posteriors_are_those_of_a_sum_over_sizes() {
+        for is_positive in [false, true] {
+            for energy in [[0.0, 1.0, 1.0], [-3.0, 2.0, 2.5], [2.0, 2.0, 4.0], [-0.5, 0.01, 0.02]] {
+                let got = profile(energy).posterior(0.7, is_positive);
+                let [factor, rms] = summed(0.7, is_positive, energy);
+                assert!((got.bayes_factor / factor - 1.0).abs() < 1e-6, "{energy:?} {is_positive}");
+                assert!((got.rms / rms - 1.0).abs() < 1e-6, "{energy:?} {is_positive}");
+            }
+        }
+    }
+
+    /// At 22 standard deviations below zero the exponential distribution is exact to three times the inverse square of that.
+    #[test]
+    fn a_positive_size_that_seems_negative_is_small_and_improbable() {
+        let energy = [45.0, 2.0, 2.0];
+        let got = profile(energy).posterior(0.7, true);
+        let [factor, rms] = summed(0.7, true, energy);
+        assert!((got.bayes_factor / factor - 1.0).abs() < 6.2e-3 && (got.rms / rms - 1.0).abs() < 6.2e-3);
+    }
+
+    /// A record that says nothing leaves what was known before.
+    #[test]
+    fn nothing_seen_leaves_the_usual_size() {
+        for is_positive in [false, true] {
+            let nothing = profile([0.3, -1.0, 1.0]).posterior(2.0, is_positive);
+            assert!((nothing.bayes_factor - 1.0).abs() < 1e-12 && (nothing.rms - 2.0).abs() < 1e-12);
+        }
+    }
+}
