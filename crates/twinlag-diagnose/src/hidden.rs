@@ -9,7 +9,7 @@
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch};
 
 use crate::candidates::{Candidate, Search};
-use crate::size::{Around, none};
+use crate::size::{Around, none, starts_beside_size};
 
 /// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each. What is resolved in
 /// them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
@@ -135,10 +135,7 @@ impl Search<'_> {
     fn unseen(&self, around: &Around<'_>, effect: &Shared, prior: f64) -> Vec<Hidden> {
         let Some((main, usual)) = effect.main().zip(effect.usual_size()) else { return Vec::new() };
         let parameters = effect.parameters();
-        let mut starts = effect.starts();
-        if (0..parameters.len()).all(|i| i == main || parameters[i].neutral().is_some()) {
-            starts.truncate(1);
-        }
+        let starts = starts_beside_size(effect.as_ref(), main);
         let (count, prior) = (around.fitted.theta.len(), prior / starts.len() as f64);
         let is_positive = none(&parameters[main]) - parameters[main].variable.lower < NEGLIGIBLE_SHARE * usual;
         let of = |start: &Vec<f64>| {

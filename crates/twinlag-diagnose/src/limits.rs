@@ -1,11 +1,11 @@
 //! What a search would have seen, and what no search can.
 
-use twinlag_model::{Fitted, ModelError, Observations, Policy, Shared};
+use twinlag_model::{Fitted, ModelError, Observations, Policy, Shared, dense};
 
 use crate::candidates::Search;
 use crate::diagnosis::Limit;
 use crate::rank::threshold;
-use crate::size::Around;
+use crate::size::{Around, starts_beside_size};
 
 impl Search<'_> {
     /// For each candidate that the model lacks, the smallest size that the search would have seen:
@@ -32,8 +32,14 @@ impl Search<'_> {
 
     fn limit(&self, around: &Around<'_>, effect: &Shared, probability: f64) -> Option<Limit> {
         let main = effect.main()?;
-        let along = self.near_none(around, effect, main, effect.starts().first()?)?;
-        let size = along.variance().sqrt() * threshold(effect.parameters().len(), probability).sqrt();
+        let starts = starts_beside_size(effect.as_ref(), main);
+        let near = |start: &Vec<f64>| self.near_none(around, effect, main, start).map(|along| along.variance());
+        let mut variances = starts.iter().map(near).collect::<Option<Vec<_>>>()?;
+        if starts.len() > 1 {
+            variances.push(self.variance_of_all(around, effect, main, &starts[0])?);
+        }
+        let variance = variances.into_iter().fold(0.0, f64::max);
+        let size = variance.sqrt() * threshold(effect.parameters().len(), probability).sqrt();
         let parameter = &effect.parameters()[main];
         (size > 0.0 && size.is_finite()).then(|| Limit {
             effect: effect.identifier(),
@@ -42,6 +48,16 @@ impl Search<'_> {
             size,
             unit: parameter.unit.into(),
         })
+    }
+
+    /// Variance of the size of an effect from `start`, where its other parameters are free as well: they take part of it.
+    fn variance_of_all(&self, around: &Around<'_>, effect: &Shared, main: usize, start: &[f64]) -> Option<f64> {
+        let Around { fitted, lin: now, .. } = around;
+        let theta = [&fitted.theta[..], start].concat();
+        let model = fitted.model.with(effect.clone());
+        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
+        let index = fitted.theta.len() + main;
+        Some(dense::inverse(&dense::gram(&lin.columns))?[index][index] * fitted.mean_energy().max(1.0))
     }
 }
 

@@ -8,7 +8,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
-use twinlag_model::{Fitted, Linearised, Parameter, Selection, Shared, dense, score_covariance};
+use twinlag_model::{Effect, Fitted, Linearised, Parameter, Selection, Shared, dense, score_covariance};
 
 use crate::candidates::Search;
 
@@ -69,6 +69,15 @@ impl Search<'_> {
 /// The size of a parameter where it changes nothing, or as little as it can.
 pub(crate) fn none(parameter: &Parameter) -> f64 {
     parameter.neutral().unwrap_or(parameter.variable.lower)
+}
+
+/// Where the parameters of `effect` begin that change nothing while it has no size, `main`: one set of values if there are none.
+pub(crate) fn starts_beside_size(effect: &dyn Effect, main: usize) -> Vec<Vec<f64>> {
+    let mut starts = effect.starts();
+    if effect.parameters().iter().enumerate().all(|(i, p)| i == main || p.neutral().is_some()) {
+        starts.truncate(1);
+    }
+    starts
 }
 
 /// The energy of a residual along the size of an effect, the other parameters at their best, in units of that of the noise.
