@@ -60,10 +60,11 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let span_s = state.prepared.observations.span_s();
     let mut circumstances =
         Circumstances { is_total_delay, causes, ..Circumstances::new(basis, &settings.known, span_s, policy) };
-    if is_whole {
+    let search = state.search().beside(&state.current);
+    let around = is_whole.then(|| search.around(&state.current)).transpose()?;
+    if let Some(around) = &around {
         let half = half_intervals(&last, &found, &with_effects);
-        let hidden = state.search().beside(&state.current).hidden(&state.current, &state.far, &half)?;
-        circumstances.hide(&hidden);
+        circumstances.hide(&search.hidden(around, &state.far, &half));
     }
     let mut judgements = circumstances.judge(&mut last);
     let mut base_judgements = if verdict == Verdict::Adequate {
@@ -88,7 +89,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     }
     remarks.sort_by_key(Remark::importance);
     // What is left over may hide an effect of any size.
-    let limits = if is_whole { state.search().beside(&state.current).limits(&state.current)? } else { Vec::new() };
+    let limits = around.as_ref().map_or_else(Vec::new, |around| search.limits(around));
     Ok(Diagnosis {
         verdict,
         effects,

@@ -9,14 +9,14 @@
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch};
 
 use crate::candidates::{Candidate, Search};
-use crate::size::{Around, none, starts_beside_size};
+use crate::size::{Around, Lacking, Profile, least_size};
 
 /// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each. What is resolved in
 /// them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
 const PIECES: usize = 4;
 const PIECE_SAMPLES: usize = 16_384;
 
-/// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise.
+/// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise. Chosen.
 const NEGLIGIBLE_SHARE: f64 = 0.1;
 
 /// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen,
@@ -76,7 +76,7 @@ pub fn unseen(
         fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
     }
     let search = Search::of(&prepared, settings, watch).beside(&fitted);
-    let hidden = search.hidden(&fitted, &[], &half_s)?;
+    let hidden = search.hidden(&search.around(&fitted)?, &[], &half_s);
     Ok([0, 1, 2].map(|i| hidden[i]))
 }
 
@@ -90,28 +90,23 @@ struct Hidden {
 }
 
 impl Search<'_> {
-    /// For both time constants, their difference, and each parameter of the effects of `current` the effect that is most
+    /// For both time constants, their difference, and each parameter of the effects of a model the effect that is most
     /// probably there unseen, where all those that would move the number by more than half its interval are together more
     /// probable than the policy allows.
     ///
     /// - `far`: effects that were fitted with quite other time constants, and not accepted
     /// - `half`: half the intervals; `None` of a number that has none
-    ///
-    /// # Errors
-    /// [`ModelError::Cancelled`] if the watch says so.
     pub(crate) fn hidden(
         &self,
-        current: &Fitted,
+        around: &Around<'_>,
         far: &[Candidate],
         half: &[Option<f64>],
-    ) -> Result<Vec<Option<Identifier>>, ModelError> {
-        let mut all = self.candidates(&current.model);
-        all.retain(|c| !c.is_noise() && !c.about().is_narrow && c.main().is_some());
-        let around = self.around(current);
+    ) -> Vec<Option<Identifier>> {
+        let all: Vec<&Lacking> = around.lacking.iter().filter(|l| !l.effect.about().is_narrow).collect();
         let prior = |effect: &Shared| self.prior_probability(effect, &all);
-        let each: Vec<Vec<Hidden>> = self.each(&all, |effect| self.unseen(&around, effect, prior(effect)))?;
-        let from_afar = far.iter().filter_map(|candidate| unseen_afar(current, candidate, prior(&candidate.effect)));
-        let hidden: Vec<Hidden> = each.into_iter().flatten().chain(from_afar).collect();
+        let near = all.iter().flat_map(|l| unseen_near(around.fitted, l, prior(&l.effect)));
+        let from_afar = far.iter().filter_map(|c| unseen_afar(around.fitted, c, prior(&c.effect)));
+        let hidden: Vec<Hidden> = near.chain(from_afar).collect();
         let of = |(i, half): (usize, &Option<f64>)| {
             let half = (*half)?;
             let decisive = || hidden.iter().filter(|h| h.shift[i] > half);
@@ -119,39 +114,37 @@ impl Search<'_> {
             let likeliest = decisive().max_by(|a, b| a.probability.total_cmp(&b.probability));
             likeliest.filter(|_| together > self.policy.hidden_effect_probability).map(|h| h.effect)
         };
-        Ok(half.iter().enumerate().map(of).collect())
+        half.iter().enumerate().map(of).collect()
     }
 
     /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, and the places
     /// and forms that it may have share that.
-    fn prior_probability(&self, effect: &Shared, all: &[Shared]) -> f64 {
-        let is_first = |(i, e): &(usize, &Shared)| all[..*i].iter().all(|o| o.identifier() != e.identifier());
-        let kinds = all.iter().enumerate().filter(is_first).count();
-        let forms = all.iter().filter(|o| o.identifier() == effect.identifier()).count();
+    fn prior_probability(&self, effect: &Shared, all: &[&Lacking]) -> f64 {
+        let kind = |i: usize| all[i].effect.identifier();
+        let kinds = (0..all.len()).filter(|i| (0..*i).all(|other| kind(other) != kind(*i))).count();
+        let forms = (0..all.len()).filter(|i| kind(*i) == effect.identifier()).count();
         self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
     }
+}
 
-    /// How probable an effect is, and what it would do, for each set of values that its other parameters may begin with.
-    fn unseen(&self, around: &Around<'_>, effect: &Shared, prior: f64) -> Vec<Hidden> {
-        let Some((main, usual)) = effect.main().zip(effect.usual_size()) else { return Vec::new() };
-        let parameters = effect.parameters();
-        let starts = starts_beside_size(effect.as_ref(), main);
-        let (count, prior) = (around.fitted.theta.len(), prior / starts.len() as f64);
-        let is_positive = none(&parameters[main]) - parameters[main].variable.lower < NEGLIGIBLE_SHARE * usual;
-        let of = |start: &Vec<f64>| {
-            let (bayes_factor, shift) = self.near_none(around, effect, main, start).map_or_else(
-                // Nothing is known of it, and it may move everything.
-                || (1.0, vec![f64::INFINITY; count + 1]),
-                |along| {
-                    let posterior = along.posterior(usual, is_positive);
-                    let shift = with_difference(&along.follow[..count]);
-                    (posterior.bayes_factor, shift.iter().map(|x| (x * posterior.rms).abs()).collect())
-                },
-            );
-            Hidden { effect: effect.identifier(), probability: probability_of(prior * bayes_factor), shift }
-        };
-        starts.iter().map(of).collect()
-    }
+/// How probable an effect is, and what it would do, for each set of values that its other parameters may begin with.
+fn unseen_near<'a>(current: &'a Fitted, lacking: &'a Lacking, prior: f64) -> impl Iterator<Item = Hidden> + 'a {
+    let Lacking { effect, main, along } = lacking;
+    let (count, prior) = (current.theta.len(), prior / along.len() as f64);
+    let hidden = move |along: &Option<Profile>, usual: f64| {
+        let size = &effect.parameters()[*main];
+        let is_positive = least_size(size) - size.variable.lower < NEGLIGIBLE_SHARE * usual;
+        // Where nothing is known of it, it may move everything.
+        let (bayes_factor, shift) = along.as_ref().map_or((1.0, vec![f64::INFINITY; count + 1]), |along| {
+            let posterior = along.posterior(usual, is_positive);
+            let shift = with_difference(&along.follow[..count]);
+            let moved = |x: &f64| Some((x * posterior.rms).abs()).filter(|x| !x.is_nan()).unwrap_or(f64::INFINITY);
+            (posterior.bayes_factor, shift.iter().map(moved).collect())
+        });
+        Hidden { effect: effect.identifier(), probability: probability_of(prior * bayes_factor), shift }
+    };
+    let usual = effect.usual_size();
+    along.iter().filter_map(move |along| Some(hidden(along, usual?)))
 }
 
 fn probability_of(odds: f64) -> f64 {

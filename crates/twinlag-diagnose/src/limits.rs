@@ -1,46 +1,36 @@
 //! What a search would have seen, and what no search can.
 
-use twinlag_model::{Fitted, ModelError, Observations, Policy, Shared, dense};
+use twinlag_model::{Observations, Policy, Shared, dense};
 
 use crate::candidates::Search;
 use crate::diagnosis::Limit;
 use crate::rank::threshold;
-use crate::size::{Around, starts_beside_size};
+use crate::size::{Around, Lacking};
 
 impl Search<'_> {
-    /// For each candidate that the model lacks, the smallest size that the search would have seen:
-    /// the square root of the threshold times the standard error that its main parameter would
-    /// have.
-    ///
-    /// # Errors
-    /// [`ModelError::Cancelled`] if the watch says so.
-    pub(crate) fn limits(&self, current: &Fitted) -> Result<Vec<Limit>, ModelError> {
-        let mut all = self.candidates(&current.model);
-        let probability = self.policy.round_false_alarm_probability / all.len().max(1) as f64;
-        all.retain(|c| !c.is_noise() && c.main().is_some());
-        let around = self.around(current);
-        let found = self.each(&all, |effect| self.limit(&around, effect, probability))?;
+    /// For each effect that the model lacks, the smallest size that the search would have seen: the square root of the threshold
+    /// times the standard error that its size would have.
+    pub(crate) fn limits(&self, around: &Around<'_>) -> Vec<Limit> {
+        let probability = self.policy.round_false_alarm_probability / around.candidates.max(1) as f64;
         let mut out: Vec<Limit> = Vec::new();
-        for limit in found.into_iter().flatten() {
+        for limit in around.lacking.iter().filter_map(|lacking| self.limit(around, lacking, probability)) {
             let is_same = |o: &Limit| o.effect == limit.effect && o.channel == limit.channel;
             if !out.iter().any(is_same) {
                 out.push(limit);
             }
         }
-        Ok(out)
+        out
     }
 
-    fn limit(&self, around: &Around<'_>, effect: &Shared, probability: f64) -> Option<Limit> {
-        let main = effect.main()?;
-        let starts = starts_beside_size(effect.as_ref(), main);
-        let near = |start: &Vec<f64>| self.near_none(around, effect, main, start).map(|along| along.variance());
-        let mut variances = starts.iter().map(near).collect::<Option<Vec<_>>>()?;
-        if starts.len() > 1 {
-            variances.push(self.variance_of_all(around, effect, main, &starts[0])?);
+    fn limit(&self, around: &Around<'_>, lacking: &Lacking, probability: f64) -> Option<Limit> {
+        let Lacking { effect, main, along } = lacking;
+        let mut variances = along.iter().map(|a| Some(a.as_ref()?.variance())).collect::<Option<Vec<f64>>>()?;
+        if along.len() > 1 {
+            variances.push(self.variance_of_all(around, effect, *main)?);
         }
         let variance = variances.into_iter().fold(0.0, f64::max);
         let size = variance.sqrt() * threshold(effect.parameters().len(), probability).sqrt();
-        let parameter = &effect.parameters()[main];
+        let parameter = &effect.parameters()[*main];
         (size > 0.0 && size.is_finite()).then(|| Limit {
             effect: effect.identifier(),
             channel: effect.channel(),
@@ -50,10 +40,10 @@ impl Search<'_> {
         })
     }
 
-    /// Variance of the size of an effect from `start`, where its other parameters are free as well: they take part of it.
-    fn variance_of_all(&self, around: &Around<'_>, effect: &Shared, main: usize, start: &[f64]) -> Option<f64> {
+    /// Variance of the size of an effect where a fit starts, its other parameters being free as well: they take part of it.
+    fn variance_of_all(&self, around: &Around<'_>, effect: &Shared, main: usize) -> Option<f64> {
         let Around { fitted, lin: now, .. } = around;
-        let theta = [&fitted.theta[..], start].concat();
+        let theta = [&fitted.theta[..], effect.starts().first()?].concat();
         let model = fitted.model.with(effect.clone());
         let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
         let index = fitted.theta.len() + main;

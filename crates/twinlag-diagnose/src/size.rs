@@ -8,7 +8,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
-use twinlag_model::{Effect, Fitted, Linearised, Parameter, Selection, Shared, dense, score_covariance};
+use twinlag_model::{Effect, Fitted, Linearised, ModelError, Parameter, Selection, Shared, dense, score_covariance};
 
 use crate::candidates::Search;
 
@@ -17,42 +17,71 @@ const SAME_RESIDUAL: f64 = 1e-9;
 /// Standard deviations below zero at which a truncated normal is as an exponential distribution.
 const FAR_BELOW_ZERO: f64 = -8.0;
 
-/// A fitted model near its best fit.
+/// A fitted model near its best fit, and along the size of each effect that it lacks.
 pub(crate) struct Around<'a> {
     pub(crate) fitted: &'a Fitted,
     pub(crate) lin: Linearised,
-    /// Half the second derivatives of its energy.
-    pub(crate) second: Vec<Vec<f64>>,
+    /// Candidates that the model lacks, noise among them.
+    pub(crate) candidates: usize,
+    /// Those of them that have a size.
+    pub(crate) lacking: Vec<Lacking>,
+}
+
+/// An effect that a model lacks.
+pub(crate) struct Lacking {
+    pub(crate) effect: Shared,
+    /// Which of its parameters is its size.
+    pub(crate) main: usize,
+    /// For each set of values that its other parameters may begin with, the energy along its size near none; `None` where the
+    /// parameters of the model are not determined beside it.
+    pub(crate) along: Vec<Option<Profile>>,
+}
+
+/// Where a model was linearised.
+struct Point<'a> {
+    fitted: &'a Fitted,
+    lin: &'a Linearised,
+    /// Half the second derivatives of the energy.
+    second: Vec<Vec<f64>>,
 }
 
 impl Search<'_> {
     /// What a fitted model is like near its best fit.
-    pub(crate) fn around<'a>(&self, fitted: &'a Fitted) -> Around<'a> {
+    ///
+    /// # Errors
+    /// [`ModelError::Cancelled`] if the watch says so.
+    pub(crate) fn around<'a>(&self, fitted: &'a Fitted) -> Result<Around<'a>, ModelError> {
         let Fitted { model, theta, .. } = fitted;
         let lin = model.linearised(theta, self.observations, self.selection);
         let second = model.second_derivatives(theta, self.observations, self.selection, &lin, &[]);
-        Around { fitted, lin, second }
+        let point = Point { fitted, lin: &lin, second };
+        let all = self.candidates(model);
+        let sized: Vec<(&Shared, usize)> = all
+            .iter()
+            .filter(|effect| !effect.is_noise())
+            .filter_map(|effect| Some((effect, effect.main()?)))
+            .collect();
+        let lacking = self.each(&sized, |&(effect, main)| {
+            let starts = starts_beside_size(effect.as_ref(), main);
+            let along = starts.iter().map(|start| self.near_none(&point, effect, main, start)).collect();
+            Lacking { effect: effect.clone(), main, along }
+        })?;
+        Ok(Around { fitted, lin, candidates: all.len(), lacking })
     }
 
     /// The energy along the size of an effect, from where it changes nothing, or from the least size that it can have; `None`
     /// where the other parameters are not determined.
     ///
     /// - `start`: values of the parameters that have no neutral one, beside the size; they are held
-    pub(crate) fn near_none(
-        &self,
-        around: &Around<'_>,
-        effect: &Shared,
-        main: usize,
-        start: &[f64],
-    ) -> Option<Profile> {
-        let Around { fitted, lin: now, second } = around;
+    fn near_none(&self, point: &Point<'_>, effect: &Shared, main: usize, start: &[f64]) -> Option<Profile> {
+        let Point { fitted, lin: now, second } = point;
         let (observations, selection, count) = (self.observations, self.selection, fitted.theta.len());
         let parameters = effect.parameters();
         let is_held = |i: usize| i != main && parameters[i].neutral().is_none();
         let mut theta = fitted.theta.clone();
-        theta.extend((0..start.len()).map(|i| if is_held(i) { start[i] } else { none(&parameters[i]) }));
+        theta.extend((0..start.len()).map(|i| if is_held(i) { start[i] } else { least_size(&parameters[i]) }));
         let model = fitted.model.with(effect.clone());
-        let mut lin = model.linearised_beside(&theta, observations, selection, Some(now));
+        let mut lin = model.linearised_beside(&theta, observations, selection, Some(*now));
         // A delay takes samples away, and a second lag filters the residual once more.
         let is_same = lin.samples == now.samples
             && lin.residual.iter().zip(&now.residual).all(|(a, b)| (a - b).abs() < SAME_RESIDUAL);
@@ -66,13 +95,14 @@ impl Search<'_> {
     }
 }
 
-/// The size of a parameter where it changes nothing, or as little as it can.
-pub(crate) fn none(parameter: &Parameter) -> f64 {
+/// The value of a parameter at which it changes nothing, or as little as it can.
+pub(crate) fn least_size(parameter: &Parameter) -> f64 {
     parameter.neutral().unwrap_or(parameter.variable.lower)
 }
 
-/// Where the parameters of `effect` begin that change nothing while it has no size, `main`: one set of values if there are none.
-pub(crate) fn starts_beside_size(effect: &dyn Effect, main: usize) -> Vec<Vec<f64>> {
+/// The starts of `effect` that differ where it has no size, `main`: in parameters without a neutral value. Without such
+/// parameters one start stands for all.
+fn starts_beside_size(effect: &dyn Effect, main: usize) -> Vec<Vec<f64>> {
     let mut starts = effect.starts();
     if effect.parameters().iter().enumerate().all(|(i, p)| i == main || p.neutral().is_some()) {
         starts.truncate(1);
@@ -161,6 +191,11 @@ pub(crate) struct Posterior {
 
 #[cfg(test)]
 mod tests {
+    use std::ops::ControlFlow;
+
+    use twinlag_model::{Effort, Identifier, Model, Observations, Prepared, Settings, Stretch};
+    use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
     use super::*;
 
     fn profile([slope, curvature, slope_variance]: [f64; 3]) -> Profile {
@@ -213,5 +248,52 @@ mod tests {
             let nothing = profile([0.3, -1.0, 1.0]).posterior(2.0, is_positive);
             assert!((nothing.bayes_factor - 1.0).abs() < 1e-12 && (nothing.rms - 2.0).abs() < 1e-12);
         }
+    }
+
+    /// Turbulence of 20 K that sensors of 12 and 60 ms read, 12 and 60 samples, in noise of 2 K.
+    fn loud_record() -> Observations {
+        let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 }));
+        let mut sensors = [Sensor::new("T1", 0.012), Sensor::new("T2", 0.060)];
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(2.0)));
+        let record = Rig::new(20, Record::new(3000, 0.001), gas, sensors).expect("a valid rig").simulate();
+        let record = record.expect("a rig of finite numbers");
+        let time_s = (0..3000).map(|k| f64::from(k) * 0.001).collect();
+        Observations::new(vec![Stretch::new(time_s, [record.t1_c, record.t2_c])], Some(0.001)).expect("finite and long")
+    }
+
+    /// Along the size of a delay the energy bends as its profile says, where products of first derivatives say more.
+    ///
+    /// Over a standard error the bend changes by less than a half, and the change goes with the square of the step: 1/800 over a
+    /// twentieth. The derivatives are averages over up to a third of a standard error: 1/18.
+    #[test]
+    fn a_profile_bends_as_the_energy_does_in_a_loud_record() {
+        let settings = Settings::default();
+        let prepared = Prepared::new(&loud_record(), &settings).expect("a record that can be fitted");
+        let (observations, selection) = (&prepared.observations, &prepared.searched);
+        let model = Model::new(&settings.known, prepared.levels.std_k);
+        let fitted = model.fit(&[0.012, 0.060], observations, selection, Effort::Finish);
+        let watch = |_: &str, _, _| ControlFlow::Continue(());
+        let search = Search::of(&prepared, &settings, &watch);
+        let around = search.around(&fitted).expect("not cancelled");
+        let is_it = |l: &&Lacking| l.effect.identifier() == Identifier::DELAY;
+        let delay = around.lacking.iter().find(is_it).expect("a delay is tried");
+        let along = delay.along[0].as_ref().expect("two lags are determined beside a delay");
+
+        let noise = fitted.mean_energy().max(1.0);
+        let model = fitted.model.with(delay.effect.clone());
+        let h = along.variance().sqrt() / 20.0;
+        let theta = |h: f64| -> Vec<f64> {
+            let here = fitted.theta.iter().chain([&0.0]);
+            here.zip(&along.follow).map(|(x, w)| x + h * w).collect()
+        };
+        let at = |h: f64| model.energy(&theta(h), observations, selection);
+        let bent = (at(h) - 2.0 * at(0.0) + at(-h)) / (2.0 * h * h * noise);
+        assert!((bent / along.curvature - 1.0).abs() < 1.0 / 18.0 + 1.0 / 800.0, "{bent} {}", along.curvature);
+
+        let lin = model.linearised(&theta(0.0), observations, selection);
+        let products = dense::gram(&lin.columns);
+        let inverse = dense::inverse(&products).expect("all three are determined");
+        let of_products = 1.0 / (inverse[2][2] * noise);
+        assert!(of_products > 1.5 * along.curvature, "{of_products} {}", along.curvature);
     }
 }

@@ -171,8 +171,8 @@ impl Model {
     /// of them.
     ///
     /// - `lin`: the residual at `theta` with its derivatives
-    /// - `known`: this matrix of the first parameters alone, if the residual is theirs still and an effect of no size was added; or
-    ///   nothing
+    /// - `known`: this matrix of a model without the last parameters, where these are an effect of no size that leaves its residual
+    ///   as it was; otherwise empty
     pub fn second_derivatives(
         &self,
         theta: &[f64],
