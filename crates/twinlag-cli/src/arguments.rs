@@ -92,7 +92,7 @@ Two thermometers rarely agree at rest. If the model is rejected, try --free gain
 A data-sheet value for one sensor often settles the rest: --known T1=0.5s+-10%. If the gas temperature is
 steady for a while, say when: --quiet-segment 0..2.5.
 
-Exit codes: 0 status ok and both time constants given, 4 otherwise (with --strict also where one of them is conditional), 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
+Exit codes: 0 status ok and both time constants given, 4 otherwise (with --strict also where one of them or their difference is conditional), 2 wrong usage, 3 the file cannot be used, 1 any other error.")]
 pub(crate) struct Characterise {
     #[command(flatten)]
     pub(crate) input: Input,

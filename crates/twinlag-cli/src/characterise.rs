@@ -3,7 +3,7 @@
 use std::io::{Read, stdin};
 use std::path::Path;
 
-use twinlag::diagnosis::ModelError;
+use twinlag::diagnosis::{Grade, ModelError};
 use twinlag::record::{Record, Selection, Table};
 use twinlag::{Characterisation, Model, Options, Status};
 
@@ -54,9 +54,12 @@ pub(crate) fn characterise(record: &Record, options: &Options, console: Console)
     answer.map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// The exit code of a characterisation: it is asked for both time constants.
+/// The exit code of a characterisation: it is asked for both time constants, and strictly for their difference as well.
 fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
-    let asked = [0, 1].map(|i| answer.sensors[i].judgement.grade);
+    let mut asked: Vec<Grade> = answer.sensors.iter().map(|sensor| sensor.judgement.grade).collect();
+    if strict {
+        asked.push(answer.time_constant_difference_s.judgement.grade);
+    }
     if answer.status == Status::Ok { grades::exit_code(&asked, &[], false, strict) } else { 4 }
 }
 

@@ -42,6 +42,7 @@ pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgeme
     for (name, judgement) in numbers.into_iter().filter(|(_, judgement)| judgement.grade != Grade::Go) {
         for reason in judgement.because.split("; ") {
             match groups.iter_mut().find(|(grade, other, _)| (*grade, *other) == (judgement.grade, reason)) {
+                Some((_, _, names)) if names.contains(&name) => {}
                 Some((_, _, names)) => names.push(name.clone()),
                 None => groups.push((judgement.grade, reason, vec![name.clone()])),
             }
@@ -79,6 +80,8 @@ mod tests {
         assert!(lines[0].starts_with("  no-go (T1, difference): the model leaves more than noise"), "{lines:?}");
         assert_eq!(lines[1], "  conditional (T2): right if T1 = 2 s, as given");
         // Failed: a reason that is one of several was said again for each number that has others.
+        let twice = Judgement::of(&[Reason::LeftOver, Reason::LeftOver]);
+        assert_eq!(twice, left);
         let both = Judgement::of(&[Reason::Given { what: "T1 = 2 s".into() }, Reason::Biased]);
         let lines = reasons([("T2".to_owned(), &given), ("gain".to_owned(), &both)], "");
         assert_eq!(lines[0], "conditional (T2, gain): right if T1 = 2 s, as given");

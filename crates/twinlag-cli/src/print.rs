@@ -265,7 +265,7 @@ fn track_text(answer: &Track, out: &Path) -> String {
             lines.push(format!("  {}: {of} {}", sensor.channel, time_constant(sensor)));
         }
         if let Some([least, most]) = extremes(along).filter(|_| answer.change != "constant") {
-            lines.push(format!("    from {least} to {most}"));
+            lines.push(format!("    between {least} and {most}"));
         }
     }
     // That nothing changes is not claimed under a model that is contradicted.

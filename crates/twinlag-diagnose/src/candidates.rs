@@ -102,17 +102,20 @@ impl Candidate {
     /// Whether every parameter of an effect, noise left out, lies inside its bounds.
     pub(crate) fn is_clear_of_bounds(&self) -> bool {
         let model = &self.fitted.model;
-        let is_clear = |(p, x): (&Parameter, &f64)| {
-            let Variable { lower, upper, scale, .. } = p.variable;
-            let [margin, low, high] = match scale {
-                Scale::Logarithmic => [LOG_MARGIN, (x / lower).ln(), (upper / x).ln()],
-                Scale::Linear { .. } => [LINEAR_MARGIN * (upper - lower), x - lower, upper - x],
-            };
-            x.is_finite() && low > margin && high > margin
-        };
         let effects = model.effects.iter().enumerate().filter(|(_, e)| !e.is_noise());
-        effects.flat_map(|(i, e)| e.parameters().iter().zip(&self.fitted.theta[model.range(i)])).all(is_clear)
+        let mut values = effects.flat_map(|(i, e)| e.parameters().iter().zip(&self.fitted.theta[model.range(i)]));
+        values.all(|(parameter, value)| is_inside_bounds(parameter, *value))
     }
+}
+
+/// Whether a value of a parameter lies inside its bounds, and not on one.
+pub(crate) fn is_inside_bounds(parameter: &Parameter, value: f64) -> bool {
+    let Variable { lower, upper, scale, .. } = parameter.variable;
+    let [margin, low, high] = match scale {
+        Scale::Logarithmic => [LOG_MARGIN, (value / lower).ln(), (upper / value).ln()],
+        Scale::Linear { .. } => [LINEAR_MARGIN * (upper - lower), value - lower, upper - value],
+    };
+    value.is_finite() && low > margin && high > margin
 }
 
 /// Deviance saved by going from `before` to `after`, the level of the noise free.

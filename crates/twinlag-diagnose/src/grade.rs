@@ -79,10 +79,10 @@ pub enum Reason {
         /// The effect that it is right with.
         effect: Identifier,
     },
-    /// An effect may be there that the record hardly shows, and that would move the number out of its interval.
+    /// Effects may be there that the record hardly shows, and that would move the number out of its interval.
     Hidden {
-        /// The likeliest of such effects.
-        effect: Identifier,
+        /// These effects, the likeliest first. All others like them together are improbable.
+        effects: Vec<Identifier>,
     },
     /// The best fit lies on a bound of it.
     OnBound,
@@ -166,6 +166,11 @@ pub enum Reason {
 }
 
 impl Reason {
+    /// That these effects may be there unseen; nothing where there are none.
+    pub(crate) fn hidden(effects: &[Identifier]) -> Option<Self> {
+        (!effects.is_empty()).then(|| Self::Hidden { effects: effects.to_vec() })
+    }
+
     /// The best grade that a number can have with it.
     pub fn grade(&self) -> Grade {
         match self {
@@ -247,10 +252,11 @@ impl fmt::Display for Reason {
             Self::Cause { effect } => {
                 write!(f, "right if the cause is {effect}: others explain the record as well and give another number")
             }
-            Self::Hidden { effect } => write!(
+            Self::Hidden { effects } => write!(
                 f,
-                "right if there is no {effect} of a usual size: the record would hardly show one, and it would move this number \
-                 out of its interval"
+                "right if there is no {} of a usual size: the record would hardly show one, and it would move this number out of \
+                 its interval",
+                listed(effects)
             ),
             Self::OnBound => f.write_str("the best fit lies on a bound of it, so it is no estimate"),
             Self::Contradicted { what, deviations, grade } => {
@@ -299,6 +305,15 @@ impl fmt::Display for Reason {
     }
 }
 
+/// Names of effects for the reader: `delay, slow-mode or radiation`.
+fn listed(effects: &[Identifier]) -> String {
+    let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+    match names.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 /// A number of standard deviations for the reader.
 pub(crate) fn rounded(deviations: f64) -> String {
     if deviations < 100.0 { format!("{deviations:.0}") } else { "more than 100".into() }
@@ -332,7 +347,12 @@ impl Judgement {
     pub fn of(reasons: &[Reason]) -> Self {
         let grade = reasons.iter().map(Reason::grade).max().unwrap_or(Grade::Go);
         // Of a number that is not given, conditions are of no use.
-        let said = reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string).collect::<Vec<_>>();
+        let mut said: Vec<String> = Vec::new();
+        for clause in reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string) {
+            if !said.contains(&clause) {
+                said.push(clause);
+            }
+        }
         let because = if said.is_empty() { WHY_GO.to_owned() } else { said.join("; ") };
         Self { grade, because }
     }
@@ -343,6 +363,7 @@ impl Judgement {
         let more = Self::of(std::slice::from_ref(reason));
         match self.grade.cmp(&more.grade) {
             Ordering::Less => more,
+            Ordering::Equal if self.because.split("; ").any(|said| said == more.because) => self,
             Ordering::Equal => Self { because: format!("{}; {}", self.because, more.because), ..self },
             Ordering::Greater => self,
         }
@@ -520,6 +541,15 @@ mod tests {
 
     fn number(value: f64, interval: [f64; 2], is_positive: bool) -> Number {
         Number { value, interval_95: Some(interval), scatter: None, is_positive }
+    }
+
+    #[test]
+    fn a_condition_names_every_effect_that_it_takes() {
+        assert_eq!(Reason::hidden(&[]), None);
+        let said = |effects: &[Identifier]| Reason::hidden(effects).expect("there are some").to_string();
+        assert!(said(&[Identifier::DELAY]).starts_with("right if there is no delay of a usual size: "));
+        let all = [Identifier::DELAY, Identifier::SLOW_MODE, Identifier::RADIATION];
+        assert!(said(&all).starts_with("right if there is no delay, slow-mode or radiation of a usual size: "));
     }
 
     /// An excess of 8 makes intervals three times as long, by a factor or by a distance.

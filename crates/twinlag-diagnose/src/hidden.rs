@@ -19,7 +19,7 @@ const PIECE_SAMPLES: usize = 16_384;
 /// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise. Chosen.
 const NEGLIGIBLE_SHARE: f64 = 0.1;
 
-/// The effect that two lags may hide, for both time constants and their difference: the one that is most probably there unseen,
+/// Effects that two lags may hide, for both time constants and their difference: those that are most probably there unseen,
 /// where all those that would move the number out of its interval are together more probable than the policy allows.
 ///
 /// ```
@@ -40,7 +40,7 @@ const NEGLIGIBLE_SHARE: f64 = 0.1;
 /// let half_s = [Some(0.0005), Some(0.003), Some(0.003)];
 /// let watch = |_: &str, _, _| std::ops::ControlFlow::Continue(());
 /// let hidden = unseen(&observations, &Settings::default(), [0.05, 0.3], &[], half_s, &watch)?;
-/// assert_eq!(hidden, [None; 3]);
+/// assert!(hidden.iter().all(Vec::is_empty));
 /// # Ok::<(), twinlag_diagnose::ModelError>(())
 /// ```
 ///
@@ -59,7 +59,7 @@ pub fn unseen(
     beside: &[(Identifier, usize)],
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
-) -> Result<[Option<Identifier>; 3], ModelError> {
+) -> Result<[Vec<Identifier>; 3], ModelError> {
     let samples = observations.samples();
     let excerpt = (samples > PIECES * PIECE_SAMPLES).then(|| {
         observations.excerpt((0..PIECES).map(|i| i * (samples - PIECE_SAMPLES) / (PIECES - 1)), PIECE_SAMPLES)
@@ -76,8 +76,8 @@ pub fn unseen(
         fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
     }
     let search = Search::of(&prepared, settings, watch).beside(&fitted);
-    let hidden = search.hidden(&search.around(&fitted)?, &[], &half_s);
-    Ok([0, 1, 2].map(|i| hidden[i]))
+    let mut hidden = search.hidden(&search.around(&fitted)?, &[], &half_s);
+    Ok([0, 1, 2].map(|i| std::mem::take(&mut hidden[i])))
 }
 
 /// An effect that may be there unseen.
@@ -90,40 +90,49 @@ struct Hidden {
 }
 
 impl Search<'_> {
-    /// For both time constants, their difference, and each parameter of the effects of a model the effect that is most
-    /// probably there unseen, where all those that would move the number by more than half its interval are together more
-    /// probable than the policy allows.
+    /// For both time constants, their difference, and each parameter of the effects of a model the effects that may be there
+    /// unseen and would move the number by more than half its interval: so many kinds, the likeliest first, that all others are
+    /// together no more probable than the policy allows.
     ///
     /// - `far`: effects that were fitted with quite other time constants, and not accepted
     /// - `half`: half the intervals; `None` of a number that has none
-    pub(crate) fn hidden(
-        &self,
-        around: &Around<'_>,
-        far: &[Candidate],
-        half: &[Option<f64>],
-    ) -> Vec<Option<Identifier>> {
+    pub(crate) fn hidden(&self, around: &Around<'_>, far: &[Candidate], half: &[Option<f64>]) -> Vec<Vec<Identifier>> {
         let all: Vec<&Lacking> = around.lacking.iter().filter(|l| !l.effect.about().is_narrow).collect();
         let prior = |effect: &Shared| self.prior_probability(effect, &all);
         let near = all.iter().flat_map(|l| unseen_near(around.fitted, l, prior(&l.effect)));
         let from_afar = far.iter().filter_map(|c| unseen_afar(around.fitted, c, prior(&c.effect)));
         let hidden: Vec<Hidden> = near.chain(from_afar).collect();
         let of = |(i, half): (usize, &Option<f64>)| {
-            let half = (*half)?;
-            let decisive = || hidden.iter().filter(|h| h.shift[i] > half);
-            let together: f64 = decisive().map(|h| h.probability).sum();
-            let likeliest = decisive().max_by(|a, b| a.probability.total_cmp(&b.probability));
-            likeliest.filter(|_| together > self.policy.hidden_effect_probability).map(|h| h.effect)
+            let decisive = |h: &&Hidden| half.is_some_and(|half| h.shift[i] > half);
+            self.too_probable(hidden.iter().filter(decisive))
         };
         half.iter().enumerate().map(of).collect()
     }
 
-    /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, and the places
-    /// and forms that it may have share that.
+    /// Kinds of effects without which all others are together no more probable than the policy allows.
+    fn too_probable<'h>(&self, hidden: impl Iterator<Item = &'h Hidden>) -> Vec<Identifier> {
+        let mut kinds: Vec<(Identifier, f64)> = Vec::new();
+        for Hidden { effect, probability, .. } in hidden {
+            match kinds.iter_mut().find(|(kind, _)| kind == effect) {
+                Some((_, sum)) => *sum += probability,
+                None => kinds.push((*effect, *probability)),
+            }
+        }
+        kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let from = |first: usize| kinds[first..].iter().map(|(_, probability)| probability).sum::<f64>();
+        let is_enough = |count: &usize| from(*count) <= self.policy.hidden_effect_probability;
+        let count = (0..kinds.len()).find(is_enough).unwrap_or(kinds.len());
+        kinds[..count].iter().map(|(kind, _)| *kind).collect()
+    }
+
+    /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, but for those that turn
+    /// phases, and the places and forms that it may have share that.
     fn prior_probability(&self, effect: &Shared, all: &[&Lacking]) -> f64 {
         let kind = |i: usize| all[i].effect.identifier();
         let kinds = (0..all.len()).filter(|i| (0..*i).all(|other| kind(other) != kind(*i))).count();
         let forms = (0..all.len()).filter(|i| kind(*i) == effect.identifier()).count();
-        self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
+        let factor = if effect.about().turns_phases { self.policy.prior_phase_factor } else { 1.0 };
+        factor * self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
     }
 }
 

@@ -30,10 +30,10 @@ pub struct Circumstances<'a> {
     /// The effect that both time constants and their difference are right with alone, where others that explain the
     /// record as well give other values.
     pub causes: [Option<Identifier>; 3],
-    /// The effect that may be there unseen and would move the number, for both time constants and their difference.
-    pub hidden: [Option<Identifier>; 3],
-    /// The effect that may be there unseen and would move the number, for each parameter of the effects in the model.
-    pub hidden_from_parameters: Vec<Option<Identifier>>,
+    /// Effects that may be there unseen and would move the number, for both time constants and their difference.
+    pub hidden: [Vec<Identifier>; 3],
+    /// Effects that may be there unseen and would move the number, for each parameter of the effects in the model.
+    pub hidden_from_parameters: Vec<Vec<Identifier>>,
     /// The numbers that decide.
     pub policy: &'a Policy,
 }
@@ -48,13 +48,14 @@ pub(crate) fn given(known: &KnownTimeConstant) -> String {
 impl<'a> Circumstances<'a> {
     /// A record of `span_s` seconds, of whose model nothing is known but what `basis` says.
     pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
-        let (causes, hidden, hidden_from_parameters) = ([None; 3], [None; 3], Vec::new());
+        let (causes, hidden_from_parameters) = ([None; 3], Vec::new());
+        let hidden = std::array::from_fn(|_| Vec::new());
         Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, policy }
     }
 
     /// Puts down the effects that may be there unseen: for both time constants, their difference, and each parameter.
-    pub(crate) fn hide(&mut self, hidden: &[Option<Identifier>]) {
-        self.hidden = [0, 1, 2].map(|i| hidden[i]);
+    pub(crate) fn hide(&mut self, hidden: &[Vec<Identifier>]) {
+        self.hidden = [0, 1, 2].map(|i| hidden[i].clone());
         self.hidden_from_parameters = hidden[3..].to_vec();
     }
 
@@ -92,7 +93,7 @@ impl<'a> Circumstances<'a> {
         let Some(value) = number.value_s else { return Judgement::of(&[Reason::NotDetermined]) };
         let most_s = self.policy.longest_given_share * self.span_s;
         let cause = self.causes[index].map(|effect| Reason::Cause { effect });
-        let hidden = self.hidden[index].map(|effect| Reason::Hidden { effect });
+        let hidden = Reason::hidden(&self.hidden[index]);
         let mut own: Vec<Reason> = cause.into_iter().chain(hidden).collect();
         if value.abs() > most_s {
             own.push(Reason::TooLong { most_s });

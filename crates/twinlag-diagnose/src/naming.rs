@@ -8,6 +8,7 @@ use twinlag_model::{
 };
 use twinlag_optimise::{End, Scale};
 
+use crate::candidates::is_inside_bounds;
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
 use crate::grade::{Judgement, Number, Reason};
@@ -141,10 +142,13 @@ pub(crate) fn judge_effect(
     let (parameters, range) = (last.model.effects[effect].parameters(), last.model.range(effect));
     // What is derived from parameters has no scatter.
     let scatter = &fit.scatter[range.clone()];
-    let is_on_bound = |index: usize| matches!(&last.end, End::OnBound(which) if which.contains(&(range.start + index)));
+    let has_ended_on = |at: usize| matches!(&last.end, End::OnBound(which) if which.contains(&at));
+    let is_on_bound = |index: usize| {
+        has_ended_on(range.start + index) || !is_inside_bounds(&parameters[index], last.theta[range.start + index])
+    };
     let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
     // Both time constants come first in a model.
-    let hidden = |index: usize| circumstances.hidden_from_parameters.get(range.start - 2 + index).copied().flatten();
+    let hidden = |index: usize| Reason::hidden(circumstances.hidden_from_parameters.get(range.start - 2 + index)?);
     let basis = circumstances.whole_basis();
     let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });
     for (index, value) in found.parameters.iter_mut().enumerate() {
@@ -159,7 +163,7 @@ pub(crate) fn judge_effect(
         let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
         let hidden = if index < parameters.len() { hidden(index) } else { (0..parameters.len()).find_map(hidden) };
         let mut own: Vec<Reason> = cause.clone().into_iter().collect();
-        own.extend(hidden.map(|effect| Reason::Hidden { effect }));
+        own.extend(hidden);
         own.extend(is_part.then_some(Reason::PartOfTotal));
         own.extend(is_bound.then_some(Reason::OnBound));
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);

@@ -78,7 +78,10 @@ pub(crate) fn unit_s(
 ) -> Result<f64, RecordError> {
     let column = || table.title(index);
     let to = |symbol: &str| (symbol != "s").then_some("s");
-    match chosen.unwrap_or(table.columns()[index].unit()) {
+    let stated = table.columns()[index].unit();
+    let named = Unit::of_time_named(table.columns()[index].name()).filter(|_| *stated == Unit::Unstated);
+    let named = named.map(|(symbol, seconds)| Unit::Time { symbol, seconds });
+    match chosen.or(named.as_ref()).unwrap_or(stated) {
         Unit::Time { symbol, seconds } if chosen.is_some() => {
             notes.push(Note::TimeUnitChosen { column: column(), unit: symbol, to: to(symbol) });
             Ok(*seconds)

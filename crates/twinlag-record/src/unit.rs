@@ -50,6 +50,14 @@ impl Unit {
         Self::known(unit)
     }
 
+    /// The length in seconds of the unit of time that the name of a column is, as `ms`, if it is one.
+    pub(crate) fn of_time_named(name: &str) -> Option<(&'static str, f64)> {
+        match Self::known(name.trim()) {
+            Some(Self::Time { symbol, seconds }) => Some((symbol, seconds)),
+            _ => None,
+        }
+    }
+
     fn known(text: &str) -> Option<Self> {
         let time = |symbol, seconds| Some(Self::Time { symbol, seconds });
         // Case tells nothing but `mS` and `MS`, which no logger writes for a time.

@@ -222,6 +222,15 @@ fn time_that_is_not_in_seconds_is_converted_and_said() {
 }
 
 /// A unit in the header decides, and the caller's decides before that.
+/// Failed: stamps every 40 ms were taken for as many seconds.
+#[test]
+fn a_time_column_may_be_named_as_its_unit() {
+    let got = timed("ms", 0.0, 40.0).expect("a record");
+    assert!(got.time_s.iter().enumerate().all(|(k, t)| (t - 0.04 * k as f64).abs() < 1e-12), "{:?}", got.time_s);
+    let got = timed("ms [s]", 0.0, 40.0).expect("a record");
+    assert_eq!(got.time_s[1], 40.0);
+}
+
 #[test]
 fn a_stated_unit_of_time_decides() {
     for (name, want_s) in

@@ -10,7 +10,7 @@ use crate::options::Options;
 use crate::rows::{Rows, settings_of};
 use crate::watch::Stop;
 
-/// Puts down for each number of `answer` the effect that may be there unseen and would move it out of its interval.
+/// Puts down for each number of `answer` the effects that may be there unseen and would move it out of its interval.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
@@ -43,9 +43,9 @@ pub(super) fn judge_unseen(
     let judgements =
         [&mut sensor_1.judgement, &mut sensor_2.judgement, &mut answer.time_constant_difference_s.judgement];
     let is_known = [sensor_1.known, sensor_2.known, false];
-    for ((judgement, effect), is_known) in judgements.into_iter().zip(hidden).zip(is_known) {
-        if let Some(effect) = effect.filter(|_| !is_known) {
-            *judgement = std::mem::take(judgement).and(&Reason::Hidden { effect });
+    for ((judgement, effects), is_known) in judgements.into_iter().zip(hidden).zip(is_known) {
+        if !effects.is_empty() && !is_known {
+            *judgement = std::mem::take(judgement).and(&Reason::Hidden { effects });
         }
     }
     Ok(())
