@@ -106,7 +106,7 @@ pub fn learn_intensity(readings: &Readings, rig: &Rig, prior: &Prior) -> Result<
     let time_s = readings.time_s();
     let n = readings.len();
     let mut intensity = Intensity { factors: vec![1.0; n] };
-    let steady = score(readings, rig, prior, &intensity.factors)?;
+    let steady = score(readings, rig, prior, None)?;
     let moves: f64 = steady.expected.iter().sum();
     if moves.is_nan() || moves < MIN_MOVES {
         return Ok(None);
@@ -135,7 +135,7 @@ pub fn learn_intensity(readings: &Readings, rig: &Rig, prior: &Prior) -> Result<
         }
         intensity.factors = logarithm.iter().map(|u| u.exp()).collect();
         if pass + 1 < PASSES {
-            now = score(readings, rig, prior, &intensity.factors)?;
+            now = score(readings, rig, prior, Some(&intensity.factors))?;
         }
     }
     Ok(Some(intensity))
@@ -210,12 +210,12 @@ mod tests {
         for terms in [vec![rough], vec![rough, line], vec![line]] {
             let prior = Prior { level_c: 20.0, terms };
             let factors: Vec<f64> = (0..120).map(|k| (0.05 * f64::from(k)).sin().exp()).collect();
-            let got = score(&readings, &rig, &prior, &factors).expect("a good rig");
+            let got = score(&readings, &rig, &prior, Some(&factors)).expect("a good rig");
             for k in [5, 40, 41, 118] {
                 let at = |by: f64| {
                     let mut factors = factors.clone();
                     factors[k] *= by.exp();
-                    score(&readings, &rig, &prior, &factors).expect("a good rig").log_likelihood
+                    score(&readings, &rig, &prior, Some(&factors)).expect("a good rig").log_likelihood
                 };
                 let want = (at(1e-4) - at(-1e-4)) / 2e-4;
                 let got = 0.5 * (got.seen[k] - got.expected[k]);

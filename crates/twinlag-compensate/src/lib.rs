@@ -64,6 +64,8 @@ mod slopes;
 #[cfg(feature = "std")]
 mod smooth;
 #[cfg(feature = "std")]
+mod sparse;
+#[cfg(feature = "std")]
 mod spectrum;
 mod stream;
 mod system;

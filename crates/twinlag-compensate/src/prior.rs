@@ -60,6 +60,7 @@ impl Term {
     }
 
     /// Two-sided spectral density at `frequency_hz`, K²/Hz.
+    #[inline]
     pub fn density_k2_per_hz(&self, frequency_hz: f64) -> f64 {
         use core::f64::consts::PI;
         match *self {

@@ -88,7 +88,7 @@ pub(crate) fn score(
     readings: &Readings,
     rig: &Rig,
     prior: &Prior,
-    factors: &[f64],
+    factors: Option<&[f64]>,
 ) -> Result<smooth::Score, CompensateError> {
     by_size!(rig, prior, score(readings, rig, prior, factors))
 }

@@ -83,6 +83,7 @@ pub(crate) fn add_autocovariance_slope(&(term, by): &Direction, period_s: f64, o
 }
 
 /// How fast the two-sided spectral density at `frequency_hz` changes in `direction`, K²/Hz.
+#[inline]
 pub(crate) fn density_slope(&(term, by): &Direction, frequency_hz: f64) -> f64 {
     let relative = match term {
         Term::Rough { std_k, corner_hz } => {

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use twinlag_transform::{Forward, Inverse, Tapered, hann};
+use twinlag_transform::{Forward, Inverse, Tapered, fast_length, hann};
 
 use crate::prior::Term;
 use crate::readings::Readings;
@@ -80,7 +80,7 @@ impl Periodogram {
         let all = (span_s / period_s).round() as usize + 1;
         let even = [0, 1].map(|i| on_grid(readings, i, first_s, period_s, all));
         let count = if all > max_piece_samples { 2 * all.div_ceil(max_piece_samples) - 1 } else { 1 };
-        let samples = 2 * all / (count + 1);
+        let samples = fast_length(2 * all / (count + 1));
         let tapered = Tapered::new(taper(samples));
         let transform = |values: &[f64]| tapered.transform(values.iter().map(|y| y - level_c));
         let pieces: Vec<[Vec<Complex64>; 2]> = (0..count)
@@ -156,19 +156,25 @@ impl Periodogram {
 
     /// As [`Periodogram::expected`], below zero where what folds back is more than there is.
     pub(crate) fn expected_signed(&self, terms: &[Term]) -> Vec<f64> {
-        let add = |lags: &mut [f64]| terms.iter().for_each(|term| add_autocovariances(term, self.period_s, lags));
-        self.tapered(add, |hz| terms.iter().map(|term| term.density_k2_per_hz(hz)).sum())
+        let mut out = self.tapered(|lags| terms.iter().for_each(|term| add_autocovariances(term, self.period_s, lags)));
+        for term in terms {
+            self.take_off_beyond(|hz| term.density_k2_per_hz(hz), &mut out);
+        }
+        out
     }
 
     /// How fast [`Periodogram::expected_signed`] changes where the numbers of terms change at these rates.
     pub(crate) fn expected_slope(&self, directions: &[Direction]) -> Vec<f64> {
         let add = |lags: &mut [f64]| directions.iter().for_each(|by| add_autocovariance_slope(by, self.period_s, lags));
-        self.tapered(add, |hz| directions.iter().map(|by| density_slope(by, hz)).sum())
+        let mut out = self.tapered(add);
+        for by in directions {
+            self.take_off_beyond(|hz| density_slope(by, hz), &mut out);
+        }
+        out
     }
 
-    /// What a periodogram shows of an autocovariance, which `add` adds at multiples of the period, and of the density beyond
-    /// the sampling.
-    fn tapered(&self, add: impl Fn(&mut [f64]), density: impl Fn(f64) -> f64) -> Vec<f64> {
+    /// What a periodogram shows of an autocovariance, which `add` adds at multiples of the period.
+    fn tapered(&self, add: impl Fn(&mut [f64])) -> Vec<f64> {
         let n = self.samples;
         let mut input = vec![0.0; 2 * n];
         add(&mut input[..n]);
@@ -176,13 +182,16 @@ impl Periodogram {
         let (lags, mirrored) = input.split_at_mut(n);
         mirrored[1..].iter_mut().rev().zip(&lags[1..]).for_each(|(to, from)| *to = *from);
         let out = self.plan.transform(&input);
-        let mut expected: Vec<f64> = (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect();
+        (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect()
+    }
+
+    /// Takes off what sensors flatten of a density beyond the sampling.
+    fn take_off_beyond(&self, density: impl Fn(f64) -> f64, out: &mut [f64]) {
         for (away_hz, taken_off) in &self.flattened {
-            for ((sum, hz), share) in expected.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
+            for ((sum, hz), share) in out.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
                 *sum -= share * density(hz + away_hz);
             }
         }
-        expected
     }
 }
 

@@ -135,8 +135,8 @@ impl Factor {
         for k in 0..u.len() {
             let row = self.row(k);
             let reach = self.band.min(k);
-            let taken: f64 = row[1..=reach].iter().zip(u[..k].iter().rev()).map(|(l, r)| l * r).sum();
-            u[k] = (u[k] - taken) / row[0];
+            let (before, rest) = u.split_at_mut(k);
+            rest[0] = (rest[0] - backwards(&row[1..=reach], &before[k - reach..])) / row[0];
         }
     }
 
@@ -209,12 +209,10 @@ impl FactorDerivative {
                 self.recent[k % stride * stride..][..stride].copy_from_slice(&self.row);
             }
             is_kept = is_settled && agreeing >= SETTLED_ROWS;
-            let mut d = values[k] - self.row[0] * residual[k];
-            let before = residual[..k].iter().rev().zip(values[..k].iter().rev());
-            for ((l, dl), (r, dr)) in of_factor[1..=reach].iter().zip(&self.row[1..=reach]).zip(before) {
-                d -= dl * r + l * dr;
-            }
-            values[k] = d / of_factor[0];
+            let (before, rest) = values.split_at_mut(k);
+            let from_factor = backwards(&self.row[..=reach], &residual[k - reach..=k]);
+            let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
+            rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
         }
     }
 
@@ -239,6 +237,11 @@ impl FactorDerivative {
             self.row[lag] = (entry - l[lag] * d_other[0]) / other[0];
         }
     }
+}
+
+/// `Σ weights[i] values[n − 1 − i]`, the last value last: where it has only just been computed, all others are added up before.
+fn backwards(weights: &[f64], values: &[f64]) -> f64 {
+    weights.iter().rev().zip(values).fold(0.0, |sum, (weight, value)| sum + weight * value)
 }
 
 /// Covariance of value `k` with value `k − lag`.

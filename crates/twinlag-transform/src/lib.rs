@@ -19,10 +19,12 @@
 
 mod fourier;
 mod kept;
+mod length;
 mod sine;
 mod taper;
 
 pub use fourier::{Forward, Inverse};
+pub use length::fast_length;
 pub use num_complex::Complex64;
 pub use sine::sine_transform;
 pub use taper::{Tapered, hann, hann_between};
