@@ -22,6 +22,11 @@ const GRID_MAX_SPANS: f64 = 0.1;
 /// Iterations, and the relative step at which a fit ends: to be ranked, and to the end.
 const LOOK: (u64, f64) = (5, 2e-2);
 const FINISH: (u64, f64) = (40, 1e-4);
+/// Deviance, in nats doubled, that a fit need not find: to be ranked, a hundredth of the weakest threshold of the search; to the
+/// end, one hundredth of a standard error of a parameter. A valley in which the data determine nothing takes many iterations,
+/// each of which goes far and gains less.
+const LOOK_DEVIANCE: f64 = 0.05;
+const FINISH_DEVIANCE: f64 = 1e-4;
 /// Evaluations for each iteration.
 const EVALUATIONS_PER_ITERATION: u64 = 4;
 
@@ -87,12 +92,15 @@ impl Model {
     /// If both time constants are held, or `start` is not finite.
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
-        let (iterations, step_tolerance) = match effort {
-            Effort::Look => LOOK,
-            Effort::Finish => FINISH,
+        let ((iterations, step_tolerance), deviance) = match effort {
+            Effort::Look => (LOOK, LOOK_DEVIANCE),
+            Effort::Finish => (FINISH, FINISH_DEVIANCE),
         };
+        let residuals = selection.counts.iter().filter(|counts| **counts).count();
         let problem = Problem::new(&cost, cost.variables.clone());
         let problem = problem.expect("bounds are in order and the time constants are free");
+        // What is left over, whatever it is, is the unit of deviances.
+        let problem = problem.with_resolution(deviance / residuals.max(1) as f64);
         let budget = Budget { iterations, evaluations: EVALUATIONS_PER_ITERATION * iterations };
         let fit = Optimiser::LevenbergMarquardt { step_tolerance }
             .minimise(&problem, start, &budget)

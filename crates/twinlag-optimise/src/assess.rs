@@ -18,7 +18,8 @@ impl Problem<'_> {
     /// and one of the value where there are none.
     ///
     /// [`End::OnBound`] within 1e-6 of a bound; else [`End::Converged`] where the curvature is
-    /// positive and a Newton step would move no coordinate by more than 1e-3, [`End::Stalled`]
+    /// positive and a Newton step would move no coordinate by more than 1e-3, or lower the cost by
+    /// no more than its resolution ([`Problem::with_resolution`]), [`End::Stalled`]
     /// where not, with `failure` (what the solver itself said) as the reason if there is one;
     /// [`End::Unchecked`] for a cost without derivatives.
     ///
@@ -76,6 +77,10 @@ impl Problem<'_> {
         let (smallest, largest) = extreme_eigenvalues(&d.curvature);
         if smallest <= FLAT * largest.max(0.0) {
             return End::Stalled("the cost is flat or falls away in some direction: this is no minimum".into());
+        }
+        let all: Vec<usize> = (0..z.len()).collect();
+        if failure.is_none() && self.is_resolved(d, &all) {
+            return End::Converged;
         }
         let mut step = d.gradient.clone();
         let mut matrix = d.curvature.concat();

@@ -6,6 +6,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::cholesky;
+
 /// A scalar function to be minimised. Implement [`Cost::derivatives`] as well if you have them:
 /// most solvers are then far faster, and the report can distinguish a minimum from a plateau.
 pub trait Cost {
@@ -149,6 +151,8 @@ pub struct Problem<'a> {
     variables: Vec<Variable>,
     free: Vec<usize>,
     bounds: Vec<(f64, f64)>,
+    /// Part of the cost by which a change of it means something.
+    resolution: f64,
 }
 
 /// Why there are no derivatives at a point.
@@ -198,7 +202,66 @@ impl<'a> Problem<'a> {
                 (v.coordinate(v.lower), v.coordinate(v.upper))
             })
             .collect();
-        Ok(Self { cost, variables, free, bounds })
+        Ok(Self { cost, variables, free, bounds, resolution: 0.0 })
+    }
+
+    /// This problem, of which a relative change of the cost below `resolution` means nothing: Levenberg-Marquardt stops where a
+    /// whole Newton step would lower the cost by no more, however far it would go, and the point counts as a minimum.
+    ///
+    /// In the sum of squares of `n` residuals of unit variance, half a standard error of a parameter is a change of 0.25, or
+    /// `0.25/n` of the cost. Without a resolution, which is 0, a fit goes on until no variable moves.
+    ///
+    /// ```
+    /// use twinlag_optimise::{Budget, Cost, Derivatives, End, Minimiser, Optimiser, Problem, Variable};
+    ///
+    /// /// `1 + x⁴ + x²/1000`, as flat as a variable that the data hardly determine.
+    /// struct Flat;
+    ///
+    /// impl Cost for Flat {
+    ///     fn value(&self, x: &[f64]) -> f64 {
+    ///         1.0 + x[0].powi(4) + 1e-3 * x[0] * x[0]
+    ///     }
+    ///
+    ///     fn derivatives(&self, x: &[f64]) -> Option<Derivatives> {
+    ///         let gradient = vec![4.0 * x[0].powi(3) + 2e-3 * x[0]];
+    ///         let curvature = vec![vec![12.0 * x[0] * x[0] + 2e-3]];
+    ///         Some(Derivatives { value: self.value(x), gradient, curvature })
+    ///     }
+    /// }
+    ///
+    /// let variable = || vec![Variable::linear("x", 1.0, -5.0, 5.0)];
+    /// let fit = |problem: &Problem<'_>| {
+    ///     let solver = Optimiser::LevenbergMarquardt { step_tolerance: 1e-9 };
+    ///     solver.minimise(problem, &[1.0], &Budget::default()).expect("it has derivatives")
+    /// };
+    /// let whole = fit(&Problem::new(&Flat, variable())?);
+    /// let coarse = fit(&Problem::new(&Flat, variable())?.with_resolution(1e-4));
+    /// assert!(coarse.evaluations.derivatives < whole.evaluations.derivatives);
+    /// assert!(coarse.value - whole.value < 1e-4);
+    /// assert_eq!((coarse.end, whole.end), (End::Converged, End::Converged));
+    /// # Ok::<(), twinlag_optimise::ProblemError>(())
+    /// ```
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: f64) -> Self {
+        self.resolution = resolution;
+        self
+    }
+
+    /// Whether a Newton step from a point lowers the cost by less than means anything; not where the curvature is not positive
+    /// definite.
+    ///
+    /// - `free`: coordinates that the step may move
+    pub(crate) fn is_resolved(&self, at: &Derivatives, free: &[usize]) -> bool {
+        if self.resolution <= 0.0 {
+            return false;
+        }
+        let mut matrix: Vec<f64> = free.iter().flat_map(|&i| free.iter().map(move |&j| at.curvature[i][j])).collect();
+        let mut step: Vec<f64> = free.iter().map(|&i| at.gradient[i]).collect();
+        if cholesky::solve(&mut matrix, &mut step).is_none() {
+            return false;
+        }
+        let gain: f64 = 0.5 * free.iter().zip(&step).map(|(&i, s)| at.gradient[i] * s).sum::<f64>();
+        gain <= self.resolution * at.value
     }
 
     /// The variables.

@@ -24,7 +24,7 @@ const DAMPING_LIMIT: f64 = 1e16;
 const LONGEST_STEP: f64 = 2.0;
 
 /// Minimises from the best point so far, which has to be known with its derivatives. Done when no
-/// coordinate would move by more than `step_tolerance`.
+/// coordinate would move by more than `step_tolerance`, or the cost fall by more than its resolution.
 pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
     let bounds = ledger.problem().bounds();
     let best = ledger.best();
@@ -47,7 +47,7 @@ pub(crate) fn run(ledger: &Ledger<'_, '_, '_>, step_tolerance: f64) -> Stop {
         };
         system.free.clear();
         system.free.extend((0..n).filter(|&i| !is_pressed(i)));
-        if system.free.is_empty() {
+        if system.free.is_empty() || ledger.problem().is_resolved(&here, &system.free) {
             ledger.report();
             return Stop::BySolver;
         }
