@@ -40,7 +40,7 @@ impl Search<'_> {
         let white = |candidate: &Candidate| candidate.score(current, self.policy).white();
         let mut best: Option<Candidate> = None;
         for effect in sizes {
-            let looked = self.with(current, &effect, &effect.starts(), robust_before);
+            let looked = self.with(current, &effect, &effect.starts());
             let other = self.finished(current, &looked, robust_before);
             if white(&other) <= white(best.as_ref().unwrap_or(chosen)) {
                 break;
@@ -61,7 +61,7 @@ impl Search<'_> {
         let mut theta = current.theta.clone();
         theta.splice(range, start);
         let model = current.model.replaced(index, effect.clone());
-        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
         let white_gain = white_gain(current, &fitted);
         let robust_gain = self.robust(current) - self.robust(&fitted);
         let held_out_nats = held_out_gain(self.observations, self.selection, current, &fitted, self.policy);
@@ -113,16 +113,18 @@ impl Search<'_> {
     fn replaced(&self, current: &Fitted, index: usize, taken: &Candidate, other: &Shared) -> Option<Replacement> {
         let range = current.model.range(index);
         let model = current.model.replaced(index, other.clone());
+        let (observations, selection) = self.excerpt();
         let look = |start: Vec<f64>| {
             let mut theta = current.theta.clone();
             theta.splice(range.clone(), start);
-            model.fit(&theta, self.observations, self.selection, Effort::Look)
+            model.fit(&theta, observations, selection, Effort::Look)
         };
         let best = other.starts().into_iter().map(look).min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
-        if white_gain(current, &best) < -self.policy.look_alike_deficit_share * best.count {
+        let here = current.model.energy(&current.theta, observations, selection);
+        if (here / best.chi2.max(1e-300)).ln() < -self.policy.look_alike_deficit_share {
             return None;
         }
-        let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Finish);
+        let fitted = model.fit(&best.theta, self.observations, self.selection, Effort::Compare);
         let more = other.parameters().len() as f64 - range.len() as f64;
         let white_gain = white_gain(current, &fitted);
         let robust_gain = self.robust(current) - self.robust(&fitted);

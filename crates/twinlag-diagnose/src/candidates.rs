@@ -1,6 +1,7 @@
 //! What may be added to a model: made from what the record shows, screened by a linearisation,
 //! fitted.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
@@ -145,7 +146,11 @@ pub(crate) struct Search<'a> {
     allowed: &'a [Identifier],
     pub(crate) policy: &'a Policy,
     watch: Watch<'a>,
+    excerpt: OnceLock<Excerpt>,
 }
+
+/// Pieces of a long record, all of a short one, and what counts of them.
+type Excerpt = (Observations, Selection);
 
 impl<'a> Search<'a> {
     /// A search of `prepared`.
@@ -158,7 +163,13 @@ impl<'a> Search<'a> {
             allowed: &settings.effects,
             policy: &settings.policy,
             watch,
+            excerpt: OnceLock::new(),
         }
+    }
+
+    /// What a first look takes in.
+    pub(crate) fn excerpt(&self) -> &Excerpt {
+        self.excerpt.get_or_init(|| self.prepared.excerpt())
     }
 
     /// The search with candidates made from what `current` shows: its time constants, lines that it
@@ -233,12 +244,14 @@ impl<'a> Search<'a> {
         let robust_before = self.robust(current);
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
         // well.
-        let excerpt = self.is_far_off(current).then(|| self.prepared.excerpt());
+        let is_far_off = self.is_far_off(current);
         let looked = self.each(&promising, |Promising { effect, starts, gain }| {
-            let looked = match &excerpt {
-                _ if effect.is_noise() => self.with_noise(current, effect)?,
-                Some(excerpt) => self.looked_at(current, effect, excerpt),
-                None => self.with(current, effect, starts, robust_before),
+            let looked = if effect.is_noise() {
+                self.with_noise(current, effect)?
+            } else if is_far_off {
+                self.looked_at(current, effect)
+            } else {
+                self.with(current, effect, starts)
             };
             Some((gain.max(looked.white_gain).max(looked.robust_gain), looked))
         })?;
@@ -247,7 +260,7 @@ impl<'a> Search<'a> {
         mean.sort_by(|(_, a), (_, b)| unshared(b).total_cmp(&unshared(a)));
         mean.truncate(self.policy.most_fitted_candidates);
         let mut finished = Vec::new();
-        if excerpt.is_none() {
+        if !is_far_off {
             // With a smaller part of the best gain than this none is taken, not even a static one.
             let finite = mean.iter().map(|(gain, _)| *gain).filter(|gain| gain.is_finite());
             let least = self.policy.static_share * finite.fold(0.0, f64::max);
@@ -280,14 +293,14 @@ impl<'a> Search<'a> {
         }
         let mut all = self.candidates(&current.model);
         all.retain(|c| c.about().turns_phases && !c.is_noise() && c.parameters().len() <= MOST_GRID_PARAMETERS);
-        let (excerpt, robust_before) = (self.prepared.excerpt(), self.robust(current));
-        self.each(&all, |effect| self.finished(current, &self.looked_at(current, effect, &excerpt), robust_before))
+        let robust_before = self.robust(current);
+        self.each(&all, |effect| self.finished(current, &self.looked_at(current, effect), robust_before))
     }
 
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
         let model = &looked.fitted.model;
-        let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Finish);
+        let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Compare);
         let robust = robust_before - self.robust(&fitted);
         let [white_gain, robust_gain] = self.gains(current, &fitted, &looked.effect, robust);
         Candidate { fitted, white_gain, robust_gain, ..looked.clone() }
@@ -342,41 +355,42 @@ impl<'a> Search<'a> {
     }
 
     /// The candidate with the best fit of all from `starts`.
-    pub(crate) fn with(&self, current: &Fitted, effect: &Shared, starts: &[Vec<f64>], robust_before: f64) -> Candidate {
-        let fitted = Self::best_of_starts(current, effect, starts, |model, theta| {
-            vec![model.fit(theta, self.observations, self.selection, Effort::Look)]
-        });
-        let [white_gain, robust_gain] = self.gains(current, &fitted, effect, robust_before - self.robust(&fitted));
-        self.candidate(effect, fitted, white_gain, robust_gain)
+    /// The candidate with the best fit of all from `starts` to an excerpt of the record, to all of it where its parameter is a
+    /// frequency. Its gains say how it compares with the others; what it is worth is found when it is fitted to the end.
+    pub(crate) fn with(&self, current: &Fitted, effect: &Shared, starts: &[Vec<f64>]) -> Candidate {
+        let whole = (self.observations, self.selection);
+        let excerpt = self.excerpt();
+        let part = if effect.about().is_narrow { whole } else { (&excerpt.0, &excerpt.1) };
+        self.fitted_to(part, current, effect, |model, theta| vec![model.fit(theta, part.0, part.1, Effort::Look)], starts)
     }
 
-    /// The candidate with the best fit to an excerpt of the record, from a grid of time constants
-    /// as well. Its gains say how it compares with the others; what it is worth is found when it is
-    /// fitted to the end.
-    fn looked_at(&self, current: &Fitted, effect: &Shared, excerpt: &(Observations, Selection)) -> Candidate {
-        let (observations, selection) = excerpt;
-        let fitted = Self::best_of_starts(current, effect, &effect.starts(), |model, theta| {
+    /// As [`Search::with`], from all starts and from a grid of time constants.
+    fn looked_at(&self, current: &Fitted, effect: &Shared) -> Candidate {
+        let (observations, selection) = self.excerpt();
+        let fits = |model: &Model, theta: &[f64]| {
             let mut fits = vec![model.fit(theta, observations, selection, Effort::Look)];
             if effect.parameters().len() <= MOST_GRID_PARAMETERS {
-                fits.push(self.over_grid(model, &theta[2..], excerpt));
+                fits.push(self.over_grid(model, &theta[2..]));
             }
             fits
-        });
+        };
+        self.fitted_to((observations, selection), current, effect, fits, &effect.starts())
+    }
+
+    fn fitted_to(
+        &self,
+        (observations, selection): (&Observations, &Selection),
+        current: &Fitted,
+        effect: &Shared,
+        fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>,
+        starts: &[Vec<f64>],
+    ) -> Candidate {
+        let model = current.model.with(effect.clone());
+        let all = starts.iter().flat_map(|start| fits(&model, &[&current.theta[..], start].concat()));
+        let fitted = all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start");
         let before = current.model.energy(&current.theta, observations, selection);
         let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
         self.candidate(effect, fitted, gain, gain)
-    }
-
-    fn best_of_starts(
-        current: &Fitted,
-        effect: &Shared,
-        starts: &[Vec<f64>],
-        fits: impl Fn(&Model, &[f64]) -> Vec<Fitted>,
-    ) -> Fitted {
-        let model = current.model.with(effect.clone());
-        let from = |start: &Vec<f64>| fits(&model, &[&current.theta[..], start].concat());
-        let all = starts.iter().flat_map(from);
-        all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start")
     }
 
     fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
@@ -395,8 +409,8 @@ impl<'a> Search<'a> {
     }
 
     /// The best fit to an excerpt from a grid of time constants.
-    fn over_grid(&self, model: &Model, rest: &[f64], excerpt: &(Observations, Selection)) -> Fitted {
-        let (observations, selection) = excerpt;
+    fn over_grid(&self, model: &Model, rest: &[f64]) -> Fitted {
+        let (observations, selection) = self.excerpt();
         let (low, high) = (GRID_FROM_PERIODS * self.context.step_s, GRID_TO_SHARE * self.context.span_s());
         let at = |i: usize| low * (high / low).powf(i as f64 / (GRID_POINTS - 1) as f64);
         let pairs = (0..GRID_POINTS).flat_map(|i| (0..GRID_POINTS).map(move |j| (i, j)));
@@ -429,7 +443,7 @@ impl<'a> Search<'a> {
         let mut theta = current.theta.clone();
         theta.extend([extra.std_k, extra.correlation_s]);
         // The weights move the time constants, and these the noise: once more is enough.
-        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Finish);
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
         let held_out_nats = 0.5 * (white.held_out - with.held_out);
         Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }

@@ -174,6 +174,7 @@ pub(crate) fn if_known(
 /// Fits with the first time constant held at each value in turn.
 fn along<'a>(values_s: impl Iterator<Item = &'a f64>, free: &Fitted, state: &State<'_>) -> Vec<Fitted> {
     let (observations, everything) = (&state.prepared.observations, &state.prepared.everything);
+    let (pieces, of_pieces) = state.prepared.excerpt();
     let mut theta = free.theta.clone();
     values_s
         .map(|tau_s| {
@@ -185,10 +186,10 @@ fn along<'a>(values_s: impl Iterator<Item = &'a f64>, free: &Fitted, state: &Sta
                 (start[0], start[1]) = (*tau_s, other_s.max(shortest_s));
                 start
             });
-            let fits = starts.map(|start| model.fit(&start, observations, everything, Effort::Look));
+            let fits = starts.map(|start| model.fit(&start, &pieces, &of_pieces, Effort::Look));
             let [one, other] = &fits;
             let start = if one.chi2 < other.chi2 { one } else { other };
-            let fitted = model.fit(&start.theta, observations, everything, Effort::Finish);
+            let fitted = model.fit(&start.theta, observations, everything, Effort::Compare);
             theta.clone_from(&fitted.theta);
             fitted
         })

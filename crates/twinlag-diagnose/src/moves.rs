@@ -258,7 +258,7 @@ impl<'a> State<'a> {
         }
         let (model, theta) = self.current.without(index);
         let search = self.search();
-        let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
         let (n, parameters) = (self.current.count, self.current.model.range(index).len());
         let loss = n * (without.mean_energy() / self.current.mean_energy()).ln();
         (loss < worth(parameters, n, search.policy)).then(|| self.removal(index, without, Some(loss)))
@@ -271,7 +271,7 @@ impl<'a> State<'a> {
         let (model, theta) = self.current.without(index);
         let model = model.with_noise(self.prepared.levels.std_k);
         let search = self.search();
-        let without = model.fit(&theta, search.observations, search.selection, Effort::Finish);
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
         let is_explained = !search.needs_noise(&without, &self.taken[index].candidate);
         is_explained.then(|| self.removal(index, without, None))
     }

@@ -6,11 +6,15 @@ use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
 use crate::model::Model;
 use crate::observations::Observations;
+use crate::prepare::whole_selection;
 use crate::selection::Selection;
 
 /// Parameters whose second derivatives are taken. Those of many, all of one effect, are given by products of first
 /// ones: what second ones add is of the time constants.
 const MAX_EXACT_CURVATURES: usize = 7;
+/// Samples up to which second derivatives are taken of the whole record, and the pieces of a longer one.
+const MAX_CURVED_SAMPLES: usize = 16_384;
+const CURVED_PIECES: usize = 8;
 /// Step of second derivatives, in standard errors of a parameter: derivatives of the gradient over it average the
 /// curvature where the parameter may be.
 const CURVATURE_STEP_SE: f64 = 0.3;
@@ -19,24 +23,40 @@ const GRID_POINTS: usize = 7;
 /// Shortest of them, in sample periods, and longest, in lengths of the record.
 const GRID_MIN_STEPS: f64 = 1.5;
 const GRID_MAX_SPANS: f64 = 0.1;
-/// Iterations, and the relative step at which a fit ends: to be ranked, and to the end.
-const LOOK: (u64, f64) = (5, 2e-2);
-const FINISH: (u64, f64) = (40, 1e-4);
-/// Deviance, in nats doubled, that a fit need not find: to be ranked, a hundredth of the weakest threshold of the search; to the
-/// end, one hundredth of a standard error of a parameter. A valley in which the data determine nothing takes many iterations,
-/// each of which goes far and gains less.
-const LOOK_DEVIANCE: f64 = 0.05;
-const FINISH_DEVIANCE: f64 = 1e-4;
+/// Most iterations of a fit.
+const LOOK_ITERATIONS: u64 = 5;
+const MAX_ITERATIONS: u64 = 40;
+/// Relative step at which a fit ends.
+const LOOK_STEP: f64 = 2e-2;
+const STEP: f64 = 1e-4;
+/// Deviance that a fit need not find: a hundredth of the least that decides between models, some ten, and the square of a
+/// hundredth of a standard error. In a curved valley in which the record hardly determines anything each of dozens of iterations
+/// gains a tenth.
+const COMPARED_DEVIANCE: f64 = 0.1;
+const FINISHED_DEVIANCE: f64 = 1e-4;
 /// Evaluations for each iteration.
 const EVALUATIONS_PER_ITERATION: u64 = 4;
 
 /// How much effort a fit makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Enough to rank it.
+    /// A few iterations, enough to rank it.
     Look,
-    /// To the end.
+    /// To a tenth of a nat or so, enough to compare models.
+    Compare,
+    /// Until no parameter moves by a hundredth of its standard error.
     Finish,
+}
+
+impl Effort {
+    /// Most iterations, the relative step at which the fit ends, and the deviance that it need not find.
+    fn limits(self) -> (u64, f64, f64) {
+        match self {
+            Self::Look => (LOOK_ITERATIONS, LOOK_STEP, COMPARED_DEVIANCE),
+            Self::Compare => (MAX_ITERATIONS, STEP, COMPARED_DEVIANCE),
+            Self::Finish => (MAX_ITERATIONS, STEP, FINISHED_DEVIANCE),
+        }
+    }
 }
 
 /// A fitted model.
@@ -92,10 +112,7 @@ impl Model {
     /// If both time constants are held, or `start` is not finite.
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
-        let ((iterations, step_tolerance), deviance) = match effort {
-            Effort::Look => (LOOK, LOOK_DEVIANCE),
-            Effort::Finish => (FINISH, FINISH_DEVIANCE),
-        };
+        let (iterations, step_tolerance, deviance) = effort.limits();
         let residuals = selection.counts.iter().filter(|counts| **counts).count();
         let problem = Problem::new(&cost, cost.variables.clone());
         let problem = problem.expect("bounds are in order and the time constants are free");
@@ -176,7 +193,8 @@ impl Model {
     ///
     /// Products of first derivatives, [`dense::gram`] of the columns, count the noise that is in these as information on
     /// the parameters. In quiet records there is little of it; where the noise is a tenth of what the gas does, it can make up most
-    /// of them.
+    /// of them. The difference is a matter of the noise, so that of a record of more than 16 384 samples is that of eight pieces of
+    /// it: off by one part in a hundred or so, the inverse root of their samples.
     ///
     /// - `lin`: the residual at `theta` with its derivatives
     /// - `known`: this matrix of a model without the last parameters, where these are an effect of no size that leaves its residual
@@ -189,9 +207,38 @@ impl Model {
         lin: &Linearised,
         known: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
+        let products = dense::gram(&lin.columns);
+        if observations.samples() <= MAX_CURVED_SAMPLES {
+            return self.curved(theta, observations, selection, &products, known);
+        }
+        // What noise adds to the products is the same all along the record.
+        let (piece, pieces) = (MAX_CURVED_SAMPLES / CURVED_PIECES, CURVED_PIECES - 1);
+        let starts = (0..CURVED_PIECES).map(|i| i * (observations.samples() - piece) / pieces);
+        let part = observations.excerpt(starts, piece);
+        let of_part = whole_selection(&part, &selection.weighting);
+        let of_lin = self.linearised(theta, &part, &of_part);
+        let part_products = dense::gram(&of_lin.columns);
+        let share = of_lin.residual.len() as f64 / lin.residual.len() as f64;
+        let part_known: Vec<Vec<f64>> = part_products.iter().take(known.len()).cloned().collect();
+        let curved = self.curved(theta, &part, &of_part, &part_products, &part_known);
+        let at = |i: usize, j: usize| match known.get(i.max(j)) {
+            Some(_) => known[i][j],
+            None => products[i][j] + (curved[i][j] - part_products[i][j]) / share,
+        };
+        (0..theta.len()).map(|i| (0..theta.len()).map(|j| at(i, j)).collect()).collect()
+    }
+
+    /// The second derivatives of [`Self::second_derivatives`], all from the residual of `observations`.
+    fn curved(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        products: &[Vec<f64>],
+        known: &[Vec<f64>],
+    ) -> Vec<Vec<f64>> {
         let (p, first) = (theta.len(), known.len());
         let cost = ResidualCost::new(self, theta, observations, selection);
-        let products = dense::gram(&lin.columns);
         let end = p.min(first + MAX_EXACT_CURVATURES);
         let is_still = |i: usize| cost.variables[i].lower == cost.variables[i].upper || products[i][i] <= 0.0;
         let row = |i: usize| {

@@ -114,7 +114,7 @@ impl Prepared {
         }
         let (observations, levels) = &self.raw;
         let model = base.model.clone().with_noise(levels.std_k);
-        Some(model.fit(&base.theta, observations, &self.searched, Effort::Finish))
+        Some(model.fit(&base.theta, observations, &self.searched, Effort::Compare))
     }
 
     pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
@@ -184,7 +184,7 @@ impl Prepared {
     /// This model with the current noise levels.
     pub fn refit(&self, fitted: &Fitted) -> Fitted {
         let model = fitted.model.clone().with_noise(self.levels.std_k);
-        model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Finish)
+        model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Compare)
     }
 
     /// Pieces of a long record, for a quick look, and what counts of them; all of a short one.
@@ -285,6 +285,11 @@ fn coarse_steps(levels: &ChannelNoise) -> impl Iterator<Item = Defect> {
 
 fn masking(effect: Identifier, channel: usize, seen: String, masked: Vec<usize>) -> Defect {
     Defect { effect, channel, seen, masked }
+}
+
+/// All residuals away from the ends.
+pub(crate) fn whole_selection(observations: &Observations, weighting: &Weighting) -> Selection {
+    selection(observations, None, weighting)
 }
 
 /// All residuals away from the ends.
