@@ -113,7 +113,7 @@ impl Search<'_> {
     fn replaced(&self, current: &Fitted, index: usize, taken: &Candidate, other: &Shared) -> Option<Replacement> {
         let range = current.model.range(index);
         let model = current.model.replaced(index, other.clone());
-        let (observations, selection) = self.excerpt();
+        let (observations, selection) = self.looked_in(other);
         let look = |start: Vec<f64>| {
             let mut theta = current.theta.clone();
             theta.splice(range.clone(), start);

@@ -12,6 +12,7 @@ use twinlag_model::{
 };
 use twinlag_optimise::{End, Scale, Variable};
 
+use crate::long::is_long;
 use crate::rank::{Kind, Score, threshold};
 
 /// Margin of a logarithm from its bound, and of a number as a share of its range, within which a
@@ -354,14 +355,28 @@ impl<'a> Search<'a> {
         current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
     }
 
-    /// The candidate with the best fit of all from `starts`.
-    /// The candidate with the best fit of all from `starts` to an excerpt of the record, to all of it where its parameter is a
-    /// frequency. Its gains say how it compares with the others; what it is worth is found when it is fitted to the end.
+    /// Where an effect is looked at first: in an excerpt of the record; in all of it where its parameter is a frequency, and of a
+    /// long record, in which pieces have shown what so few samples can.
+    pub(crate) fn looked_in(&self, effect: &Shared) -> (&Observations, &Selection) {
+        if effect.about().is_narrow || is_long(self.observations) {
+            (self.observations, self.selection)
+        } else {
+            let (observations, selection) = self.excerpt();
+            (observations, selection)
+        }
+    }
+
+    /// The candidate with the best fit of all from `starts`, as a first look has it. Its gains say how it compares with the others;
+    /// what it is worth is found when it is fitted to the end.
     pub(crate) fn with(&self, current: &Fitted, effect: &Shared, starts: &[Vec<f64>]) -> Candidate {
-        let whole = (self.observations, self.selection);
-        let excerpt = self.excerpt();
-        let part = if effect.about().is_narrow { whole } else { (&excerpt.0, &excerpt.1) };
-        self.fitted_to(part, current, effect, |model, theta| vec![model.fit(theta, part.0, part.1, Effort::Look)], starts)
+        let part = self.looked_in(effect);
+        self.fitted_to(
+            part,
+            current,
+            effect,
+            |model, theta| vec![model.fit(theta, part.0, part.1, Effort::Look)],
+            starts,
+        )
     }
 
     /// As [`Search::with`], from all starts and from a grid of time constants.

@@ -35,6 +35,8 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let with_effects = to_the_end(&state.current, &state);
     let mut last = summary(&with_effects, &state, policy);
     let mut remarks = remarks_of(&state.moves);
+    let all = state.prepared.observations.samples();
+    remarks.extend(state.searched_samples.map(|samples| Remark::SearchedInPieces { samples, all }));
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
     let mut found = found(&state, &with_effects, &last);

@@ -6,6 +6,7 @@ use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unre
 use crate::conclude::conclude;
 use crate::diagnosis::Diagnosis;
 use crate::excitation::{SINGLE, tones};
+use crate::long::pieces;
 use crate::moves::{Proposal, State};
 
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
@@ -32,10 +33,23 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     let prepared = Prepared::new(observations, settings)?;
     report(watch, "two lags", 0, 1)?;
     let tones = tones(observations, &settings.policy);
-    let mut state = State::new(prepared, settings, watch);
     let can_learn = tones != Some(SINGLE);
-    while can_learn && state.taken.len() < settings.policy.most_effects && advance(&mut state, settings)? {}
+    let mut state = match pieces(observations) {
+        Some(pieces) => {
+            let mut part = State::new(Prepared::new(&pieces, settings)?, settings, watch);
+            search(&mut part, settings, can_learn)?;
+            State::carried(part, prepared, settings, watch)
+        }
+        None => State::new(prepared, settings, watch),
+    };
+    search(&mut state, settings, can_learn)?;
     conclude(state, settings, tones)
+}
+
+/// Moves on as long as there is a move.
+fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
+    while can_learn && state.taken.len() < settings.policy.most_effects && advance(state, settings)? {}
+    Ok(())
 }
 
 /// The next move: an effect, reviewed with all others; where there is none, the noise; where that

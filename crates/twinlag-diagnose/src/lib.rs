@@ -47,6 +47,7 @@ mod if_known;
 mod judge;
 mod left_over;
 mod limits;
+mod long;
 mod moves;
 mod naming;
 mod rank;

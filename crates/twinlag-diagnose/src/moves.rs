@@ -151,14 +151,34 @@ pub(crate) struct State<'a> {
     pub(crate) moves: Vec<Move>,
     /// Effects with time constants far from those that there are, of which none was accepted.
     pub(crate) far: Vec<Candidate>,
+    /// Samples of the pieces that were searched first, of a long record.
+    pub(crate) searched_samples: Option<usize>,
+    /// Effects with such time constants that these pieces do not exclude.
+    pub(crate) far_in_pieces: Option<Vec<Candidate>>,
 }
 
 impl<'a> State<'a> {
     /// Two lags.
     pub(crate) fn new(mut prepared: Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
         let base = prepared.base(settings);
+        Self::of(base, prepared, settings, watch)
+    }
+
+    /// Two lags that were fitted.
+    pub(crate) fn of(base: Fitted, prepared: Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
         let current = base.clone();
-        Self { prepared, settings, watch, base, current, taken: Vec::new(), moves: Vec::new(), far: Vec::new() }
+        Self {
+            prepared,
+            settings,
+            watch,
+            base,
+            current,
+            taken: Vec::new(),
+            moves: Vec::new(),
+            far: Vec::new(),
+            searched_samples: None,
+            far_in_pieces: None,
+        }
     }
 
     pub(crate) fn search(&self) -> Search<'_> {
@@ -204,7 +224,7 @@ impl<'a> State<'a> {
     }
 
     /// Both models with the levels and weights that there are now.
-    fn refit(&mut self) {
+    pub(crate) fn refit(&mut self) {
         (self.current, self.base) = (self.prepared.refit(&self.current), self.prepared.refit(&self.base));
     }
 
@@ -219,7 +239,10 @@ impl<'a> State<'a> {
     /// accepted, keeps what came closest.
     pub(crate) fn add_from_afar(&mut self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
-        let candidates = search.far_away(&self.current)?;
+        let candidates = match &self.far_in_pieces {
+            Some(far) => search.far_in_whole(&self.current, far)?,
+            None => search.far_away(&self.current)?,
+        };
         let addition = self.addition(&search, &candidates);
         self.far = if addition.is_none() { candidates } else { Vec::new() };
         Ok(addition)

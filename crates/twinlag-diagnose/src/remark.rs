@@ -62,6 +62,13 @@ pub enum Remark {
     },
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
+    /// The search looked at pieces of the record first.
+    SearchedInPieces {
+        /// Samples of the pieces.
+        samples: usize,
+        /// Samples of the record.
+        all: usize,
+    },
     /// Something is missing, and intervals do not know how far it moves the numbers.
     BiasUnknown {
         /// Whether a time constant was known beforehand.
@@ -102,6 +109,7 @@ impl Remark {
             Self::Replaced { .. } => 7,
             Self::OtherChannel { .. } => 8,
             Self::Needless { .. } => 9,
+            Self::SearchedInPieces { .. } => 10,
         }
     }
 }
@@ -161,6 +169,11 @@ impl fmt::Display for Remark {
                 "{effect} was first placed in the other channel, but explains more in this one: if the rig says otherwise, \
                  believe the rig"
             ),
+            Self::SearchedInPieces { samples, all } => write!(
+                f,
+                "effects were searched for in {samples} of {all} samples, spread over the record; what was found was fitted to all \
+                 of it, and what else may be missing was screened against all of it"
+            ),
             Self::Needless { effect } => write!(
                 f,
                 "{effect} was added first and later removed, because other effects explain the record without it: there is no \
@@ -190,6 +203,7 @@ mod tests {
             Remark::Contradicted { what: "T1 = 0.8 s".into(), instead: "T1 = 0.4 s".into(), deviations: 9.7 },
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown { is_one_known: false },
+            Remark::SearchedInPieces { samples: 24_576, all: 1_000_000 },
         ];
         let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();
         assert_eq!(importance.len(), all.len(), "no two remarks have one place");

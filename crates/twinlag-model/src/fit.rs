@@ -26,9 +26,10 @@ const GRID_MAX_SPANS: f64 = 0.1;
 /// Most iterations of a fit.
 const LOOK_ITERATIONS: u64 = 5;
 const MAX_ITERATIONS: u64 = 40;
-/// Relative step at which a fit ends.
+/// Relative step at which a fit ends that is to be ranked, and any other: in a long record a standard error may be a hundred-thousandth
+/// of a time constant.
 const LOOK_STEP: f64 = 2e-2;
-const STEP: f64 = 1e-4;
+const STEP: f64 = 1e-7;
 /// Deviance that a fit need not find: a hundredth of the least that decides between models, some ten, and the square of a
 /// hundredth of a standard error. In a curved valley in which the record hardly determines anything each of dozens of iterations
 /// gains a tenth.

@@ -91,14 +91,27 @@ impl Prepared {
 
     /// The two-lag model, isolated wrong readings, which show once there is one, masked.
     pub fn base(&mut self, settings: &Settings) -> Fitted {
+        self.base_by(settings, |model, observations, searched| {
+            model.fit_over_grid(&[], GRID_STARTS, observations, searched)
+        })
+    }
+
+    /// As [`Self::base`], from time constants that are about right.
+    pub fn base_from(&mut self, tau_s: &[f64], settings: &Settings) -> Fitted {
+        self.base_by(settings, |model, observations, searched| {
+            model.fit(tau_s, observations, searched, Effort::Compare)
+        })
+    }
+
+    fn base_by(&mut self, settings: &Settings, fit: impl Fn(&Model, &Observations, &Selection) -> Fitted) -> Fitted {
         let model = Model::new(&settings.known, self.levels.std_k);
-        let mut base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
+        let mut base = fit(&model, &self.observations, &self.searched);
         // A wrong reading hides its neighbours: once more where there were some.
         for _ in 0..SPIKE_ROUNDS {
             if !settings.effects.contains(&Identifier::SPIKES) || !self.mask_spikes(&base) {
                 break;
             }
-            base = model.fit_over_grid(&[], GRID_STARTS, &self.observations, &self.searched);
+            base = fit(&model, &self.observations, &self.searched);
         }
         if !self.found.is_empty() {
             self.find_levels(&base, settings);

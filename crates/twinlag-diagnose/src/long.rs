@@ -1,0 +1,98 @@
+//! Long records, which are searched in pieces.
+//!
+//! Residuals are local functions of the readings, so that pieces of a record lose nothing but their ends: what is left of a search
+//! of them is what a record of so many samples shows. What it finds is then fitted to the whole record, where the search goes on
+//! from there: every effect that is still missing is screened against all residuals, and what stands out is fitted to all. Effects
+//! with quite other time constants, each of which costs a fit, are fitted to the whole where the pieces do not exclude them.
+
+use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Watch};
+
+use crate::candidates::{Candidate, Search};
+use crate::moves::{Move, State, Taken};
+
+/// Samples of a record that is searched whole. A search takes some hundred fits, one of the whole a second for a million samples.
+const MAX_SEARCHED_SAMPLES: usize = 49_152;
+/// Pieces of a longer one, spread evenly, and the samples of each: more than twenty thousand samples, of which a delay of 64 samples
+/// takes a tenth.
+const PIECES: usize = 12;
+const PIECE_SAMPLES: usize = 2048;
+/// Deviance by which the pieces exclude an effect: odds of one to a hundred and fifty.
+const EXCLUDED_DEVIANCE: f64 = 10.0;
+/// Factor within which time constants are the same: a screening of the effect has looked there.
+const SAME_TAU_FACTOR: f64 = 1.1;
+
+/// Whether a record is searched in pieces first.
+pub(crate) fn is_long(observations: &Observations) -> bool {
+    observations.samples() > MAX_SEARCHED_SAMPLES
+}
+
+/// Pieces of a long record; `None` of one that is searched whole, or consists of stretches too short for pieces.
+pub(crate) fn pieces(observations: &Observations) -> Option<Observations> {
+    let samples = observations.samples();
+    if !is_long(observations) {
+        return None;
+    }
+    let starts = (0..PIECES).map(|i| i * (samples - PIECE_SAMPLES) / (PIECES - 1));
+    let pieces = observations.excerpt(starts, PIECE_SAMPLES);
+    (!is_long(&pieces)).then_some(pieces)
+}
+
+impl<'a> State<'a> {
+    /// What a search of pieces found, fitted to the whole record.
+    pub(crate) fn carried(part: State<'_>, mut prepared: Prepared, settings: &'a Settings, watch: Watch<'a>) -> Self {
+        let base = prepared.base_from(&part.base.theta, settings);
+        let current = match part.current.model.noise() {
+            Some(_) => part.current.clone(),
+            None => {
+                Fitted { model: part.current.model.clone().with_noise(prepared.levels.std_k), ..part.current.clone() }
+            }
+        };
+        let mut out = Self::of(base, prepared, settings, watch);
+        out.current = out.fitted(&current, Effort::Compare);
+        if part.taken.iter().any(|taken| taken.candidate.effect.about().is_narrow) {
+            out.prepared.find_levels(&out.current, settings);
+            out.refit();
+        }
+        if part.prepared.levels.is_of_residual && out.prepared.has_high_levels(&out.current, settings) {
+            out.prepared.lower_levels(&out.current, settings);
+            out.refit();
+        }
+        if part.moves.iter().any(|entry| matches!(entry, Move::Reweigh { .. })) {
+            out.prepared.weigh_by(&out.current);
+            out.refit();
+        }
+        out.taken = part.taken.into_iter().map(|taken| out.taken_in_whole(taken)).collect();
+        out.moves = part.moves;
+        out.searched_samples = Some(part.prepared.observations.samples());
+        let is_open = |far: &Candidate| far.white_gain > -EXCLUDED_DEVIANCE && is_elsewhere(&far.fitted, &part.current);
+        out.far_in_pieces = Some(part.far.into_iter().filter(is_open).collect());
+        out
+    }
+
+    fn fitted(&self, fitted: &Fitted, effort: Effort) -> Fitted {
+        fitted.model.fit(&fitted.theta, &self.prepared.observations, &self.prepared.searched, effort)
+    }
+
+    /// An effect that pieces showed, with fits to the whole record.
+    fn taken_in_whole(&self, taken: Taken) -> Taken {
+        let candidate = Candidate { fitted: self.current.clone(), ..taken.candidate };
+        let in_whole = |tie: Candidate| Candidate { fitted: self.fitted(&tie.fitted, Effort::Compare), ..tie };
+        Taken { candidate, ties: taken.ties.into_iter().map(in_whole).collect() }
+    }
+}
+
+impl Search<'_> {
+    /// Effects with quite other time constants that pieces do not exclude, fitted to the whole record beside `current`.
+    pub(crate) fn far_in_whole(&self, current: &Fitted, far: &[Candidate]) -> Result<Vec<Candidate>, ModelError> {
+        let robust_before = self.robust(current);
+        let fits = |far: &&Candidate| far.fitted.model.effects.len() == current.model.effects.len() + 1;
+        let far: Vec<&Candidate> = far.iter().filter(fits).collect();
+        self.each(&far, |far| self.finished(current, far, robust_before))
+    }
+}
+
+/// Whether time constants of two fits differ.
+fn is_elsewhere(one: &Fitted, other: &Fitted) -> bool {
+    let is_far = |i: usize| (one.theta[i] / other.theta[i]).ln().abs() > SAME_TAU_FACTOR.ln();
+    is_far(0) || is_far(1)
+}
