@@ -322,7 +322,7 @@ impl<'a> Whitened<'a> {
     }
 
     /// Whether the steps are uneven and the inverse looks further than one of them.
-    fn has_no_inverse<D>(&self, pair: &Pair<D>) -> bool {
+    pub(crate) fn has_no_inverse<D>(&self, pair: &Pair<D>) -> bool {
         !is_one_step(&self.model, pair)
             && self.readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_)))
     }

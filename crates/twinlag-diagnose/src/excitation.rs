@@ -1,7 +1,7 @@
 //! What the gas does: how many tones there are to learn from.
 
 use twinlag_model::{Observations, Policy, levels};
-use twinlag_transform::Tapered;
+use twinlag_transform::{Complex64, Forward};
 
 /// Tones of a gas from which nothing but two time constants can be learned.
 pub(crate) const SINGLE: usize = 1;
@@ -33,16 +33,21 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
     let noise_k = levels(observations)?.std_k[channel];
     // Blackman and Harris: side lobes of a millionth of a millionth part of the power.
     let window = |k: usize| {
-        let x = std::f64::consts::TAU * (k as f64 + 0.5) / n as f64;
-        0.35875 - 0.48829 * x.cos() + 0.14128 * (2.0 * x).cos() - 0.01168 * (3.0 * x).cos()
+        let c = (std::f64::consts::TAU * (k as f64 + 0.5) / n as f64).cos();
+        let (double, triple) = (2.0 * c * c - 1.0, (4.0 * c * c - 3.0) * c);
+        0.35875 - 0.48829 * c + 0.14128 * double - 0.01168 * triple
     };
-    let tapered = Tapered::new((0..n).map(window).collect());
-    let scale = tapered.energy();
+    let mut tapered: Vec<f64> = (0..n).map(window).collect();
+    let scale: f64 = tapered.iter().map(|w| w * w).sum();
     // The level under the window: the plain mean is another where the last period is not whole, and leaves a line at zero.
-    let weight: f64 = tapered.taper().iter().sum();
-    let level = tapered.taper().iter().zip(y).map(|(w, y)| w * y).sum::<f64>() / weight;
-    let spectrum = tapered.transform(y[..n].iter().map(|y| y - level));
-    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
+    let weight: f64 = tapered.iter().sum();
+    let level = tapered.iter().zip(y).map(|(w, y)| w * y).sum::<f64>() / weight;
+    tapered.iter_mut().zip(y).for_each(|(w, y)| *w *= y - level);
+    let plan = Forward::of(n);
+    let mut spectrum = vec![Complex64::ZERO; plan.bins()];
+    plan.transform_into(&mut tapered, &mut spectrum, &mut Vec::new());
+    drop(tapered);
+    let power: Vec<f64> = spectrum.into_iter().map(|x| x.norm_sqr() / scale).collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = (policy.tone_power_ratio * noise_k * noise_k).max(LEAST_SHARE * largest);
     // What moves less than a few times in the whole record is no tone: it is not seen to come back.

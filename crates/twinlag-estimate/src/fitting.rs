@@ -3,10 +3,11 @@
 
 use twinlag_cross_relation::{CostValue, Form, Whitened, sandwich};
 use twinlag_optimise::{Budget, Evaluations, Fit, Minimiser, MultiStart, Problem, Variable};
+use twinlag_sensor::Discretisation;
 
 use crate::error::EstimateError;
 use crate::objective::{EstimatorCost, Objective, Prior};
-use crate::starts::hold_known;
+use crate::starts::{hold_known, starts};
 
 /// Compression may move no parameter by more than this many standard errors before the exact cost
 /// is minimised in its place: so little that one Newton step takes it back.
@@ -38,8 +39,7 @@ pub(crate) fn add(all: &mut Evaluations, more: Evaluations) {
     all.derivatives += more.derivatives;
 }
 
-/// Minimises `whitened` with `priors` over `variables` from `starts`, which are made once the
-/// objective is there.
+/// Minimises `whitened` with `priors` over `variables` from `own` starts, or from those of the record where there are none.
 ///
 /// Where the record allows it, in the compressed form; then again from there in the exact one if
 /// the bound on what that can have moved (where long segments were gathered in pieces: a Newton step of the exact cost) is above a
@@ -50,7 +50,7 @@ pub(crate) fn minimise_whitened<'a, const P: usize>(
     priors: &[Prior],
     variables: &[Variable],
     minimiser: &dyn Minimiser,
-    starts: impl FnOnce(&Objective<'_, '_, P>) -> Vec<Vec<f64>>,
+    own: Vec<Vec<f64>>,
 ) -> Result<Minimised<'a>, EstimateError> {
     let run = |cost: &EstimatorCost<'a>, starts: &[Vec<f64>]| {
         let objective = Objective::<P> { cost, priors };
@@ -58,9 +58,16 @@ pub(crate) fn minimise_whitened<'a, const P: usize>(
         Ok::<_, EstimateError>(MultiStart::run(&problem, minimiser, starts, &Budget::default())?)
     };
     // At second order each evaluation is the banded one anyway.
+    let readings = whitened.readings();
+    let starts_on = |cost: &EstimatorCost<'a>| starts(&Objective::<P> { cost, priors }, readings, variables);
+    let stand_in = if P == 6 || !own.is_empty() { None } else { stand_in(&whitened, P == 4)? };
     let whitened = if P == 6 { whitened } else { whitened.compressed(P == 4) };
     let cost = EstimatorCost::Whitened(whitened);
-    let starts = starts(&Objective::<P> { cost: &cost, priors });
+    let starts = match stand_in.map(EstimatorCost::Whitened) {
+        Some(stand_in) => best_of_either_order(&run(&stand_in, &starts_on(&stand_in))?),
+        None if own.is_empty() => starts_on(&cost),
+        None => own,
+    };
     let mut all = run(&cost, &starts)?;
     let EstimatorCost::Whitened(whitened) = cost else { unreachable!("built as whitened above") };
     if whitened.form() != Form::Compressed {
@@ -85,6 +92,26 @@ pub(crate) fn minimise_whitened<'a, const P: usize>(
     all = run(&cost, &[best])?;
     let EstimatorCost::Whitened(whitened) = cost else { unreachable!("built as whitened above") };
     Ok(Minimised { whitened, all })
+}
+
+/// The cost that shows where to start where `whitened` takes all of a long record for each evaluation and another hold does not:
+/// what the gas does between samples moves a minimum, by a sample at most, and makes or removes none.
+fn stand_in<'a>(whitened: &Whitened<'a>, calibration: bool) -> Result<Option<Whitened<'a>>, EstimateError> {
+    let is_first_order = whitened.hold() == Discretisation::FirstOrderHold;
+    if !is_first_order || whitened.form() != Form::Banded || whitened.autoregression().iter().any(|a| !a.is_empty()) {
+        return Ok(None);
+    }
+    let other = whitened.clone().with_hold(Discretisation::ZeroOrderHold)?;
+    Ok(other.is_gathered_in_pieces().then(|| other.compressed(calibration)))
+}
+
+/// The lowest ends with the first time constant shorter, and with it longer.
+fn best_of_either_order(all: &MultiStart) -> Vec<Vec<f64>> {
+    let of_order = |is_shorter: bool| {
+        let fits = all.fits().iter().filter(|fit| (fit.x[0] < fit.x[1]) == is_shorter);
+        fits.min_by(|a, b| a.value.total_cmp(&b.value)).map(|fit| fit.x.clone())
+    };
+    [true, false].into_iter().filter_map(of_order).collect()
 }
 
 /// One Newton step of a cost, by its Gauss-Newton matrix.

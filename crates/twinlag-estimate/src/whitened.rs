@@ -18,7 +18,7 @@ use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::outcome::Solved;
 use crate::second_lag::Unseen;
-use crate::starts::{hold_known, second_lags, starts};
+use crate::starts::{hold_known, second_lags};
 use crate::task::Task;
 use crate::vocabulary::{NoiseColour, NoiseKnowledge};
 
@@ -403,9 +403,7 @@ fn minimise<'a, const P: usize>(
         None => task.starts::<P>(variables),
     };
     let run = |whitened: Whitened<'a>, own: Vec<Vec<f64>>| {
-        minimise_whitened::<P>(whitened, priors, variables, task.minimiser, |objective| {
-            if own.is_empty() { starts(objective, task.readings, variables) } else { own }
-        })
+        minimise_whitened::<P>(whitened, priors, variables, task.minimiser, own)
     };
     let mut done = run(whitened, own)?;
     add(&mut evaluations, done.evaluations());

@@ -24,7 +24,7 @@ use crate::answers::Characterisation;
 use crate::error::Error;
 use crate::options::Options;
 use crate::quiet;
-use crate::rows::Rows;
+use crate::rows::observations;
 use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
@@ -78,10 +78,25 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
 /// As [`characterise`]; [`Error::Cancelled`].
 pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>) -> Result<Characterisation, Error> {
     options.check()?;
+    let stop = Stop::new(watch);
+    let mut answer = of_two_lags(record, options, &stop)?;
+    let Ok(observations) = observations(record) else { return Ok(answer) };
+    if is_single_tone(&observations, &Policy::default()) {
+        answer.warnings.push(Remark::SingleTone.to_string());
+        // Two lags alone are what was asked for, and under them both equations determine both numbers.
+        let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
+        answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
+    } else {
+        unseen::judge_unseen(&mut answer, &observations, options, &stop)?;
+    }
+    Ok(answer)
+}
+
+/// What the record says if nothing is missing beside two lags.
+fn of_two_lags(record: &Record, options: &Options, stop: &Stop<'_>) -> Result<Characterisation, Error> {
     let readings = readings(record, options)?;
     check_sampling(&readings, options)?;
-    let stop = Stop::new(watch);
-    let asked = Asked { record, options, stop: &stop };
+    let asked = Asked { record, options, stop };
     // Levels that are given need no rest.
     let quiet_s: &[[f64; 2]] = if options.noise_std_k.is_none() { &options.quiet_segments_s } else { &[] };
     let at_rest = quiet::runs(record, quiet_s)?;
@@ -92,17 +107,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         _ => answer::<2>(&asked, &task),
     };
     stop.check()?;
-    let mut answer = answer?;
-    let Ok(rows) = Rows::of(record) else { return Ok(answer) };
-    if is_single_tone(&rows.observations, &Policy::default()) {
-        answer.warnings.push(Remark::SingleTone.to_string());
-        // Two lags alone are what was asked for, and under them both equations determine both numbers.
-        let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
-        answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
-    } else {
-        unseen::judge_unseen(&mut answer, &rows, options, &stop)?;
-    }
-    Ok(answer)
+    answer
 }
 
 /// The channels of a record as the costs take them, cut where samples are missing.
