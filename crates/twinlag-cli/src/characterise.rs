@@ -1,10 +1,10 @@
 //! `twinlag characterise FILE`.
 
-use std::io::{Read, stdin};
+use std::io::stdin;
 use std::path::Path;
 
 use twinlag::diagnosis::{Grade, ModelError};
-use twinlag::record::{Record, Selection, Table};
+use twinlag::record::{Record, Selection};
 use twinlag::{Characterisation, Model, Options, Status};
 
 use crate::arguments::Characterise;
@@ -65,9 +65,7 @@ fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
 
 pub(crate) fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
     if file == Path::new("-") {
-        let mut bytes = Vec::new();
-        stdin().read_to_end(&mut bytes).map_err(|e| Failure::File(format!("standard input: cannot be read: {e}")))?;
-        Ok(Record::from_table(&Table::read(&bytes, "standard input")?, selection)?)
+        Ok(Record::from_reader(stdin(), "standard input", selection)?)
     } else {
         Ok(Record::read(file, selection)?)
     }
