@@ -18,6 +18,11 @@ pub fn is_single_tone(observations: &Observations, policy: &Policy) -> bool {
     tones(observations, policy) == Some(SINGLE)
 }
 
+/// Whether the readings of a channel, evenly sampled and with noise of `noise_k`, are a single tone.
+pub fn is_single_tone_in(reading_c: &[f64], noise_k: f64, policy: &Policy) -> bool {
+    tones_of(reading_c, policy, || Some(noise_k)) == Some(SINGLE)
+}
+
 /// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples
 /// are uneven or the power is spread. Each tone gives two equations, and two time constants take
 /// two. The level of the record, what drifts in it, and what a start out of balance leaves do not count.
@@ -25,12 +30,18 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
     observations.period_s?;
     let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
     let stretch = observations.stretches.iter().max_by_key(|s| s.time_s.len())?;
-    let y = &stretch.reading_c[channel];
+    tones_of(&stretch.reading_c[channel], policy, || Some(levels(observations)?.std_k[channel]))
+}
+
+/// Number of separate tones in the readings of one channel, as of [`tones`].
+///
+/// - `noise_k`: standard deviation of the noise, asked for where there are readings enough
+fn tones_of(y: &[f64], policy: &Policy, noise_k: impl FnOnce() -> Option<f64>) -> Option<usize> {
     let n = y.len() & !1;
     if n < policy.tone_fewest_samples {
         return None;
     }
-    let noise_k = levels(observations)?.std_k[channel];
+    let noise_k = noise_k()?;
     // Blackman and Harris: side lobes of a millionth of a millionth part of the power.
     let window = |k: usize| {
         let c = (std::f64::consts::TAU * (k as f64 + 0.5) / n as f64).cos();

@@ -6,6 +6,7 @@
 mod bootstrap;
 mod conclude;
 mod contradiction;
+mod excerpt;
 mod explain;
 mod fill;
 mod judge;
@@ -28,6 +29,7 @@ use crate::rows::observations;
 use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
+use excerpt::Excerpt;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
@@ -80,14 +82,20 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
     options.check()?;
     let stop = Stop::new(watch);
     let mut answer = of_two_lags(record, options, &stop)?;
-    let Ok(observations) = observations(record) else { return Ok(answer) };
-    if is_single_tone(&observations, &Policy::default()) {
+    let looked_at = match Excerpt::of_long(record, options)? {
+        Some(excerpt) => excerpt,
+        None => match observations(record) {
+            Ok(all) => Excerpt { is_single_tone: is_single_tone(&all, &Policy::default()), observations: all },
+            Err(_) => return Ok(answer),
+        },
+    };
+    if looked_at.is_single_tone {
         answer.warnings.push(Remark::SingleTone.to_string());
         // Two lags alone are what was asked for, and under them both equations determine both numbers.
         let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
         answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
     } else {
-        unseen::judge_unseen(&mut answer, &observations, options, &stop)?;
+        unseen::judge_unseen(&mut answer, &looked_at.observations, options, &stop)?;
     }
     Ok(answer)
 }
