@@ -24,7 +24,7 @@ use crate::spectral::{self, Sums};
 use crate::transform::Transformed;
 
 /// Readings up to which the bins of a record are kept: beyond, the banded form takes less memory than they and no more time.
-const MAX_KEPT_BINS: usize = 1 << 19;
+pub(crate) const MAX_KEPT_BINS: usize = 1 << 19;
 
 /// How the whitening is computed. The first two give the same numbers to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
