@@ -53,7 +53,7 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
     characterise_watched(record, options, UNWATCHED)
 }
 
-/// [`characterise`], with `watch` called for every replicate of a bootstrap.
+/// [`characterise`], with `watch` called after each of its four steps and for every replicate of a bootstrap.
 ///
 /// ```
 #[doc = include_str!("../example.txt")]
@@ -115,6 +115,7 @@ fn of_two_lags(record: &Record, options: &Options, stop: &Stop<'_>) -> Result<Ch
         _ => answer::<2>(&asked, &task),
     };
     stop.check()?;
+    stop.say(STEPS, 3, 4);
     answer
 }
 
@@ -182,6 +183,9 @@ struct Asked<'a> {
     stop: &'a Stop<'a>,
 }
 
+/// What is reported of the steps: the fit, what the gas does between samples, what is left over, what may be hidden.
+const STEPS: &str = "steps of the characterisation";
+
 /// Probability beyond which the other hold takes the place of the one that was tried first: a likelihood ratio of 150, the
 /// fifth power of `e`. Below it a short second lag and a hold look alike, and the choice would change with what else is fitted;
 /// the interval covers both.
@@ -201,7 +205,9 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     let mut warnings = asked.needless();
     // The whitened estimate comes first, whichever is asked: the others begin at it, and what it
     // leaves says whether the model is right.
+    asked.stop.say(STEPS, 0, 4);
     let mut fit = WhitenedFit::<'a, P>::find(task)?;
+    asked.stop.say(STEPS, 1, 4);
     warnings.extend(outweighed(&fit));
     // What the gas does between samples must be settled before the residual is judged: a wrong hold
     // leaves more than noise.
@@ -218,6 +224,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     // Only now is it known whether errors are those of noise or those of the residual, and all
     // intervals rest on which.
     let theta = fit.theta();
+    asked.stop.say(STEPS, 2, 4);
     let tests = asked.tests(&fit, &theta)?;
     let is_rejected = fit.is_rejected_by(&tests);
     let middle = if is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
