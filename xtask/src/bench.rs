@@ -40,6 +40,19 @@ pub(crate) struct Bench {
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
+    #[command(flatten)]
+    long: Long,
+    /// One step of `--scale`, in a process of its own.
+    #[arg(long, hide = true, requires = "file")]
+    step: Option<scale::Named>,
+    /// The file of that step.
+    #[arg(hide = true)]
+    file: Option<PathBuf>,
+}
+
+/// How the verbs grow.
+#[derive(Args)]
+struct Long {
     /// Measures how time and memory of each verb grow with the record, in place of the fits, and writes the book's page on it.
     #[arg(long, conflicts_with_all = ["million", "diagnose", "stream"])]
     scale: bool,
@@ -55,24 +68,18 @@ pub(crate) struct Bench {
     /// A verb that would take longer is not asked for more rows, s.
     #[arg(long, requires = "scale", default_value_t = 600.0)]
     limit: f64,
-    /// One step of `--scale`, in a process of its own.
-    #[arg(long, hide = true, requires = "file")]
-    step: Option<scale::Named>,
-    /// The file of that step.
-    #[arg(hide = true)]
-    file: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Bench) -> Result<()> {
     if let (Some(step), Some(file)) = (&arguments.step, &arguments.file) {
         return step.run(file);
     }
-    if arguments.scale {
+    if arguments.long.scale {
         return scale::run(&scale::Asked {
-            quick: arguments.quick,
-            huge: arguments.huge,
-            measured: arguments.measured.as_deref(),
-            limit_s: arguments.limit,
+            quick: arguments.long.quick,
+            huge: arguments.long.huge,
+            measured: arguments.long.measured.as_deref(),
+            limit_s: arguments.long.limit,
         });
     }
     if arguments.million {

@@ -116,7 +116,7 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
         // Of a long record each of these vectors counts.
         drop(differences);
         let lone_outliers = lone(&is_far, readings.segments().iter().map(other));
-        let step = quantisation_step(readings.segments().iter().map(channel));
+        let step = quantisation_step(&readings.segments().iter().map(channel));
         let floor = step.map_or(0.0, |q| q / 12.0_f64.sqrt());
         let std_k = from_differences.max(floor);
         // The third differences of white noise have autocorrelations −3/4, 3/10, −1/20: their mean
@@ -188,7 +188,7 @@ fn third_difference(steps: &Steps, k: usize) -> [f64; 4] {
 /// A grid counts if nearly all differences are whole multiples of the smallest one. Written
 /// decimals always make some grid; it is the floor that they imply that is used, and it is small
 /// where the decimals are fine.
-fn quantisation_step<'a>(channels: impl Iterator<Item = &'a [f64]> + Clone) -> Option<f64> {
+fn quantisation_step<'a>(channels: &(impl Iterator<Item = &'a [f64]> + Clone)) -> Option<f64> {
     let differences = || channels.clone().flat_map(|y| y.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 1e-9);
     let step = differences().fold(f64::INFINITY, f64::min);
     if !step.is_finite() {

@@ -28,8 +28,8 @@ pub(crate) fn sweep<const P: usize, const Q: usize>(
     pair: &Pair<DualSVec64<P>>,
     mut visit: impl FnMut(f64, &[f64; Q]),
 ) {
-    const { assert!(Q <= P, "no more derivatives than parameters") };
     type Dual<const P: usize> = DualSVec64<P>;
+    const { assert!(Q <= P, "no more derivatives than parameters") };
     let variance = model.white_variance();
     let (y1, y2) = (segment.y1(), segment.y2());
     let zero = Dual::<P>::from_re(0.0);

@@ -58,7 +58,7 @@ pub(crate) struct Took {
 pub(super) struct Row {
     pub(super) verb: Verb,
     pub(super) took: Took,
-    pub(super) bare: Option<Took>,
+    pub(super) bare: Took,
 }
 
 /// A measured record.
@@ -129,8 +129,7 @@ fn expected_s(before: &Took, rows: usize) -> f64 {
 
 fn measure(verb: Verb, file: &Path) -> Result<Row> {
     let took = child(Step::Verb(verb), file)?;
-    let bare = verb.bare().map(|bare| child(bare, file)).transpose()?;
-    Ok(Row { verb, took, bare })
+    Ok(Row { verb, took, bare: child(verb.bare(), file)? })
 }
 
 /// A step in a process of its own.

@@ -92,7 +92,7 @@ fn table(results: &Results) -> String {
             row.took.rows as f64,
             seconds(row.took.wall_s),
             seconds(row.took.processor_s),
-            row.bare.map_or_else(none, |bare| seconds(bare.processor_s)),
+            seconds(row.bare.processor_s),
             ratio(row).map_or_else(none, |ratio| format!("{ratio:.1}")),
             exponent.map_or_else(none, |exponent| format!("{exponent:.2}")),
             row.took.peak_mb.map_or_else(none, |mb| format!("{mb:.0}")),
@@ -136,7 +136,7 @@ fn seconds(s: f64) -> String {
 }
 
 fn ratio(row: &Row) -> Option<f64> {
-    row.bare.filter(|bare| bare.processor_s > 0.0).map(|bare| row.took.processor_s / bare.processor_s)
+    (row.bare.processor_s > 0.0).then(|| row.took.processor_s / row.bare.processor_s)
 }
 
 fn exponent(before: &Took, now: &Took) -> f64 {

@@ -39,11 +39,11 @@ impl Verb {
     }
 
     /// The work that the verb cannot do without.
-    pub(crate) fn bare(self) -> Option<Step> {
+    pub(crate) fn bare(self) -> Step {
         match self {
-            Self::Read => Some(Step::Parse),
-            Self::Characterise | Self::Diagnose => Some(Step::Transforms),
-            Self::Compensate | Self::Track => Some(Step::Filter),
+            Self::Read => Step::Parse,
+            Self::Characterise | Self::Diagnose => Step::Transforms,
+            Self::Compensate | Self::Track => Step::Filter,
         }
     }
 }
