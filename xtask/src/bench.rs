@@ -1,10 +1,12 @@
 //! How long a fit and a trial take (Criterion, `benches/fits.rs`), the fits beside the SciPy script that a user would otherwise
 //! write: same record, same cost, same start, same minimum, in one run.
 
+pub(crate) mod scale;
 mod stream;
 
 use std::fs;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::process::Command;
 use std::time::Instant;
 
@@ -38,9 +40,48 @@ pub(crate) struct Bench {
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
+    #[command(flatten)]
+    long: Long,
+    /// One step of `--scale`, in a process of its own.
+    #[arg(long, hide = true, requires = "file")]
+    step: Option<scale::Named>,
+    /// The file of that step.
+    #[arg(hide = true)]
+    file: Option<PathBuf>,
+}
+
+/// How the verbs grow.
+#[derive(Args)]
+struct Long {
+    /// Measures how time and memory of each verb grow with the record, in place of the fits, and writes the book's page on it.
+    #[arg(long, conflicts_with_all = ["million", "diagnose", "stream"])]
+    scale: bool,
+    /// Up to a hundred thousand rows alone, and no page.
+    #[arg(long, requires = "scale")]
+    quick: bool,
+    /// A hundred million rows as well, where the machine has the memory.
+    #[arg(long, requires = "scale")]
+    huge: bool,
+    /// A folder of measured records, as for `measured`, to diagnose as well.
+    #[arg(long, requires = "scale", value_name = "DIR")]
+    measured: Option<PathBuf>,
+    /// A verb that would take longer is not asked for more rows, s.
+    #[arg(long, requires = "scale", default_value_t = 600.0)]
+    limit: f64,
 }
 
 pub(crate) fn run(arguments: &Bench) -> Result<()> {
+    if let (Some(step), Some(file)) = (&arguments.step, &arguments.file) {
+        return step.run(file);
+    }
+    if arguments.long.scale {
+        return scale::run(&scale::Asked {
+            quick: arguments.long.quick,
+            huge: arguments.long.huge,
+            measured: arguments.long.measured.as_deref(),
+            limit_s: arguments.long.limit,
+        });
+    }
     if arguments.million {
         return million(arguments.trials);
     }
@@ -111,13 +152,15 @@ fn mean_s(id: &str) -> Result<f64> {
     Ok(1e-9 * estimates["mean"]["point_estimate"].as_f64().context("a mean")?)
 }
 
-/// The most memory that this process has had.
+/// The most memory that this process has had, MB; `None` where the system does not say.
+pub(crate) fn peak_mb() -> Option<f64> {
+    let text = fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find(|l| l.starts_with("VmHWM"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+}
+
+/// As a text.
 fn peak_memory() -> String {
-    let peak_mb = || -> Option<f64> {
-        let text = fs::read_to_string("/proc/self/status").ok()?;
-        let line = text.lines().find(|l| l.starts_with("VmHWM"))?;
-        Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
-    };
     peak_mb().map_or("unknown".into(), |m| format!("{m:.1} MB"))
 }
 

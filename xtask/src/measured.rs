@@ -75,6 +75,13 @@ const CASES: &[Case<Characterisation>] = &[
     case("sp_column_fire/Diesel_1p1.csv", ["tc025_1m_C", "pt_1m_C"], "", not_ok),
 ];
 
+/// The records that are diagnosed, each with its two channels, once.
+pub(crate) fn records() -> Vec<(&'static str, [&'static str; 2])> {
+    let mut out = diagnosed::records();
+    out.dedup();
+    out
+}
+
 /// Two first-order lags are known not to be the whole story: an answer without a warning would be a trap.
 fn not_ok(answer: &Characterisation) -> Result<()> {
     ensure!(answer.status != Status::Ok, "status ok on a record that two first-order lags are known not to explain");

@@ -96,7 +96,7 @@ impl NoiseLevel {
 /// [`NoiseError::TooShort`] without at least 8 runs of four neighbouring samples.
 pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError> {
     let level = |channel: fn(&Segment) -> &[f64], other: fn(&Segment) -> &[f64]| -> Result<NoiseLevel, NoiseError> {
-        let mut differences = Vec::new();
+        let mut differences = Vec::with_capacity(readings.len());
         for segment in readings.segments() {
             let y = channel(segment);
             for (k, four) in y.windows(4).enumerate() {
@@ -111,10 +111,12 @@ pub fn estimate_noise(readings: &Readings) -> Result<[NoiseLevel; 2], NoiseError
         let all = differences.len();
         let is_far: Vec<bool> = differences.iter().map(|d| d.abs() > limit_k).collect();
         differences.retain(|d| d.abs() <= limit_k);
-        let lone_outliers = lone(&is_far, readings.segments().iter().map(other));
         let count = differences.len();
         let from_differences = (differences.iter().map(|d| d * d).sum::<f64>() / count as f64).sqrt();
-        let step = quantisation_step(readings.segments().iter().map(channel));
+        // Of a long record each of these vectors counts.
+        drop(differences);
+        let lone_outliers = lone(&is_far, readings.segments().iter().map(other));
+        let step = quantisation_step(&readings.segments().iter().map(channel));
         let floor = step.map_or(0.0, |q| q / 12.0_f64.sqrt());
         let std_k = from_differences.max(floor);
         // The third differences of white noise have autocorrelations −3/4, 3/10, −1/20: their mean
@@ -186,15 +188,16 @@ fn third_difference(steps: &Steps, k: usize) -> [f64; 4] {
 /// A grid counts if nearly all differences are whole multiples of the smallest one. Written
 /// decimals always make some grid; it is the floor that they imply that is used, and it is small
 /// where the decimals are fine.
-fn quantisation_step<'a>(channels: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
-    let differences: Vec<f64> =
-        channels.flat_map(|y| y.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 1e-9).collect();
-    let step = differences.iter().copied().fold(f64::INFINITY, f64::min);
+fn quantisation_step<'a>(channels: &(impl Iterator<Item = &'a [f64]> + Clone)) -> Option<f64> {
+    let differences = || channels.clone().flat_map(|y| y.windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 1e-9);
+    let step = differences().fold(f64::INFINITY, f64::min);
     if !step.is_finite() {
         return None;
     }
-    let on_grid = differences.iter().filter(|d| ((*d / step) - (*d / step).round()).abs() < 0.05).count();
-    (on_grid as f64 >= 0.95 * differences.len() as f64).then_some(step)
+    let is_on_grid = |d: f64| ((d / step) - (d / step).round()).abs() < 0.05;
+    let (all, on_grid) =
+        differences().fold((0_u32, 0_u32), |(all, on_grid), d| (all + 1, on_grid + u32::from(is_on_grid(d))));
+    (f64::from(on_grid) >= 0.95 * f64::from(all)).then_some(step)
 }
 
 #[cfg(test)]

@@ -21,6 +21,11 @@ use twinlag_transform::{Complex64, Tapered, hann_between};
 /// Width of a band: this factor in frequency, and at least [`MIN_BAND_BINS`] bins.
 const BAND_FREQUENCY_RATIO: f64 = 1.25;
 const MIN_BAND_BINS: usize = 12;
+/// Longer stretches are taken in pieces. The bands are some tenths of their frequency wide, which pieces resolve but for the
+/// slowest, where the gas is and moments have no weight; there are as many bins in all.
+const MAX_WHOLE_SAMPLES: usize = 1 << 19;
+/// Samples of a piece. Chosen: its transform stays in fast memory.
+const PIECE_SAMPLES: usize = 1 << 16;
 /// Samples of a stretch that is used, at least: its 31 bins make two bands.
 const MIN_STRETCH_SAMPLES: usize = 64;
 /// Neighbouring bins of a Hann window share power: a mean over them has the variance of this many
@@ -46,8 +51,26 @@ struct Band {
     gas: f64,
     /// Independent bins.
     weight: f64,
-    /// For each bin, `cos w` and both filters' power gain.
-    bins: Vec<(f64, [f64; 2])>,
+    /// For each bin, `cos w`, both filters' power gain, and the number of pieces that share it.
+    bins: Vec<(f64, [f64; 2], f64)>,
+}
+
+/// Products in one bin, summed over the pieces that share it.
+struct Bin {
+    /// Cycles per sample.
+    frequency: f64,
+    moments: Vector2<f64>,
+    gas: f64,
+    /// Pieces.
+    count: f64,
+}
+
+impl Bin {
+    fn add(&mut self, moments: Vector2<f64>, gas: f64) {
+        self.moments += moments;
+        self.gas += gas;
+        self.count += 1.0;
+    }
 }
 
 /// What [`NoiseMoments::levels`] finds.
@@ -75,11 +98,23 @@ impl JointLevels {
 impl NoiseMoments {
     /// Moments of `inputs`; `None` if no stretch has 64 samples.
     pub fn new(inputs: &InferredInputs) -> Option<Self> {
-        let mut bins: Vec<(f64, Vector2<f64>, f64, f64)> = Vec::new();
-        for [f1, f2] in inputs.segments.iter().filter(|s| s[0].len() >= MIN_STRETCH_SAMPLES) {
+        let mut bins: Vec<Bin> = Vec::new();
+        let mut tapers: Vec<Tapered> = Vec::new();
+        let pieces = inputs.segments.iter().flat_map(|[f1, f2]| {
+            // Of shorter stretches the whole is one piece.
+            let length = if f1.len() > MAX_WHOLE_SAMPLES { PIECE_SAMPLES } else { f1.len().max(1) };
+            f1.chunks(length).zip(f2.chunks(length))
+        });
+        for (f1, f2) in pieces.filter(|(f1, _)| f1.len() >= MIN_STRETCH_SAMPLES) {
             let n = f1.len();
             let mean = 0.5 * (f1.iter().sum::<f64>() + f2.iter().sum::<f64>()) / n as f64;
-            let tapered = Tapered::new(hann_between(n));
+            // Pieces of one stretch share their bins.
+            let is_next = n == PIECE_SAMPLES && tapers.last().is_some_and(|last| last.taper().len() == n);
+            if !is_next {
+                tapers = vec![Tapered::new(hann_between(n))];
+            }
+            let first_bin = if is_next { bins.len() - (n.div_ceil(2) - 1) } else { bins.len() };
+            let tapered = &tapers[0];
             let energy = tapered.energy();
             let first = tapered.transform(f1.iter().map(|f| f - mean));
             let difference = tapered.transform(f1.iter().zip(f2).map(|(f1, f2)| f1 - f2));
@@ -89,18 +124,22 @@ impl NoiseMoments {
                 let (p, u) = (first[k], difference[k]);
                 let q = p - u;
                 let moments = Vector2::new((p * u.conj()).re, -(q * u.conj()).re) / energy;
-                bins.push((k as f64 / n as f64, moments, (p * q.conj()).re / energy, 1.0));
+                let gas = (p * q.conj()).re / energy;
+                match bins.get_mut(first_bin + k - 1) {
+                    Some(bin) => bin.add(moments, gas),
+                    None => bins.push(Bin { frequency: k as f64 / n as f64, moments, gas, count: 1.0 }),
+                }
             }
         }
         if bins.is_empty() {
             return None;
         }
-        bins.sort_by(|a, b| a.0.total_cmp(&b.0));
+        bins.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
         let mut bands = Vec::new();
         let mut from = 0;
         while from < bins.len() {
-            let edge = bins[from].0 * BAND_FREQUENCY_RATIO;
-            let mut to = bins.partition_point(|b| b.0 <= edge).max(from + MIN_BAND_BINS).min(bins.len());
+            let edge = bins[from].frequency * BAND_FREQUENCY_RATIO;
+            let mut to = bins.partition_point(|b| b.frequency <= edge).max(from + MIN_BAND_BINS).min(bins.len());
             if bins.len() - to < MIN_BAND_BINS {
                 to = bins.len();
             }
@@ -182,20 +221,20 @@ impl NoiseMoments {
 }
 
 impl Band {
-    fn of(bins: &[(f64, Vector2<f64>, f64, f64)], filters: &[Vec<f64>; 2]) -> Self {
-        let count = bins.len() as f64;
+    fn of(bins: &[Bin], filters: &[Vec<f64>; 2]) -> Self {
+        let count = bins.iter().map(|b| b.count).sum::<f64>();
         let gain = |filter: &[f64], turn: Complex64| {
             filter.iter().rev().fold(Complex64::new(0.0, 0.0), |sum, c| sum * turn + c).norm_sqr()
         };
         Self {
-            moments: bins.iter().map(|b| b.1).sum::<Vector2<f64>>() / count,
-            gas: (bins.iter().map(|b| b.2).sum::<f64>() / count).max(0.0),
+            moments: bins.iter().map(|b| b.moments).sum::<Vector2<f64>>() / count,
+            gas: (bins.iter().map(|b| b.gas).sum::<f64>() / count).max(0.0),
             weight: count / BINS_PER_INDEPENDENT_BIN,
             bins: bins
                 .iter()
                 .map(|b| {
-                    let turn = Complex64::from_polar(1.0, std::f64::consts::TAU * b.0);
-                    (turn.re, [gain(&filters[0], turn), gain(&filters[1], turn)])
+                    let turn = Complex64::from_polar(1.0, std::f64::consts::TAU * b.frequency);
+                    (turn.re, [gain(&filters[0], turn), gain(&filters[1], turn)], b.count)
                 })
                 .collect(),
         }
@@ -205,8 +244,8 @@ impl Band {
     fn shape(&self, ar1: [f64; 2]) -> Vector2<f64> {
         let colour = |phi: f64, cosine: f64| (1.0 - phi * phi) / (1.0 + phi * phi - 2.0 * phi * cosine);
         let mean = |i: usize| -> f64 {
-            self.bins.iter().map(|(cosine, gain)| gain[i] * colour(ar1[i], *cosine)).sum::<f64>()
-                / self.bins.len() as f64
+            self.bins.iter().map(|(cosine, gain, count)| count * gain[i] * colour(ar1[i], *cosine)).sum::<f64>()
+                / self.bins.iter().map(|bin| bin.2).sum::<f64>()
         };
         Vector2::new(mean(0), mean(1))
     }

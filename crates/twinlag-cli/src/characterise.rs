@@ -1,10 +1,11 @@
 //! `twinlag characterise FILE`.
 
-use std::io::{Read, stdin};
+use std::fs::File;
+use std::io::stdin;
 use std::path::Path;
 
 use twinlag::diagnosis::{Grade, ModelError};
-use twinlag::record::{Record, Selection, Table};
+use twinlag::record::{Record, Selection};
 use twinlag::{Characterisation, Model, Options, Status};
 
 use crate::arguments::Characterise;
@@ -16,7 +17,7 @@ use crate::progress::Progress;
 
 pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failure> {
     let options = command.input.method.options()?;
-    let record = read(&command.input.file, &command.input.columns.selection())?;
+    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
     let answer = match &command.model {
         Some(path) => {
@@ -65,10 +66,16 @@ fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
 
 pub(crate) fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
     if file == Path::new("-") {
-        let mut bytes = Vec::new();
-        stdin().read_to_end(&mut bytes).map_err(|e| Failure::File(format!("standard input: cannot be read: {e}")))?;
-        Ok(Record::from_table(&Table::read(&bytes, "standard input")?, selection)?)
+        Ok(Record::from_reader(stdin(), "standard input", selection)?)
     } else {
         Ok(Record::read(file, selection)?)
     }
+}
+
+/// As [`read`], and shows how far it has come.
+pub(crate) fn read_watched(file: &Path, selection: &Selection, console: Console) -> Result<Record, Failure> {
+    let opened = std::fs::metadata(file).ok().filter(std::fs::Metadata::is_file).zip(File::open(file).ok());
+    let Some((about, opened)) = opened else { return read(file, selection) };
+    let progress = Progress::start(console, "reading".into());
+    Ok(Record::from_reader(progress.reading(opened, about.len()), &file.display().to_string(), selection)?)
 }

@@ -1,5 +1,6 @@
 //! Progress on standard error during long work.
 
+use std::io::{self, Read};
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
@@ -30,6 +31,11 @@ impl Progress {
         ControlFlow::Continue(())
     }
 
+    /// `reader`, of a file of so many bytes, whose reading is shown with the time that is left.
+    pub(crate) fn reading<R: Read>(&self, reader: R, bytes: u64) -> impl Read {
+        Counted { reader, progress: self, read: 0, bytes }
+    }
+
     /// Shows how far the work has come, once it has taken two seconds.
     fn say(&self, message: impl Fn() -> String) {
         if let Some((bar, since)) = &self.0
@@ -37,6 +43,27 @@ impl Progress {
         {
             bar.set_message(message());
         }
+    }
+}
+
+/// Counts what is read.
+struct Counted<'a, R> {
+    reader: R,
+    progress: &'a Progress,
+    read: u64,
+    bytes: u64,
+}
+
+impl<R: Read> Read for Counted<'_, R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        let read = self.reader.read(to)?;
+        self.read += read as u64;
+        if let Some((_, since)) = &self.progress.0 {
+            let share = (self.read as f64 / self.bytes.max(1) as f64).min(1.0);
+            let left_s = since.elapsed().as_secs_f64() * (1.0 - share) / share.max(f64::MIN_POSITIVE);
+            self.progress.say(|| format!("reading: {:.0} %, {left_s:.0} s left,", 100.0 * share));
+        }
+        Ok(read)
     }
 }
 

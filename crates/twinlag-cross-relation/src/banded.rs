@@ -14,20 +14,22 @@ use crate::noise_model::HoldAndNoise;
 use crate::parameters::{Pair, parts};
 use crate::polynomial::MAX_COEFFICIENTS;
 use crate::readings::{Segment, Steps};
+use crate::spectral::Sloped;
 
 /// Relative difference that rounding makes.
 const SETTLED_RELATIVE: f64 = 4.0 * f64::EPSILON;
 /// Rows that must agree with the one before before the factor counts as settled.
 const SETTLED_ROWS: usize = MAX_COEFFICIENTS;
 
-/// Calls `visit` with each whitened residual of `segment`, in order of time.
-pub(crate) fn sweep<const P: usize>(
+/// Calls `visit` with each whitened residual of `segment` and its derivatives by the first `Q` parameters, in order of time.
+pub(crate) fn sweep<const P: usize, const Q: usize>(
     segment: &Segment,
     model: &HoldAndNoise,
     pair: &Pair<DualSVec64<P>>,
-    mut visit: impl FnMut(DualSVec64<P>),
+    mut visit: impl FnMut(f64, &[f64; Q]),
 ) {
     type Dual<const P: usize> = DualSVec64<P>;
+    const { assert!(Q <= P, "no more derivatives than parameters") };
     let variance = model.white_variance();
     let (y1, y2) = (segment.y1(), segment.y2());
     let zero = Dual::<P>::from_re(0.0);
@@ -64,22 +66,20 @@ pub(crate) fn sweep<const P: usize>(
             rows.swap(0, 1);
             rows[0] = row(model, pair, steps[k]);
         }
+        if agreeing >= SETTLED_ROWS {
+            let settled = Settled::new([0, 1].map(|i| rows[0].data[i].as_slice()), &factors[0][..=band], pair.offset);
+            let before = residuals.map(sloped);
+            match (width, band) {
+                (2, 1) => settled.sweep::<2, 1>([&y1[k..], &y2[k..]], &before, visit),
+                (3, 2) => settled.sweep::<3, 2>([&y1[k..], &y2[k..]], &before, visit),
+                _ => settled.sweep_any(width, band, [&y1[k..], &y2[k..]], before, visit),
+            }
+            return;
+        }
         let [d1, d2] = [0, 1].map(|i| rows[0].data[i].as_slice());
         let mut u = zero;
         for j in 0..width {
             u += d1[j] * y1[k + j] - d2[j] * (-pair.offset + y2[k + j]);
-        }
-
-        if agreeing >= SETTLED_ROWS {
-            let mut residual = u;
-            for lag in 1..=band {
-                residual -= factors[0][lag] * residuals[lag - 1];
-            }
-            residual /= factors[0][0];
-            visit(residual);
-            residuals[..=band].rotate_right(1);
-            residuals[0] = residual;
-            continue;
         }
 
         // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the
@@ -99,13 +99,110 @@ pub(crate) fn sweep<const P: usize>(
             residual -= factor[lag] * residuals[lag - 1];
         }
         residual /= factor[0];
-        visit(residual);
+        let (r, dr) = sloped(residual);
+        visit(r, &dr);
 
         agreeing = if is_even && k > band && agree(&factor, &factors[0]) { agreeing + 1 } else { 0 };
         factors[..=band].rotate_right(1);
         residuals[..=band].rotate_right(1);
         factors[0] = factor;
         residuals[0] = residual;
+    }
+}
+
+/// A number with its derivatives by the first `Q` of `P` parameters.
+fn sloped<const P: usize, const Q: usize>(x: DualSVec64<P>) -> Sloped<Q> {
+    let (value, slopes) = parts(x);
+    (value, std::array::from_fn(|i| slopes[i]))
+}
+
+/// The rows of even steps once the factor has settled: `r[k] = (u[k] − Σ_i l[i] r[k−i])/l[0]`, each filter divided by `l[0]`.
+struct Settled<const Q: usize> {
+    /// Of both channels, oldest sample first; that of the second with its sign.
+    data: [[Sloped<Q>; MAX_COEFFICIENTS]; 2],
+    /// What the offset adds.
+    level: Sloped<Q>,
+    /// Of the residuals before, newest first.
+    back: [Sloped<Q>; MAX_COEFFICIENTS],
+}
+
+impl<const Q: usize> Settled<Q> {
+    fn new<const P: usize>(data: [&[DualSVec64<P>]; 2], factor: &[DualSVec64<P>], offset: DualSVec64<P>) -> Self {
+        let inverse = factor[0].recip();
+        let none = (0.0, [0.0; Q]);
+        let mut out = Self { data: [[none; MAX_COEFFICIENTS]; 2], level: none, back: [none; MAX_COEFFICIENTS] };
+        let mut sum = DualSVec64::from_re(0.0);
+        for j in 0..data[0].len() {
+            sum += data[1][j];
+            out.data[0][j] = sloped(data[0][j] * inverse);
+            out.data[1][j] = sloped(-data[1][j] * inverse);
+        }
+        out.level = sloped(sum * offset * inverse);
+        for (back, factor) in out.back.iter_mut().zip(&factor[1..]) {
+            *back = sloped(-*factor * inverse);
+        }
+        out
+    }
+
+    /// All residuals of readings `y`, whose filters have `W` coefficients each and whose factor reaches back by `B` residuals.
+    ///
+    /// - `before`: the last residuals, newest first
+    fn sweep<const W: usize, const B: usize>(
+        &self,
+        y: [&[f64]; 2],
+        before: &[Sloped<Q>],
+        mut visit: impl FnMut(f64, &[f64; Q]),
+    ) {
+        let data: [[Sloped<Q>; W]; 2] = [0, 1].map(|i| std::array::from_fn(|j| self.data[i][j]));
+        let back: [Sloped<Q>; B] = std::array::from_fn(|i| self.back[i]);
+        let mut last: [Sloped<Q>; B] = std::array::from_fn(|i| before[i]);
+        let windows = |i: usize| y[i].windows(W).map(|w| <&[f64; W]>::try_from(w).expect("windows of W"));
+        for (y1, y2) in windows(0).zip(windows(1)) {
+            let (mut r, mut dr) = self.level;
+            for j in 0..W {
+                r += data[0][j].0 * y1[j] + data[1][j].0 * y2[j];
+                for p in 0..Q {
+                    dr[p] += data[0][j].1[p] * y1[j] + data[1][j].1[p] * y2[j];
+                }
+            }
+            // What was last counts last: only that has to be waited for.
+            for i in (0..B).rev() {
+                r += back[i].0 * last[i].0;
+                for p in 0..Q {
+                    dr[p] += back[i].1[p] * last[i].0 + back[i].0 * last[i].1[p];
+                }
+            }
+            visit(r, &dr);
+            last.copy_within(..B - 1, 1);
+            last[0] = (r, dr);
+        }
+    }
+
+    /// As [`Self::sweep`], for filters of any length.
+    fn sweep_any(
+        &self,
+        width: usize,
+        band: usize,
+        y: [&[f64]; 2],
+        mut last: [Sloped<Q>; MAX_COEFFICIENTS],
+        mut visit: impl FnMut(f64, &[f64; Q]),
+    ) {
+        for (y1, y2) in y[0].windows(width).zip(y[1].windows(width)) {
+            let (mut r, mut dr) = self.level;
+            for (data, y) in self.data.iter().zip([y1, y2]) {
+                for (c, y) in data.iter().zip(y) {
+                    r += c.0 * y;
+                    (0..Q).for_each(|p| dr[p] += c.1[p] * y);
+                }
+            }
+            for (c, last) in self.back[..band].iter().zip(&last).rev() {
+                r += c.0 * last.0;
+                (0..Q).for_each(|p| dr[p] += c.1[p] * last.0 + c.0 * last.1[p]);
+            }
+            visit(r, &dr);
+            last.copy_within(..band, 1);
+            last[0] = (r, dr);
+        }
     }
 }
 

@@ -17,6 +17,70 @@ pub(crate) struct Bands {
     counts: Vec<f64>,
 }
 
+/// Where a function is interpolated in a band.
+#[derive(Clone, Copy)]
+struct Nodes {
+    /// Chebyshev's, from −1 to 1.
+    unit: [f64; NODES_PER_BAND],
+    middle: f64,
+    half_width: f64,
+}
+
+impl Nodes {
+    /// From the lowest place of the band to the highest.
+    fn between(low: f64, high: f64) -> Self {
+        let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES_PER_BAND as f64;
+        let unit = std::array::from_fn(|q| angle(q).cos());
+        Self { unit, middle: 0.5 * (high + low), half_width: 0.5 * (high - low) }
+    }
+
+    fn places(&self) -> [f64; NODES_PER_BAND] {
+        self.unit.map(|c| self.middle + self.half_width * c)
+    }
+
+    /// Lagrange's polynomials at `x`.
+    fn lagrange(&self, x: f64) -> [f64; NODES_PER_BAND] {
+        let unit = &self.unit;
+        let at = (x - self.middle) / self.half_width;
+        std::array::from_fn(|q| {
+            (0..NODES_PER_BAND).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
+        })
+    }
+}
+
+/// Places at which a band of many more bins is summed, each for as many of them: the midpoint rule, off by some `1/24` of the square
+/// of their distance in widths of the band, 1e-8.
+const PLACES_PER_BAND: usize = 2048;
+
+/// The points of [`Bands::points`] for the bins `cos(π j/n)`, `j = 1 … n−1`, of a long segment of `n` samples, without any bin.
+pub(crate) fn points_of_long(samples: usize) -> Vec<(f64, f64)> {
+    let cosine = |j: f64| (std::f64::consts::PI * j / samples as f64).cos();
+    let mut out = Vec::new();
+    let mut first = 1;
+    while first < samples {
+        let edge = BAND_RATIO * (1.0 - cosine(first as f64));
+        let last = ((1.0 - edge).max(-1.0).acos() / std::f64::consts::PI * samples as f64) as usize;
+        let bins = (last.clamp(first, samples - 1) + 1) - first;
+        if bins <= NODES_PER_BAND {
+            out.push((cosine(first as f64), 1.0));
+            first += 1;
+            continue;
+        }
+        let (high, low) = (cosine(first as f64), cosine((first + bins - 1) as f64));
+        let nodes = Nodes::between(low, high);
+        let places = bins.min(PLACES_PER_BAND);
+        let each = bins as f64 / places as f64;
+        let mut counts = [0.0; NODES_PER_BAND];
+        for place in 0..places {
+            let lagrange = nodes.lagrange(cosine(first as f64 - 0.5 + (place as f64 + 0.5) * each));
+            (0..NODES_PER_BAND).for_each(|q| counts[q] += each * lagrange[q]);
+        }
+        out.extend(nodes.places().into_iter().zip(counts));
+        first += bins;
+    }
+    out
+}
+
 #[derive(Clone, Copy)]
 pub(crate) struct Band {
     pub(crate) first_bin: usize,
@@ -43,17 +107,13 @@ impl Bands {
                 continue;
             }
             let (high, low) = (cosines[first_bin], cosines[first_bin + bins - 1]);
-            let (middle, half_width) = (0.5 * (high + low), 0.5 * (high - low));
-            let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES_PER_BAND as f64;
-            let unit: [f64; NODES_PER_BAND] = std::array::from_fn(|q| angle(q).cos());
-            out.nodes.extend(unit.iter().map(|c| middle + half_width * c));
+            let nodes = Nodes::between(low, high);
+            let half_width = nodes.half_width;
+            out.nodes.extend(nodes.places());
             out.bands.push(Band { first_bin, bins, first_node, half_width });
             let mut counts = [0.0; NODES_PER_BAND];
             for x in &cosines[first_bin..first_bin + bins] {
-                let at = (x - middle) / half_width;
-                let lagrange: [f64; NODES_PER_BAND] = std::array::from_fn(|q| {
-                    (0..NODES_PER_BAND).filter(|&k| k != q).map(|k| (at - unit[k]) / (unit[q] - unit[k])).product()
-                });
+                let lagrange = nodes.lagrange(*x);
                 (0..NODES_PER_BAND).for_each(|q| counts[q] += lagrange[q]);
                 out.lagrange.push(lagrange);
             }
@@ -67,5 +127,29 @@ impl Bands {
     /// that is smooth in `x`.
     pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         self.nodes.iter().copied().zip(self.counts.iter().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A spectrum that falls from 1 within a thousandth of the band, as noise through the inverse of a slow sensor: exact sums over a
+    /// million bins. The interpolation is off by 5e-5 of any value at most, and in both alike.
+    #[test]
+    fn points_of_long_segments_are_those_of_their_bins() {
+        let samples = 1_000_000;
+        let cosines: Vec<f64> =
+            (1..samples).map(|j| (std::f64::consts::PI * j as f64 / samples as f64).cos()).collect();
+        let falls = |x: f64| 1.0 / (1.0 + 2e5 * (1.0 - x));
+        let exact: f64 = cosines.iter().map(|x| falls(*x)).sum();
+        let of_bins: f64 = Bands::new(&cosines).points().map(|(x, bins)| bins * falls(x)).sum();
+        let of_long: f64 = points_of_long(samples).into_iter().map(|(x, bins)| bins * falls(x)).sum();
+        assert!(
+            (of_bins / exact - 1.0).abs() < 5e-5 && (of_long / of_bins - 1.0).abs() < 1e-6,
+            "{exact} {of_bins} {of_long}"
+        );
+        let bins: f64 = points_of_long(samples).iter().map(|point| point.1).sum();
+        assert!((bins - (samples - 1) as f64).abs() < 1e-6 * bins, "{bins}");
     }
 }

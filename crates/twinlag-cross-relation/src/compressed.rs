@@ -14,22 +14,31 @@
 //! and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a
 //! bound on what the minimum can move.
 
+use std::sync::Arc;
+
 use num_dual::DualSVec64;
 
 use crate::bands::NODES_PER_BAND;
 use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
+use crate::readings::{Segment, Steps};
 use crate::spectral::{Sloped, Sums, Weights};
-use crate::transform::Transformed;
+use crate::transform::{Plan, Transformed};
+
+/// Samples of the pieces that a long segment is gathered from. A cut takes one whitened residual away and what the noise on its
+/// two sides has in common; the transform of a piece stays in fast memory. Chosen.
+const PIECE_SAMPLES: usize = 1 << 17;
 
 /// Products of the first `T` series, upper triangle.
 const fn pairs(series: usize) -> usize {
     series * (series + 1) / 2
 }
 
-/// One segment, compressed: for each product of two series, its sums at the points.
+/// One segment, or pieces of one length, compressed: for each product of two series, its sums at the points.
 #[derive(Clone, Debug)]
 pub(crate) struct Compressed {
+    period_s: f64,
+    plan: Arc<Plan>,
     /// `[pair][node]`, pairs in the order `(0,0), (0,1), (1,1), (0,2), …`.
     gram: Vec<Vec<f64>>,
 }
@@ -37,10 +46,32 @@ pub(crate) struct Compressed {
 impl Compressed {
     /// The products of the first three series, or of all five.
     pub(crate) fn new(segment: &Transformed, series: usize) -> Self {
-        match series {
-            3 => Self { gram: gather::<3, { pairs(3) }>(segment) },
-            _ => Self { gram: gather::<5, { pairs(5) }>(segment) },
+        let gram = match series {
+            3 => gather::<3, { pairs(3) }>(segment),
+            _ => gather::<5, { pairs(5) }>(segment),
+        };
+        Self { period_s: segment.period_s, plan: segment.plan.clone(), gram }
+    }
+
+    /// The products of a long segment, gathered piece by piece without keeping any bin: pieces of one length, and what is left
+    /// over. `None` if the segment is unevenly sampled.
+    ///
+    /// The sums are those of the pieces: [`PIECE_SAMPLES`] is so long that next to nothing is lost between them.
+    pub(crate) fn of_pieces(segment: &Segment, series: usize) -> Option<Vec<Self>> {
+        let Steps::Even(period_s) = *segment.steps() else { return None };
+        let mut out: Vec<Self> = Vec::new();
+        let channels = segment.y1().chunks(PIECE_SAMPLES).zip(segment.y2().chunks(PIECE_SAMPLES));
+        for (y1, y2) in channels.filter(|(y1, _)| y1.len() > 1) {
+            let piece = Self::new(&Transformed::of(y1, y2, period_s), series);
+            match out.last_mut().filter(|last| Arc::ptr_eq(&last.plan, &piece.plan)) {
+                Some(last) => {
+                    let sums = last.gram.iter_mut().flatten();
+                    sums.zip(piece.gram.iter().flatten()).for_each(|(sum, value)| *sum += value);
+                }
+                None => out.push(piece),
+            }
         }
+        Some(out)
     }
 
     /// Whether gain and offset are served as well.
@@ -51,25 +82,19 @@ impl Compressed {
     /// Adds this segment to `sums`.
     pub(crate) fn accumulate<const P: usize>(
         &self,
-        segment: &Transformed,
         model: &HoldAndNoise,
         pair: &Pair<DualSVec64<P>>,
         sums: &mut Sums<P>,
     ) {
-        let weights = Weights::new(model, pair, segment.period_s);
+        let weights = Weights::new(model, pair, self.period_s);
         match P {
-            2 => self.accumulate_pairs::<P, { pairs(3) }>(segment, &weights, sums),
-            _ => self.accumulate_pairs::<P, { pairs(5) }>(segment, &weights, sums),
+            2 => self.accumulate_pairs::<P, { pairs(3) }>(&weights, sums),
+            _ => self.accumulate_pairs::<P, { pairs(5) }>(&weights, sums),
         }
     }
 
-    fn accumulate_pairs<const P: usize, const G: usize>(
-        &self,
-        segment: &Transformed,
-        weights: &Weights<P>,
-        sums: &mut Sums<P>,
-    ) {
-        let nodes = &segment.plan.bands().nodes[..];
+    fn accumulate_pairs<const P: usize, const G: usize>(&self, weights: &Weights<P>, sums: &mut Sums<P>) {
+        let nodes = &self.plan.bands().nodes[..];
         let gram: [&[f64]; G] = std::array::from_fn(|g| &self.gram[g][..nodes.len()]);
         let forms = Forms::<P, G>::new(&weights.parts);
         for (j, &x) in nodes.iter().enumerate() {
@@ -88,28 +113,22 @@ impl Compressed {
     /// Bounds on what compression changes of half the gradient, added up over this segment.
     pub(crate) fn gradient_error<const P: usize>(
         &self,
-        segment: &Transformed,
         model: &HoldAndNoise,
         pair: &Pair<DualSVec64<P>>,
         out: &mut [f64; P],
     ) {
-        let weights = Weights::new(model, pair, segment.period_s);
+        let weights = Weights::new(model, pair, self.period_s);
         match P {
-            2 => self.gradient_error_of_pairs::<P, { pairs(3) }>(segment, &weights, out),
-            _ => self.gradient_error_of_pairs::<P, { pairs(5) }>(segment, &weights, out),
+            2 => self.gradient_error_of_pairs::<P, { pairs(3) }>(&weights, out),
+            _ => self.gradient_error_of_pairs::<P, { pairs(5) }>(&weights, out),
         }
     }
 
     /// With `J_j (1 + ε_j)` in place of `J_j = r_j²`: `½ ∂(J ε) = r ∂r ε + ½ J ε ∂ ln ε`, Cauchy's
     /// inequality for the first over a band, and `∂ ln ε = Σ_q ∂ ln(β/λ_q)`, the same for all its
     /// bins.
-    fn gradient_error_of_pairs<const P: usize, const G: usize>(
-        &self,
-        segment: &Transformed,
-        weights: &Weights<P>,
-        out: &mut [f64; P],
-    ) {
-        let bands = segment.plan.bands();
+    fn gradient_error_of_pairs<const P: usize, const G: usize>(&self, weights: &Weights<P>, out: &mut [f64; P]) {
+        let bands = self.plan.bands();
         let forms = Forms::<P, G>::new(&weights.parts);
         let beta = &weights.beta;
         for band in bands.bands.iter().filter(|b| b.half_width > 0.0) {

@@ -13,7 +13,6 @@
 //! Noise of neighbouring `x` is correlated, which none of them uses: the whitened cost does, and is
 //! more precise.
 
-use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, Side};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector3};
 
@@ -66,16 +65,11 @@ impl DifferenceEquationEstimator {
     /// (abstract seen). Weights: own derivation, docs, chapter "Theory", section 2.
     pub fn estimate(self, readings: &Readings) -> Result<[f64; 2], CostError> {
         let period_s = readings.even_period_s().ok_or(CostError::UnevenSampling)?;
-        let columns: Vec<Vector3<f64>> = runs(readings).flatten().collect();
+        let columns = || -> Vec<Vector3<f64>> { runs(readings).flatten().collect() };
         let [lambda, kappa] = match self {
-            Self::LeastSquares => {
-                let regressors = Mat::from_fn(columns.len(), 2, |i, j| columns[i][j]);
-                let target = Mat::from_fn(columns.len(), 1, |i, _| -columns[i][2]);
-                let solution = regressors.col_piv_qr().solve_lstsq(target);
-                [solution[(0, 0)], solution[(1, 0)]]
-            }
-            Self::TotalLeastSquares => smallest_direction(&columns, &Matrix3::identity())?,
-            Self::Generalised { .. } => smallest_direction(&columns, &self.spread()?)?,
+            Self::LeastSquares => least_squares(runs(readings).flatten()),
+            Self::TotalLeastSquares => smallest_direction(&columns(), &Matrix3::identity())?,
+            Self::Generalised { .. } => smallest_direction(&columns(), &self.spread()?)?,
         };
         let poles = [-kappa / lambda, 1.0 - lambda - kappa];
         if poles.iter().all(|p| *p > 0.0 && *p < 1.0) {
@@ -243,4 +237,27 @@ fn smallest_direction(columns: &[Vector3<f64>], spread: &Matrix3<f64>) -> Result
     let second = (v[(1, last)] - lower[(2, 1)] * third) / lower[(1, 1)];
     let first = (v[(0, last)] - lower[(1, 0)] * second - lower[(2, 0)] * third) / lower[(0, 0)];
     Ok([first / third, second / third])
+}
+/// Rows that are factorised at a time.
+const ROWS_AT_A_TIME: usize = 4096;
+
+/// The `[λ, κ]` for which `λ x0 + κ x1 + x2` has the least sum of squares over all rows `x`, by orthogonal factorisation of some
+/// rows at a time below the triangle of those before: as exact as of all at once.
+fn least_squares(mut rows: impl Iterator<Item = Vector3<f64>>) -> [f64; 2] {
+    let mut kept: Vec<Vector3<f64>> = Vec::with_capacity(ROWS_AT_A_TIME + 3);
+    loop {
+        let before = kept.len();
+        kept.extend(rows.by_ref().take(ROWS_AT_A_TIME));
+        if kept.len() == before {
+            break;
+        }
+        let stacked = Mat::from_fn(kept.len().max(3), 3, |i, j| kept.get(i).map_or(0.0, |row| row[j]));
+        let factor = stacked.qr();
+        let triangle = factor.thin_R();
+        kept.clear();
+        kept.extend((0..3).map(|i| Vector3::from_fn(|j, _| if j < i { 0.0 } else { triangle[(i, j)] })));
+    }
+    let [Some(first), Some(second)] = [kept.first(), kept.get(1)] else { return [f64::NAN; 2] };
+    let kappa = -second[2] / second[1];
+    [-(first[2] + first[1] * kappa) / first[0], kappa]
 }

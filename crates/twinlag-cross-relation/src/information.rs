@@ -17,11 +17,12 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use twinlag_transform::sine_transform;
 
+use crate::bands::points_of_long;
 use crate::inverse::row;
 use crate::parameters::{Pair, parts};
 use crate::sandwich::{inverse, sandwich};
 use crate::transform::Plan;
-use crate::whitened::Whitened;
+use crate::whitened::{MAX_KEPT_BINS, Whitened};
 
 /// How the variance of the gradient is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -183,7 +184,7 @@ impl Whitened<'_> {
         let variance = self.model().white_variance();
         let (mut first, mut all) = (0.0, 0.0);
         for segment in self.readings().segments() {
-            for (cosine, bins) in Plan::of(segment.len()).bands().points() {
+            for (cosine, bins) in points(segment.len()) {
                 let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
                 let power = |i: usize| {
                     let taps = row.noise[i].as_slice().iter().rev();
@@ -205,8 +206,7 @@ impl Whitened<'_> {
         let [v1, v2] = self.model().white_variance();
         let mut out = [[0.0; P]; P];
         for segment in self.readings().segments() {
-            let plan = Plan::of(segment.len());
-            for (cosine, bins) in plan.bands().points() {
+            for (cosine, bins) in points(segment.len()) {
                 let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
                 let at = |c: &[(f64, [f64; P])]| {
                     let mut power = Complex::new(1.0, 0.0);
@@ -259,6 +259,11 @@ impl Whitened<'_> {
         }
         out
     }
+}
+
+/// Points `x = cos w` for the bins of a segment, and how many bins each stands for.
+fn points(samples: usize) -> Vec<(f64, f64)> {
+    if samples > MAX_KEPT_BINS { points_of_long(samples) } else { Plan::of(samples).bands().points().collect() }
 }
 
 /// Mean square of `bins` in windows that widen with frequency: from 0.7 to 1.4 times it, a few bins

@@ -34,6 +34,7 @@ mod difference_equation;
 mod error;
 mod free_gains;
 mod inferred;
+mod influences;
 mod information;
 mod interval_95;
 mod inverse;
@@ -54,6 +55,7 @@ pub use difference_equation::{DifferenceEquationEstimator, difference_equation_l
 pub use error::CostError;
 pub use free_gains::FreeGains;
 pub use inferred::{InferredInputs, inferred_inputs};
+pub use influences::Influences;
 pub use information::ScoreVariance;
 pub use interval_95::{CHI2_95, Z_975, log_normal_interval_95};
 pub use parameters::{CostValue, Parameter};

@@ -68,7 +68,8 @@ impl PartScatter {
         }
         bins.sort_by(|a, b| a.0.total_cmp(&b.0));
         let by_frequency: Vec<[f64; 2]> = bins.into_iter().map(|(_, terms)| terms).collect();
-        Some(Self { along: between(&along, standard_error)?, by_frequency: between(&by_frequency, standard_error)? })
+        let between = |terms: &[[f64; 2]]| between(terms.iter().copied(), standard_error);
+        Some(Self { along: between(&along)?, by_frequency: between(&by_frequency)? })
     }
 
     /// The larger of both ratios.
@@ -83,8 +84,8 @@ impl PartScatter {
 }
 
 /// Scatter between parts of equal information of `terms`: contributions to the estimate, and to its information.
-fn between(terms: &[[f64; 2]], standard_error: f64) -> Option<Scatter> {
-    let total: f64 = terms.iter().map(|t| t[1]).sum();
+pub(crate) fn between(terms: impl ExactSizeIterator<Item = [f64; 2]> + Clone, standard_error: f64) -> Option<Scatter> {
+    let total: f64 = terms.clone().map(|t| t[1]).sum();
     let is_usable = total > 0.0 && total.is_finite() && standard_error > 0.0 && standard_error.is_finite();
     if terms.len() < 2 * PARTS || !is_usable {
         return None;

@@ -107,7 +107,12 @@ impl Transformed {
     /// `None` if the segment is unevenly sampled.
     pub(crate) fn new(segment: &Segment) -> Option<Self> {
         let Steps::Even(period_s) = *segment.steps() else { return None };
-        let plan = Plan::of(segment.len());
+        Some(Self::of(segment.y1(), segment.y2(), period_s))
+    }
+
+    /// Readings `y1`, `y2` `[n]`, `period_s` between samples.
+    pub(crate) fn of(y1: &[f64], y2: &[f64], period_s: f64) -> Self {
+        let plan = Plan::of(y1.len());
         let mut padded = vec![0.0; plan.fourier.samples()];
         let mut spectrum = vec![Complex64::ZERO; plan.fourier.bins()];
         let mut scratch = Vec::new();
@@ -122,10 +127,10 @@ impl Transformed {
             };
             spectrum[1..].iter().zip(plan.cosines.iter().zip(&plan.sines)).map(both).unzip()
         };
-        let (first, change1): (Vec<f64>, Vec<f64>) = transform(segment.y1());
-        let (second, change2): (Vec<f64>, Vec<f64>) = transform(segment.y2());
+        let (first, change1): (Vec<f64>, Vec<f64>) = transform(y1);
+        let (second, change2): (Vec<f64>, Vec<f64>) = transform(y2);
         let difference = first.iter().zip(&second).map(|(a, b)| a - b).collect();
-        Some(Self { period_s, plan, difference, change: [change1, change2], second })
+        Self { period_s, plan, difference, change: [change1, change2], second }
     }
 
     /// Bins of this segment.

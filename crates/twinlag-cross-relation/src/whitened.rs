@@ -7,6 +7,8 @@
 //! of the errors-in-variables problem; only the *ratio* of the noise levels moves its minimum. No
 //! initial state, no samples to discard.
 
+use std::sync::Arc;
+
 use num_dual::DualSVec64;
 use twinlag_sensor::Discretisation;
 
@@ -15,11 +17,14 @@ use crate::compressed::Compressed;
 use crate::error::CostError;
 use crate::inverse::{has_inverse, is_one_step, row};
 use crate::noise_model::{HoldAndNoise, check_autoregression, check_noise};
-use crate::parameters::{CostValue, Pair, parts};
-use crate::readings::{Readings, Steps};
+use crate::parameters::{CostValue, Pair};
+use crate::readings::{Readings, Segment, Steps};
 use crate::sandwich::inverse;
 use crate::spectral::{self, Sums};
 use crate::transform::Transformed;
+
+/// Readings up to which the bins of a record are kept: beyond, the banded form takes less memory than they and no more time.
+pub(crate) const MAX_KEPT_BINS: usize = 1 << 19;
 
 /// How the whitening is computed. The first two give the same numbers to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,10 +44,12 @@ pub enum Form {
 pub struct Whitened<'a> {
     readings: &'a Readings,
     model: HoldAndNoise,
-    /// Present in the spectral and compressed forms: one entry for each segment.
-    transformed: Option<Vec<Transformed>>,
-    /// Present in the compressed form.
-    compressed: Option<Vec<Compressed>>,
+    /// Present where bins are kept: one entry for each segment.
+    transformed: Option<Arc<Vec<Transformed>>>,
+    /// Present once they were asked for.
+    bands: Option<Arc<Vec<Compressed>>>,
+    /// Whether the bands take the place of the bins.
+    is_compressed: bool,
 }
 
 impl<'a> Whitened<'a> {
@@ -55,7 +62,9 @@ impl<'a> Whitened<'a> {
     /// the inverse is wide.
     pub fn new(readings: &'a Readings, hold: Discretisation, noise_std: [f64; 2]) -> Result<Self, CostError> {
         let even = readings.segments().iter().all(|s| matches!(s.steps(), Steps::Even(_)));
-        let form = if even && hold != Discretisation::FirstOrderHold { Form::Spectral } else { Form::Banded };
+        let is_short = readings.len() <= MAX_KEPT_BINS;
+        let form =
+            if even && hold != Discretisation::FirstOrderHold && is_short { Form::Spectral } else { Form::Banded };
         Self::with_form(readings, hold, noise_std, form)
     }
 
@@ -80,45 +89,70 @@ impl<'a> Whitened<'a> {
         if readings.segments().iter().all(|s| s.len() < needed) {
             return Err(CostError::TooShort { samples: readings.len(), needed });
         }
-        let transformed: Option<Vec<Transformed>> = match form {
+        let transformed: Option<Arc<Vec<Transformed>>> = match form {
             Form::Banded => None,
             Form::Spectral | Form::Compressed if needed > 2 => return Err(CostError::NoSpectralForm),
+            Form::Compressed if readings.len() > MAX_KEPT_BINS && readings.even_period_s().is_some() => None,
             Form::Spectral | Form::Compressed => {
                 let each = readings.segments().iter().map(Transformed::new).collect::<Option<_>>();
-                Some(each.ok_or(CostError::NoSpectralForm)?)
+                Some(Arc::new(each.ok_or(CostError::NoSpectralForm)?))
             }
         };
         let model = HoldAndNoise::white(hold, noise_std);
-        let out = Self { readings, model, transformed, compressed: None };
+        let out = Self { readings, model, transformed, bands: None, is_compressed: false };
         Ok(if form == Form::Compressed { out.compressed(false) } else { out })
     }
 
-    /// This cost with its bins gathered into bands, if it is in the spectral form; unchanged
+    /// This cost with its bins gathered into bands, if it is in the spectral form or its readings are many; unchanged
     /// otherwise.
+    ///
+    /// Of more than half a million readings the bins are those of pieces of 131 072 samples, and are not kept: that takes one
+    /// whitened residual in so many away, and what it moves the minimum by is seen in the gradient of the cost without
+    /// compression.
     ///
     /// - `calibration`: whether gain and offset will be asked for (`P` 4), which takes more than
     ///   twice as many sums; without it such questions are answered by the full sum
     #[must_use]
     pub fn compressed(mut self, calibration: bool) -> Self {
-        let series = if calibration { 5 } else { 3 };
-        let segments = self.transformed.as_ref().filter(|_| self.model.is_white());
-        self.compressed = segments.map(|all| all.iter().map(|s| Compressed::new(s, series)).collect());
+        let is_possible = self.model.is_white() && (self.transformed.is_some() || self.is_gathered_in_pieces());
+        let serves = |all: &Arc<Vec<Compressed>>| all.iter().all(|bands| bands.has_calibration() || !calibration);
+        if is_possible && !self.bands.as_ref().is_some_and(serves) {
+            let series = if calibration { 5 } else { 3 };
+            let all = match &self.transformed {
+                Some(all) => Some(all.iter().map(|s| Compressed::new(s, series)).collect()),
+                None => self
+                    .readings
+                    .segments()
+                    .iter()
+                    .map(|s| Compressed::of_pieces(s, series))
+                    .collect::<Option<Vec<_>>>()
+                    .map(|all| all.concat()),
+            };
+            self.bands = all.map(Arc::new);
+        }
+        self.is_compressed = is_possible && self.bands.is_some();
         self
+    }
+
+    /// Whether compression takes the bins of pieces, which are not kept.
+    pub fn is_gathered_in_pieces(&self) -> bool {
+        let is_one_step = matches!(self.model.hold, Discretisation::ZeroOrderHold | Discretisation::Bilinear);
+        is_one_step && self.model.is_white() && self.transformed.is_none() && self.readings.len() > MAX_KEPT_BINS
     }
 
     /// This cost without compression.
     #[must_use]
     pub fn exact(mut self) -> Self {
-        self.compressed = None;
+        self.is_compressed = false;
         self
     }
 
     /// How evaluations at first order are computed.
     pub fn form(&self) -> Form {
-        match (&self.transformed, &self.compressed) {
-            (None, _) => Form::Banded,
-            (Some(_), None) => Form::Spectral,
-            (Some(_), Some(_)) => Form::Compressed,
+        match &self.transformed {
+            _ if self.is_compressed => Form::Compressed,
+            Some(_) => Form::Spectral,
+            None => Form::Banded,
         }
     }
 
@@ -130,6 +164,19 @@ impl<'a> Whitened<'a> {
         check_noise(noise_std)?;
         self.model.noise_std = noise_std;
         Ok(self)
+    }
+
+    /// This cost for another hold, without transforming again where both take the same transforms.
+    ///
+    /// # Errors
+    /// As [`Whitened::new`].
+    pub fn with_hold(mut self, hold: Discretisation) -> Result<Self, CostError> {
+        let is_one_step = |hold| matches!(hold, Discretisation::ZeroOrderHold | Discretisation::Bilinear);
+        if self.model.is_white() && (hold == self.model.hold || (is_one_step(hold) && is_one_step(self.model.hold))) {
+            (self.model.hold, self.is_compressed) = (hold, false);
+            return Ok(self);
+        }
+        Self::new(self.readings, hold, self.model.noise_std)
     }
 
     /// This cost for autoregressive noise of each channel, `n[k] = φ1 n[k−1] + φ2 n[k−2] + e[k]`
@@ -149,7 +196,7 @@ impl<'a> Whitened<'a> {
             return Err(CostError::HoldNeedsEvenSampling);
         }
         self.model.autoregression = autoregression;
-        self.compressed = None;
+        self.is_compressed = false;
         Ok(self)
     }
 
@@ -198,23 +245,20 @@ impl<'a> Whitened<'a> {
             return CostValue { value: f64::INFINITY, gradient: [0.0; P], hessian: [[0.0; P]; P] };
         }
         let mut sums = Sums::ZERO;
-        match (&self.transformed, &self.compressed) {
-            (Some(segments), Some(all)) if self.is_compressed_at(&pair) => {
-                for (segment, compressed) in segments.iter().zip(all) {
-                    compressed.accumulate(segment, &self.model, &pair, &mut sums);
+        match (&self.transformed, &self.bands) {
+            (_, Some(all)) if self.is_compressed_at(&pair) => {
+                for compressed in all.iter() {
+                    compressed.accumulate(&self.model, &pair, &mut sums);
                 }
             }
             (Some(segments), _) if is_one_step(&self.model, &pair) => {
-                for segment in segments {
+                for segment in segments.iter() {
                     spectral::accumulate(segment, &self.model, &pair, &mut sums);
                 }
             }
             _ => {
                 for segment in self.readings.segments() {
-                    banded::sweep(segment, &self.model, &pair, |residual| {
-                        let (r, dr) = parts(residual);
-                        sums.add(r, &dr);
-                    });
+                    banded::sweep(segment, &self.model, &pair, |r, dr| sums.add(r, dr));
                 }
             }
         }
@@ -240,7 +284,16 @@ impl<'a> Whitened<'a> {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn residual<const P: usize>(&self, theta: &[f64; P]) -> Vec<Vec<f64>> {
-        self.jacobian(theta).into_iter().map(|s| s.into_iter().map(|(r, _)| r).collect()).collect()
+        let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
+        if self.has_no_inverse(&pair) {
+            return Vec::new();
+        }
+        let of = |segment: &Segment| {
+            let mut out = Vec::with_capacity(segment.len());
+            banded::sweep(segment, &self.model, &pair, |r, _: &[f64; 0]| out.push(r));
+            out
+        };
+        self.readings.segments().iter().map(of).collect()
     }
 
     /// The whitened residual in order of time with its derivatives `[∂r/∂θ_i]`, one vector for each
@@ -250,9 +303,9 @@ impl<'a> Whitened<'a> {
         if self.has_no_inverse(&pair) {
             return Vec::new();
         }
-        let of = |segment| {
-            let mut out = Vec::new();
-            banded::sweep(segment, &self.model, &pair, |residual| out.push(parts(residual)));
+        let of = |segment: &Segment| {
+            let mut out = Vec::with_capacity(segment.len());
+            banded::sweep(segment, &self.model, &pair, |r, dr| out.push((r, *dr)));
             out
         };
         self.readings.segments().iter().map(of).collect()
@@ -269,14 +322,16 @@ impl<'a> Whitened<'a> {
     }
 
     /// Whether the steps are uneven and the inverse looks further than one of them.
-    fn has_no_inverse<D>(&self, pair: &Pair<D>) -> bool {
+    pub(crate) fn has_no_inverse<D>(&self, pair: &Pair<D>) -> bool {
         !is_one_step(&self.model, pair)
             && self.readings.segments().iter().any(|s| matches!(s.steps(), Steps::Uneven(_)))
     }
 
     fn is_compressed_at<const P: usize>(&self, pair: &Pair<DualSVec64<P>>) -> bool {
         let serves = |c: &Compressed| P == 2 || c.has_calibration();
-        is_one_step(&self.model, pair) && self.compressed.as_ref().is_some_and(|all| all.iter().all(serves))
+        self.is_compressed
+            && is_one_step(&self.model, pair)
+            && self.bands.as_ref().is_some_and(|all| all.iter().all(serves))
     }
 
     /// How far compression can have moved each of the `free` parameters from the minimum of the
@@ -289,13 +344,10 @@ impl<'a> Whitened<'a> {
     pub fn shift_bound<const P: usize>(&self, theta: &[f64; P], free: &[usize]) -> [f64; P] {
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         let mut out = [0.0; P];
-        let (Some(segments), Some(all), true) = (&self.transformed, &self.compressed, self.is_compressed_at(&pair))
-        else {
-            return out;
-        };
+        let (Some(all), true) = (&self.bands, self.is_compressed_at(&pair)) else { return out };
         let mut gradient = [0.0; P];
-        for (segment, compressed) in segments.iter().zip(all) {
-            compressed.gradient_error(segment, &self.model, &pair, &mut gradient);
+        for compressed in all.iter() {
+            compressed.gradient_error(&self.model, &pair, &mut gradient);
         }
         let half = self.evaluate(theta).hessian.map(|row| row.map(|h| 0.5 * h));
         let covariance = inverse(&half, free);

@@ -1,7 +1,7 @@
 //! What the gas does: how many tones there are to learn from.
 
 use twinlag_model::{Observations, Policy, levels};
-use twinlag_transform::Tapered;
+use twinlag_transform::{Complex64, Forward};
 
 /// Tones of a gas from which nothing but two time constants can be learned.
 pub(crate) const SINGLE: usize = 1;
@@ -18,6 +18,11 @@ pub fn is_single_tone(observations: &Observations, policy: &Policy) -> bool {
     tones(observations, policy) == Some(SINGLE)
 }
 
+/// Whether the readings of a channel, evenly sampled and with noise of `noise_k`, are a single tone.
+pub fn is_single_tone_in(reading_c: &[f64], noise_k: f64, policy: &Policy) -> bool {
+    tones_of(reading_c, policy, || Some(noise_k)) == Some(SINGLE)
+}
+
 /// Number of separate tones in the more lively channel, 1 for a single sine; `None` where samples
 /// are uneven or the power is spread. Each tone gives two equations, and two time constants take
 /// two. The level of the record, what drifts in it, and what a start out of balance leaves do not count.
@@ -25,24 +30,35 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
     observations.period_s?;
     let channel = usize::from(observations.mean_and_std(1)[1] > observations.mean_and_std(0)[1]);
     let stretch = observations.stretches.iter().max_by_key(|s| s.time_s.len())?;
-    let y = &stretch.reading_c[channel];
+    tones_of(&stretch.reading_c[channel], policy, || Some(levels(observations)?.std_k[channel]))
+}
+
+/// Number of separate tones in the readings of one channel, as of [`tones`].
+///
+/// - `noise_k`: standard deviation of the noise, asked for where there are readings enough
+fn tones_of(y: &[f64], policy: &Policy, noise_k: impl FnOnce() -> Option<f64>) -> Option<usize> {
     let n = y.len() & !1;
     if n < policy.tone_fewest_samples {
         return None;
     }
-    let noise_k = levels(observations)?.std_k[channel];
+    let noise_k = noise_k()?;
     // Blackman and Harris: side lobes of a millionth of a millionth part of the power.
     let window = |k: usize| {
-        let x = std::f64::consts::TAU * (k as f64 + 0.5) / n as f64;
-        0.35875 - 0.48829 * x.cos() + 0.14128 * (2.0 * x).cos() - 0.01168 * (3.0 * x).cos()
+        let c = (std::f64::consts::TAU * (k as f64 + 0.5) / n as f64).cos();
+        let (double, triple) = (2.0 * c * c - 1.0, (4.0 * c * c - 3.0) * c);
+        0.35875 - 0.48829 * c + 0.14128 * double - 0.01168 * triple
     };
-    let tapered = Tapered::new((0..n).map(window).collect());
-    let scale = tapered.energy();
+    let mut tapered: Vec<f64> = (0..n).map(window).collect();
+    let scale: f64 = tapered.iter().map(|w| w * w).sum();
     // The level under the window: the plain mean is another where the last period is not whole, and leaves a line at zero.
-    let weight: f64 = tapered.taper().iter().sum();
-    let level = tapered.taper().iter().zip(y).map(|(w, y)| w * y).sum::<f64>() / weight;
-    let spectrum = tapered.transform(y[..n].iter().map(|y| y - level));
-    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / scale).collect();
+    let weight: f64 = tapered.iter().sum();
+    let level = tapered.iter().zip(y).map(|(w, y)| w * y).sum::<f64>() / weight;
+    tapered.iter_mut().zip(y).for_each(|(w, y)| *w *= y - level);
+    let plan = Forward::of(n);
+    let mut spectrum = vec![Complex64::ZERO; plan.bins()];
+    plan.transform_into(&mut tapered, &mut spectrum, &mut Vec::new());
+    drop(tapered);
+    let power: Vec<f64> = spectrum.into_iter().map(|x| x.norm_sqr() / scale).collect();
     let largest = power.iter().copied().fold(0.0, f64::max);
     let least = (policy.tone_power_ratio * noise_k * noise_k).max(LEAST_SHARE * largest);
     // What moves less than a few times in the whole record is no tone: it is not seen to come back.

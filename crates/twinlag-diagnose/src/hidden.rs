@@ -6,6 +6,8 @@
 //! (a normal of zero mean whose standard deviation is [`Effect::usual_size`](twinlag_model::Effect::usual_size)). What the record
 //! shows well, and does not show, is not there.
 
+use std::ops::Range;
+
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch};
 
 use crate::candidates::{Candidate, Search};
@@ -18,6 +20,15 @@ const PIECE_SAMPLES: usize = 16_384;
 
 /// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise. Chosen.
 const NEGLIGIBLE_SHARE: f64 = 0.1;
+
+/// The samples of a record by which [`unseen`] judges it, where it does not take them all.
+pub fn pieces_of_long(samples: usize) -> Option<[Range<usize>; PIECES]> {
+    let piece = |i: usize| {
+        let start = i * (samples - PIECE_SAMPLES) / (PIECES - 1);
+        start..start + PIECE_SAMPLES
+    };
+    (samples > PIECES * PIECE_SAMPLES).then(|| std::array::from_fn(piece))
+}
 
 /// Effects that two lags may hide, for both time constants and their difference: those that are most probably there unseen,
 /// where all those that would move the number out of its interval are together more probable than the policy allows.
@@ -60,10 +71,8 @@ pub fn unseen(
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Vec<Identifier>; 3], ModelError> {
-    let samples = observations.samples();
-    let excerpt = (samples > PIECES * PIECE_SAMPLES).then(|| {
-        observations.excerpt((0..PIECES).map(|i| i * (samples - PIECE_SAMPLES) / (PIECES - 1)), PIECE_SAMPLES)
-    });
+    let excerpt = pieces_of_long(observations.samples())
+        .map(|pieces| observations.excerpt(pieces.iter().map(|piece| piece.start), PIECE_SAMPLES));
     let prepared = Prepared::new(excerpt.as_ref().unwrap_or(observations), settings)?;
     let fit =
         |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);

@@ -18,7 +18,7 @@ use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::outcome::Solved;
 use crate::second_lag::Unseen;
-use crate::starts::{hold_known, second_lags, starts};
+use crate::starts::{hold_known, second_lags};
 use crate::task::Task;
 use crate::vocabulary::{NoiseColour, NoiseKnowledge};
 
@@ -103,7 +103,8 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
     fn search(task: &Task<'a>, levels: NoiseLevels) -> Result<Self, EstimateError> {
         let variables = task.variables::<P>(levels.std_k[1]);
         let priors = task.priors();
-        let ended = minimise::<P>(task, &variables, &priors, &levels, task.hold, levels.std_k, None)?;
+        let whitened = Whitened::new(task.readings, task.hold, levels.std_k)?;
+        let ended = minimise::<P>(task, &variables, &priors, &levels, whitened, None)?;
         Ok(Self {
             task: task.clone(),
             whitened: ended.whitened,
@@ -125,7 +126,8 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
         from: Option<&[f64]>,
     ) -> Result<Ended<'a>, EstimateError> {
         let Self { task, variables, priors, levels, .. } = self;
-        minimise::<P>(task, variables, priors, levels, hold, noise_std, from)
+        let whitened = self.whitened.clone().with_hold(hold)?.with_noise(noise_std)?;
+        minimise::<P>(task, variables, priors, levels, whitened, from)
     }
 
     /// Takes `ended` for the fit.
@@ -379,18 +381,17 @@ fn max_rounds(colour: NoiseColour) -> usize {
     }
 }
 
-/// Minimises the whitened cost for noise of `noise_std`, `from` a point or from all starts.
+/// Minimises `whitened`, with the colour that `levels` have, `from` a point or from all starts.
 fn minimise<'a, const P: usize>(
     task: &Task<'a>,
     variables: &[Variable],
     priors: &[Prior],
     levels: &NoiseLevels,
-    hold: Discretisation,
-    noise_std: [f64; 2],
+    mut whitened: Whitened<'a>,
     from: Option<&[f64]>,
 ) -> Result<Ended<'a>, EstimateError> {
     let mut evaluations = Evaluations::default();
-    let mut whitened = Whitened::new(task.readings, hold, noise_std)?;
+    let hold = whitened.hold();
     if levels.ar1 != [0.0; 2] {
         whitened = whitened.with_autoregression(levels.ar1.map(|phi| vec![phi]))?;
     }
@@ -402,9 +403,7 @@ fn minimise<'a, const P: usize>(
         None => task.starts::<P>(variables),
     };
     let run = |whitened: Whitened<'a>, own: Vec<Vec<f64>>| {
-        minimise_whitened::<P>(whitened, priors, variables, task.minimiser, |objective| {
-            if own.is_empty() { starts(objective, task.readings, variables) } else { own }
-        })
+        minimise_whitened::<P>(whitened, priors, variables, task.minimiser, own)
     };
     let mut done = run(whitened, own)?;
     add(&mut evaluations, done.evaluations());
@@ -472,7 +471,8 @@ fn first_order_ends<const Q: usize>(
     evaluations: &mut Evaluations,
 ) -> Result<Vec<Vec<f64>>, EstimateError> {
     let variables = task.variables::<Q>(levels.std_k[1]);
-    let ended = minimise::<Q>(task, &variables, &task.priors(), levels, hold, levels.std_k, None)?;
+    let whitened = Whitened::new(task.readings, hold, levels.std_k)?;
+    let ended = minimise::<Q>(task, &variables, &task.priors(), levels, whitened, None)?;
     add(evaluations, ended.evaluations);
     Ok(ended.ends)
 }

@@ -110,6 +110,12 @@ impl Observations {
         Ok(out)
     }
 
+    /// These as pieces of a longer record, whose more lively channel has the standard deviation `swing_k` (K).
+    #[must_use]
+    pub fn of_record_with_swing(self, swing_k: f64) -> Self {
+        Self { swing_k, ..self }
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.stretches.iter().map(Stretch::len).sum()
@@ -195,6 +201,9 @@ impl Observations {
                 break;
             }
         }
-        if stretches.is_empty() { self.clone() } else { Self { stretches, ..self.clone() } }
+        if stretches.is_empty() {
+            return self.clone();
+        }
+        Self { stretches, period_s: self.period_s, swing_k: self.swing_k, flow: self.flow.clone() }
     }
 }

@@ -17,7 +17,7 @@ pub(crate) fn lines_from_end(text: &str) -> impl Iterator<Item = &str> {
     text.rsplit(line_end(text)).map(|line| line.trim_end_matches('\r'))
 }
 
-fn line_end(text: &str) -> char {
+pub(crate) fn line_end(text: &str) -> char {
     if text.contains('\n') { '\n' } else { '\r' }
 }
 

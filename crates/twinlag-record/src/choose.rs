@@ -25,6 +25,18 @@ pub(crate) struct Chosen {
     pub(crate) flow: Option<usize>,
 }
 
+impl Chosen {
+    /// All of them.
+    pub(crate) fn columns(&self) -> Vec<usize> {
+        let time = match self.time {
+            Some(TimeColumns::One(index)) => vec![index],
+            Some(TimeColumns::DateAndTime { date, time }) => vec![date, time],
+            None => Vec::new(),
+        };
+        time.into_iter().chain(self.channels).chain(self.reference).chain(self.flow).collect()
+    }
+}
+
 /// Periods from row to row that may be given: no logger is faster than a nanosecond or slower than
 /// a year. What is beyond is a slip of the exponent.
 const SHORTEST_PERIOD_S: f64 = 1e-9;

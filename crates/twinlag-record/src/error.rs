@@ -81,6 +81,8 @@ pub enum RecordError {
          or, if it is UTF-16, save it with a byte-order mark"
     )]
     Binary { file: String, offset: usize },
+    #[error("{file}: line {line}: is not in UTF-8, as the lines before it are; save the file in one encoding")]
+    EncodingChanges { file: String, line: usize },
     #[error("{file}: is empty, expected a header and rows of time and two temperatures")]
     Empty { file: String },
     #[error(

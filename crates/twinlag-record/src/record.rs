@@ -3,13 +3,14 @@
 //! Nothing is resampled and nothing is filled: a missing temperature is NaN, and `segments` are the
 //! runs of rows between missing ones and gaps.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::ops::Range;
 use std::path::Path;
 
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
 use crate::note::Note;
+use crate::row_lines::RowLines;
 use crate::sampling::{self, Clock, Sampling, SamplingKind};
 use crate::selection::{SamplingChoice, Selection};
 use crate::table::{Table, shortened};
@@ -82,7 +83,7 @@ pub struct Record {
     /// How the file was understood.
     pub notes: Vec<Note>,
     /// Line of each row, where the record was read from a file.
-    lines: Option<Vec<usize>>,
+    lines: Option<RowLines>,
 }
 
 /// What is known of the rows besides their numbers, for messages.
@@ -104,7 +105,8 @@ impl Origin<'_> {
         let cell = |index: usize| {
             let (table, _) = self.table?;
             let column = &table.columns()[index];
-            Some(column.text(row).map_or_else(|| plain(column.raw()[row]), str::to_owned))
+            let number = column.raw().get(row).copied().unwrap_or(time_s);
+            Some(column.text(row).map_or_else(|| plain(number), str::to_owned))
         };
         let time = match self.table.and_then(|(_, chosen)| chosen.time) {
             Some(time_axis::TimeColumns::One(index)) => cell(index),
@@ -123,7 +125,17 @@ impl Record {
     /// # Errors
     /// Those of [`Table::from_path`] and of [`Record::from_table`].
     pub fn read(path: impl AsRef<Path>, selection: &Selection) -> Result<Self, RecordError> {
-        Self::from_table(&Table::from_path(path)?, selection)
+        Self::from_owned(Table::from_path(path)?, selection)
+    }
+
+    /// Reads text as it comes: [`Table::from_reader`], then [`Record::from_table`].
+    ///
+    /// - `source`: its name in messages
+    ///
+    /// # Errors
+    /// Those of [`Table::from_reader`] and of [`Record::from_table`].
+    pub fn from_reader(reader: impl Read, source: &str, selection: &Selection) -> Result<Self, RecordError> {
+        Self::from_owned(Table::from_reader(reader, source)?, selection)
     }
 
     /// Takes time and two temperatures from a table; converts them to s and °C, and checks them.
@@ -133,12 +145,18 @@ impl Record {
     /// not increase, and temperatures that cannot be: out of range, missing throughout, constant,
     /// identical, or fewer than 8 usable.
     pub fn from_table(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
+        Self::from_owned(table.clone(), selection)
+    }
+
+    /// As [`Self::from_table`], without a second copy of what the table holds.
+    fn from_owned(mut table: Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
-        let chosen = choose(table, selection, &mut notes)?;
+        let chosen = choose(&table, selection, &mut notes)?;
+        table.keep_values_of(&chosen.columns());
         let (time_s, clock) = match (chosen.time, selection.period_s) {
             (Some(columns), _) => {
                 let TimeAxis { time_s, clock } =
-                    time_axis::read(table, columns, selection.time_unit.as_ref(), &mut notes)?;
+                    time_axis::read(&mut table, columns, selection.time_unit.as_ref(), &mut notes)?;
                 (time_s, Some(clock))
             }
             (None, period_s) => {
@@ -152,8 +170,10 @@ impl Record {
         let mut temperatures = Vec::new();
         let indices = chosen.channels.into_iter().chain(chosen.reference);
         for index in indices.clone() {
-            temperatures.push(celsius(table, index, &mut notes)?);
+            let is_wanted_again = indices.clone().filter(|other| *other == index).count() > 1;
+            temperatures.push(celsius(&mut table, index, is_wanted_again, &mut notes)?);
         }
+        let table = &table;
         let last = chosen.channels[1];
         let of = |at: usize| indices.clone().nth(at).unwrap_or(last);
         let origin = Origin {
@@ -322,7 +342,7 @@ impl Record {
             sampling,
             segments,
             notes,
-            lines: origin.table.and_then(|(table, _)| table.lines()).map(<[usize]>::to_vec),
+            lines: origin.table.and_then(|(table, _)| table.lines()).cloned(),
         })
     }
 
@@ -330,7 +350,7 @@ impl Record {
     ///
     /// - `row`: from 0. Panics if the record has no such row.
     pub fn place_of(&self, row: usize) -> Place {
-        self.lines.as_ref().map_or(Place::Sample(row + 1), |lines| Place::Line(lines[row]))
+        self.lines.as_ref().map_or(Place::Sample(row + 1), |lines| Place::Line(lines.of(row)))
     }
 
     /// Number of rows, missing ones counted.
@@ -376,8 +396,15 @@ fn names(table: &Table, channels: [usize; 2]) -> [String; 2] {
     pick(Column::label).or_else(|| pick(Column::name)).unwrap_or_else(|| ["T1", "T2"].map(str::to_owned))
 }
 
-fn celsius(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<Vec<f64>, RecordError> {
-    let values = table.numbers(index)?;
+/// The temperatures of a column, which are moved out of the table where they are in °C and nobody wants them again: their numbers
+/// are in the record then, for messages.
+fn celsius(
+    table: &mut Table,
+    index: usize,
+    is_wanted_again: bool,
+    notes: &mut Vec<Note>,
+) -> Result<Vec<f64>, RecordError> {
+    table.numbers(index)?;
     let unit = table.columns()[index].unit();
     let column = table.title(index);
     if unit.to_celsius(0.0).is_none() {
@@ -385,7 +412,10 @@ fn celsius(table: &Table, index: usize, notes: &mut Vec<Note>) -> Result<Vec<f64
     }
     let to = matches!(unit, Unit::Kelvin | Unit::Fahrenheit).then_some("°C");
     notes.push(Note::Unit { column, unit: unit.symbol().to_owned(), stated: *unit != Unit::Unstated, to });
-    Ok(values.iter().map(|&value| unit.to_celsius(value).unwrap_or(f64::NAN)).collect())
+    if to.is_none() && !is_wanted_again {
+        return Ok(table.take_values(index));
+    }
+    Ok(table.numbers(index)?.iter().map(|&value| unit.to_celsius(value).unwrap_or(f64::NAN)).collect())
 }
 
 fn check_time(time_s: &[f64], origin: &Origin<'_>) -> Result<(), RecordError> {
@@ -415,7 +445,7 @@ fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(
         file: origin.file.to_owned(),
         at: origin.place(row),
         column: origin.columns[column].clone(),
-        value: cells.map_or(values_c[row], |cells| cells.raw()[row]),
+        value: cells.and_then(|cells| cells.raw().get(row).copied()).unwrap_or(values_c[row]),
         cell: cells.and_then(|cells| cells.beyond(row)).map(shortened),
         unit: origin.units[column].symbol(),
     })
@@ -440,6 +470,15 @@ fn note_kelvins(values_c: [&[f64]; 2], origin: &Origin<'_>, notes: &mut Vec<Note
         if let Some(reading_k) = Some(&origin.units[i]).filter(|unit| **unit == Unit::Kelvin).and_then(|_| cold()) {
             notes.push(Note::ColdKelvin { column: origin.columns[i].clone(), reading_k });
         }
+    }
+    // Most records are settled by counting: whose differences are mostly below a limit, their median is.
+    let limit_k = -ABSOLUTE_ZERO_C - NEAR_ICE_POINT_K;
+    let apart = || values_c[0].iter().zip(values_c[1]).map(|(a, b)| a - b).filter(|apart_k| !apart_k.is_nan());
+    let [all, above, below] = apart().fold([0_usize; 3], |[all, above, below], apart_k| {
+        [all + 1, above + usize::from(apart_k >= limit_k), below + usize::from(apart_k <= -limit_k)]
+    });
+    if 2 * above < all && 2 * below < all {
+        return;
     }
     let Some(apart_k) = median(values_c[0].iter().zip(values_c[1]).map(|(a, b)| a - b)) else { return };
     if (apart_k.abs() + ABSOLUTE_ZERO_C).abs() < NEAR_ICE_POINT_K {

@@ -97,8 +97,8 @@ impl Clock {
 pub(crate) fn judge(time_s: &[f64], clock: Option<Clock>, choice: SamplingChoice) -> Sampling {
     let steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let median = median(&steps);
-    let digits = clock.map(|clock| rounding(time_s, clock));
-    let coarsest = digits.as_ref().and_then(|digits| digits.iter().copied().reduce(f64::max));
+    let format = clock.map(|clock| (clock, Format::of(time_s, clock)));
+    let coarsest = format.and_then(|(clock, format)| format.coarsest(time_s, clock));
     let grid = clock.and_then(|clock| grid(time_s, &steps, clock.unit_s, coarsest));
     let may_be_rounded = |unit: &f64| *unit < median * 1.5 && !are_skips(&steps, median);
     let rounding = grid.filter(may_be_rounded).unwrap_or(0.0);
@@ -116,7 +116,10 @@ pub(crate) fn judge(time_s: &[f64], clock: Option<Clock>, choice: SamplingChoice
     let is_whole = 20 * skips <= steps.len();
     let is_uniform = high - period <= 0.01 * period && period - low <= 0.01 * period;
     let is_rounded = grid.is_some_and(|unit| high - low <= 1.01 * unit && is_steady(time_s, limit, period, unit))
-        || digits.is_some_and(|digits| is_even_but_for_digits(time_s, &digits, limit, period));
+        || (!(is_whole && is_uniform)
+            && format.is_some_and(|(clock, format)| {
+                is_even_but_for_digits(time_s, &format.units(time_s, clock), limit, period)
+            }));
     let kind = match choice {
         SamplingChoice::Uniform => SamplingKind::Uniform,
         SamplingChoice::Auto if is_whole && is_uniform => SamplingKind::Uniform,
@@ -281,37 +284,80 @@ fn grid(time_s: &[f64], steps: &[f64], unit_s: f64, coarsest: Option<f64>) -> Op
     if let Some(coarsest) = coarsest.filter(|last| *last > unit && *last <= shortest) {
         return Some(coarsest);
     }
-    let common = steps.iter().map(|step| (step / unit).round() as u64).fold(0, divisor);
+    // No divisor is less than one.
+    let common = steps.iter().try_fold(0, |all, step| match divisor(all, (step / unit).round() as u64) {
+        1 => Err(1),
+        all => Ok(all),
+    });
+    let common = common.unwrap_or_else(|one| one);
     let shortest = (shortest / unit).round() as u64;
     // Where all steps are multiples of the shortest one the divisor is the sampling, not the clock.
     Some(if common < shortest { unit * common.max(1) as f64 } else { unit })
 }
 
-/// The unit of the last digit of each stamp, where all are printed to one number of significant
-/// digits: seven give 0.04166667 s and 1049.958 s. Otherwise that of single precision, if all
-/// stamps were kept in it, or twice that of doubles, since what is added up is off by a unit: serial
-/// days are to no more than 1e-5 s.
-fn rounding(time_s: &[f64], clock: Clock) -> Vec<f64> {
-    let exponent = |stamp: f64| stamp.abs().log10().floor() as i32;
-    let is_printed = |stamp: f64, digits: i32| {
-        let unit = 10_f64.powi(exponent(stamp) + 1 - digits);
-        off_grid(stamp / unit) < 0.01 + 2.0 * f64::EPSILON * stamp.abs() / unit
-    };
-    let digits = |stamp: f64| (1..=MAX_DIGITS).find(|digits| is_printed(stamp, *digits));
-    let stamps = || clock.printed(time_s).filter(|stamp| *stamp != 0.0);
-    let of_each = |unit: &dyn Fn(f64) -> f64| {
-        // A stamp of zero is exact in any format: it is as good as the best of the others.
-        let best = stamps().map(unit).fold(f64::INFINITY, f64::min);
-        clock.printed(time_s).map(|stamp| clock.unit_s * if stamp == 0.0 { best } else { unit(stamp) }).collect()
-    };
-    let last_bit = |epsilon: f64| move |stamp: f64| epsilon * 2_f64.powf(stamp.abs().log2().floor());
-    match stamps().map(digits).try_fold(0, |most, digits| Some(digits?.max(most))) {
-        // Seven digits print the same in single precision and in double: they may be all there are.
-        Some(most) if most <= SINGLE_DIGITS => of_each(&|stamp| 10_f64.powi(exponent(stamp) + 1 - most)),
-        _ if stamps().all(is_single) => of_each(&last_bit(f64::from(f32::EPSILON))),
-        Some(most) => of_each(&|stamp| 10_f64.powi(exponent(stamp) + 1 - most)),
-        None => of_each(&last_bit(2.0 * f64::EPSILON)),
+/// How stamps were printed: what the unit of their last digit is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Format {
+    /// All to one number of significant digits: seven give 0.04166667 s and 1049.958 s.
+    Digits(i32),
+    /// As binary numbers of which one unit in the last place is this share.
+    Binary(f64),
+}
+
+impl Format {
+    /// The significant digits, if all stamps have at most [`MAX_DIGITS`]. Otherwise single precision, if all stamps were kept in it,
+    /// or twice the unit of doubles, since what is added up is off by a unit: serial days are to no more than 1e-5 s.
+    fn of(time_s: &[f64], clock: Clock) -> Self {
+        let is_printed =
+            |stamp: f64, unit: f64| off_grid(stamp / unit) < 0.01 + 2.0 * f64::EPSILON * stamp.abs() / unit;
+        let unit = |stamp: f64, digits: i32| 10_f64.powi(exponent(stamp) + 1 - digits);
+        let digits = |stamp: f64| (1..=MAX_DIGITS).find(|digits| is_printed(stamp, unit(stamp, *digits)));
+        let stamps = || clock.printed(time_s).filter(|stamp| *stamp != 0.0);
+        // Stamps with no more digits than one before are seen to be so at once: neighbours have the same power of ten.
+        let (mut decade, mut last_digit) = (0.0..0.0, f64::NAN);
+        let most = |most: i32, stamp: f64| {
+            if decade.contains(&stamp.abs()) && is_printed(stamp, last_digit) {
+                return Some(most);
+            }
+            let most = digits(stamp)?.max(most);
+            decade = 10_f64.powi(exponent(stamp))..10_f64.powi(exponent(stamp) + 1);
+            last_digit = unit(stamp, most);
+            Some(most)
+        };
+        match stamps().try_fold(0, most) {
+            // Seven digits print the same in single precision and in double: they may be all there are.
+            Some(most) if most <= SINGLE_DIGITS => Self::Digits(most),
+            _ if stamps().all(is_single) => Self::Binary(f64::from(f32::EPSILON)),
+            Some(most) => Self::Digits(most),
+            None => Self::Binary(2.0 * f64::EPSILON),
+        }
     }
+
+    /// The unit of the last digit of a stamp other than zero.
+    fn unit(self, stamp: f64) -> f64 {
+        match self {
+            Self::Digits(most) => 10_f64.powi(exponent(stamp) + 1 - most),
+            Self::Binary(epsilon) => epsilon * 2_f64.powf(stamp.abs().log2().floor()),
+        }
+    }
+
+    /// The unit of the largest stamp, s, which no other one exceeds.
+    fn coarsest(self, time_s: &[f64], clock: Clock) -> Option<f64> {
+        let largest = clock.printed(time_s).fold(0.0, |largest: f64, stamp| largest.max(stamp.abs()));
+        (largest > 0.0).then(|| clock.unit_s * self.unit(largest))
+    }
+
+    /// The unit of the last digit of each stamp, s. A stamp of zero is exact in any format: it is as good as the best of the others.
+    fn units(self, time_s: &[f64], clock: Clock) -> Vec<f64> {
+        let stamps = clock.printed(time_s);
+        let best =
+            stamps.clone().filter(|stamp| *stamp != 0.0).map(|stamp| self.unit(stamp)).fold(f64::INFINITY, f64::min);
+        stamps.map(|stamp| clock.unit_s * if stamp == 0.0 { best } else { self.unit(stamp) }).collect()
+    }
+}
+
+fn exponent(stamp: f64) -> i32 {
+    stamp.abs().log10().floor() as i32
 }
 
 /// Whether a stamp is one of single precision, as it is or in the fewest digits that give it again.
@@ -323,7 +369,9 @@ fn is_single(stamp: f64) -> bool {
 
 fn off_grid(position: f64) -> f64 {
     // Beyond 2^43 the fraction of a double is no better than a thousandth.
-    if position.abs() > 8e12 { 1.0 } else { (position - position.round()).abs() }
+    // Adding this leaves no fraction, without a call for each stamp.
+    const NO_FRACTION: f64 = 6_755_399_441_055_744.0;
+    if position.abs() > 8e12 { 1.0 } else { (position - ((position + NO_FRACTION) - NO_FRACTION)).abs() }
 }
 
 fn divisor(a: u64, b: u64) -> u64 {

@@ -1,17 +1,20 @@
 //! A table of cells as it stands in the file, read once; numbers are parsed, everything else is
 //! kept as text.
 
-use std::borrow::Cow;
-use std::fs;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
-use crate::cells::{is_idle, lines, lines_from_end, split};
+use crate::cells::{is_idle, line_end, lines, split};
 use crate::column::{Column, Kind};
 use crate::dialect::{Evidence, Unclear};
+use crate::fill::Filling;
 use crate::layout::Layout;
 use crate::note::Note;
+use crate::parts::Parts;
+use crate::row_lines::RowLines;
 use crate::selection::ColumnRef;
-use crate::sign::{Decimal, Delimiter};
+use crate::sign::Decimal;
 use crate::{Place, RecordError, encoding};
 
 /// Delimited text as loggers write it, taken apart: columns of numbers, of date-times, of text.
@@ -27,7 +30,7 @@ pub struct Table {
 #[derive(Clone, Debug)]
 pub(crate) enum Places {
     /// Line of each row in the file, from 1.
-    Lines(Vec<usize>),
+    Lines(RowLines),
     /// That many rows of columns that never were in a file.
     Samples(usize),
 }
@@ -43,8 +46,8 @@ impl Table {
         if path.is_dir() {
             return Err(RecordError::IsDirectory { file });
         }
-        match fs::read(path) {
-            Ok(bytes) => Self::read(&bytes, &file),
+        match File::open(path) {
+            Ok(opened) => Self::from_reader(opened, &file),
             Err(error) => Err(RecordError::CannotRead { file, reason: error.to_string() }),
         }
     }
@@ -65,72 +68,49 @@ impl Table {
     /// signs, on open quotation marks, and on lines with too many or too few cells.
     pub fn read(bytes: &[u8], source: &str) -> Result<Self, RecordError> {
         let (text, encoding) = encoding::decode(bytes, source)?;
-        let layout = Layout::find(&text, source)?;
-        let decimal = sniff_decimal(&text, &layout, source)?;
-        let Layout { delimiter, header_line, .. } = layout;
-        let format = Note::Format { delimiter, decimal, encoding, header_line };
-        let columns = (0..layout.width).map(|index| {
-            Column::new(layout.names.get(index).cloned().unwrap_or_default(), layout.units[index].clone())
-        });
-        let (columns, places) = (columns.collect(), Places::Lines(Vec::new()));
-        let mut table = Self { source: source.to_owned(), columns, places, notes: vec![format] };
-        table.fill(&text, &layout, decimal)?;
-        for column in &mut table.columns {
-            column.judge();
-        }
-        Ok(table)
+        let look = Look::at(&text, source)?;
+        let mut filling = Filling::new(source, &look.layout, look.decimal);
+        let end = line_end(&text) as u8;
+        filling.take(&text, end)?;
+        filling.end(!text.as_bytes().ends_with(&[end]))?;
+        Ok(Self::of(filling, encoding))
     }
 
-    fn fill(&mut self, text: &str, layout: &Layout, decimal: Decimal) -> Result<(), RecordError> {
-        let file = || self.source.clone();
-        let width = layout.width;
-        let (mut cells, mut row_lines) = (Vec::new(), Vec::new());
-        let (mut repeated, mut first_repeated) = (0, 0);
-        let mut rows = lines(text).skip(layout.first_line - 1).filter(|(_, line)| !is_idle(line)).peekable();
-        while let Some((line, content)) = rows.next() {
-            let is_last = rows.peek().is_none();
-            // A header that comes again begins like no number does, so that good rows need no
-            // comparison.
-            let odd = !content.trim_start().starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
-            if odd && layout.head.iter().any(|head| head.trim() == content.trim()) {
-                repeated += 1;
-                if repeated == 1 {
-                    first_repeated = line;
-                }
-                continue;
-            }
-            let open = split(content, layout.delimiter, &mut cells).is_err();
-            if open && !is_last {
-                return Err(RecordError::OpenQuote { file: file(), line });
-            }
-            let found = cells.len();
-            let trailing = found == width + 1 && cells[width].is_empty();
-            if open || (is_last && found < width) {
-                self.notes.push(Note::CutLine { line, found, expected: width });
-                continue;
-            }
-            if found != width && !trailing {
-                let whole = |cell: &Cow<'_, str>| cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
-                let commas = layout.delimiter == Delimiter::Comma && found > width && cells.iter().all(whole);
-                return Err(if commas {
-                    RecordError::DecimalCommaBetweenCommas { file: file(), line, expected: width, found }
-                } else {
-                    RecordError::CellCount { file: file(), line, expected: width, found }
-                });
-            }
-            for (column, cell) in self.columns.iter_mut().zip(&cells) {
-                column.push(row_lines.len(), cell, decimal);
-            }
-            row_lines.push(line);
-            if is_last && lines_from_end(text).next() == Some(content) {
-                self.notes.push(Note::NoFinalLineBreak { line });
-            }
+    /// Reads text as it comes, without keeping it: what is found by looking is found in the first
+    /// 4 MiB, and must hold for all lines after them. Otherwise as [`Table::read`].
+    ///
+    /// ```
+    /// let text = "time,T1,T2\n".to_owned() + &(0..9).map(|k| format!("{k},20.5,21\n")).collect::<String>();
+    /// let table = twinlag_record::Table::from_reader(text.as_bytes(), "a pipe")?;
+    /// assert_eq!((table.rows(), table.columns()[1].name()), (9, "T1"));
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    ///
+    /// - `source`: its name in messages
+    ///
+    /// # Errors
+    /// [`RecordError::CannotRead`], [`RecordError::EncodingChanges`], and those of [`Table::read`].
+    pub fn from_reader(reader: impl Read, source: &str) -> Result<Self, RecordError> {
+        let mut parts = Parts::new(reader, source);
+        let first = parts.first()?;
+        let Some(first) = first else { return Self::read(&parts.all()?, source) };
+        let look = Look::at(&first, source)?;
+        let mut filling = Filling::new(source, &look.layout, look.decimal);
+        filling.take(&first, b'\n')?;
+        drop(first);
+        while let Some(part) = parts.next(filling.seen())? {
+            filling.take(&part, b'\n')?;
         }
-        if repeated > 0 {
-            self.notes.push(Note::RepeatedHeader { lines: repeated, first_line: first_repeated });
-        }
-        self.places = Places::Lines(row_lines);
-        Ok(())
+        filling.end(parts.is_open())?;
+        Ok(Self::of(filling, parts.encoding()))
+    }
+
+    fn of(filling: Filling<'_>, encoding: &'static str) -> Self {
+        let Filling { source, layout, decimal, mut columns, lines, mut notes, .. } = filling;
+        let Layout { delimiter, header_line, .. } = *layout;
+        notes.insert(0, Note::Format { delimiter, decimal, encoding, header_line });
+        columns.iter_mut().for_each(Column::judge);
+        Self { source: source.to_owned(), columns, places: Places::Lines(lines), notes }
     }
 
     /// The name that the caller gave.
@@ -157,17 +137,28 @@ impl Table {
     /// - `row`: from 0. Panics if a file has no such row.
     pub fn place_of(&self, row: usize) -> Place {
         match &self.places {
-            Places::Lines(lines) => Place::Line(lines[row]),
+            Places::Lines(lines) => Place::Line(lines.of(row)),
             Places::Samples(_) => Place::Sample(row + 1),
         }
     }
 
     /// Line of each row in the file, from 1, if there is a file.
-    pub(crate) fn lines(&self) -> Option<&[usize]> {
+    pub(crate) fn lines(&self) -> Option<&RowLines> {
         match &self.places {
             Places::Lines(lines) => Some(lines),
             Places::Samples(_) => None,
         }
+    }
+
+    /// Lets go of the numbers of all columns but these.
+    pub(crate) fn keep_values_of(&mut self, columns: &[usize]) {
+        let rest = self.columns.iter_mut().enumerate().filter(|(index, _)| !columns.contains(index));
+        rest.for_each(|(_, column)| column.values = Vec::new());
+    }
+
+    /// Moves the numbers of a column out of the table.
+    pub(crate) fn take_values(&mut self, index: usize) -> Vec<f64> {
+        std::mem::take(&mut self.columns[index].values)
     }
 
     /// What was understood of the file so far.
@@ -253,6 +244,20 @@ pub(crate) fn shortened(text: &str) -> String {
         return text.to_owned();
     }
     text.chars().take(MAX_CHARACTERS).chain("...".chars()).collect()
+}
+
+/// What is found by looking at the lines of a file, or at the first of them.
+struct Look {
+    layout: Layout,
+    decimal: Decimal,
+}
+
+impl Look {
+    fn at(text: &str, source: &str) -> Result<Self, RecordError> {
+        let layout = Layout::find(text, source)?;
+        let decimal = sniff_decimal(text, &layout, source)?;
+        Ok(Self { layout, decimal })
+    }
 }
 
 /// Looks at 500 rows, or at as many more as it takes to see a decimal sign.

@@ -31,7 +31,7 @@ pub(crate) enum TimeColumns {
 /// [`RecordError::NotATimeUnit`], [`RecordError::TimeUnitUnclear`], [`RecordError::NotATime`], [`RecordError::AmbiguousDate`],
 /// [`RecordError::MissingTime`], and those of [`Table::numbers`].
 pub(crate) fn read(
-    table: &Table,
+    table: &mut Table,
     columns: TimeColumns,
     unit: Option<&Unit>,
     notes: &mut Vec<Note>,
@@ -53,15 +53,25 @@ pub(crate) fn read(
     }
 }
 
-fn numeric(table: &Table, index: usize, chosen: Option<&Unit>, notes: &mut Vec<Note>) -> Result<TimeAxis, RecordError> {
+fn numeric(
+    table: &mut Table,
+    index: usize,
+    chosen: Option<&Unit>,
+    notes: &mut Vec<Note>,
+) -> Result<TimeAxis, RecordError> {
     let values = table.numbers(index)?;
     if let Some(row) = values.iter().position(|value| !value.is_finite()) {
         let (file, at) = (table.source().to_owned(), table.place_of(row));
         return Err(RecordError::MissingTime { file, at, column: table.title(index) });
     }
     let unit_s = unit_s(table, index, chosen, notes)?;
-    let first = values.first().copied().unwrap_or(0.0);
-    let time_s = values.iter().map(|value| seconds(value - first, unit_s)).collect();
+    let first = table.numbers(index)?.first().copied().unwrap_or(0.0);
+    let time_s = if first == 0.0 && unit_s == 1.0 {
+        // The column itself; messages find its numbers in the record.
+        table.take_values(index)
+    } else {
+        table.numbers(index)?.iter().map(|value| seconds(value - first, unit_s)).collect()
+    };
     Ok(TimeAxis { time_s, clock: Clock { unit_s, first } })
 }
 

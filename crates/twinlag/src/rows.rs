@@ -1,7 +1,7 @@
 //! The rows of a record as the model of a rig takes them.
 
 use twinlag_diagnose::{KnownTimeConstant, Masked, Observations, Settings, Stretch};
-use twinlag_record::Record;
+use twinlag_record::{Grid, Record};
 
 use twinlag_cross_relation::Parameter;
 
@@ -23,16 +23,7 @@ impl Rows {
     pub(crate) fn of(record: &Record) -> Result<Self, Error> {
         let grid = record.grid().without_short(MIN_STRETCH_SAMPLES);
         let of_sample = grid.rows().collect();
-        let stretches = grid.stretches.into_iter().map(|stretch| {
-            let missing = stretch.missing();
-            let out = Stretch::new(stretch.time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
-            match stretch.flow {
-                Some(flow) => out.with_flow(flow),
-                None => out,
-            }
-        });
-        let observations = Observations::new(stretches.collect(), grid.period_s)?;
-        Ok(Self { observations, of_sample })
+        Ok(Self { observations: on(grid)?, of_sample })
     }
 
     /// Puts lines of the file and stamps in the place of samples.
@@ -44,6 +35,23 @@ impl Rows {
             }
         }
     }
+}
+
+/// The readings of a record.
+pub(crate) fn observations(record: &Record) -> Result<Observations, Error> {
+    on(record.grid().without_short(MIN_STRETCH_SAMPLES))
+}
+
+fn on(grid: Grid) -> Result<Observations, Error> {
+    let stretches = grid.stretches.into_iter().map(|stretch| {
+        let missing = stretch.missing();
+        let out = Stretch::new(stretch.time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
+        match stretch.flow {
+            Some(flow) => out.with_flow(flow),
+            None => out,
+        }
+    });
+    Ok(Observations::new(stretches.collect(), grid.period_s)?)
 }
 
 /// What the options say of noise and time constants beforehand, as settings of a diagnosis.

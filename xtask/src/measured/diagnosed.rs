@@ -82,6 +82,11 @@ fn calibration(answer: &Diagnosis, gain: f64, offset_k: f64) -> Result<()> {
     Ok(())
 }
 
+/// The records of all cases with their channels, those of one record after each other.
+pub(super) fn records() -> Vec<(&'static str, [&'static str; 2])> {
+    CASES.iter().map(|case| (case.file, case.channels)).collect()
+}
+
 /// What came of all cases.
 pub(super) struct Diagnosed {
     pub(super) failures: Vec<String>,

@@ -6,6 +6,7 @@
 mod bootstrap;
 mod conclude;
 mod contradiction;
+mod excerpt;
 mod explain;
 mod fill;
 mod judge;
@@ -24,10 +25,11 @@ use crate::answers::Characterisation;
 use crate::error::Error;
 use crate::options::Options;
 use crate::quiet;
-use crate::rows::Rows;
+use crate::rows::observations;
 use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
+use excerpt::Excerpt;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
@@ -51,7 +53,7 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
     characterise_watched(record, options, UNWATCHED)
 }
 
-/// [`characterise`], with `watch` called for every replicate of a bootstrap.
+/// [`characterise`], with `watch` called after each of its four steps and for every replicate of a bootstrap.
 ///
 /// ```
 #[doc = include_str!("../example.txt")]
@@ -78,10 +80,31 @@ pub fn characterise(record: &Record, options: &Options) -> Result<Characterisati
 /// As [`characterise`]; [`Error::Cancelled`].
 pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>) -> Result<Characterisation, Error> {
     options.check()?;
+    let stop = Stop::new(watch);
+    let mut answer = of_two_lags(record, options, &stop)?;
+    let looked_at = match Excerpt::of_long(record, options)? {
+        Some(excerpt) => excerpt,
+        None => match observations(record) {
+            Ok(all) => Excerpt { is_single_tone: is_single_tone(&all, &Policy::default()), observations: all },
+            Err(_) => return Ok(answer),
+        },
+    };
+    if looked_at.is_single_tone {
+        answer.warnings.push(Remark::SingleTone.to_string());
+        // Two lags alone are what was asked for, and under them both equations determine both numbers.
+        let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
+        answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
+    } else {
+        unseen::judge_unseen(&mut answer, &looked_at.observations, options, &stop)?;
+    }
+    Ok(answer)
+}
+
+/// What the record says if nothing is missing beside two lags.
+fn of_two_lags(record: &Record, options: &Options, stop: &Stop<'_>) -> Result<Characterisation, Error> {
     let readings = readings(record, options)?;
     check_sampling(&readings, options)?;
-    let stop = Stop::new(watch);
-    let asked = Asked { record, options, stop: &stop };
+    let asked = Asked { record, options, stop };
     // Levels that are given need no rest.
     let quiet_s: &[[f64; 2]] = if options.noise_std_k.is_none() { &options.quiet_segments_s } else { &[] };
     let at_rest = quiet::runs(record, quiet_s)?;
@@ -92,17 +115,8 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         _ => answer::<2>(&asked, &task),
     };
     stop.check()?;
-    let mut answer = answer?;
-    let Ok(rows) = Rows::of(record) else { return Ok(answer) };
-    if is_single_tone(&rows.observations, &Policy::default()) {
-        answer.warnings.push(Remark::SingleTone.to_string());
-        // Two lags alone are what was asked for, and under them both equations determine both numbers.
-        let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
-        answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
-    } else {
-        unseen::judge_unseen(&mut answer, &rows, options, &stop)?;
-    }
-    Ok(answer)
+    stop.say(STEPS, 3, 4);
+    answer
 }
 
 /// The channels of a record as the costs take them, cut where samples are missing.
@@ -169,6 +183,9 @@ struct Asked<'a> {
     stop: &'a Stop<'a>,
 }
 
+/// What is reported of the steps: the fit, what the gas does between samples, what is left over, what may be hidden.
+const STEPS: &str = "steps of the characterisation";
+
 /// Probability beyond which the other hold takes the place of the one that was tried first: a likelihood ratio of 150, the
 /// fifth power of `e`. Below it a short second lag and a hold look alike, and the choice would change with what else is fitted;
 /// the interval covers both.
@@ -188,7 +205,9 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     let mut warnings = asked.needless();
     // The whitened estimate comes first, whichever is asked: the others begin at it, and what it
     // leaves says whether the model is right.
+    asked.stop.say(STEPS, 0, 4);
     let mut fit = WhitenedFit::<'a, P>::find(task)?;
+    asked.stop.say(STEPS, 1, 4);
     warnings.extend(outweighed(&fit));
     // What the gas does between samples must be settled before the residual is judged: a wrong hold
     // leaves more than noise.
@@ -205,6 +224,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     // Only now is it known whether errors are those of noise or those of the residual, and all
     // intervals rest on which.
     let theta = fit.theta();
+    asked.stop.say(STEPS, 2, 4);
     let tests = asked.tests(&fit, &theta)?;
     let is_rejected = fit.is_rejected_by(&tests);
     let middle = if is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };

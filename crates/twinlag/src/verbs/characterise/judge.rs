@@ -1,6 +1,6 @@
 //! Whether the numbers of a characterisation may be used.
 
-use twinlag_cross_relation::{PartScatter, TestName, sandwich};
+use twinlag_cross_relation::{Influences, PartScatter, TestName, sandwich};
 use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
 use twinlag_estimate::{Estimator, Known, REJECTION_P_VALUE};
 
@@ -103,32 +103,21 @@ pub(super) fn given(known: &Known) -> String {
 
 /// What each residual does to the parameters.
 struct Scattering<'c, const P: usize> {
-    residual: Vec<Vec<f64>>,
-    /// Derivatives of each residual, run by run.
-    derivatives: Vec<Vec<[f64; P]>>,
-    /// Inverse of the sum of their products.
+    influences: Influences<P>,
+    /// Inverse of the sum of products of the derivatives.
     inverse: Option<[[f64; P]; P]>,
     covariance: &'c [[f64; P]; P],
 }
 
 impl<'c, const P: usize> Scattering<'c, P> {
     fn of(conclusion: &Conclusion<'_, '_, P>, covariance: &'c [[f64; P]; P]) -> Self {
-        let jacobian = conclusion.fit.whitened().jacobian(&conclusion.solved.theta);
-        let mut products = [[0.0; P]; P];
-        for (_, d) in jacobian.iter().flatten() {
-            for i in 0..P {
-                for j in 0..P {
-                    products[i][j] += d[i] * d[j];
-                }
-            }
-        }
+        let influences = conclusion.fit.whitened().influences(&conclusion.solved.theta);
+        let mut products = influences.products();
         for prior in conclusion.fit.knowledge() {
             products[prior.index][prior.index] += prior.std.powi(-2);
         }
-        let residual = jacobian.iter().map(|run| run.iter().map(|(r, _)| *r).collect()).collect();
-        let derivatives = jacobian.into_iter().map(|run| run.into_iter().map(|(_, d)| d).collect()).collect();
         let inverse = sandwich(&products, &products, &conclusion.fit.free());
-        Self { residual, derivatives, inverse, covariance }
+        Self { influences, inverse, covariance }
     }
 
     /// How far a sum of parameters, each by its index and its factor, moves between parts of the record.
@@ -137,9 +126,6 @@ impl<'c, const P: usize> Scattering<'c, P> {
         let pairs = sum.iter().flat_map(|a| sum.iter().map(move |b| (a, b)));
         let variance: f64 = pairs.map(|((i, s), (j, t))| s * t * self.covariance[*i][*j]).sum();
         let weights: [f64; P] = std::array::from_fn(|i| sum.iter().map(|(j, t)| inverse[i][*j] * t).sum());
-        let influence = |d: &[f64; P]| d.iter().zip(&weights).map(|(d, w)| d * w).sum::<f64>();
-        let influences: Vec<Vec<f64>> =
-            self.derivatives.iter().map(|run| run.iter().map(influence).collect()).collect();
-        PartScatter::of(&self.residual, &influences, variance.max(0.0).sqrt())
+        self.influences.scatter(&weights, variance.max(0.0).sqrt())
     }
 }

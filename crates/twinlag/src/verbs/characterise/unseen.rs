@@ -2,12 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use twinlag_diagnose::{Identifier, ModelError, Reason, unseen};
+use twinlag_diagnose::{Identifier, ModelError, Observations, Reason, unseen};
 
 use crate::answers::{Characterisation, Status};
 use crate::error::Error;
 use crate::options::Options;
-use crate::rows::{Rows, settings_of};
+use crate::rows::settings_of;
 use crate::watch::Stop;
 
 /// Puts down for each number of `answer` the effects that may be there unseen and would move it out of its interval.
@@ -16,7 +16,7 @@ use crate::watch::Stop;
 /// [`Error::Cancelled`].
 pub(super) fn judge_unseen(
     answer: &mut Characterisation,
-    rows: &Rows,
+    observations: &Observations,
     options: &Options,
     stop: &Stop<'_>,
 ) -> Result<(), Error> {
@@ -33,7 +33,7 @@ pub(super) fn judge_unseen(
     let [one, two] = answer.sensors.each_ref().map(|sensor| half(sensor.interval_95_s));
     let half_s = [one, two, half(answer.time_constant_difference_s.interval_95_s)];
     let watch = |_: &str, _, _| if stop.is_wanted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-    let hidden = match unseen(&rows.observations, &settings_of(options), [one_s, two_s], &beside, half_s, &watch) {
+    let hidden = match unseen(observations, &settings_of(options), [one_s, two_s], &beside, half_s, &watch) {
         Ok(hidden) => hidden,
         Err(ModelError::Cancelled) => return Err(Error::Cancelled),
         // What the model of a diagnosis cannot take, it cannot judge.
