@@ -195,6 +195,6 @@ impl Observations {
                 break;
             }
         }
-        if stretches.is_empty() { self.clone() } else { Self { stretches, ..self.clone() } }
+        if stretches.is_empty() { self.clone() } else { Self { stretches, flow: self.flow.clone(), ..*self } }
     }
 }
