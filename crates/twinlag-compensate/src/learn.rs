@@ -9,6 +9,7 @@ mod holes;
 mod part;
 mod whittle;
 
+use rayon::prelude::*;
 use twinlag_optimise::{Budget, Minimiser, Optimiser, Problem};
 
 use crate::error::CompensateError;
@@ -244,26 +245,32 @@ impl Search<'_> {
     /// `current` with one part left out, or one of each kind in its place, or a comb that ends
     /// elsewhere.
     fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
+        let gas = (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none());
+        let others: Vec<Vec<Fitted>> =
+            gas.collect::<Vec<usize>>().into_par_iter().map(|i| self.without(current, i)).collect();
+        others.concat()
+    }
+
+    /// `current` without part `i`, or with others in its place.
+    fn without(&self, current: &Fitted, i: usize) -> Vec<Fitted> {
         let mut out = Vec::new();
-        for i in (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none()) {
+        let mut parts = current.parts.clone();
+        parts.remove(i);
+        let others = self.jointly(Fitted::unknown(parts));
+        for kind in self.kinds() {
+            let other = self.best(&others, self.within(&others.parts, kind));
+            if other.score() < current.score() + MAX_SCORE_DEFICIT {
+                out.push(self.jointly(other));
+            }
+        }
+        if has_gas(&others.parts) {
+            out.push(others);
+        }
+        if let Some(otherwise) = current.parts[i].otherwise() {
             let mut parts = current.parts.clone();
-            parts.remove(i);
-            let others = self.jointly(Fitted::unknown(parts));
-            for kind in self.kinds() {
-                let other = self.best(&others, self.within(&others.parts, kind));
-                if other.score() < current.score() + MAX_SCORE_DEFICIT {
-                    out.push(self.jointly(other));
-                }
-            }
-            if has_gas(&others.parts) {
-                out.push(others);
-            }
-            if let Some(otherwise) = current.parts[i].otherwise() {
-                let mut parts = current.parts.clone();
-                parts[i] = otherwise;
-                if states(&parts) <= self.room {
-                    out.push(self.jointly(Fitted::unknown(parts)));
-                }
+            parts[i] = otherwise;
+            if states(&parts) <= self.room {
+                out.push(self.jointly(Fitted::unknown(parts)));
             }
         }
         out
@@ -288,13 +295,13 @@ impl Search<'_> {
     /// `current` with the one of `candidates` that explains most beside it.
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
         let others = expected(self.periodogram, &current.parts);
-        let mut begun: Vec<Fitted> = candidates.into_iter().map(|part| self.fit(&[part], &others, 3)).collect();
+        let mut begun: Vec<Fitted> = candidates.into_par_iter().map(|part| self.fit(&[part], &others, 3)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
         begun.truncate(CANDIDATES_FITTED);
         let noise = current.parts.iter().filter_map(Part::noise);
         let of_noise: f64 = noise.map(|factors| self.periodogram.of_factors(factors).0).sum();
-        let added = begun.into_iter().map(|begun| self.fit(&begun.parts, &others, 12));
-        match added.min_by(|a, b| a.score().total_cmp(&b.score())) {
+        let added: Vec<Fitted> = begun.into_par_iter().map(|begun| self.fit(&begun.parts, &others, 12)).collect();
+        match added.into_iter().min_by(|a, b| a.score().total_cmp(&b.score())) {
             Some(added) => Fitted {
                 parts: current.parts.iter().cloned().chain(added.parts).collect(),
                 deviance: added.deviance + of_noise,

@@ -10,7 +10,7 @@ use crate::prior::Term;
 use crate::readings::Readings;
 use crate::rig::Rig;
 use crate::slopes::density_with_slopes;
-use crate::tapered::add_shown;
+use crate::tapered::{Place, add_shown};
 
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
 /// lasts longer the smoother sees all the same.
@@ -48,9 +48,10 @@ pub(crate) struct Periodogram {
     pub(crate) pieces: f64,
     /// The bins' frequencies, from the second on: the first is the level.
     pub(crate) frequency_hz: Vec<f64>,
-    /// Bins that each is the mean of, and half of their width: one and nothing, unless they are pooled.
+    /// Bins that each is the mean of: one, unless they are pooled.
     pub(crate) bins: Vec<f64>,
-    half_hz: Vec<f64>,
+    /// Where they are.
+    places: Vec<Place>,
     /// Two-sided, K²/Hz.
     pub(crate) power: Vec<f64>,
     /// What the noise of each channel adds to it.
@@ -138,7 +139,7 @@ impl Periodogram {
             samples,
             pieces: if count > 1 { worth * count as f64 } else { 1.0 },
             bins: vec![1.0; frequency_hz.len()],
-            half_hz: vec![0.0; frequency_hz.len()],
+            places: frequency_hz.iter().map(|hz| Place::new(*hz, 0.0, period_s)).collect(),
             power: sums.iter().map(|sums| sums[0] * scale).collect(),
             noise,
             disagreement: disagreement.collect(),
@@ -176,7 +177,7 @@ impl Periodogram {
     }
 
     fn add_shown(&self, term: &Term, out: &mut [[f64; 4]]) {
-        add_shown(term, self.samples, self.period_s, [&self.frequency_hz, &self.half_hz], out);
+        add_shown(term, self.samples, self.period_s, &self.places, out);
         for (away_hz, taken_off) in &self.flattened {
             for ((sums, hz), share) in out.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
                 let beyond = density_with_slopes(term, hz + away_hz);
@@ -197,7 +198,9 @@ impl Periodogram {
             |values: &[f64], range: &Range<usize>| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
         let means = |values: &[f64]| ranges.iter().map(|range| mean(values, range)).collect::<Vec<f64>>();
         let bin_hz = 1.0 / (self.samples as f64 * self.period_s);
+        let frequency_hz = means(&self.frequency_hz);
         let half_hz = |range: &Range<usize>| 0.5 * (range.len() - 1) as f64 * bin_hz;
+        let place = |(range, hz): (&Range<usize>, &f64)| Place::new(*hz, half_hz(range), self.period_s);
         let skipped = self.power.len() - self.disagreement.len();
         let seen = ranges.iter().filter(|range| range.start >= skipped).map(|range| {
             let range = range.start - skipped..range.end - skipped;
@@ -205,8 +208,8 @@ impl Periodogram {
             [0, 1].map(|i| part.iter().map(|d| d[i]).sum::<f64>() / part.len() as f64)
         });
         Self {
-            frequency_hz: means(&self.frequency_hz),
-            half_hz: ranges.iter().map(half_hz).collect(),
+            places: ranges.iter().zip(&frequency_hz).map(place).collect(),
+            frequency_hz,
             bins: ranges.iter().map(|range| range.len() as f64).collect(),
             power: means(&self.power),
             noise: [0, 1].map(|i| means(&self.noise[i])),

@@ -11,7 +11,7 @@
 //! b = (¼, 1, ¼)        κ = 1/(2 sin ½θ) − 1/(4 sin θ)
 //! ```
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
@@ -21,8 +21,11 @@ use crate::prior::Term;
 /// critical damping are taken as that far away. Rounding is below 1e-7 with it.
 const MIN_FROM_CRITICAL: f64 = 1e-6;
 /// Least decay of an exponential over a piece: what lasts for twenty pieces shows as what lasts for ever, but for
-/// [`MIN_DECAY`]`/2π` of a bin, by which it is wider. Rounding is below 1e-10 with it.
+/// [`MIN_DECAY`]`/2π` of a bin, by which it is wider. Rounding is below 1e-6 with it: half turns are known within 1e-16, which is 3e-11 of
+/// `0.05/16384`, and slopes go with the third power of that.
 const MIN_DECAY: f64 = 0.05;
+/// Decay over a piece after which nothing is left, `e^−40`.
+const NOTHING_LEFT: f64 = 40.0;
 
 /// One exponential `c e^(λ|t|)` of an autocovariance, with derivatives with respect to the term's numbers.
 struct Exponential {
@@ -68,65 +71,93 @@ fn exponentials(term: &Term) -> Vec<Exponential> {
     }
 }
 
-/// Adds to `out` at each of `frequency_hz` what a piece of `term` shows, K²/Hz, and its derivatives with respect to the
-/// term's numbers.
-///
-/// - `samples`, `period_s`: of the piece
-/// - `half_hz`: half of the width over which the mean is taken at each frequency; a line in it is at least as wide
-pub(crate) fn add_shown(
-    term: &Term,
-    samples: usize,
-    period_s: f64,
-    [frequency_hz, half_hz]: [&[f64]; 2],
-    out: &mut [[f64; 4]],
-) {
+/// A frequency at which a periodogram of samples `Ts` apart is asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    frequency_hz: f64,
+    /// Half of the width over which the mean is taken there; a line in it is at least as wide.
+    half_hz: f64,
+    /// Cosine and sine of `π f Ts`.
+    half_turn: Complex64,
+}
+
+impl Place {
+    pub(crate) fn new(frequency_hz: f64, half_hz: f64, period_s: f64) -> Self {
+        Self { frequency_hz, half_hz, half_turn: Complex64::cis(PI * frequency_hz * period_s) }
+    }
+}
+
+/// Adds to `out` at each of `places` what a piece of `samples`, `period_s` apart, of `term` shows, K²/Hz, and its derivatives
+/// with respect to the term's numbers.
+pub(crate) fn add_shown(term: &Term, samples: usize, period_s: f64, places: &[Place], out: &mut [[f64; 4]]) {
     let n = samples as f64;
+    let taper = Taper::new(n);
     for of in exponentials(term) {
         let line_hz = of.rate.im.abs() / TAU;
-        for ((hz, half_hz), out) in frequency_hz.iter().zip(half_hz).zip(out.iter_mut()) {
-            let least =
-                if (hz - line_hz).abs() <= *half_hz { TAU * half_hz * n * period_s } else { 0.0 }.max(MIN_DECAY);
-            let own = -of.rate.re * period_s * n;
-            let angle = (of.rate.im - TAU * hz) * period_s;
-            let [shown, mut slope] = tapered(n, -own.max(least) / n, angle);
-            out[0] += period_s * (of.variance * (2.0 * shown - 1.0)).re;
-            slope *= 2.0 * of.variance * period_s;
+        let half_turn = Complex64::cis(0.5 * of.rate.im * period_s);
+        let own = -of.rate.re * period_s * n;
+        for (place, out) in places.iter().zip(out.iter_mut()) {
+            let is_here = (place.frequency_hz - line_hz).abs() <= place.half_hz;
+            let least = if is_here { TAU * place.half_hz * n * period_s } else { 0.0 }.max(MIN_DECAY);
+            let decay = own.max(least);
+            let turns = (line_hz.copysign(of.rate.im) - place.frequency_hz) * period_s * n;
+            let [shown, slope] = taper.shown(decay, turns, half_turn * place.half_turn.conj());
+            let (shown, slope) = (2.0 * shown - 1.0, 2.0 * of.variance * period_s * slope);
+            out[0] += period_s * (of.variance * shown).re;
             for i in 0..3 {
                 let by_rate = if own > least { of.rate_by[i] } else { Complex64::new(0.0, of.rate_by[i].im) };
-                out[1 + i] += period_s * (of.variance_by[i] * (2.0 * shown - 1.0) + slope * by_rate).re;
+                out[1 + i] += period_s * (of.variance_by[i] * shown + slope * by_rate).re;
             }
         }
     }
 }
 
-/// `1 − e^(a + ib)` without cancellation.
-fn one_less_exp(real: f64, imaginary: f64) -> Complex64 {
-    let (sine, cosine) = (0.5 * imaginary).sin_cos();
-    let less = real.exp_m1();
-    Complex64::new(2.0 * sine * sine * (1.0 + less) - less, -2.0 * sine * cosine * (1.0 + less))
+/// Hann's taper of `n` samples.
+struct Taper {
+    n: f64,
+    /// `iκ`.
+    ends: Complex64,
+    /// Half of the turns `−θ`, 0 and `θ`.
+    half_turns: [Complex64; 3],
 }
 
-/// `F` and its derivative at `x = real + i imaginary`, for pieces of `n` samples.
-fn tapered(n: f64, real: f64, imaginary: f64) -> [Complex64; 2] {
-    let theta = TAU / n;
-    let kappa = Complex64::new(0.0, 0.5 / (0.5 * theta).sin() - 0.25 / theta.sin());
-    let past = one_less_exp(n * real, n * imaginary);
-    // t_q, D_q and t_q D_q², which is the derivative of D_q.
-    let [before, at, after] = [-1.0, 0.0, 1.0].map(|q: f64| {
-        let less = one_less_exp(real, imaginary + q * theta);
-        let sum = less.inv();
-        [1.0 - less, sum, (1.0 - less) * sum * sum]
-    });
-    let of = |part: [Complex64; 3]| part[1] + 0.25 * (part[0] + part[2]);
-    let sums = of([before[1], at[1], after[1]]);
-    let slopes = of([before[2], at[2], after[2]]);
-    let curvatures = of([before, at, after].map(|[t, sum, slope]| slope * (1.0 + t) * sum));
-    let ends = slopes + kappa * (after[1] - before[1]);
-    let ends_slope = curvatures + kappa * (after[2] - before[2]);
-    let scale = 2.0 / (3.0 * n);
-    let value = n * sums - past * ends;
-    let slope = n * slopes - past * ends_slope + n * (1.0 - past) * ends;
-    [scale * value, scale * slope]
+impl Taper {
+    fn new(n: f64) -> Self {
+        let theta = TAU / n;
+        let ends = Complex64::new(0.0, 0.5 / (0.5 * theta).sin() - 0.25 / theta.sin());
+        Self { n, ends, half_turns: [-0.5, 0.0, 0.5].map(|q| Complex64::cis(q * theta)) }
+    }
+
+    /// `F` and its derivative at `x = (−decay + 2πi turns)/n`, of which half the angle is given as a turn as well.
+    fn shown(&self, decay: f64, turns: f64, half_turn: Complex64) -> [Complex64; 2] {
+        let n = self.n;
+        // 1 − e^(a + ib) = −(e^a − 1) + 2 e^a sin²(b/2) − 2i e^a sin(b/2) cos(b/2), in which nothing cancels.
+        let less = (-decay / n).exp_m1();
+        let one_less = |half: Complex64, less: f64| {
+            Complex64::new(2.0 * half.im * half.im * (1.0 + less) - less, -2.0 * half.im * half.re * (1.0 + less))
+        };
+        let past = if decay > NOTHING_LEFT {
+            Complex64::from(1.0)
+        } else {
+            one_less(Complex64::cis(PI * turns), (-decay).exp_m1())
+        };
+        // t_q, D_q and t_q D_q², which is the derivative of D_q.
+        let [before, at, after] = self.half_turns.map(|own| {
+            let less = one_less(half_turn * own, less);
+            let sum = less.conj() / less.norm_sqr();
+            [1.0 - less, sum, (1.0 - less) * sum * sum]
+        });
+        let of = |part: [Complex64; 3]| part[1] + 0.25 * (part[0] + part[2]);
+        let sums = of([before[1], at[1], after[1]]);
+        let slopes = of([before[2], at[2], after[2]]);
+        let curvatures = of([before, at, after].map(|[t, sum, slope]| slope * (1.0 + t) * sum));
+        let ends = slopes + self.ends * (after[1] - before[1]);
+        let ends_slope = curvatures + self.ends * (after[2] - before[2]);
+        let scale = 2.0 / (3.0 * n);
+        let value = n * sums - past * ends;
+        let slope = n * slopes - past * ends_slope + n * (1.0 - past) * ends;
+        [scale * value, scale * slope]
+    }
 }
 
 #[cfg(test)]
@@ -150,7 +181,7 @@ mod tests {
 
     fn shown(term: &Term, hz: f64) -> [f64; 4] {
         let mut out = [[0.0; 4]];
-        add_shown(term, SAMPLES, PERIOD_S, [&[hz], &[0.0]], &mut out);
+        add_shown(term, SAMPLES, PERIOD_S, &[Place::new(hz, 0.0, PERIOD_S)], &mut out);
         out[0]
     }
 
