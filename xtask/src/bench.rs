@@ -1,6 +1,7 @@
 //! How long a fit and a trial take (Criterion, `benches/fits.rs`), the fits beside the SciPy script that a user would otherwise
 //! write: same record, same cost, same start, same minimum, in one run.
 
+mod smoother;
 mod stream;
 
 use std::fs;
@@ -38,6 +39,9 @@ pub(crate) struct Bench {
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
+    /// Times one pass of filter and smoother over 1e5 samples in place of the fits, beside the same in NumPy.
+    #[arg(long, conflicts_with_all = ["million", "diagnose", "stream"])]
+    smoother: bool,
 }
 
 pub(crate) fn run(arguments: &Bench) -> Result<()> {
@@ -49,6 +53,9 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
     }
     if arguments.stream {
         return stream::run();
+    }
+    if arguments.smoother {
+        return smoother::run();
     }
     let status = Command::new("cargo")
         .args(["bench", "--package", "xtask", "--bench", "fits", "--", "--noplot", "--quiet"])

@@ -60,7 +60,8 @@ impl<const D: usize> Later<D> {
                 let agrees = before.is_some_and(|r| has_settled(&r.weight, &self.weight));
                 agreeing = if agrees { agreeing + 1 } else { 0 };
                 let comes_again = j >= events.start + cycle && stage.kept[j - cycle].gains == kept.gains;
-                recent[j % cycle] = comes_again.then(|| Recent { gains: kept.gains, weight: self.weight });
+                recent[j % cycle] =
+                    if comes_again { Some(Recent { gains: kept.gains, weight: self.weight }) } else { None };
                 pass(kept, gains, &self.pull, &self.weight);
                 self.weight = back.around(&self.weight);
             }

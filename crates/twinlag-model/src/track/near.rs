@@ -49,13 +49,11 @@ impl<'a> Near<'a> {
     fn energy(&self, sample: usize) -> f64 {
         let constant = self.fitted.model.without(self.fitted.model.effects.len() - 1);
         let changed = constant.with(varying::step(self.instants_s[sample]));
-        match &self.piece {
-            Some((observations, selection)) => changed.energy(&self.fitted.theta, observations, selection),
-            None => {
-                let observations = &self.tracker.prepared.observations;
-                changed.fit(&self.fitted.theta, observations, self.tracker.selection, Effort::Look).chi2
-            }
+        if let Some((observations, selection)) = &self.piece {
+            return changed.energy(&self.fitted.theta, observations, selection);
         }
+        let observations = &self.tracker.prepared.observations;
+        changed.fit(&self.fitted.theta, observations, self.tracker.selection, Effort::Look).chi2
     }
 
     /// The likeliest sample `within`, around `from`.
