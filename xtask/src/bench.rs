@@ -2,6 +2,7 @@
 //! write: same record, same cost, same start, same minimum, in one run.
 
 pub(crate) mod scale;
+mod smoother;
 mod stream;
 
 use std::fs;
@@ -40,6 +41,9 @@ pub(crate) struct Bench {
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
+    /// Times one pass of filter and smoother over 1e5 samples in place of the fits, beside the same in NumPy.
+    #[arg(long, conflicts_with_all = ["million", "diagnose", "stream"])]
+    smoother: bool,
     #[command(flatten)]
     long: Long,
     /// One step of `--scale`, in a process of its own.
@@ -90,6 +94,9 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
     }
     if arguments.stream {
         return stream::run();
+    }
+    if arguments.smoother {
+        return smoother::run();
     }
     let status = Command::new("cargo")
         .args(["bench", "--package", "xtask", "--bench", "fits", "--", "--noplot", "--quiet"])

@@ -1,7 +1,6 @@
 //! `twinlag compensate FILE --out OUT.csv`: the gas temperature with its standard deviation.
 
 use twinlag::diagnosis::Verdict;
-use twinlag::record::{Decimals, write_csv};
 use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 
 use crate::arguments::{Compensate, Trust};
@@ -36,10 +35,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =
             [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
-        let mut text = Vec::new();
-        write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
-        text = output::with_column(&text, "grade", &answer.judgement.grade.to_string());
-        output::data(&command.out, to_stdout, &text)?;
+        output::data(&command.out, to_stdout, &columns, ("grade", std::iter::repeat(answer.judgement.grade)))?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
         }

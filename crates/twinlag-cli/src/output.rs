@@ -1,7 +1,10 @@
 //! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
-use std::io::{ErrorKind, Write, stdout};
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
+
+use twinlag::record::{Decimals, write_csv};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -69,29 +72,69 @@ pub(crate) fn check_data(
     Ok(to_stdout)
 }
 
-/// Writes a table of numbers to a file or to standard output.
-pub(crate) fn data(out: &Path, to_stdout: bool, text: &[u8]) -> Result<(), Failure> {
+/// Writes a table of numbers, row by row, to a file or to standard output, with one column more.
+///
+/// - `last`: the name of that column, and its cells
+pub(crate) fn data<T: ToString>(
+    out: &Path,
+    to_stdout: bool,
+    columns: &[(&str, &[f64])],
+    last: (&str, impl Iterator<Item = T>),
+) -> Result<(), Failure> {
+    let cells = std::iter::once(last.0.to_owned()).chain(last.1.map(|cell| cell.to_string()));
+    let written = |out: Box<dyn Write>| {
+        let mut rows = WithCells { out, cells, is_closed: false };
+        write_csv(&mut rows, columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
+        Ok(())
+    };
     if to_stdout {
-        return match stdout().write_all(text) {
-            // The reader has closed the pipe, having read enough.
-            Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(()),
-            written => written.map_err(|e| Failure::Other(format!("standard output: {e}"))),
-        };
+        return written(Box::new(stdout().lock()));
     }
-    write(out, text)
+    let file = File::create(out).map_err(|e| cannot_be_written(out, &e))?;
+    written(Box::new(BufWriter::new(file)))
 }
 
-/// A table of numbers with one column more, the same in each row.
-pub(crate) fn with_column(text: &[u8], name: &str, value: &str) -> Vec<u8> {
-    with_cells(text, name, std::iter::repeat(value))
+/// A table that gets a cell at the end of each row.
+struct WithCells<W, I> {
+    out: W,
+    cells: I,
+    /// Whether the reader has closed the pipe, having read enough.
+    is_closed: bool,
 }
 
-/// A table of numbers with one column more, a cell for each row.
-pub(crate) fn with_cells<T: ToString>(text: &[u8], name: &str, cells: impl IntoIterator<Item = T>) -> Vec<u8> {
-    let text = String::from_utf8_lossy(text);
-    let cells = std::iter::once(name.to_owned()).chain(cells.into_iter().map(|cell| cell.to_string()));
-    let rows = text.lines().zip(cells).map(|(row, cell)| format!("{row},{cell}\n"));
-    rows.collect::<String>().into_bytes()
+impl<W: Write, I: Iterator<Item = String>> WithCells<W, I> {
+    fn write_rows(&mut self, text: &[u8]) -> std::io::Result<()> {
+        for part in text.split_inclusive(|byte| *byte == b'\n') {
+            match part.strip_suffix(b"\n") {
+                Some(row) => {
+                    self.out.write_all(row)?;
+                    writeln!(self.out, ",{}", self.cells.next().unwrap_or_default())?;
+                }
+                None => self.out.write_all(part)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn unless_closed(&mut self, result: std::io::Result<()>) -> std::io::Result<()> {
+        self.is_closed |= result.as_ref().is_err_and(|e| e.kind() == ErrorKind::BrokenPipe);
+        if self.is_closed { Ok(()) } else { result }
+    }
+}
+
+impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
+    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
+        if !self.is_closed {
+            let written = self.write_rows(text);
+            self.unless_closed(written)?;
+        }
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let flushed = self.out.flush();
+        self.unless_closed(flushed)
+    }
 }
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
@@ -113,4 +156,21 @@ pub(crate) fn command_line() -> String {
 
 fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
     Failure::Other(format!("{}: cannot be written: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Text may come in pieces that end anywhere.
+    #[test]
+    fn each_row_gets_its_cell() {
+        let mut out = Vec::new();
+        let cells = ["grade", "go", "no-go"].map(str::to_owned).into_iter();
+        let mut rows = WithCells { out: &mut out, cells, is_closed: false };
+        for piece in ["a,", "b\n1,2\n3", ",4", "\n"] {
+            rows.write_all(piece.as_bytes()).expect("memory");
+        }
+        assert_eq!(String::from_utf8_lossy(&out), "a,b,grade\n1,2,go\n3,4,no-go\n");
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::io::{self, Read};
 use std::ops::ControlFlow;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -12,22 +13,38 @@ use crate::console::Console;
 const LONG: Duration = Duration::from_secs(2);
 
 /// A spinner with the elapsed time. It shows on a terminal only, and disappears when dropped.
-pub(crate) struct Progress(Option<(ProgressBar, Instant)>);
+pub(crate) struct Progress {
+    bar: Option<(ProgressBar, Instant)>,
+    /// What is being done, and since when.
+    task: Mutex<(String, Instant)>,
+}
 
 impl Progress {
     pub(crate) fn start(console: Console, message: String) -> Self {
         if console.quiet {
-            return Self(None);
+            return Self::showing(None);
         }
         let style = ProgressStyle::with_template("{spinner} {msg} {elapsed}").expect("the template is well formed");
         let bar = ProgressBar::new_spinner().with_style(style).with_message(message);
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self(Some((bar, Instant::now())))
+        Self::showing(Some((bar, Instant::now())))
     }
 
-    /// How far a verb has come; it is never cancelled from here.
+    fn showing(bar: Option<(ProgressBar, Instant)>) -> Self {
+        Self { bar, task: Mutex::new((String::new(), Instant::now())) }
+    }
+
+    /// How far a verb has come, with the time that is left of its task, once that has taken two seconds; it is never cancelled
+    /// from here.
     pub(crate) fn watch(&self, task: &str, done: usize, total: usize) -> ControlFlow<()> {
-        self.say(|| format!("{task}: {done} of {total}"));
+        let mut current = self.task.lock().expect("no thread panics");
+        if current.0 != task {
+            *current = (task.to_owned(), Instant::now());
+        }
+        let left = time_left(current.1.elapsed(), done, total)
+            .map(|left| format!(", {} s left", left.as_secs().max(1)))
+            .unwrap_or_default();
+        self.say(|| format!("{task}: {done} of {total}{left}"));
         ControlFlow::Continue(())
     }
 
@@ -38,7 +55,7 @@ impl Progress {
 
     /// Shows how far the work has come, once it has taken two seconds.
     fn say(&self, message: impl Fn() -> String) {
-        if let Some((bar, since)) = &self.0
+        if let Some((bar, since)) = &self.bar
             && since.elapsed() > LONG
         {
             bar.set_message(message());
@@ -69,8 +86,26 @@ impl<R: Read> Read for Counted<'_, R> {
 
 impl Drop for Progress {
     fn drop(&mut self) {
-        if let Some((bar, _)) = &self.0 {
+        if let Some((bar, _)) = &self.bar {
             bar.finish_and_clear();
         }
+    }
+}
+
+/// The time that the rest of a task takes, if it goes on as it did; `None` before that can be said.
+fn time_left(elapsed: Duration, done: usize, total: usize) -> Option<Duration> {
+    let left = total.checked_sub(done).filter(|left| *left > 0 && done > 0 && elapsed > LONG)?;
+    Some(elapsed.mul_f64(left as f64 / done as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rest_takes_as_long_as_what_was_done() {
+        let after = |elapsed_s, done| time_left(Duration::from_secs(elapsed_s), done, 40);
+        assert_eq!(after(30, 10), Some(Duration::from_secs(90)));
+        assert_eq!([after(1, 10), after(30, 0), after(30, 40)], [None; 3]);
     }
 }

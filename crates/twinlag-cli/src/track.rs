@@ -1,6 +1,5 @@
 //! `twinlag track FILE --out OUT.csv`: both time constants along the record.
 
-use twinlag::record::{Decimals, write_csv};
 use twinlag::{Status, TrackOptions};
 
 use crate::arguments::Track;
@@ -42,10 +41,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
             ("tau2_low_s", &two.low_s),
             ("tau2_high_s", &two.high_s),
         ];
-        let mut text = Vec::new();
-        write_csv(&mut text, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
-        text = output::with_cells(&text, "grade", &answer.grades);
-        output::data(&command.out, to_stdout, &text)?;
+        output::data(&command.out, to_stdout, &columns, ("grade", answer.grades.iter()))?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::track_picture(&answer)?)?;
         }

@@ -82,6 +82,13 @@ impl Intensity {
         }
     }
 
+    /// The factors of some of the `readings` that they are of, found by their instants.
+    #[must_use]
+    pub fn of_part(&self, readings: &Readings, part: &Readings) -> Self {
+        let place = |time_s: &f64| readings.time_s().partition_point(|t| t < time_s).min(self.factors.len() - 1);
+        Self { factors: part.time_s().iter().map(|t| self.factors[place(t)]).collect() }
+    }
+
     /// The factors.
     pub fn factors(&self) -> &[f64] {
         &self.factors
@@ -111,7 +118,8 @@ pub fn learn_intensity(readings: &Readings, rig: &Rig, prior: &Prior) -> Result<
     if moves.is_nan() || moves < MIN_MOVES {
         return Ok(None);
     }
-    let span_s = time_s[n - 1] - time_s[0];
+    // Without the time between pieces of a record.
+    let span_s = n as f64 * readings.period_s();
     let worth = worth(readings, rig, prior);
     let of_memory = |moved: f64| (moved * span_s / moves).min(MAX_MEMORY_SHARE * span_s);
     let mut logarithm = vec![0.0; n];

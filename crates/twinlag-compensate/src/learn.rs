@@ -9,6 +9,7 @@ mod holes;
 mod part;
 mod whittle;
 
+use rayon::prelude::*;
 use twinlag_optimise::{Budget, Minimiser, Optimiser, Problem};
 
 use crate::error::CompensateError;
@@ -126,7 +127,8 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let span_s = periodogram.samples as f64 * periodogram.period_s;
     let limits = Limits { swing_k, span_s, period_s: periodogram.period_s };
     let room = MAX_STATES.saturating_sub(states_of(rig, &[])).min(MAX_GAS_STATES);
-    let search = Search { periodogram: &periodogram, limits, room, ask };
+    let pooled = periodogram.pooled();
+    let search = Search { bins: &periodogram, periodogram: &pooled, limits, room, ask };
     let (best, mut others) = search.run();
     let score = best.score();
     let missing = 1.0 - got as f64 / periodogram.all as f64;
@@ -155,6 +157,9 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
 }
 
 struct Search<'a> {
+    /// Where candidates are looked for.
+    bins: &'a Periodogram,
+    /// What they are fitted to.
     periodogram: &'a Periodogram,
     limits: Limits,
     /// States that the gas may have.
@@ -240,26 +245,32 @@ impl Search<'_> {
     /// `current` with one part left out, or one of each kind in its place, or a comb that ends
     /// elsewhere.
     fn exchanged(&self, current: &Fitted) -> Vec<Fitted> {
+        let gas = (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none());
+        let others: Vec<Vec<Fitted>> =
+            gas.collect::<Vec<usize>>().into_par_iter().map(|i| self.without(current, i)).collect();
+        others.concat()
+    }
+
+    /// `current` without part `i`, or with others in its place.
+    fn without(&self, current: &Fitted, i: usize) -> Vec<Fitted> {
         let mut out = Vec::new();
-        for i in (0..current.parts.len()).filter(|i| current.parts[*i].noise().is_none()) {
+        let mut parts = current.parts.clone();
+        parts.remove(i);
+        let others = self.jointly(Fitted::unknown(parts));
+        for kind in self.kinds() {
+            let other = self.best(&others, self.within(&others.parts, kind));
+            if other.score() < current.score() + MAX_SCORE_DEFICIT {
+                out.push(self.jointly(other));
+            }
+        }
+        if has_gas(&others.parts) {
+            out.push(others);
+        }
+        if let Some(otherwise) = current.parts[i].otherwise() {
             let mut parts = current.parts.clone();
-            parts.remove(i);
-            let others = self.jointly(Fitted::unknown(parts));
-            for kind in self.kinds() {
-                let other = self.best(&others, self.within(&others.parts, kind));
-                if other.score() < current.score() + MAX_SCORE_DEFICIT {
-                    out.push(self.jointly(other));
-                }
-            }
-            if has_gas(&others.parts) {
-                out.push(others);
-            }
-            if let Some(otherwise) = current.parts[i].otherwise() {
-                let mut parts = current.parts.clone();
-                parts[i] = otherwise;
-                if states(&parts) <= self.room {
-                    out.push(self.jointly(Fitted::unknown(parts)));
-                }
+            parts[i] = otherwise;
+            if states(&parts) <= self.room {
+                out.push(self.jointly(Fitted::unknown(parts)));
             }
         }
         out
@@ -283,14 +294,14 @@ impl Search<'_> {
 
     /// `current` with the one of `candidates` that explains most beside it.
     fn best(&self, current: &Fitted, candidates: Vec<Part>) -> Fitted {
-        let others = self.expected(&current.parts);
-        let mut begun: Vec<Fitted> = candidates.into_iter().map(|part| self.fit(&[part], &others, 3)).collect();
+        let others = expected(self.periodogram, &current.parts);
+        let mut begun: Vec<Fitted> = candidates.into_par_iter().map(|part| self.fit(&[part], &others, 3)).collect();
         begun.sort_by(|a, b| a.score().total_cmp(&b.score()));
         begun.truncate(CANDIDATES_FITTED);
         let noise = current.parts.iter().filter_map(Part::noise);
         let of_noise: f64 = noise.map(|factors| self.periodogram.of_factors(factors).0).sum();
-        let added = begun.into_iter().map(|begun| self.fit(&begun.parts, &others, 12));
-        match added.min_by(|a, b| a.score().total_cmp(&b.score())) {
+        let added: Vec<Fitted> = begun.into_par_iter().map(|begun| self.fit(&begun.parts, &others, 12)).collect();
+        match added.into_iter().min_by(|a, b| a.score().total_cmp(&b.score())) {
             Some(added) => Fitted {
                 parts: current.parts.iter().cloned().chain(added.parts).collect(),
                 deviance: added.deviance + of_noise,
@@ -343,8 +354,8 @@ impl Search<'_> {
     /// What might be added to `current`, where there is most above what is expected: a line, a
     /// band, a broad process, a comb.
     fn more(&self, current: &Fitted) -> Vec<Part> {
-        let p = self.periodogram;
-        let expected = self.expected(&current.parts);
+        let p = self.bins;
+        let expected = expected(p, &current.parts);
         let ratio: Vec<f64> = p.power.iter().zip(&expected).map(|(i, e)| i / e).collect();
         let excess_k = |j: usize, half: usize| {
             let range = j.saturating_sub(half)..(j + half + 1).min(ratio.len());
@@ -378,7 +389,7 @@ impl Search<'_> {
     fn combs(&self, ratio: &[f64], excess_k: impl Fn(usize, usize) -> f64) -> Vec<Part> {
         let gain = |j: usize| {
             let r = ratio[j];
-            if r > 1.0 { self.periodogram.pieces * (r - 1.0 - r.ln()) } else { 0.0 }
+            if r > 1.0 { self.bins.pieces * (r - 1.0 - r.ln()) } else { 0.0 }
         };
         // Bins count from the second one; a quarter of a bin of the highest harmonic is the step.
         let bins = ratio.len() as f64;
@@ -408,18 +419,9 @@ impl Search<'_> {
         [false, true].map(|goes_on| Part::Comb { frequency_hz, width_hz, std_k: std_k.clone(), goes_on }).to_vec()
     }
 
-    fn expected(&self, parts: &[Part]) -> Vec<f64> {
-        let mut out = self.beside(parts);
-        out.iter_mut().zip(self.periodogram.of_parts(parts)).for_each(|(sum, p)| *sum += p);
-        out
-    }
-
     /// What is expected beside `parts`: noise, unless that is one of them.
     fn beside(&self, parts: &[Part]) -> Vec<f64> {
-        if parts.iter().any(|part| part.noise().is_some()) {
-            return vec![0.0; self.periodogram.power.len()];
-        }
-        self.periodogram.of_noise([1.0; 2])
+        beside(self.periodogram, parts)
     }
 
     /// The numbers of `parts` that are likeliest beside `others`.
@@ -440,6 +442,20 @@ impl Search<'_> {
             None => Fitted::unknown(parts.to_vec()),
         }
     }
+}
+
+/// What is expected of `parts` and everything else.
+fn expected(periodogram: &Periodogram, parts: &[Part]) -> Vec<f64> {
+    let mut out = beside(periodogram, parts);
+    out.iter_mut().zip(periodogram.of_parts(parts)).for_each(|(sum, p)| *sum += p);
+    out
+}
+
+fn beside(periodogram: &Periodogram, parts: &[Part]) -> Vec<f64> {
+    if parts.iter().any(|part| part.noise().is_some()) {
+        return vec![0.0; periodogram.power.len()];
+    }
+    periodogram.of_noise([1.0; 2])
 }
 
 /// The one of `all` with the least score.

@@ -70,6 +70,8 @@ mod spectrum;
 mod stream;
 mod system;
 #[cfg(feature = "std")]
+mod tapered;
+#[cfg(feature = "std")]
 mod tracker;
 
 #[cfg(feature = "std")]

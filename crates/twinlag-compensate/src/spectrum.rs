@@ -1,15 +1,16 @@
 //! The power of the gas as both readings together show it, and what a gas of known spectrum would
 //! show.
 
-use std::f64::consts::TAU;
+use std::ops::Range;
 
 use num_complex::Complex64;
-use twinlag_transform::{Forward, Inverse, Tapered, fast_length, hann};
+use twinlag_transform::{Tapered, fast_length, hann};
 
 use crate::prior::Term;
 use crate::readings::Readings;
 use crate::rig::Rig;
-use crate::slopes::{Direction, add_autocovariance_slope, density_slope};
+use crate::slopes::density_with_slopes;
+use crate::tapered::{Place, add_shown};
 
 /// Longest piece of a record that is transformed at once: the cost of a fit grows with it, and what
 /// lasts longer the smoother sees all the same.
@@ -23,8 +24,14 @@ const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 /// As many of them each way where the gas is taken to end at half the sampling rate: beyond, noise that
 /// falls as `1/f²` has a twelfth of what it has above that rate.
 const ENDING_FOLDS: i32 = 6;
-/// Distance from critical damping below which both exponentials of a resonance cancel.
-const NEARLY_CRITICAL_ETA: f64 = 1e-3;
+/// Pieces that the mean is of, at most; of longer records they are evenly apart. They determine the power in a pool of `b` bins
+/// within `√(1.9/(64 b))` of it: 2 % of its square root where there is one line, a hundredth of that in what is wide, so that the
+/// numbers of a prior move its bands by less than a thousandth.
+const MAX_PIECES: usize = 64;
+/// Width of a pool of bins as a share of their frequency.
+const POOL_SHARE: f64 = 1.0 / 128.0;
+/// Records of nothing but chance in one of which a pool is taken apart.
+const CHANCE_RECORDS: f64 = 20.0;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
 const OVERLAPPING_WORTH: f64 = 0.947;
 
@@ -41,6 +48,10 @@ pub(crate) struct Periodogram {
     pub(crate) pieces: f64,
     /// The bins' frequencies, from the second on: the first is the level.
     pub(crate) frequency_hz: Vec<f64>,
+    /// Bins that each is the mean of: one, unless they are pooled.
+    pub(crate) bins: Vec<f64>,
+    /// Where they are.
+    places: Vec<Place>,
     /// Two-sided, K²/Hz.
     pub(crate) power: Vec<f64>,
     /// What the noise of each channel adds to it.
@@ -52,10 +63,6 @@ pub(crate) struct Periodogram {
     /// The part of the folded-back power that the sensors remove, in each bin, by multiples of the
     /// sampling frequency.
     flattened: Vec<(f64, Vec<f64>)>,
-    /// Autocorrelation of the taper.
-    taper: Vec<f64>,
-    /// The transform of twice the length.
-    plan: Forward,
 }
 
 /// Hann's taper, of unit energy.
@@ -75,20 +82,13 @@ impl Periodogram {
     /// - `max_piece_samples`: the longest piece that is transformed at once
     pub(crate) fn of(readings: &Readings, rig: &Rig, level_c: f64, max_piece_samples: usize) -> Self {
         let period_s = readings.period_s();
-        let first_s = readings.time_s()[0];
-        let span_s = readings.time_s()[readings.len() - 1] - first_s;
+        let span_s = readings.time_s()[readings.len() - 1] - readings.time_s()[0];
         let all = (span_s / period_s).round() as usize + 1;
-        let even = [0, 1].map(|i| on_grid(readings, i, first_s, period_s, all));
         let count = if all > max_piece_samples { 2 * all.div_ceil(max_piece_samples) - 1 } else { 1 };
         let samples = fast_length(2 * all / (count + 1));
+        let (count, worth) = if count > MAX_PIECES { (MAX_PIECES, 1.0) } else { (count, OVERLAPPING_WORTH) };
         let tapered = Tapered::new(taper(samples));
-        let transform = |values: &[f64]| tapered.transform(values.iter().map(|y| y - level_c));
-        let pieces: Vec<[Vec<Complex64>; 2]> = (0..count)
-            .map(|k| k * (all - samples) / count.saturating_sub(1).max(1))
-            .map(|from| [0, 1].map(|i| transform(&even[i][from..from + samples])))
-            .collect();
-        let bins = 1..samples.div_ceil(2);
-        let frequency_hz: Vec<f64> = bins.clone().map(|j| j as f64 / (samples as f64 * period_s)).collect();
+        let frequency_hz: Vec<f64> = (1..samples.div_ceil(2)).map(|j| j as f64 / (samples as f64 * period_s)).collect();
         let weights_at = |hz: f64| rig.sensors.map(|s| s.response(hz).conj() / s.noise_density_k2_per_hz(hz, period_s));
         let seen = |hz: f64, weights: &[Complex64; 2]| -> Complex64 {
             weights.iter().zip(&rig.sensors).map(|(w, s)| w * s.response(hz)).sum()
@@ -101,13 +101,6 @@ impl Periodogram {
             };
             (away_hz, frequency_hz.iter().map(taken_off).collect())
         });
-        let power = bins.zip(&frequency_hz).map(|(j, &hz)| {
-            let weights = weights_at(hz);
-            let information = seen(hz, &weights).re;
-            let of = |piece: &[Vec<Complex64>; 2]| (weights[0] * piece[0][j] + weights[1] * piece[1][j]).norm_sqr();
-            pieces.iter().map(of).sum::<f64>() / (information * information * count as f64) * period_s
-        });
-        let power = power.collect();
         let noise = [0, 1].map(|i| {
             let of = |hz: &f64| {
                 let weights = weights_at(*hz);
@@ -116,20 +109,43 @@ impl Periodogram {
             };
             frequency_hz.iter().map(of).collect()
         });
-        let disagreement = frequency_hz.iter().enumerate().skip(frequency_hz.len() / 8).map(|(k, &hz)| {
-            let [h1, h2] = rig.sensors.map(|s| s.response(hz));
-            let [n1, n2] = rig.sensors.map(|s| s.noise_density_k2_per_hz(hz, period_s));
+        // What both readings say together, and what they do not: their weights in each, in every bin.
+        let weights = |hz: &f64| {
+            let weights = weights_at(*hz);
+            let information = seen(*hz, &weights).re;
+            let [h1, h2] = rig.sensors.map(|s| s.response(*hz));
+            let [n1, n2] = rig.sensors.map(|s| s.noise_density_k2_per_hz(*hz, period_s));
             let [first, second] = [h2.norm_sqr() * n1, h1.norm_sqr() * n2];
-            let of = |piece: &[Vec<Complex64>; 2]| (h2 * piece[0][k + 1] - h1 * piece[1][k + 1]).norm_sqr();
-            let power = pieces.iter().map(of).sum::<f64>() / count as f64 * period_s;
-            [power / (first + second), first / (first + second)]
-        });
-        let disagreement = disagreement.collect();
-        let taper = autocorrelation(tapered.taper());
-        let plan = Forward::of(2 * samples);
-        let pieces = if count > 1 { OVERLAPPING_WORTH * count as f64 } else { 1.0 };
-        let flattened = flattened.to_vec();
-        Self { period_s, all, samples, pieces, frequency_hz, power, noise, disagreement, flattened, taper, plan }
+            let all = first + second;
+            ([weights.map(|w| w / information), [h2 / all.sqrt(), -h1 / all.sqrt()]], first / all)
+        };
+        let weights: Vec<([[Complex64; 2]; 2], f64)> = frequency_hz.iter().map(weights).collect();
+        let mut sums = vec![[0.0; 2]; weights.len()];
+        for k in 0..count {
+            let from = k * (all - samples) / (count - 1).max(1);
+            let grid = [0, 1].map(|i| on_grid(readings, i, period_s, from..from + samples));
+            let [one, two] = grid.map(|values| tapered.transform(values.iter().map(|y| y - level_c)));
+            for (j, ((sums, (weights, _)), one)) in (1..).zip(sums.iter_mut().zip(&weights).zip(&one[1..])) {
+                let of = |[first, second]: [Complex64; 2]| (first * one + second * two[j]).norm_sqr();
+                [0, 1].into_iter().for_each(|i| sums[i] += of(weights[i]));
+            }
+        }
+        let scale = period_s / count as f64;
+        let skipped = weights.len() / 8;
+        let disagreement = sums.iter().zip(&weights).skip(skipped).map(|(sums, (_, first))| [sums[1] * scale, *first]);
+        Self {
+            period_s,
+            all,
+            samples,
+            pieces: if count > 1 { worth * count as f64 } else { 1.0 },
+            bins: vec![1.0; frequency_hz.len()],
+            places: frequency_hz.iter().map(|hz| Place::new(*hz, 0.0, period_s)).collect(),
+            power: sums.iter().map(|sums| sums[0] * scale).collect(),
+            noise,
+            disagreement: disagreement.collect(),
+            flattened: flattened.to_vec(),
+            frequency_hz,
+        }
     }
 
     /// The periodogram as it would have come of a gas that does not move faster than half the sampling
@@ -142,118 +158,110 @@ impl Periodogram {
         Self { flattened: flattened.collect(), ..self.clone() }
     }
 
-    /// What the periodogram of a gas with these terms is expected to be:
-    /// `Ts Σ_m r(m Ts) a(m) exp(−2πi f m Ts)`, `a` the taper's autocorrelation, which is exact for
-    /// a record of any length (Sykulski et al. 2019). That is the gas as if it were sampled itself;
-    /// what it has above the sampling folds back through sensors that have flattened it, so
-    /// `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)` comes off, `G` what both sensors together make
-    /// of the gas.
+    /// What the periodogram of a gas with these terms is expected to be: what its pieces show of the gas as if it were
+    /// sampled itself, which is exact for pieces of any length (Sykulski et al. 2019). What the gas has above the sampling folds
+    /// back through sensors that have flattened it, so `Σ_k S(f + k/Ts) (1 − |G(f + k/Ts)/G(f)|²)` comes off, `G` what both
+    /// sensors together make of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
-        let mut expected = self.expected_signed(terms);
-        expected.iter_mut().for_each(|sum| *sum = sum.max(0.0));
-        expected
+        let mut out = vec![[0.0; 4]; self.power.len()];
+        terms.iter().for_each(|term| self.add_shown(term, &mut out));
+        out.into_iter().map(|[sum, ..]| sum.max(0.0)).collect()
     }
 
-    /// As [`Periodogram::expected`], below zero where what folds back is more than there is.
-    pub(crate) fn expected_signed(&self, terms: &[Term]) -> Vec<f64> {
-        let mut out = self.tapered(|lags| terms.iter().for_each(|term| add_autocovariances(term, self.period_s, lags)));
-        for term in terms {
-            self.take_off_beyond(|hz| term.density_k2_per_hz(hz), &mut out);
-        }
+    /// What `term` adds to what is expected, below zero where what folds back is more than there is, and the derivatives of
+    /// that with respect to its numbers.
+    pub(crate) fn shown(&self, term: &Term) -> Vec<[f64; 4]> {
+        let mut out = vec![[0.0; 4]; self.power.len()];
+        self.add_shown(term, &mut out);
         out
     }
 
-    /// How fast [`Periodogram::expected_signed`] changes where the numbers of terms change at these rates.
-    pub(crate) fn expected_slope(&self, directions: &[Direction]) -> Vec<f64> {
-        let add = |lags: &mut [f64]| directions.iter().for_each(|by| add_autocovariance_slope(by, self.period_s, lags));
-        let mut out = self.tapered(add);
-        for by in directions {
-            self.take_off_beyond(|hz| density_slope(by, hz), &mut out);
-        }
-        out
-    }
-
-    /// What a periodogram shows of an autocovariance, which `add` adds at multiples of the period.
-    fn tapered(&self, add: impl Fn(&mut [f64])) -> Vec<f64> {
-        let n = self.samples;
-        let mut input = vec![0.0; 2 * n];
-        add(&mut input[..n]);
-        input.iter_mut().zip(&self.taper).for_each(|(r, a)| *r *= a);
-        let (lags, mirrored) = input.split_at_mut(n);
-        mirrored[1..].iter_mut().rev().zip(&lags[1..]).for_each(|(to, from)| *to = *from);
-        let out = self.plan.transform(&input);
-        (1..=self.frequency_hz.len()).map(|j| out[2 * j].re * self.period_s).collect()
-    }
-
-    /// Takes off what sensors flatten of a density beyond the sampling.
-    fn take_off_beyond(&self, density: impl Fn(f64) -> f64, out: &mut [f64]) {
+    fn add_shown(&self, term: &Term, out: &mut [[f64; 4]]) {
+        add_shown(term, self.samples, self.period_s, &self.places, out);
         for (away_hz, taken_off) in &self.flattened {
-            for ((sum, hz), share) in out.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
-                *sum -= share * density(hz + away_hz);
+            for ((sums, hz), share) in out.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
+                let beyond = density_with_slopes(term, hz + away_hz);
+                sums.iter_mut().zip(beyond).for_each(|(sum, part)| *sum -= share * part);
             }
         }
     }
+
+    /// This periodogram in pools of neighbouring bins, a [`POOL_SHARE`] of their frequency wide, for a search.
+    ///
+    /// A pool of `b` bins with the mean `Ī` of power has the likelihood of its bins, `−b (ln P + Ī/P)`, if what is expected, `P`,
+    /// is the same for all. For the power at their middle this is so but for `p² `[`POOL_SHARE`]`²/24` of it where spectra go as
+    /// `f^p`: 2e-5 at `p = 3`. Where one bin stands out more than chance explains once in [`CHANCE_RECORDS`] records, there may be
+    /// a line, and bins stay by themselves.
+    pub(crate) fn pooled(&self) -> Self {
+        let ranges = self.pools();
+        let mean =
+            |values: &[f64], range: &Range<usize>| values[range.clone()].iter().sum::<f64>() / range.len() as f64;
+        let means = |values: &[f64]| ranges.iter().map(|range| mean(values, range)).collect::<Vec<f64>>();
+        let bin_hz = 1.0 / (self.samples as f64 * self.period_s);
+        let frequency_hz = means(&self.frequency_hz);
+        let half_hz = |range: &Range<usize>| 0.5 * (range.len() - 1) as f64 * bin_hz;
+        let place = |(range, hz): (&Range<usize>, &f64)| Place::new(*hz, half_hz(range), self.period_s);
+        let skipped = self.power.len() - self.disagreement.len();
+        let seen = ranges.iter().filter(|range| range.start >= skipped).map(|range| {
+            let range = range.start - skipped..range.end - skipped;
+            let part = &self.disagreement[range];
+            [0, 1].map(|i| part.iter().map(|d| d[i]).sum::<f64>() / part.len() as f64)
+        });
+        Self {
+            places: ranges.iter().zip(&frequency_hz).map(place).collect(),
+            frequency_hz,
+            bins: ranges.iter().map(|range| range.len() as f64).collect(),
+            power: means(&self.power),
+            noise: [0, 1].map(|i| means(&self.noise[i])),
+            disagreement: seen.collect(),
+            flattened: self.flattened.iter().map(|(away_hz, share)| (*away_hz, means(share))).collect(),
+            ..*self
+        }
+    }
+
+    /// Neighbouring bins that go together.
+    fn pools(&self) -> Vec<Range<usize>> {
+        let unlikely = (self.power.len() as f64 * CHANCE_RECORDS).ln() / self.pieces;
+        let mut out = Vec::new();
+        let mut from = 0;
+        while from < self.power.len() {
+            let to = (from + 1 + (from as f64 * POOL_SHARE) as usize).min(self.power.len());
+            let bins = &self.power[from..to];
+            let mean = bins.iter().sum::<f64>() / bins.len() as f64;
+            // Chernoff's bound of the mean of exponential variables.
+            let stands_out = |power: &f64| power / mean - 1.0 - (power / mean).ln() > unlikely;
+            if bins.iter().any(stands_out) {
+                out.extend((from..to).map(|j| j..j + 1));
+            } else {
+                out.push(from..to);
+            }
+            from = to;
+        }
+        out
+    }
 }
 
-/// Adds to `out` what [`Term::autocovariance_k2`] gives at multiples of `period_s`: real and
-/// complex exponentials, each a product of the one before.
-fn add_autocovariances(term: &Term, period_s: f64, out: &mut [f64]) {
-    let mut add = |start: Complex64, rate: Complex64| {
-        let factor = (rate * period_s).exp();
-        let mut value = start;
-        for sum in &mut *out {
-            *sum += value.re;
-            value *= factor;
+/// Some readings of an even grid of steps of `period_s` from the first instant on, with straight lines between those that there
+/// are.
+fn on_grid(readings: &Readings, channel: usize, period_s: f64, instants: Range<usize>) -> Vec<f64> {
+    let time_s = readings.time_s();
+    let place = |k: usize| (time_s[k] - time_s[0]) / period_s;
+    let known = |k: usize| Some((place(k), readings.reading_c(channel, k)?));
+    let first = time_s.partition_point(|t| (t - time_s[0]) / period_s < instants.start as f64);
+    let mut before = (0..first).rev().find_map(known);
+    let mut rest = (first..time_s.len()).filter_map(known).peekable();
+    let of = |j: usize| {
+        let at = j as f64;
+        while let Some(passed) = rest.next_if(|(place, _)| *place < at) {
+            before = Some(passed);
+        }
+        match (before, rest.peek()) {
+            (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (at - a.0) / (b.0 - a.0),
+            (Some((_, only)), None) | (None, Some(&(_, only))) => only,
+            (None, None) => 0.0,
         }
     };
-    let real = |re: f64| Complex64::new(re, 0.0);
-    match *term {
-        Term::Rough { std_k, corner_hz } => add(real(std_k * std_k), real(-TAU * corner_hz)),
-        Term::Resonance { std_k, frequency_hz, quality } => {
-            let (rate, half) = (TAU * frequency_hz, 0.5 / quality);
-            let square = 1.0 - half * half;
-            let eta = square.abs().sqrt();
-            let variance = std_k * std_k;
-            if eta < NEARLY_CRITICAL_ETA {
-                let at = (0..out.len()).map(|m| term.autocovariance_k2(m as f64 * period_s));
-                out.iter_mut().zip(at).for_each(|(sum, r)| *sum += r);
-            } else if square > 0.0 {
-                add(variance * Complex64::new(1.0, -half / eta), rate * Complex64::new(-half, eta));
-            } else {
-                add(real(0.5 * variance * (1.0 + half / eta)), real((eta - half) * rate));
-                add(real(0.5 * variance * (1.0 - half / eta)), real(-(eta + half) * rate));
-            }
-        }
-    }
-}
-
-fn autocorrelation(window: &[f64]) -> Vec<f64> {
-    let n = window.len();
-    let mut spectrum = Forward::of(2 * n).transform(window);
-    spectrum.iter_mut().for_each(|s| *s = Complex64::new(s.norm_sqr() / (2 * n) as f64, 0.0));
-    let mut out = Inverse::of(2 * n).transform(spectrum);
-    out.truncate(n);
-    out
-}
-
-fn on_grid(readings: &Readings, channel: usize, first_s: f64, period_s: f64, samples: usize) -> Vec<f64> {
-    let known: Vec<(f64, f64)> = (0..readings.len())
-        .filter_map(|k| Some(((readings.time_s()[k] - first_s) / period_s, readings.reading_c(channel, k)?)))
-        .collect();
-    let mut next = 0;
-    (0..samples)
-        .map(|j| {
-            let at = j as f64;
-            while next < known.len() && known[next].0 < at {
-                next += 1;
-            }
-            match (next.checked_sub(1).and_then(|k| known.get(k)), known.get(next)) {
-                (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (at - a.0) / (b.0 - a.0),
-                (Some(only), None) | (None, Some(only)) => only.1,
-                (None, None) => 0.0,
-            }
-        })
-        .collect()
+    instants.map(of).collect()
 }
 
 /// Frequencies, Hz, and two-sided spectral densities, K²/Hz, of `values` that are read every
@@ -273,29 +281,4 @@ pub fn power_spectrum(values: &[f64], period_s: f64) -> (Vec<f64>, Vec<f64>) {
         from = to;
     }
     (hz, density)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// 20 000 products of 2⁻⁵³ each.
-    #[test]
-    fn products_are_the_autocovariances() {
-        let resonance = |quality| Term::Resonance { std_k: 3.0, frequency_hz: 5.0, quality };
-        for term in [
-            Term::Rough { std_k: 3.0, corner_hz: 2.0 },
-            resonance(0.3),
-            resonance(0.5),
-            resonance(0.8),
-            resonance(50.0),
-        ] {
-            let mut got = vec![0.0; 20_000];
-            add_autocovariances(&term, 0.001, &mut got);
-            for (m, got) in got.iter().enumerate() {
-                let want = term.autocovariance_k2(m as f64 * 0.001);
-                assert!((got - want).abs() < 9.0 * 20_000.0 * f64::EPSILON, "{term:?} at {m}: {got}, want {want}");
-            }
-        }
-    }
 }

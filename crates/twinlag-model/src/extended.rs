@@ -47,6 +47,17 @@ impl Extended {
         Self { model: fitted.model.clone(), theta: fitted.theta.clone(), observations }
     }
 
+    /// The same model with pieces of the record, as [`Observations::excerpt`] takes them.
+    #[must_use]
+    pub fn excerpt(&self, starts: impl Iterator<Item = usize>, length: usize) -> Self {
+        Self { observations: Arc::new(self.observations.excerpt(starts, length)), ..self.clone() }
+    }
+
+    /// Number of samples of the record.
+    pub fn samples(&self) -> usize {
+        self.observations.samples()
+    }
+
     /// Each effect with its channel and the names of its parameters.
     fn seats(&self) -> impl Iterator<Item = (Identifier, Option<usize>, Vec<&str>)> {
         let names = |e: &Shared| e.parameters().iter().map(|p| p.name).collect();

@@ -201,9 +201,6 @@ impl Observations {
                 break;
             }
         }
-        if stretches.is_empty() {
-            return self.clone();
-        }
-        Self { stretches, period_s: self.period_s, swing_k: self.swing_k, flow: self.flow.clone() }
+        if stretches.is_empty() { self.clone() } else { Self { stretches, flow: self.flow.clone(), ..*self } }
     }
 }

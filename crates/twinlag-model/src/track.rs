@@ -1,5 +1,10 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
+mod near;
+mod scan;
+
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -15,6 +20,8 @@ use crate::prepare::Prepared;
 use crate::selection::Selection;
 use crate::settings::{Settings, Watch, report};
 use crate::summary::summarise;
+use near::Near;
+use scan::Scan;
 
 /// Fewest coefficients of the shared change.
 const LEAST_COEFFICIENTS: usize = 3;
@@ -23,11 +30,9 @@ const LEAST_CURVATURE: f64 = 0.25;
 const CURVATURES: i32 = 12;
 /// A strength this much less likely than the best, in `−2 ln L`, ends the search.
 const HOPELESS_DEVIANCE: f64 = 20.0;
-/// Instants at which a step is looked for, and times that the best is looked around.
-const STEP_INSTANTS: usize = 40;
-const STEP_ROUNDS: usize = 4;
-/// Halvings by which the ends of its interval are found.
-const INTERVAL_HALVINGS: usize = 5;
+/// Times that a step is looked for where the one before was found, and the largest share by which parameters move in one of them.
+const STEP_ROUNDS: usize = 6;
+const LARGEST_MOVE: f64 = 0.5;
 /// Share of the record at either end in which a step is not distinguished from a slope of the
 /// start.
 const STEP_MARGIN_SHARE: f64 = 0.05;
@@ -240,63 +245,57 @@ impl Tracker<'_> {
 
     /// The step that takes most off, and the fit with it.
     fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, ModelError> {
+        let time_s: Vec<f64> =
+            self.prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
         let [first_s, last_s] = self.prepared.observations.ends_s();
-        let span_s = last_s - first_s;
-        let mut from_s = first_s + STEP_MARGIN_SHARE * span_s;
-        let mut apart_s = (1.0 - 2.0 * STEP_MARGIN_SHARE) * span_s / (STEP_INSTANTS - 1) as f64;
-        let mut tried: Vec<(f64, Fitted)> = Vec::new();
+        let margin_s = STEP_MARGIN_SHARE * (last_s - first_s);
+        let place = |t: f64| time_s.partition_point(|time_s| *time_s < t);
+        let within = place(first_s + margin_s)..place(last_s - margin_s);
+        let (mut theta, mut change, mut sample) = (constant.theta.clone(), 0.0, usize::MAX);
         for round in 0..STEP_ROUNDS {
             report(watch, "steps", round, STEP_ROUNDS)?;
-            let instants: Vec<f64> = (0..STEP_INSTANTS).map(|k| from_s + k as f64 * apart_s).collect();
-            for at_s in instants.into_iter().filter(|t| *t > first_s && *t < last_s) {
-                tried.push((at_s, self.fit(constant, varying::step(at_s), &[0.0], Effort::Look)));
+            let Some(scan) = self.scan(constant, &theta, change, within.clone()) else { return Ok(None) };
+            let (likeliest, _, by) = &scan.best;
+            let largest = change + by[theta.len()];
+            for (theta, by) in theta.iter_mut().zip(by) {
+                *theta += by.clamp(-LARGEST_MOVE * theta.abs(), LARGEST_MOVE * theta.abs());
             }
-            let Some(best) = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2)) else { return Ok(None) };
-            let best_s = best.0;
-            from_s = best_s - apart_s;
-            apart_s *= 2.0 / (STEP_INSTANTS - 1) as f64;
-            if apart_s < 0.25 * self.prepared.context.step_s {
+            change =
+                largest.clamp((1.0 - LARGEST_MOVE) * (1.0 + change) - 1.0, (1.0 + LARGEST_MOVE) * (1.0 + change) - 1.0);
+            if std::mem::replace(&mut sample, *likeliest) == *likeliest {
                 break;
             }
         }
-        let best = tried.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2));
-        let Some((at_s, looked)) = best.cloned() else { return Ok(None) };
-        let fitted = self.fit(constant, varying::step(at_s), &[looked.theta[constant.theta.len()]], Effort::Finish);
+        let from = Fitted { theta, ..constant.clone() };
+        // Between two samples, where it is, there is nothing to see.
+        let instants_s: Vec<f64> = (0..time_s.len()).map(|k| 0.5 * (time_s[k.max(1) - 1] + time_s[k])).collect();
+        let fit = |sample: usize, effort| self.fit(&from, varying::step(instants_s[sample]), &[change], effort);
+        let looked = fit(sample, Effort::Look);
+        let near = Near::of(self, &looked, sample, &instants_s);
+        let at = near.likeliest(sample, &within);
+        let fitted = fit(at, Effort::Finish);
         let limit = INSTANT_95 * fitted.mean_energy().max(1.0);
+        let n = constant.theta.len();
+        let Some(scan) = self.scan(constant, &fitted.theta[..n], fitted.theta[n], within) else { return Ok(None) };
         let half_s = 0.5 * self.prepared.context.step_s;
-        // All instants that are as likely, also those that others lie before, and from the best one on until none is.
-        let within = tried.iter().filter(|t| t.1.chi2 - looked.chi2 < limit).map(|t| t.0);
-        let ends = [-1.0, 1.0].map(|sign| self.farthest(constant, &fitted, at_s, sign, limit));
-        let [low, high] = within.chain(ends).fold([at_s, at_s], |[low, high], t| [low.min(t), high.max(t)]);
+        let [low, high] = near.interval(at, &scan, limit);
         let point = ChangePoint {
-            at_s,
-            interval_95_s: [low - half_s, high + half_s],
-            factor: 1.0 + fitted.theta[constant.theta.len()],
+            at_s: instants_s[at],
+            interval_95_s: [instants_s[low] - half_s, instants_s[high] + half_s],
+            factor: 1.0 + fitted.theta[n],
             evidence: score(constant, 0.0) - score(&fitted, 0.0),
         };
         Ok(Some((point, fitted)))
     }
 
-    /// The last instant before or after `at_s` up to which a step takes as much off as the `best` one, but for `limit`.
-    fn farthest(&self, constant: &Fitted, best: &Fitted, at_s: f64, sign: f64, limit: f64) -> f64 {
-        let [first_s, last_s] = self.prepared.observations.ends_s();
-        let n = constant.theta.len();
-        let from = Fitted { theta: best.theta[..n].to_vec(), ..constant.clone() };
-        let is_within = |t: f64| {
-            let is_one = t > first_s && t < last_s;
-            is_one && self.fit(&from, varying::step(t), &best.theta[n..], Effort::Look).chi2 - best.chi2 < limit
-        };
-        let mut inside_s = 0.0;
-        let mut outside_s = 0.25 * self.prepared.context.step_s;
-        while is_within(at_s + sign * outside_s) {
-            inside_s = outside_s;
-            outside_s *= 2.0;
-        }
-        for _ in 0..INTERVAL_HALVINGS {
-            let middle_s = 0.5 * (inside_s + outside_s);
-            if is_within(at_s + sign * middle_s) { inside_s = middle_s } else { outside_s = middle_s }
-        }
-        at_s + sign * inside_s
+    /// How likely a step is at each sample `within`, linearised at these parameters and this change.
+    fn scan(&self, constant: &Fitted, theta: &[f64], change: f64, within: Range<usize>) -> Option<Scan> {
+        let (observations, selection) = (&self.prepared.observations, self.selection);
+        let before = constant.model.linearised(theta, observations, selection);
+        // Time constants are others all along.
+        let changed = constant.model.with(varying::step(f64::NEG_INFINITY));
+        let after: Vec<f64> = theta.iter().copied().chain([change]).collect();
+        Scan::of(&before, &changed.linearised(&after, observations, selection), within)
     }
 
     fn ratio(&self, fitted: &Fitted) -> RatioTest {

@@ -2,7 +2,9 @@
 //!
 //! The band of a sample adds up variances: that of the smoother, given model, prior and intensity; what
 //! the model's parameters and the prior's numbers move it by, a standard error at a time; and how far
-//! priors apart that fit as well put it.
+//! priors apart that fit as well put it. Of a long record, pieces show which of these matter.
+
+use std::borrow::Cow;
 
 use twinlag_compensate::{
     Form, Gas, Intensity, Learned, Prior, Readings, Rig, learn, learn_intensity, learn_with_noise, reconstruct,
@@ -10,12 +12,14 @@ use twinlag_compensate::{
 };
 use twinlag_diagnose::{Extended, ModelFit};
 
+mod cases;
 mod faults;
+
+use cases::{Case, Moved, Moves};
 
 pub use faults::GasFault;
 
 use crate::error::Error;
-use crate::parallel::in_parallel;
 use crate::verbs::CompensateOptions;
 use crate::watch::Stop;
 
@@ -28,6 +32,11 @@ const MAX_NOISE_INFLATIONS: usize = 6;
 /// Share of a variance that is left at least when the motion beyond half the sampling rate is taken off, which
 /// rounding or a changing intensity may make larger than the whole. Chosen.
 const LEAST_VARIANCE_SHARE: f64 = 0.05;
+
+/// Samples of each piece of a long record in which decisions are made, and their number: with all of them together, the excess
+/// of innovations is known within a hundredth. Records of less than twice as many are not long.
+const PIECE_SAMPLES: usize = 4096;
+const PIECES: usize = 4;
 
 /// The gas with everything that its bands rest on.
 pub(crate) struct Banded {
@@ -45,16 +54,26 @@ pub(crate) struct Banded {
 /// How the gas is reconstructed by the model of a fit.
 pub(crate) struct Reconstruction<'a> {
     fit: &'a ModelFit,
-    extended: &'a Extended,
+    extended: Cow<'a, Extended>,
     options: &'a CompensateOptions,
     stop: &'a Stop<'a>,
 }
 
 impl<'a> Reconstruction<'a> {
     pub(crate) fn of(fit: &'a ModelFit, options: &'a CompensateOptions, stop: &'a Stop<'a>) -> Result<Self, Error> {
-        let extended = fit.extended.as_ref().expect("a fit of a record");
+        let extended = Cow::Borrowed(fit.extended.as_ref().expect("a fit of a record"));
         stop.check()?;
         Ok(Self { fit, extended, options, stop })
+    }
+
+    /// This reconstruction in pieces of a long record, evenly apart; `None` of a record that is not long.
+    fn in_pieces(&self) -> Option<Self> {
+        let samples = self.extended.samples();
+        (samples > 2 * PIECES * PIECE_SAMPLES).then(|| {
+            let starts = (0..PIECES).map(|k| k * (samples - PIECE_SAMPLES) / (PIECES - 1));
+            let extended = Cow::Owned(self.extended.excerpt(starts, PIECE_SAMPLES));
+            Self { extended, ..*self }
+        })
     }
 
     /// The gas temperature, and how much it moves with each standard error of the model's
@@ -69,53 +88,68 @@ impl<'a> Reconstruction<'a> {
         self.stop.check()?;
         let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
         let Learned { prior, sigma_priors, alternatives, mut noise_factor, ends } = learned;
-        let mut gas = self.gas(theta, &Motion { prior: &prior, intensity: None, ends }, noise_factor)?;
-        if is_found && is_excessive(&gas) {
-            (noise_factor, gas) = self.louder(&Motion { prior: &prior, intensity: None, ends }, noise_factor, gas)?;
+        let pieces = self.in_pieces();
+        let part = pieces.as_ref().unwrap_or(self);
+        let steady = Motion { prior: &prior, intensity: None, ends };
+        if is_found {
+            noise_factor = part.louder(&steady, noise_factor)?;
         }
         let (_, rig) = self.rig(theta, noise_factor)?;
-        let intensity = self.intensity(&readings, &rig, &prior)?;
-        let intensity = intensity.as_ref();
-        if intensity.is_some() {
-            gas = self.gas(theta, &Motion { prior: &prior, intensity, ends }, noise_factor)?;
-        }
+        let intensity = self.intensity(part, &readings, &rig, &prior)?;
+        let motion = Motion { intensity: intensity.as_ref(), ..steady };
+        let gas = self.gas(theta, &motion, noise_factor)?;
         let columns = self.fit.covariance.as_deref().map(columns).unwrap_or_default();
-        let moved = columns.iter().map(|column| theta.iter().zip(column).map(|(t, d)| t + d).collect());
-        let of_model = moved.map(|moved: Vec<f64>| (moved, &prior));
-        let of_prior = sigma_priors.iter().map(|prior| (theta.to_vec(), prior));
-        let of_alternative = alternatives.iter().map(|(_, prior)| (theta.to_vec(), prior));
-        let cases: Vec<(Vec<f64>, &Prior)> = of_model.chain(of_prior).chain(of_alternative).collect();
-        let task = "how model and prior move the gas temperature";
-        let of_case = |(theta, prior): &(Vec<f64>, &Prior)| {
-            self.gas(theta, &Motion { prior, intensity, ends }, noise_factor).ok()
-        };
-        let others = in_parallel(&cases, task, self.stop, of_case);
-        self.stop.check()?;
-        let (of_model, rest) = others.split_at(columns.len());
-        let (of_prior, of_alternative) = rest.split_at(sigma_priors.len());
-        let (of_model, of_prior) = (moved_by(&gas, of_model), moved_by(&gas, of_prior));
-        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
-        let parameter_std_k = of_model.iter().map(|v| widened_by * v.sqrt()).collect();
         // The prior's share counts twice: an estimated prior takes the gas for better known than it
         // is, by as much as it moves it. Beside an intensity, which would take most of it back, once.
         let times = if intensity.is_some() { 1.0 } else { 2.0 };
-        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + times * prior);
-        let weights = alternatives.iter().map(|(weight, _)| *weight);
-        let weights = if intensity.is_some() { judged(&gas, weights, of_alternative) } else { weights.collect() };
-        let gas = averaged(&gas, weights.into_iter().zip(of_alternative));
+        let moved = |column: &Vec<f64>| theta.iter().zip(column).map(|(t, d)| t + d).collect();
+        let of_model = columns.iter().map(|column| Case { theta: moved(column), prior: &prior, moves: Moves::Model });
+        let same = |prior, moves| Case { theta: theta.to_vec(), prior, moves };
+        let of_prior = sigma_priors.iter().map(|prior| same(prior, Moves::Prior { times }));
+        let of_others = alternatives.iter().map(|(weight, prior)| same(prior, Moves::Mixture { weight: *weight }));
+        let cases = of_model.chain(of_prior).chain(of_others).collect();
+        let run = |case: &Case<'_>| self.gas(&case.theta, &Motion { prior: case.prior, ..motion }, noise_factor).ok();
+        let chosen = match &pieces {
+            None => cases::Chosen::all(cases),
+            Some(part) => {
+                let (of_part, _) = part.rig(theta, noise_factor)?;
+                let intensity = intensity.as_ref().map(|intensity| intensity.of_part(&readings, &of_part));
+                let motion = Motion { intensity: intensity.as_ref(), ..steady };
+                let run =
+                    |case: &Case<'_>| part.gas(&case.theta, &Motion { prior: case.prior, ..motion }, noise_factor).ok();
+                cases::Chosen::by(cases, &part.gas(theta, &motion, noise_factor)?, self.stop, run)
+            }
+        };
+        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
+        let Moved { gas, of_model, of_prior } = chosen.moved(gas, intensity.is_some(), self.stop, run);
+        self.stop.check()?;
+        let parameter_std_k = of_model.iter().map(|v| widened_by * v.sqrt()).collect();
+        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + prior);
         let std_k: Vec<f64> = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
         let scale = self.scale(theta);
         let faults = faults::of(&readings, &rig, scale, &gas.gas_c, &std_k, widened_by);
         Ok(Banded { readings, rig, prior, gas, std_k, parameter_std_k, widened_by, faults })
     }
 
-    /// How the gas's intensity changes. It is learned from the whole record, so a filter, which may not
-    /// know what comes, keeps a constant one, and so does a fixed lag.
-    fn intensity(&self, readings: &Readings, rig: &Rig, prior: &Prior) -> Result<Option<Intensity>, Error> {
+    /// How the gas's intensity changes, if it does so in `part` of the record. It is learned from the whole record, so a filter,
+    /// which may not know what comes, keeps a constant one, and so does a fixed lag.
+    fn intensity(
+        &self,
+        part: &Self,
+        readings: &Readings,
+        rig: &Rig,
+        prior: &Prior,
+    ) -> Result<Option<Intensity>, Error> {
         if self.options.form != Form::Smoother {
             return Ok(None);
         }
         self.stop.check()?;
+        if part.extended.samples() < readings.len() {
+            let (of_part, _) = part.rig(part.extended.parameters(), [1.0; 2])?;
+            if learn_intensity(&of_part, rig, prior)?.is_none() {
+                return Ok(None);
+            }
+        }
         Ok(learn_intensity(readings, rig, prior)?)
     }
 
@@ -144,24 +178,29 @@ impl<'a> Reconstruction<'a> {
         Ok(gas)
     }
 
-    /// Noise made louder as long as readings become more probable. Where the prior's spectrum does
-    /// not end as the gas's does, it has pushed the noise aside: it comes back as far as the
-    /// readings say.
-    fn louder(&self, motion: &Motion<'_>, noise_factor: [f64; 2], gas: Gas) -> Result<([f64; 2], Gas), Error> {
-        let mut best = (noise_factor, gas);
+    /// The noise, made louder as long as readings that are farther from their predictions than they should be become more
+    /// probable. Where the prior's spectrum does not end as the gas's does, it has pushed the noise aside: it comes back as far
+    /// as the readings say.
+    fn louder(&self, motion: &Motion<'_>, noise_factor: [f64; 2]) -> Result<[f64; 2], Error> {
+        let at = |factor| self.gas(self.extended.parameters(), motion, factor);
+        let (mut best, mut gas) = (noise_factor, at(noise_factor)?);
+        if !is_excessive(&gas) {
+            return Ok(best);
+        }
         for _ in 0..MAX_NOISE_INFLATIONS {
-            let louder = best.0.map(|factor| factor * NOISE_INFLATION_STEP);
-            let other = self.gas(self.extended.parameters(), motion, louder)?;
-            if other.log_likelihood <= best.1.log_likelihood {
+            let louder = best.map(|factor| factor * NOISE_INFLATION_STEP);
+            let other = at(louder)?;
+            if other.log_likelihood <= gas.log_likelihood {
                 break;
             }
-            best = (louder, other);
+            (best, gas) = (louder, other);
         }
         Ok(best)
     }
 }
 
 /// How the gas moves.
+#[derive(Clone, Copy)]
 struct Motion<'a> {
     prior: &'a Prior,
     intensity: Option<&'a Intensity>,
@@ -183,17 +222,6 @@ impl Motion<'_> {
     }
 }
 
-/// The sum of squares by which `others` differ from `gas`, at each sample.
-fn moved_by(gas: &Gas, others: &[Option<Gas>]) -> Vec<f64> {
-    let mut variance = vec![0.0; gas.gas_c.len()];
-    for other in others.iter().flatten() {
-        for ((v, a), b) in variance.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
-            *v += (a - b) * (a - b);
-        }
-    }
-    variance
-}
-
 /// Whether readings are clearly farther from what the others led to expect than they should be.
 fn is_excessive(gas: &Gas) -> bool {
     gas.innovation_energy - 1.0 > MAX_INNOVATION_EXCESS * (2.0 / gas.innovations as f64).sqrt()
@@ -204,33 +232,6 @@ fn is_noise_found(options: &CompensateOptions, rig: &Rig) -> bool {
     let given = &options.diagnose.characterise;
     let is_white = rig.mismatch.is_none() && rig.sensors.iter().all(|s| s.coloured.is_none());
     is_white && options.model.is_none() && given.noise_std_k.is_none() && given.quiet_segments_s.is_empty()
-}
-
-/// The weights of other priors, which were those of a constant intensity, with the likelihood that they have with a changing
-/// one.
-fn judged(gas: &Gas, weights: impl Iterator<Item = f64>, others: &[Option<Gas>]) -> Vec<f64> {
-    let weights: Vec<f64> = weights.collect();
-    let own = 1.0 - weights.iter().sum::<f64>();
-    let gain =
-        |other: &Option<Gas>| other.as_ref().map_or(f64::NEG_INFINITY, |o| o.log_likelihood - gas.log_likelihood);
-    let most = others.iter().map(gain).fold(0.0, f64::max);
-    let of_others: Vec<f64> = weights.iter().zip(others).map(|(w, other)| w * (gain(other) - most).exp()).collect();
-    let all = own * (-most).exp() + of_others.iter().sum::<f64>();
-    of_others.iter().map(|weight| weight / all).collect()
-}
-
-/// The mean of `gas` and of those by other priors, with the variance of the mixture.
-fn averaged<'a>(gas: &Gas, others: impl Iterator<Item = (f64, &'a Option<Gas>)>) -> Gas {
-    let others: Vec<(f64, &Gas)> = others.filter_map(|(weight, other)| Some((weight, other.as_ref()?))).collect();
-    let own = 1.0 - others.iter().map(|(weight, _)| weight).sum::<f64>();
-    let of = |k: usize| {
-        let all = || others.iter().copied().chain([(own, gas)]);
-        let mean_c: f64 = all().map(|(w, g)| w * g.gas_c[k]).sum();
-        let variance: f64 = all().map(|(w, g)| w * (g.std_k[k].powi(2) + (g.gas_c[k] - mean_c).powi(2))).sum();
-        (mean_c, variance.sqrt())
-    };
-    let (gas_c, std_k) = (0..gas.gas_c.len()).map(of).unzip();
-    Gas { gas_c, std_k, ..gas.clone() }
 }
 
 /// Columns of the Cholesky factor of `covariance`; what is held has none.

@@ -3,7 +3,10 @@
 use twinlag_optimise::Variable;
 
 use crate::prior::Term;
-use crate::slopes::Direction;
+
+/// The place of a term, and how fast each of its numbers changes in some direction, in the order in which it has them: the
+/// standard deviation, the frequency, the quality.
+pub(super) type Direction = (usize, [f64; 3]);
 
 /// Bounds of a quality.
 const QUALITY_BOUNDS: [f64; 2] = [0.02, 1e4];
@@ -88,11 +91,11 @@ impl Part {
         }
     }
 
-    /// Its terms, and how fast their numbers change with number `a` of [`Part::values`]; terms that do not are left out.
+    /// How fast the numbers of its terms change with number `a` of [`Part::values`]; terms that do not are left out.
     pub(super) fn directions(&self, a: usize) -> Vec<Direction> {
         match self {
             Self::Noise(_) => Vec::new(),
-            Self::Single(term) => vec![(*term, std::array::from_fn(|i| if i == a { 1.0 } else { 0.0 }))],
+            Self::Single(_) => vec![(0, std::array::from_fn(|i| if i == a { 1.0 } else { 0.0 }))],
             Self::Turbulent { std_k, corner_hz, fastest_hz } => {
                 // The step between corners is `(F/c)^(1/(n−1))`, and shares of the variance go with `step^(−2k/3)`.
                 let by_corner = -1.0 / ((CASCADE_TERMS - 1) as f64 * corner_hz);
@@ -110,7 +113,7 @@ impl Part {
                             0.0,
                         ],
                     };
-                    (*term, by)
+                    (k, by)
                 };
                 terms.iter().enumerate().map(of).collect()
             }
@@ -127,7 +130,7 @@ impl Part {
                         _ if a == lines => [0.0, (k + 1) as f64, by_shared(quality / frequency_hz)],
                         _ => [0.0, 0.0, by_shared(-quality / self.values()[lines + 1])],
                     };
-                    (by != [0.0; 3]).then_some((term, by))
+                    (by != [0.0; 3]).then_some((k, by))
                 };
                 self.terms().into_iter().enumerate().filter_map(of).collect()
             }
@@ -185,18 +188,6 @@ impl Part {
                 std_k.iter().copied().chain([*frequency_hz, *width_hz]).collect()
             }
         }
-    }
-
-    /// The term of which number `a` is the standard deviation, and which nothing else depends on.
-    pub(super) fn size_of(&self, a: usize) -> Option<usize> {
-        let sizes = match self {
-            Self::Single(_) => 1,
-            // It is in none, or in all of its terms.
-            Self::Noise(_) | Self::Turbulent { .. } => 0,
-            // The last two are in what goes on above them, if anything does.
-            Self::Comb { std_k, goes_on, .. } => std_k.len().saturating_sub(if *goes_on { 2 } else { 0 }),
-        };
-        (a < sizes).then_some(a)
     }
 
     pub(super) fn variables(&self, limits: &Limits) -> Vec<Variable> {

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use twinlag_optimise::{Cost, Derivatives};
 
-use super::part::{self, Part};
+use super::part::{self, Direction, Part};
 use crate::prior::Term;
 use crate::spectrum::Periodogram;
 
@@ -41,8 +41,9 @@ impl Whittle<'_> {
     }
 
     fn deviance(&self, expected: &[f64]) -> f64 {
-        let sum: f64 = expected.iter().zip(&self.periodogram.power).map(|(e, i)| e.ln() + i / e).sum();
-        2.0 * self.periodogram.pieces * sum
+        let p = self.periodogram;
+        let each = expected.iter().zip(&p.power).zip(&p.bins).map(|((e, i), bins)| bins * (e.ln() + i / e));
+        2.0 * p.pieces * each.sum::<f64>()
     }
 }
 
@@ -68,15 +69,17 @@ impl Periodogram {
         let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();
         let mut gradient = factors.map(|v| 2.0 * prior * v.ln() / v);
         let mut curvature = [[2.0 * prior / factors[0].powi(2), 0.0], [0.0, 2.0 * prior / factors[1].powi(2)]];
-        for &[power, first] in &self.disagreement {
+        let skipped = self.bins.len() - self.disagreement.len();
+        for (&[power, first], bins) in self.disagreement.iter().zip(&self.bins[skipped..]) {
             let shares = [first, 1.0 - first];
             let expected = shares[0] * factors[0] + shares[1] * factors[1];
-            value += 2.0 * self.pieces * (expected.ln() + power / expected);
+            let worth = 2.0 * self.pieces * bins;
+            value += worth * (expected.ln() + power / expected);
             let slopes = shares.map(|s| s / expected);
             for a in 0..2 {
-                gradient[a] += 2.0 * self.pieces * slopes[a] * (1.0 - power / expected);
+                gradient[a] += worth * slopes[a] * (1.0 - power / expected);
                 for b in 0..2 {
-                    curvature[a][b] += 2.0 * self.pieces * slopes[a] * slopes[b];
+                    curvature[a][b] += worth * slopes[a] * slopes[b];
                 }
             }
         }
@@ -110,11 +113,15 @@ impl Cost for Whittle<'_> {
                 slopes.extend(p.noise.clone());
                 continue;
             }
-            let each: Vec<Vec<f64>> = part.terms().iter().map(|t| p.expected_signed(&[*t])).collect();
-            each.iter().for_each(|own| add(&mut gas, own));
-            slopes.extend(part.values().iter().enumerate().map(|(a, value)| match part.size_of(a) {
-                Some(term) => each[term].iter().map(|p| 2.0 * p / value).collect(),
-                None => p.expected_slope(&part.directions(a)),
+            let each: Vec<Vec<[f64; 4]>> = part.terms().iter().map(|term| p.shown(term)).collect();
+            each.iter().for_each(|own| gas.iter_mut().zip(own).for_each(|(sum, [value, ..])| *sum += value));
+            slopes.extend((0..part.values().len()).map(|a| {
+                let directions = part.directions(a);
+                let along = |j: usize| {
+                    let of = |(term, by): &Direction| (0..3).map(|i| by[i] * each[*term][j][1 + i]).sum::<f64>();
+                    directions.iter().map(of).sum()
+                };
+                (0..gas.len()).map(along).collect()
             }));
         }
         // Of the gas there cannot be less than nothing, and where there is nothing, nothing
@@ -131,10 +138,12 @@ impl Cost for Whittle<'_> {
         }
         let residual: Vec<f64> = p.power.iter().zip(&expected).map(|(i, e)| 1.0 - i / e).collect();
         let dot = |a: &[f64], b: &[f64]| 2.0 * p.pieces * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let weighted = |s: &Vec<f64>| s.iter().zip(&p.bins).map(|(s, bins)| s * bins).collect::<Vec<f64>>();
+        let of_bins: Vec<Vec<f64>> = slopes.iter().map(weighted).collect();
         let mut out = Derivatives {
             value: self.deviance(&expected),
-            gradient: slopes.iter().map(|s| dot(s, &residual)).collect(),
-            curvature: slopes.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
+            gradient: of_bins.iter().map(|s| dot(s, &residual)).collect(),
+            curvature: of_bins.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
         };
         let mut at = 0;
         for part in &parts {

@@ -44,7 +44,7 @@ impl<const D: usize> Later<D> {
         let mut agreeing = 0;
         // The passage that leads on from the event before, where the weight there is that of the last cycle.
         let mut stale: Option<(usize, usize)> = None;
-        for j in events.rev() {
+        for j in events.clone().rev() {
             let kept = &stage.kept[j];
             let gains = &stage.gains[kept.gains];
             self.pull_by(task, kept, gains);
@@ -59,7 +59,9 @@ impl<const D: usize> Later<D> {
                 let before = recent[j % cycle].as_ref().filter(|r| r.gains == kept.gains);
                 let agrees = before.is_some_and(|r| has_settled(&r.weight, &self.weight));
                 agreeing = if agrees { agreeing + 1 } else { 0 };
-                recent[j % cycle] = Some(Recent { gains: kept.gains, weight: self.weight });
+                let comes_again = j >= events.start + cycle && stage.kept[j - cycle].gains == kept.gains;
+                recent[j % cycle] =
+                    if comes_again { Some(Recent { gains: kept.gains, weight: self.weight }) } else { None };
                 pass(kept, gains, &self.pull, &self.weight);
                 self.weight = back.around(&self.weight);
             }
@@ -92,9 +94,16 @@ impl<const D: usize> Later<D> {
             let Some((gain, variance)) = &gains.updates[i] else { continue };
             let c = &task.system.reads[i];
             let column = self.weight * gain;
-            let both = gain.dot(&column);
-            self.weight -= c * column.transpose() + column * c.transpose();
-            self.weight += c * c.transpose() * (both + 1.0 / variance);
+            let both = gain.dot(&column) + 1.0 / variance;
+            // Most of `c` is zero.
+            for k in (0..D).filter(|k| c[*k] != 0.0) {
+                for l in 0..D {
+                    let by = c[k] * column[l];
+                    self.weight[(k, l)] -= by;
+                    self.weight[(l, k)] -= by;
+                    self.weight[(k, l)] += both * c[k] * c[l];
+                }
+            }
         }
     }
 }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use nalgebra::{SMatrix, SVector};
 
 use super::events::Events;
-use crate::filter::Belief;
+use crate::filter::{Belief, along};
 use crate::prior::Prior;
 use crate::readings::Readings;
 use crate::rig::{Rig, SensorAt};
@@ -121,7 +121,7 @@ struct Kind {
 /// An event of the last cycle.
 #[derive(Clone)]
 struct Recent<const D: usize> {
-    kind: Option<Kind>,
+    kind: Kind,
     gains: Gains<D>,
     /// Covariance of the state after the readings.
     covariance: SMatrix<f64, D, D>,
@@ -182,7 +182,7 @@ impl<const D: usize> Filter<D> {
         let (gas, lines) = (task.system.gas.dot(state), task.system.lines.dot(state));
 
         let phase = j % cycle;
-        let recent = self.recent[phase].as_ref().filter(|r| kind.is_some() && r.kind == kind);
+        let recent = self.recent[phase].as_ref().filter(|r| kind == Some(r.kind));
         let (gains, innovations) = match recent {
             Some(recent) if self.agreeing >= cycle => {
                 let gains = Gains { passage, ..recent.gains };
@@ -240,8 +240,8 @@ impl<const D: usize> Filter<D> {
         if let Some(intensity) = task.intensity {
             self.belief.covariance += by.by_gas * (intensity[task.events.at(j).sample()] - 1.0);
         }
-        let row = self.belief.covariance * system.gas;
-        let lines = if task.has_lines() { self.belief.covariance * system.lines } else { SVector::zeros() };
+        let row = along(&self.belief.covariance, &system.gas);
+        let lines = if task.has_lines() { along(&self.belief.covariance, &system.lines) } else { SVector::zeros() };
         let variance = system.gas.dot(&row);
         let mut innovations = [0.0; 2];
         let updates = [0, 1].map(|i| {
@@ -250,13 +250,13 @@ impl<const D: usize> Filter<D> {
             innovations[i] = update.innovation;
             Some((update.gain, update.variance))
         });
-        let variance_after = system.gas.dot(&(self.belief.covariance * system.gas));
+        let variance_after = system.gas.dot(&along(&self.belief.covariance, &system.gas));
         let gains = Gains { passage, row, variance, lines, updates, variance_after };
-        let covariance = self.belief.covariance;
-        let before = self.recent[j % cycle].as_ref().filter(|r| kind.is_some() && r.kind == kind);
-        let agrees = before.is_some_and(|r| has_settled(&r.covariance, &covariance));
+        let covariance = &self.belief.covariance;
+        let before = self.recent[j % cycle].as_ref().filter(|r| kind == Some(r.kind));
+        let agrees = before.is_some_and(|r| has_settled(&r.covariance, covariance));
         self.agreeing = if agrees { self.agreeing + 1 } else { 0 };
-        self.recent[j % cycle] = Some(Recent { kind, gains, covariance });
+        self.recent[j % cycle] = kind.map(|kind| Recent { kind, gains, covariance: *covariance });
         (gains, innovations)
     }
 }
