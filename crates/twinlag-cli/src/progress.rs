@@ -75,11 +75,9 @@ impl<R: Read> Read for Counted<'_, R> {
     fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
         let read = self.reader.read(to)?;
         self.read += read as u64;
-        if let Some((_, since)) = &self.progress.0 {
-            let share = (self.read as f64 / self.bytes.max(1) as f64).min(1.0);
-            let left_s = since.elapsed().as_secs_f64() * (1.0 - share) / share.max(f64::MIN_POSITIVE);
-            self.progress.say(|| format!("reading: {:.0} %, {left_s:.0} s left,", 100.0 * share));
-        }
+        let [read_mib, all_mib] = [self.read, self.bytes].map(|bytes| (bytes >> 20) as usize);
+        // Nobody is asked whether to go on.
+        let _ = self.progress.watch("reading, MiB", read_mib, all_mib);
         Ok(read)
     }
 }
