@@ -38,6 +38,9 @@ pub(crate) struct Bench {
     /// Times the closed loop on a record of 20 000 samples of every kind in place of the fits.
     #[arg(long, conflicts_with = "million")]
     diagnose: bool,
+    /// Samples of these records, in place of 20 000: what is found in so many must be found in more.
+    #[arg(long, requires = "diagnose", value_name = "ROWS")]
+    rows: Option<usize>,
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
@@ -90,7 +93,7 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
         return million(arguments.trials);
     }
     if arguments.diagnose {
-        return closed_loop();
+        return closed_loop(arguments.rows.unwrap_or(LONG));
     }
     if arguments.stream {
         return stream::run();
@@ -202,12 +205,12 @@ fn million(trials: Option<u64>) -> Result<()> {
 const LONG: usize = 20_000;
 
 /// How long a diagnosis of all effects takes, for each kind of record.
-fn closed_loop() -> Result<()> {
+fn closed_loop(rows: usize) -> Result<()> {
     let mut slowest = (0.0, "none");
     for kind in Kind::ALL {
         let drawn = undeclared(&[kind], 1.0, None, 1)?;
         let mut sampled = drawn.rig.record().clone();
-        sampled.samples = LONG;
+        sampled.samples = rows;
         let rig = drawn.rig.with_record(sampled)?;
         // Without the reference: that it is scored against costs two smoothers more.
         let mut record = record_of(rig.simulate()?)?;
@@ -222,7 +225,7 @@ fn closed_loop() -> Result<()> {
         }
     }
     println!(
-        "the slowest of {} records of {LONG} samples takes {:.2} s ({}), on {} processors",
+        "the slowest of {} records of {rows} samples takes {:.2} s ({}), on {} processors",
         Kind::ALL.len(),
         slowest.0,
         slowest.1,

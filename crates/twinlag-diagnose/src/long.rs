@@ -96,3 +96,65 @@ fn is_elsewhere(one: &Fitted, other: &Fitted) -> bool {
     let is_far = |i: usize| (one.theta[i] / other.theta[i]).ln().abs() > SAME_TAU_FACTOR.ln();
     is_far(0) || is_far(1)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use twinlag_model::{Identifier, Stretch};
+    use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+    use super::*;
+    use crate::diagnose::diagnose;
+    use crate::remark::Remark;
+
+    const SAMPLES: usize = 60_000;
+
+    /// Turbulence that sensors of 12 and 60 ms read, the second one through another lag of 6 ms.
+    fn long_record() -> Observations {
+        let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 }));
+        let mut sensors = [Sensor::new("T1", 0.012), Sensor::new("T2", 0.060)];
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.2)));
+        sensors[1].second_time_constant_s = Some(0.006);
+        let rig = Rig::new(3, Record::new(SAMPLES, 0.001), gas, sensors).expect("a valid rig");
+        let record = rig.simulate().expect("finite numbers");
+        Observations::new(vec![Stretch::new(record.time_s, [record.t1_c, record.t2_c])], Some(0.001)).expect("a record")
+    }
+
+    /// Of a record that is searched in pieces the numbers are those of all of it: standard errors go with the root of the
+    /// samples, of which pieces have two fifths, and values lie within five of them.
+    #[test]
+    fn what_pieces_show_is_fitted_to_all_of_a_long_record() {
+        let (observations, settings) = (long_record(), Settings::default());
+        let watch = |_: &str, _, _| ControlFlow::Continue(());
+        let answer = diagnose(&observations, &settings, &watch).expect("a diagnosis");
+        let named: Vec<Identifier> = answer.effects.iter().map(|e| e.effect).collect();
+        assert_eq!(named, [Identifier::SECOND_ORDER]);
+        assert_eq!(answer.remarks, [Remark::SearchedInPieces { samples: PIECES * PIECE_SAMPLES, all: SAMPLES }]);
+        let of_pieces = diagnose(&pieces(&observations).expect("long"), &settings, &watch).expect("a diagnosis");
+        for ((whole, part), tau_s) in
+            answer.last.time_constants.iter().zip(&of_pieces.last.time_constants).zip([0.012, 0.060])
+        {
+            let (value_s, error_s) = (whole.value_s.expect("determined"), whole.standard_error_s.expect("determined"));
+            assert!((value_s - tau_s).abs() < 5.0 * error_s, "{value_s} ± {error_s} s, and {tau_s} s is true");
+            let ratio = part.standard_error_s.expect("determined") / error_s;
+            assert!(ratio > 1.3, "errors of pieces are {ratio} times as large, and the root of 5/2 is 1.58");
+        }
+    }
+
+    /// A short record is searched whole, and so is a long one that consists of stretches shorter than a piece.
+    #[test]
+    fn a_record_without_pieces_is_searched_whole() {
+        let stretch = |samples: usize, from: usize| {
+            let time_s: Vec<f64> = (from..from + samples).map(|k| k as f64).collect();
+            let reading_c = [2.0, 3.0].map(|k| time_s.iter().map(|t| (k * t).sin()).collect());
+            Stretch::new(time_s, reading_c)
+        };
+        let observations = |stretches| Observations::new(stretches, Some(1.0)).expect("a record");
+        assert!(pieces(&observations(vec![stretch(MAX_SEARCHED_SAMPLES, 0)])).is_none());
+        let shreds = (0..60).map(|i| stretch(1000, 2000 * i)).collect();
+        assert!(pieces(&observations(shreds)).is_none());
+        let long = observations(vec![stretch(MAX_SEARCHED_SAMPLES + 1, 0)]);
+        assert_eq!(pieces(&long).expect("long").samples(), PIECES * PIECE_SAMPLES);
+    }
+}

@@ -53,9 +53,13 @@ fn a_bootstrap_is_repeatable_and_tells_how_far_it_is() {
     let record = rig(2, 800);
     let ask = |seed: u64| {
         let told = AtomicUsize::new(0);
-        let watch = |_: &str, done: usize, of: usize| {
-            assert!(done <= of && of == 39);
-            told.fetch_add(1, Ordering::Relaxed);
+        let watch = |task: &str, done: usize, of: usize| {
+            assert!(done <= of, "{task}: {done} of {of}");
+            // Other steps of the answer are reported as well.
+            if task.contains("bootstrap") {
+                assert_eq!(of, 39);
+                told.fetch_add(1, Ordering::Relaxed);
+            }
             ControlFlow::Continue(())
         };
         let intervals = Intervals::Bootstrap(Bootstrap { replicates: 39, seed });
