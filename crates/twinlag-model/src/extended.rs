@@ -47,7 +47,7 @@ impl Extended {
         Self { model: fitted.model.clone(), theta: fitted.theta.clone(), observations }
     }
 
-    /// The same model with pieces of the record, as [`Observations::excerpt`] takes them.
+    /// This model with pieces of the record, as [`Observations::excerpt`] takes them.
     #[must_use]
     pub fn excerpt(&self, starts: impl Iterator<Item = usize>, length: usize) -> Self {
         Self { observations: Arc::new(self.observations.excerpt(starts, length)), ..self.clone() }
