@@ -28,6 +28,7 @@ const SCIPY_FITS: usize = 20;
 const MINIMA: &str = "the reference tests hold both minima to 1e-6";
 
 #[derive(Args)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Bench {
     /// Also runs the study of a million trials, and says how long it takes and how much memory.
     #[arg(long)]

@@ -131,6 +131,9 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let search = Search { bins: &periodogram, periodogram: &pooled, limits, room, ask };
     let (best, mut others) = search.run();
     let score = best.score();
+    // What was found in pools is fitted to all bins.
+    let search = Search { periodogram: &periodogram, ..search };
+    let best = search.jointly(Fitted::unknown(best.parts));
     let missing = 1.0 - got as f64 / periodogram.all as f64;
     let is_uneven = readings.unevenness() > MAX_MISSING_SHARE;
     let is_bridged = missing > MAX_MISSING_SHARE || is_uneven;

@@ -24,9 +24,9 @@ const FOLDS: [f64; 6] = [-1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 /// As many of them each way where the gas is taken to end at half the sampling rate: beyond, noise that
 /// falls as `1/f²` has a twelfth of what it has above that rate.
 const ENDING_FOLDS: i32 = 6;
-/// Pieces that the mean is of, at most; of longer records they are evenly apart. They determine the power in a pool of `b` bins
-/// within `√(1.9/(64 b))` of it: 2 % of its square root where there is one line, a hundredth of that in what is wide, so that the
-/// numbers of a prior move its bands by less than a thousandth.
+/// Pieces that the mean is of, at most; of longer records they are evenly apart. Neighbouring bins go together, so `b` of them
+/// determine the power there within `√(1.9/(64 b))`: 17 % for one bin, 2 % for a hundred. What that leaves open of the prior's
+/// numbers is in the bands.
 const MAX_PIECES: usize = 64;
 /// Width of a pool of bins as a share of their frequency.
 const POOL_SHARE: f64 = 1.0 / 128.0;
