@@ -8,7 +8,9 @@
 
 use std::ops::Range;
 
-use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch};
+use twinlag_model::{
+    Effort, Fitted, Identifier, Model, ModelError, Observations, Prepared, Settings, Shared, Watch, evenly_spread,
+};
 
 use crate::candidates::{Candidate, Search};
 use crate::size::{Around, Lacking, Profile, least_size};
@@ -22,12 +24,9 @@ const PIECE_SAMPLES: usize = 16_384;
 const NEGLIGIBLE_SHARE: f64 = 0.1;
 
 /// The samples of a record by which [`unseen`] judges it, where it does not take them all.
-pub fn pieces_of_long(samples: usize) -> Option<[Range<usize>; PIECES]> {
-    let piece = |i: usize| {
-        let start = i * (samples - PIECE_SAMPLES) / (PIECES - 1);
-        start..start + PIECE_SAMPLES
-    };
-    (samples > PIECES * PIECE_SAMPLES).then(|| std::array::from_fn(piece))
+pub fn pieces_of_long(samples: usize) -> Option<Vec<Range<usize>>> {
+    let piece = |start: usize| start..start + PIECE_SAMPLES;
+    (samples > PIECES * PIECE_SAMPLES).then(|| evenly_spread(samples, PIECES, PIECE_SAMPLES).map(piece).collect())
 }
 
 /// Effects that two lags may hide, for both time constants and their difference: those that are most probably there unseen,

@@ -67,7 +67,8 @@ pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{
     About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, ModelError, ModelFit,
-    Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, fit_with, track,
+    Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, evenly_spread,
+    fit_with, track,
 };
 
 /// A diagnosis may go to any thread, and be read by several.

@@ -5,7 +5,7 @@
 //! from there: every effect that is still missing is screened against all residuals, and what stands out is fitted to all. Effects
 //! with quite other time constants, each of which costs a fit, are fitted to the whole where the pieces do not exclude them.
 
-use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Watch};
+use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Watch, evenly_spread};
 
 use crate::candidates::{Candidate, Search};
 use crate::moves::{Move, State, Taken};
@@ -28,11 +28,10 @@ pub(crate) fn is_long(observations: &Observations) -> bool {
 
 /// Pieces of a long record; `None` of one that is searched whole, or consists of stretches too short for pieces.
 pub(crate) fn pieces(observations: &Observations) -> Option<Observations> {
-    let samples = observations.samples();
     if !is_long(observations) {
         return None;
     }
-    let starts = (0..PIECES).map(|i| i * (samples - PIECE_SAMPLES) / (PIECES - 1));
+    let starts = evenly_spread(observations.samples(), PIECES, PIECE_SAMPLES);
     let pieces = observations.excerpt(starts, PIECE_SAMPLES);
     (!is_long(&pieces)).then_some(pieces)
 }

@@ -5,7 +5,7 @@ use twinlag_optimise::{Budget, End, Fit, Minimiser, Optimiser, Problem};
 use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
 use crate::model::Model;
-use crate::observations::Observations;
+use crate::observations::{Observations, evenly_spread};
 use crate::prepare::whole_selection;
 use crate::selection::Selection;
 
@@ -213,9 +213,8 @@ impl Model {
             return self.curved(theta, observations, selection, &products, known);
         }
         // What noise adds to the products is the same all along the record.
-        let (piece, pieces) = (MAX_CURVED_SAMPLES / CURVED_PIECES, CURVED_PIECES - 1);
-        let starts = (0..CURVED_PIECES).map(|i| i * (observations.samples() - piece) / pieces);
-        let part = observations.excerpt(starts, piece);
+        let piece = MAX_CURVED_SAMPLES / CURVED_PIECES;
+        let part = observations.excerpt(evenly_spread(observations.samples(), CURVED_PIECES, piece), piece);
         let of_part = whole_selection(&part, &selection.weighting);
         let of_lin = self.linearised(theta, &part, &of_part);
         let part_products = dense::gram(&of_lin.columns);

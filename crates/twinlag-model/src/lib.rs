@@ -53,7 +53,7 @@ pub use known::fit_with;
 pub use model::{KnownTimeConstant, Model};
 pub use num_dual::DualNum;
 pub use number::{Curve, Number, TimeFunction};
-pub use observations::{Observations, Stretch};
+pub use observations::{Observations, Stretch, evenly_spread};
 pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
 pub use policy::Policy;
 pub use prepare::Prepared;

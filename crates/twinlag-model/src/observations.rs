@@ -10,6 +10,20 @@ const MIN_STRETCH_SAMPLES: usize = 8;
 /// Fewest samples of a record that can be diagnosed: fewer leave no blocks to be held out.
 const MIN_RECORD_SAMPLES: usize = 60;
 
+/// First samples of pieces of `length` samples, spread evenly over a record of `samples`, from its first sample to its last.
+///
+/// ```
+/// use twinlag_model::evenly_spread;
+///
+/// assert_eq!(evenly_spread(100, 3, 20).collect::<Vec<usize>>(), [0, 40, 80]);
+/// ```
+///
+/// # Panics
+/// If a record is shorter than one piece, or for fewer than two pieces.
+pub fn evenly_spread(samples: usize, pieces: usize, length: usize) -> impl Iterator<Item = usize> {
+    (0..pieces).map(move |i| i * (samples - length) / (pieces - 1))
+}
+
 /// An unbroken stretch of both channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {

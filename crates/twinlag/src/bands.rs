@@ -10,7 +10,7 @@ use twinlag_compensate::{
     Form, Gas, Intensity, Learned, Prior, Readings, Rig, learn, learn_intensity, learn_with_noise, reconstruct,
     reconstruct_with,
 };
-use twinlag_diagnose::{Extended, ModelFit};
+use twinlag_diagnose::{Extended, ModelFit, evenly_spread};
 
 mod cases;
 mod faults;
@@ -70,7 +70,7 @@ impl<'a> Reconstruction<'a> {
     fn in_pieces(&self) -> Option<Self> {
         let samples = self.extended.samples();
         (samples > 2 * PIECES * PIECE_SAMPLES).then(|| {
-            let starts = (0..PIECES).map(|k| k * (samples - PIECE_SAMPLES) / (PIECES - 1));
+            let starts = evenly_spread(samples, PIECES, PIECE_SAMPLES);
             let extended = Cow::Owned(self.extended.excerpt(starts, PIECE_SAMPLES));
             Self { extended, ..*self }
         })

@@ -10,6 +10,9 @@ use std::ops::Range;
 use crate::cost::Linearised;
 use crate::dense;
 
+/// A pivot that is less than this share of what it was is rounding.
+const PIVOT_SHARE: f64 = 1e-12;
+
 /// The least energy of a step at each sample.
 pub(super) struct Scan {
     /// A sample from which on the time constants are others, and the least energy with it.
@@ -89,6 +92,3 @@ fn least_energy(sums: &[Vec<f64>]) -> f64 {
     }
     left[n - 1][n - 1]
 }
-
-/// A pivot that is less than this share of what it was is rounding.
-const PIVOT_SHARE: f64 = 1e-12;

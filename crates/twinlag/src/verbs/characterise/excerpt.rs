@@ -1,5 +1,7 @@
 //! What is looked at of a record beside its two lags.
 
+use std::ops::Range;
+
 use twinlag_bias::estimate_noise;
 use twinlag_diagnose::{Observations, Policy, Stretch, is_single_tone_in, pieces_of_long};
 use twinlag_record::{Record, SamplingKind};
@@ -25,11 +27,12 @@ impl Excerpt {
         let is_even = record.sampling.kind != SamplingKind::Irregular;
         let Some(pieces) = pieces_of_long(record.len()).filter(|_| is_whole && is_even) else { return Ok(None) };
         let period_s = record.sampling.period_s;
-        let stretches = pieces.map(|rows| {
+        let stretch = |rows: Range<usize>| {
             let time_s = rows.clone().map(|row| record.time_s[0] + row as f64 * period_s).collect();
             Stretch::new(time_s, [&record.t1_c, &record.t2_c].map(|channel| channel[rows.clone()].to_vec()))
-        });
-        let Ok(observations) = Observations::new(stretches.into(), Some(period_s)) else { return Ok(None) };
+        };
+        let stretches = pieces.into_iter().map(stretch).collect();
+        let Ok(observations) = Observations::new(stretches, Some(period_s)) else { return Ok(None) };
         let channels = [&record.t1_c[..], &record.t2_c];
         let swing_k = channels.map(std);
         let livelier = usize::from(swing_k[1] > swing_k[0]);
