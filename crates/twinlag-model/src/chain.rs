@@ -14,7 +14,7 @@
 //! from one evaluation to the next.
 
 use crate::number::{Curve, Real};
-use crate::observations::Stretch;
+use crate::observations::Cut;
 use crate::rows::Rows;
 
 /// How many samples a delay may reach where they are uneven.
@@ -82,19 +82,19 @@ impl<T: Real> Chain<T> {
     }
 
     /// Readings of a channel as they are.
-    pub(crate) fn of(stretch: &Stretch, channel: usize, period_s: Option<f64>) -> Self {
+    pub(crate) fn of(cut: Cut<'_>, channel: usize, period_s: Option<f64>) -> Self {
         let mut out = Self::empty();
-        out.begin(stretch, channel, period_s);
+        out.begin(cut, channel, period_s);
         out
     }
 
     /// Begins again, with the readings of a channel as they are.
-    pub(crate) fn begin(&mut self, stretch: &Stretch, channel: usize, period_s: Option<f64>) {
+    pub(crate) fn begin(&mut self, cut: Cut<'_>, channel: usize, period_s: Option<f64>) {
         self.time_s.clear();
-        self.time_s.extend_from_slice(&stretch.time_s);
+        self.time_s.extend_from_slice(cut.time_s);
         self.skipped = 0;
         self.value.clear();
-        self.value.extend(stretch.reading_c[channel].iter().map(|y| T::from(*y)));
+        self.value.extend(cut.reading_c[channel].iter().map(|y| T::from(*y)));
         self.rows.begin();
         self.period_s = period_s;
     }
@@ -315,10 +315,11 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::observations::Stretch;
 
     fn chain(value: impl Fn(f64) -> f64, time_s: Vec<f64>, period_s: Option<f64>) -> Chain<f64> {
         let reading: Vec<f64> = time_s.iter().map(|t| value(*t)).collect();
-        Chain::of(&Stretch::new(time_s, [reading.clone(), reading]), 0, period_s)
+        Chain::of(Stretch::new(time_s, [reading.clone(), reading]).whole(), 0, period_s)
     }
 
     /// `y = sin ωt` through `1 + τ s` has amplitude `√(1 + ω²τ²)`; the operators smooth by `(2 + cos ωT)/3` and differ from the

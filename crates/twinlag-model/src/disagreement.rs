@@ -4,11 +4,14 @@
 //! The derivative is exact: the inverse is computed in numbers that carry it along. Where the parameter moves none of
 //! the rows that carry noise, as an offset does, the factor of the residual whitens the derivative as well.
 
+use std::ops::Range;
+
 use crate::inverse::Inverse;
 use crate::number::{Number, Real};
 use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
 use crate::rows::Rows;
+use crate::selection::Span;
 use crate::whitening::{Factor, FactorDerivative, Source, Variance};
 
 /// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
@@ -16,6 +19,8 @@ use crate::whitening::{Factor, FactorDerivative, Source, Variance};
 const MASKED_NOISE_SWINGS: f64 = 20.0;
 /// Fewest disagreements of a stretch: one of fewer is left out.
 const MIN_DISAGREEMENTS: usize = 4;
+/// Samples of a window: derivatives of one in up to a dozen numbers each, a megabyte, stay in the cache of a processor.
+const WINDOW_SAMPLES: usize = 8192;
 /// Part of a step by which the instant of a value may differ from its sample's.
 const SAME_INSTANT_STEPS: f64 = 0.25;
 
@@ -103,10 +108,12 @@ impl<T: Real> Disagreement<T> {
     }
 
     /// What brings noise in, of readings with `variances`; of derivatives, where there are some.
-    pub(crate) fn sources<'a>(&'a self, variances: &'a [Variance; 2]) -> Vec<Source<'a, T>> {
+    ///
+    /// - `first_sample`: the sample of the stretch with which the inverse begins
+    pub(crate) fn sources<'a>(&'a self, variances: &'a [Variance; 2], first_sample: usize) -> Vec<Source<'a, T>> {
         let readings = self.reading_rows.iter().zip(variances);
         let extra = self.extra_rows.iter().zip(&self.extra_variances);
-        readings.chain(extra).map(|(rows, variance)| Source { rows, variance }).collect()
+        readings.chain(extra).map(|(rows, variance)| Source { rows, variance, first_sample }).collect()
     }
 }
 
@@ -120,11 +127,39 @@ pub(crate) fn first_sample(stretch: &Stretch, first_s: f64, step_s: f64) -> usiz
     stretch.time_s.partition_point(|t| *t < first_s - SAME_INSTANT_STEPS * step_s)
 }
 
-/// Memory for a derivative.
+/// Values of a stretch that are whitened at a time, and the factor for them. Up to so many samples a stretch is one window.
+#[derive(Debug)]
+pub(crate) struct Window {
+    /// Which of the pieces.
+    piece: usize,
+    /// Its first value, counted through the piece, and through all pieces; a lead comes before it.
+    first: usize,
+    from: usize,
+    /// Values without the lead.
+    count: usize,
+    /// Last values of the window before, which its own are correlated with.
+    lead: usize,
+    factor: Factor,
+}
+
+impl Window {
+    /// Its residuals, counted through all pieces.
+    pub(crate) fn residuals(&self) -> Range<usize> {
+        self.from..self.from + self.count
+    }
+
+    /// Its samples of the stretch.
+    fn samples(&self, consumed: usize) -> Range<usize> {
+        self.first - self.lead..self.first + self.count + consumed
+    }
+}
+
+/// The derivative along a record, window after window.
 #[derive(Default)]
-pub(crate) struct MovedMemory {
-    disagreement: Disagreement<Number>,
+pub(crate) struct Moved {
     factor: FactorDerivative,
+    /// Derivatives of the last window that was computed, its lead first.
+    values: Vec<f64>,
 }
 
 /// Evaluates plants of one record, one after the other.
@@ -132,7 +167,11 @@ pub(crate) struct Evaluator<'a> {
     observations: &'a Observations,
     variances: Vec<[Variance; 2]>,
     plain: Disagreement<f64>,
-    factors: Vec<Factor>,
+    /// Windows of the last evaluation, in their order, and after them those of earlier ones, for their memory.
+    windows: Vec<Window>,
+    used: usize,
+    /// Most values of a window of evenly spaced samples.
+    pub(crate) window_samples: usize,
     /// Pieces of the last evaluation.
     pub(crate) pieces: Vec<Piece>,
     /// Its whitened residual.
@@ -148,66 +187,118 @@ impl<'a> Evaluator<'a> {
             observations,
             variances: observations.stretches.iter().map(of_stretch).collect(),
             plain: Disagreement::empty(),
-            factors: Vec::new(),
+            windows: Vec::new(),
+            used: 0,
+            window_samples: WINDOW_SAMPLES,
             pieces: Vec::new(),
             residual: Vec::new(),
         }
     }
 
+    /// Windows of the last evaluation.
+    pub(crate) fn windows(&self) -> &[Window] {
+        &self.windows[..self.used]
+    }
+
+    /// Where the values of window `index` belong.
+    pub(crate) fn span(&self, index: usize) -> Span<'_> {
+        let Window { piece, first, count, .. } = &self.windows[index];
+        let piece = &self.pieces[*piece];
+        Span { piece, is_first: *first == 0, is_last: first + count == piece.count }
+    }
+
     /// The whitened residual of `plant`, into [`Self::residual`].
     pub(crate) fn evaluate(&mut self, plant: &Plant) {
-        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
+        let is_even = self.observations.period_s.is_some();
         self.pieces.clear();
         self.residual.clear();
+        self.used = 0;
         let mut before = 0;
         for (index, stretch) in self.observations.stretches.iter().enumerate() {
-            if is_long_enough(stretch, plant, period_s.is_some()) {
-                self.plain.inverse.invert(plant, stretch, period_s);
-                self.plain.compare(plant, step_s);
-                let count = self.plain.values.len();
-                let first_s = self.plain.inverse.chains[0].times_s()[0];
-                let first_sample = before + first_sample(stretch, first_s, step_s);
-                if self.factors.len() == self.pieces.len() {
-                    self.factors.push(Factor::empty());
+            if is_long_enough(stretch, plant, is_even) {
+                let count = stretch.len() - plant.consumed(is_even);
+                self.pieces.push(Piece { stretch: index, count, first_sample: before });
+                // Rows of uneven samples are as wide as the delays of all of them need.
+                let most = if is_even { self.window_samples } else { count };
+                for first in (0..count).step_by(most) {
+                    self.evaluate_window(plant, first, most.min(count - first));
                 }
-                let factor = &mut self.factors[self.pieces.len()];
-                factor.compute(&self.plain.sources(&self.variances[index]), count);
-                factor.whiten(&mut self.plain.values);
-                self.pieces.push(Piece { stretch: index, count, first_sample });
-                self.residual.extend_from_slice(&self.plain.values);
             }
             before += stretch.len();
         }
     }
 
-    /// The derivative of the residual, into `out`, at the values of the plant that was evaluated last: `plant` has
-    /// them, with the derivatives of what the parameter moves.
+    /// The residual of the next window of the last piece.
+    fn evaluate_window(&mut self, plant: &Plant, first: usize, count: usize) {
+        let Self { observations, variances, plain, windows, used, pieces, residual, .. } = self;
+        if windows.len() == *used {
+            windows.push(Window { piece: 0, first: 0, from: 0, count: 0, lead: 0, factor: Factor::empty() });
+        }
+        let (before, rest) = windows.split_at_mut(*used);
+        let before = before.last().filter(|_| first > 0).map(|before| &before.factor);
+        let window = &mut rest[0];
+        let lead = before.map_or(0, Factor::band);
+        (window.piece, window.first, window.from) = (pieces.len() - 1, first, residual.len());
+        (window.count, window.lead) = (count, lead);
+        *used += 1;
+        let piece = pieces.last_mut().expect("the piece of the window");
+        let stretch = &observations.stretches[piece.stretch];
+        let (period_s, step_s) = (observations.period_s, observations.step_s());
+        let samples = window.samples(plant.consumed(period_s.is_some()));
+        plain.inverse.invert(plant, stretch.cut(samples.clone()), period_s);
+        plain.compare(plant, step_s);
+        debug_assert_eq!(plain.values.len(), lead + count, "as many as the operators leave");
+        if first == 0 {
+            piece.first_sample += first_sample(stretch, plain.inverse.chains[0].times_s()[0], step_s);
+        }
+        let sources = plain.sources(&variances[piece.stretch], samples.start);
+        window.factor.compute(&sources, lead + count, before);
+        plain.values[..lead].copy_from_slice(&residual[residual.len() - lead..]);
+        window.factor.whiten(&mut plain.values, lead);
+        residual.extend_from_slice(&plain.values[lead..]);
+    }
+
+    /// The derivative of the residual in window `index`, at the values of the plant that was evaluated last: `plant` has them, with
+    /// the derivatives of what the parameter moves.
     ///
     /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
-    pub(crate) fn derivative(&self, plant: &Plant, functions: [bool; 2], memory: &mut MovedMemory, out: &mut Vec<f64>) {
-        let MovedMemory { disagreement, factor: of_factor } = memory;
-        let moved = plant.moved(functions);
-        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
-        out.clear();
-        for (piece, factor) in self.pieces.iter().zip(&self.factors) {
-            if moved == [false; 2] {
-                out.resize(out.len() + piece.count, 0.0);
-                continue;
-            }
-            let stretch = &self.observations.stretches[piece.stretch];
-            disagreement.inverse.invert_moved(plant, stretch, period_s, moved);
-            disagreement.compare(plant, step_s);
-            let from = out.len();
-            out.extend(disagreement.values.iter().map(|v| v.eps));
-            let values = &mut out[from..];
-            let mut sources = disagreement.sources(&self.variances[piece.stretch]);
-            sources.retain(|source| !source.rows.is_constant());
-            if sources.is_empty() {
-                factor.whiten(values);
-            } else {
-                let residual = &self.residual[from..from + piece.count];
-                of_factor.whiten(factor, &sources, residual, values);
-            }
+    /// - `moved`: after the window before
+    pub(crate) fn derivative<'m>(
+        &self,
+        plant: &Plant,
+        functions: [bool; 2],
+        index: usize,
+        disagreement: &mut Disagreement<Number>,
+        moved: &'m mut Moved,
+    ) -> &'m [f64] {
+        let Moved { factor: of_factor, values } = moved;
+        let Window { piece, first, from, count, lead, ref factor } = self.windows[index];
+        let chains = plant.moved(functions);
+        if chains == [false; 2] {
+            values.clear();
+            values.resize(count, 0.0);
+            return values;
         }
+        let stretch = self.pieces[piece].stretch;
+        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
+        let samples = self.windows[index].samples(plant.consumed(period_s.is_some()));
+        let cut = self.observations.stretches[stretch].cut(samples.clone());
+        disagreement.inverse.invert_moved(plant, cut, period_s, chains);
+        disagreement.compare(plant, step_s);
+        // The last values of the window before are whitened.
+        values.drain(..values.len() - lead);
+        values.extend(disagreement.values[lead..].iter().map(|v| v.eps));
+        if first == 0 {
+            of_factor.begin(factor.band());
+        }
+        let mut sources = disagreement.sources(&self.variances[stretch], samples.start);
+        sources.retain(|source| !source.rows.is_constant());
+        if sources.is_empty() && of_factor.passes(count) {
+            factor.whiten(values, lead);
+        } else {
+            let residual = &self.residual[from - lead..from + count];
+            of_factor.whiten(factor, &sources, residual, values, lead);
+        }
+        &values[lead..]
     }
 }

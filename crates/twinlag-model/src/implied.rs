@@ -4,7 +4,7 @@
 use crate::chain::Chain;
 use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variance};
 use crate::inverse::Inverse;
-use crate::observations::{Observations, Stretch};
+use crate::observations::Observations;
 use crate::plant::Plant;
 use crate::rows::Rows;
 use crate::whitening::{Factor, Variance};
@@ -98,7 +98,7 @@ impl Plant {
     fn evaluate_stretch(&self, observations: &Observations, index: usize, before: usize, out: &mut Evaluation) {
         let (stretch, step_s) = (&observations.stretches[index], observations.step_s());
         let mut disagreement = Disagreement::<f64>::empty();
-        disagreement.inverse.invert(self, stretch, observations.period_s);
+        disagreement.inverse.invert(self, stretch.whole(), observations.period_s);
         // What the sensors imply, before the differences that whiten extra noise.
         let inferred = disagreement.inverse.chains.clone();
         disagreement.compare(self, step_s);
@@ -106,8 +106,8 @@ impl Plant {
             [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
         let mut residual = std::mem::take(&mut disagreement.values);
         let mut factor = Factor::empty();
-        factor.compute(&disagreement.sources(&variances), residual.len());
-        factor.whiten(&mut residual);
+        factor.compute(&disagreement.sources(&variances, 0), residual.len(), None);
+        factor.whiten(&mut residual, 0);
         let count = residual.len();
         let times_s = &disagreement.inverse.chains[0].times_s()[..count];
         let start = before + first_sample(stretch, times_s[0], step_s);
@@ -132,10 +132,8 @@ impl Plant {
         let stretch = observations.stretches.iter().max_by_key(|s| s.len()).expect("not empty");
         let (middle, around) = (stretch.len() / 2, self.reach + PATH_SAMPLES);
         let (from, to) = (middle.saturating_sub(around), (middle + around).min(stretch.len()));
-        let cut = |values: &[f64]| values[from..to].to_vec();
-        let cut = Stretch::new(cut(&stretch.time_s), [0, 1].map(|i| cut(&stretch.reading_c[i])));
         let mut inverse = Inverse::<f64>::empty();
-        inverse.invert_with_gas(self, &cut, observations.period_s);
+        inverse.invert_with_gas(self, stretch.cut(from..to), observations.period_s);
         let k = inverse.count() / 2;
         let mut rows = Rows::identity();
         let mut of_channel = |i: usize| {

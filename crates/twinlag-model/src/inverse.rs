@@ -2,7 +2,7 @@
 
 use crate::chain::{Along, Chain, Curves};
 use crate::number::{Number, Real, is_exactly};
-use crate::observations::Stretch;
+use crate::observations::Cut;
 use crate::plant::{Place, Plant, Sensor};
 use crate::rows::Rows;
 
@@ -23,32 +23,32 @@ impl<T: Real> Inverse<T> {
         Self { chains: [Chain::empty(), Chain::empty()], gas: Chain::empty(), tau_s: Vec::new(), has: [true; 2] }
     }
 
-    /// Takes the readings of a stretch through the inverse of `plant`.
-    pub(crate) fn invert(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>) {
+    /// Takes readings through the inverse of `plant`.
+    pub(crate) fn invert(&mut self, plant: &Plant, cut: Cut<'_>, period_s: Option<f64>) {
         let has_gas = plant.extra.iter().any(|e| e.place == Place::Gas);
-        self.run(plant, stretch, period_s, has_gas);
+        self.run(plant, cut, period_s, has_gas);
     }
 
-    /// Takes the readings of a stretch through the inverse of `plant`, in those of the chains that a parameter moves.
-    pub(crate) fn invert_moved(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>, moved: [bool; 2]) {
+    /// Takes readings through the inverse of `plant`, in those of the chains that a parameter moves.
+    pub(crate) fn invert_moved(&mut self, plant: &Plant, cut: Cut<'_>, period_s: Option<f64>, moved: [bool; 2]) {
         self.has = moved;
-        self.invert(plant, stretch, period_s);
+        self.invert(plant, cut, period_s);
     }
 
-    /// Takes the readings of a stretch through the inverse of `plant`, and finds the path of noise of the gas as well.
-    pub(crate) fn invert_with_gas(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>) {
-        self.run(plant, stretch, period_s, true);
+    /// Takes readings through the inverse of `plant`, and finds the path of noise of the gas as well.
+    pub(crate) fn invert_with_gas(&mut self, plant: &Plant, cut: Cut<'_>, period_s: Option<f64>) {
+        self.run(plant, cut, period_s, true);
     }
 
-    fn run(&mut self, plant: &Plant, stretch: &Stretch, period_s: Option<f64>, has_gas: bool) {
+    fn run(&mut self, plant: &Plant, cut: Cut<'_>, period_s: Option<f64>, has_gas: bool) {
         let Self { chains, gas, tau_s, has } = self;
         for (i, chain) in chains.iter_mut().enumerate().filter(|(i, _)| has[*i]) {
-            chain.begin(stretch, i, period_s);
+            chain.begin(cut, i, period_s);
         }
         plant.correct(chains, *has);
         // Of the gas's path nothing but the rows is of interest.
         if has_gas {
-            gas.begin(stretch, 0, period_s);
+            gas.begin(cut, 0, period_s);
         }
         if let Some(delay_s) = plant.delay_s {
             let delays_s = [T::from(0.0), T::of(delay_s)];

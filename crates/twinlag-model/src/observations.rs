@@ -1,5 +1,6 @@
 //! The two channels as the diagnosis takes them: absolute temperatures in unbroken stretches.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use crate::error::ModelError;
@@ -65,6 +66,26 @@ impl Stretch {
     pub(crate) fn len(&self) -> usize {
         self.time_s.len()
     }
+
+    /// Some of its samples.
+    pub(crate) fn cut(&self, samples: Range<usize>) -> Cut<'_> {
+        let reading_c = [0, 1].map(|i| &self.reading_c[i][samples.clone()]);
+        Cut { time_s: &self.time_s[samples], reading_c }
+    }
+
+    /// All of its samples.
+    pub(crate) fn whole(&self) -> Cut<'_> {
+        self.cut(0..self.len())
+    }
+}
+
+/// Successive samples of a stretch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cut<'a> {
+    /// Sample instants, s.
+    pub(crate) time_s: &'a [f64],
+    /// Readings of channels 1 and 2, °C.
+    pub(crate) reading_c: [&'a [f64]; 2],
 }
 
 /// Both channels of a record.

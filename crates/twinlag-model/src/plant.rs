@@ -191,7 +191,7 @@ impl Plant {
 
     /// The temperatures of both sensors: readings without what calibration, lines and crosstalk make of them, °C.
     pub(crate) fn temperatures(&self, stretch: &Stretch) -> [Vec<f64>; 2] {
-        let mut chains = [0, 1].map(|i| Chain::<f64>::of(stretch, i, None));
+        let mut chains = [0, 1].map(|i| Chain::<f64>::of(stretch.whole(), i, None));
         self.correct(&mut chains, [true; 2]);
         chains.map(|chain| chain.value)
     }

@@ -18,23 +18,99 @@ impl Selection {
         self.counts.get(sample).copied().unwrap_or(false)
     }
 
-    /// Appends those of `values` that count, filtered, to `out`.
-    ///
-    /// - `values`: one for each residual of `pieces`
-    /// - `filtered`: memory for the filtered values
-    pub(crate) fn pick(&self, values: &[f64], pieces: &[Piece], filtered: &mut Vec<f64>, out: &mut Vec<f64>) {
-        let mut from = 0;
-        for piece in pieces {
-            self.weighting.apply_into(&values[from..from + piece.count], filtered);
-            let counts = self.counts.get(piece.first_sample..).unwrap_or(&[]);
-            out.extend(filtered.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r));
-            from += piece.count;
-        }
-    }
-
     /// Samples of the residuals of `pieces` that count.
     pub(crate) fn samples(&self, pieces: &[Piece]) -> Vec<usize> {
         let of_piece = |p: &Piece| p.first_sample..p.first_sample + p.count;
         pieces.iter().flat_map(of_piece).filter(|sample| self.holds(*sample)).collect()
+    }
+
+    /// Appends those of `filtered` values that count to `out`, the first of them of sample `first`.
+    fn pick(&self, filtered: &[f64], first: usize, out: &mut Vec<f64>) {
+        let counts = self.counts.get(first..).unwrap_or(&[]);
+        out.extend(filtered.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r));
+    }
+}
+
+/// Which values of a piece a window has.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span<'a> {
+    pub(crate) piece: &'a Piece,
+    /// Whether it is the first of the piece.
+    pub(crate) is_first: bool,
+    /// Whether it is the last of the piece.
+    pub(crate) is_last: bool,
+}
+
+/// Values that count, filtered, of a piece that comes window after window: the filter reaches over the ends of windows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sieve {
+    /// Values that the filter reaches from the next one on.
+    values: Vec<f64>,
+    filtered: Vec<f64>,
+    /// Place in the piece of the first of these values, and of the next one that is filtered.
+    first: usize,
+    next: usize,
+}
+
+impl Sieve {
+    /// Appends those that count to `out`, of the window and of those before it as far as the filter reaches only now.
+    pub(crate) fn pick(&mut self, window: &[f64], span: Span<'_>, selection: &Selection, out: &mut Vec<f64>) {
+        let (weighting, first_sample) = (&selection.weighting, span.piece.first_sample);
+        if span.is_first && span.is_last {
+            weighting.apply_into(window, &mut self.filtered);
+            return selection.pick(&self.filtered, first_sample, out);
+        }
+        if span.is_first {
+            self.values.clear();
+            (self.first, self.next) = (0, 0);
+        }
+        self.values.extend_from_slice(window);
+        weighting.apply_into(&self.values, &mut self.filtered);
+        let unreached = if span.is_last { 0 } else { weighting.half() };
+        let end = (self.first + self.values.len()).saturating_sub(unreached).max(self.next);
+        selection.pick(&self.filtered[self.next - self.first..end - self.first], first_sample + self.next, out);
+        self.next = end;
+        let needless = (end - self.first).saturating_sub(weighting.memory());
+        self.values.drain(..needless);
+        self.first += needless;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observations::{Observations, Stretch};
+
+    /// Values that are filtered in windows are those that are filtered at once: the sums are the same ones.
+    #[test]
+    fn windows_are_filtered_as_the_whole() {
+        let value = |k: usize| ((k * k * 7 + k) as f64 * 2.399).sin();
+        let values: Vec<f64> = (0..3000).map(value).collect();
+        let time_s = (0..3000).map(|k| k as f64).collect();
+        // Slow readings with noise, so that the weights are not flat.
+        let reading = |i: usize| (0..3000).map(|k| (0.02 * (k + i) as f64).sin() + 0.1 * value(k + 1000 * i)).collect();
+        let stretch = Stretch::new(time_s, [reading(0), reading(1)]);
+        let observations = Observations::new(vec![stretch], Some(1.0)).expect("a record");
+        let weighting = Weighting::of(&observations, [0.07; 2]);
+        assert!(weighting.half() > 0);
+        let counts: Vec<bool> = (0..3000).map(|k| k % 700 > 40).collect();
+        for weighting in [Weighting::default(), weighting.by_residual(&[values.clone()]), weighting] {
+            let selection = Selection { counts: counts.clone(), weighting };
+            let piece = Piece { stretch: 0, count: 2990, first_sample: 4 };
+            let picked = |most: usize| {
+                let (mut sieve, mut out) = (Sieve::default(), Vec::new());
+                for from in (0..piece.count).step_by(most) {
+                    let to = (from + most).min(piece.count);
+                    let span = Span { piece: &piece, is_first: from == 0, is_last: to == piece.count };
+                    sieve.pick(&values[from..to], span, &selection, &mut out);
+                }
+                out
+            };
+            let whole = picked(piece.count);
+            assert_eq!(whole.len(), selection.samples(&[piece]).len());
+            for most in [31, 512, 1495] {
+                assert_eq!(picked(most), whole, "windows of {most}");
+            }
+        }
     }
 }

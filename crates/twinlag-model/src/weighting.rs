@@ -122,6 +122,11 @@ impl Weighting {
         self.taps.len() / 2
     }
 
+    /// How many values before one its filtered value depends on.
+    pub(crate) fn memory(&self) -> usize {
+        self.half() + self.prediction.len()
+    }
+
     /// The mean weight over frequency: degrees of freedom per residual.
     pub fn mean(&self) -> f64 {
         if self.taps.is_empty() { 1.0 } else { self.taps.iter().map(|t| t * t).sum() }

@@ -3,6 +3,9 @@
 //!
 //! Where the weights of all rows are the same, the rows of `L` settle after a few times the band, from the start and
 //! from each masked reading on, and the last one stands for all up to the next masked reading; so do their derivatives.
+//!
+//! A long stretch is whitened in windows. Each begins with the last values of the one before it, as many as the band: the *lead*,
+//! whose rows and whitened values are known, so that the result is that of the whole stretch.
 
 use crate::number::{Number, Real};
 use crate::rows::Rows;
@@ -19,6 +22,15 @@ const DERIVATIVE_ROUNDING: f64 = 1e-13;
 pub(crate) struct Source<'a, T> {
     pub(crate) rows: &'a Rows<T>,
     pub(crate) variance: &'a Variance,
+    /// Sample of the stretch that rows count from.
+    pub(crate) first_sample: usize,
+}
+
+impl<T: Real> Source<'_, T> {
+    /// First reading that enters value `k`.
+    fn reading(&self, k: usize) -> usize {
+        self.first_sample + self.rows.start + k
+    }
 }
 
 /// Variance of the white noise of readings, K².
@@ -54,9 +66,9 @@ impl Variance {
 
 /// Whether a masked reading enters value `k`, or one within `band` before it.
 fn is_masked_around<T: Real>(sources: &[Source<'_, T>], k: usize, band: usize) -> bool {
-    sources.iter().any(|Source { rows, variance }| {
-        let end = rows.start + k + rows.width;
-        variance.has_masked_in((rows.start + k).saturating_sub(band)..end)
+    sources.iter().any(|source| {
+        let first = source.reading(k);
+        source.variance.has_masked_in(first.saturating_sub(band)..first + source.rows.width)
     })
 }
 
@@ -69,15 +81,24 @@ pub(crate) struct Factor {
     kept: Vec<u32>,
     /// Entries of a row of the covariance without masked readings, where all are the same.
     same: Vec<f64>,
+    /// Rows in a row that agreed at the end.
+    agreeing: usize,
 }
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new() }
+        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0 }
+    }
+
+    /// Values before one that it is correlated with.
+    pub(crate) fn band(&self) -> usize {
+        self.band
     }
 
     /// Becomes the factor of the covariance of `count` values, in its own memory.
-    pub(crate) fn compute(&mut self, sources: &[Source<'_, f64>], count: usize) {
+    ///
+    /// - `before`: that of the window before, where the first of the values are a lead
+    pub(crate) fn compute(&mut self, sources: &[Source<'_, f64>], count: usize, before: Option<&Self>) {
         self.band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
         let (band, stride) = (self.band, self.band + 1);
         let settles = sources.iter().all(|s| s.rows.is_same()) && count > band;
@@ -85,10 +106,15 @@ impl Factor {
         if settles {
             self.same.extend((0..stride).map(|lag| covariance_of_same(sources, lag)));
         }
-        let mut agreeing = 0;
         self.rows.clear();
         self.kept.clear();
-        for k in 0..count {
+        let mut agreeing = 0;
+        let has_lead = before.is_some();
+        if let Some(before) = before {
+            agreeing = before.agreeing;
+            self.lead(before);
+        }
+        for k in self.kept.len()..count {
             let is_plain = settles && !is_masked_around(sources, k, band);
             if is_plain && agreeing >= SETTLED_ROWS {
                 self.kept.push(self.kept[k - 1]);
@@ -113,9 +139,22 @@ impl Factor {
             }
             let scale = row[0];
             let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= ROUNDING * scale;
-            let has_settled = is_plain && k > band && row.iter().zip(older_row(k - 1)).all(agrees);
+            let has_settled = is_plain && (k > band || has_lead) && row.iter().zip(older_row(k - 1)).all(agrees);
             agreeing = if has_settled { agreeing + 1 } else { 0 };
             self.kept.push((from / stride) as u32);
+        }
+        self.agreeing = agreeing;
+    }
+
+    /// Begins with the last rows of the window before, as many as the band.
+    fn lead(&mut self, before: &Self) {
+        debug_assert_eq!(before.band, self.band, "windows of one stretch");
+        let last = before.kept.len() - self.band..before.kept.len();
+        for k in last.clone() {
+            if k == last.start || !before.is_settled(k) {
+                self.rows.extend_from_slice(before.row(k));
+            }
+            self.kept.push((self.rows.len() / (self.band + 1) - 1) as u32);
         }
     }
 
@@ -131,8 +170,10 @@ impl Factor {
     }
 
     /// `L⁻¹ u` in place.
-    pub(crate) fn whiten(&self, u: &mut [f64]) {
-        for k in 0..u.len() {
+    ///
+    /// - `lead`: so many values are whitened already
+    pub(crate) fn whiten(&self, u: &mut [f64], lead: usize) {
+        for k in lead..u.len() {
             let row = self.row(k);
             let reach = self.band.min(k);
             let (before, rest) = u.split_at_mut(k);
@@ -154,15 +195,46 @@ impl Factor {
     }
 }
 
-/// Memory for the derivative of a factor: its last rows, row `k` in place `k mod stride`.
+/// The derivative of a factor: its last rows, value `k` of the stretch in place `k mod stride`.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactorDerivative {
     recent: Vec<f64>,
     row: Vec<f64>,
     same: Vec<f64>,
+    /// Values of the stretch up to the end of the last window.
+    end: usize,
+    /// Rows in a row that agreed at the end.
+    agreeing: usize,
+    /// Whether the last row stands for those that follow.
+    is_kept: bool,
+    /// The largest entry of all rows of the stretch.
+    largest: f64,
 }
 
 impl FactorDerivative {
+    /// Begins a stretch whose factor has bands of `band`.
+    pub(crate) fn begin(&mut self, band: usize) {
+        let stride = band + 1;
+        self.recent.clear();
+        self.recent.resize(stride * stride, 0.0);
+        self.row.clear();
+        self.row.resize(stride, 0.0);
+        (self.end, self.agreeing, self.is_kept, self.largest) = (0, 0, false, 0.0);
+    }
+
+    /// Goes past `count` values where no source has derivatives, if there is nothing left of those before; whether there is not.
+    pub(crate) fn passes(&mut self, count: usize) -> bool {
+        let stride = self.row.len();
+        let rows = if self.is_kept { &self.row } else { &self.recent };
+        let is_still = rows.iter().all(|d| d.abs() <= DERIVATIVE_ROUNDING * self.largest);
+        if is_still {
+            let end = self.end + count;
+            self.begin(stride - 1);
+            self.end = end;
+        }
+        is_still
+    }
+
     /// The derivative of `r = L⁻¹ u`, in place of that of `u`: `L dr = du − dL r`, where `dL` follows from the
     /// derivative of `V = L Lᵀ` row by row.
     ///
@@ -170,54 +242,53 @@ impl FactorDerivative {
     /// - `sources`: what makes `V`, with the derivatives of the rows; a source whose rows have none may be left out
     /// - `residual`: `r`
     /// - `values`: the derivative of `u`, and then of `r`
+    /// - `lead`: so many values are whitened already
     pub(crate) fn whiten(
         &mut self,
         factor: &Factor,
         sources: &[Source<'_, Number>],
         residual: &[f64],
         values: &mut [f64],
+        lead: usize,
     ) {
         let (band, stride) = (factor.band, factor.band + 1);
         let settles = !factor.same.is_empty();
-        let mut is_kept = false;
-        self.recent.clear();
-        self.recent.resize(stride * stride, 0.0);
-        self.row.clear();
-        self.row.resize(stride, 0.0);
         self.same.clear();
         if settles {
             self.same.extend((0..stride).map(|lag| derivative_of_same(sources, lag)));
         }
-        let mut agreeing = 0;
-        for k in 0..values.len() {
+        let first = self.end - lead;
+        for k in lead..values.len() {
             let reach = band.min(k);
             let of_factor = factor.row(k);
             // Where the factor has settled, its derivative does soon after.
             let is_settled = factor.is_settled(k);
-            if !(is_settled && agreeing >= SETTLED_ROWS) {
-                if is_kept {
+            if !(is_settled && self.agreeing >= SETTLED_ROWS) {
+                if self.is_kept {
                     // All rows in reach were the one that was kept.
                     self.recent.chunks_exact_mut(stride).for_each(|row| row.copy_from_slice(&self.row));
                 }
                 let is_plain = settles && (is_settled || !is_masked_around(sources, k, band));
-                self.next_row(factor, sources, k, is_plain);
+                self.next_row(factor, sources, k, first, is_plain);
                 let largest = self.row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-                let before = &self.recent[(k + stride - 1) % stride * stride..][..stride];
+                self.largest = self.largest.max(largest);
+                let before = &self.recent[(first + k + stride - 1) % stride * stride..][..stride];
                 let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest;
                 let has_settled = is_settled && self.row.iter().zip(before).all(agrees);
-                agreeing = if has_settled { agreeing + 1 } else { 0 };
-                self.recent[k % stride * stride..][..stride].copy_from_slice(&self.row);
+                self.agreeing = if has_settled { self.agreeing + 1 } else { 0 };
+                self.recent[(first + k) % stride * stride..][..stride].copy_from_slice(&self.row);
             }
-            is_kept = is_settled && agreeing >= SETTLED_ROWS;
+            self.is_kept = is_settled && self.agreeing >= SETTLED_ROWS;
             let (before, rest) = values.split_at_mut(k);
             let from_factor = backwards(&self.row[..=reach], &residual[k - reach..=k]);
             let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
             rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
         }
+        self.end = first + values.len();
     }
 
-    /// Row `k` of `dL`.
-    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, is_plain: bool) {
+    /// Row `k` of `dL`, of a window with `first` values before it.
+    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, first: usize, is_plain: bool) {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
         let l = factor.row(k);
@@ -230,7 +301,7 @@ impl FactorDerivative {
                 continue;
             }
             let other = factor.row(k - lag);
-            let d_other = &self.recent[(k - lag) % stride * stride..][..stride];
+            let d_other = &self.recent[(first + k - lag) % stride * stride..][..stride];
             for older in lag + 1..=reach {
                 entry -= self.row[older] * other[older - lag] + l[older] * d_other[older - lag];
             }
@@ -265,7 +336,7 @@ fn derivative_of_same(sources: &[Source<'_, Number>], lag: usize) -> f64 {
 }
 
 fn sum_over_same<T: Real>(sources: &[Source<'_, T>], lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
-    let of_source = |Source { rows, variance }: &Source<'_, T>| -> f64 {
+    let of_source = |Source { rows, variance, .. }: &Source<'_, T>| -> f64 {
         let row = rows.at(0);
         let products = row.iter().zip(row.get(lag..).unwrap_or(&[])).map(|(a, b)| product(*a, *b));
         variance.plain * products.sum::<f64>()
@@ -276,13 +347,14 @@ fn sum_over_same<T: Real>(sources: &[Source<'_, T>], lag: usize, product: impl F
 /// `Σ σ² product(weight in value k, weight in value k − lag)` over the readings that both have in common.
 fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
     let mut sum = 0.0;
-    for Source { rows, variance } in sources {
+    for source in sources {
+        let Source { rows, variance, .. } = source;
         let (now, then) = (rows.at(k), rows.at(k - lag));
         if lag >= now.len() {
             continue;
         }
         let products = now.iter().zip(&then[lag..]).map(|(a, b)| product(*a, *b));
-        let first = rows.start + k;
+        let first = source.reading(k);
         sum += if variance.has_masked_in(first..first + now.len()) {
             products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
         } else {
@@ -306,7 +378,7 @@ mod tests {
         let time_s: Vec<f64> = (0..SAMPLES).map(|k| k as f64).collect();
         let reading: Vec<f64> = (0..SAMPLES).map(|k| (0.7 * k as f64).sin() + 0.01 * (k * k % 7) as f64).collect();
         let stretch = Stretch::new(time_s, [reading.clone(), reading]);
-        let mut chain = Chain::of(&stretch, 0, Some(1.0));
+        let mut chain = Chain::of(stretch.whole(), 0, Some(1.0));
         chain.factor(Along::Same(tau_s), Curves::default());
         chain
     }
@@ -319,14 +391,14 @@ mod tests {
 
     /// What brings noise into two chains.
     fn sources<'a, T: Real>(chains: &'a [Chain<T>; 2], variances: &'a [Variance; 2]) -> [Source<'a, T>; 2] {
-        [0, 1].map(|i| Source { rows: &chains[i].rows, variance: &variances[i] })
+        [0, 1].map(|i| Source { rows: &chains[i].rows, variance: &variances[i], first_sample: 0 })
     }
 
     /// Factor and disagreement of two lags, one reading masked or none.
     fn two_lags(tau_s: [f64; 2], is_masked: bool) -> (Vec<f64>, Factor) {
         let chains = tau_s.map(through_lag);
         let mut factor = Factor::empty();
-        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len());
+        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len(), None);
         let u = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| *a - *b).collect();
         (u, factor)
     }
@@ -337,7 +409,7 @@ mod tests {
     fn the_banded_factor_is_that_of_the_dense_matrix() {
         let (u, factor) = two_lags([3.0, 9.0], true);
         let mut whitened = u.clone();
-        factor.whiten(&mut whitened);
+        factor.whiten(&mut whitened, 0);
         let (m, [_, variance]) = (u.len(), variances(true));
         let dense_rows = |rows: &Rows<f64>| -> Vec<Vec<f64>> {
             (0..m)
@@ -372,16 +444,18 @@ mod tests {
         for is_masked in [false, true] {
             let residual = |tau_s: f64| {
                 let (mut u, factor) = two_lags([tau_s, 9.0], is_masked);
-                factor.whiten(&mut u);
+                factor.whiten(&mut u, 0);
                 u
             };
             let (mut whitened, factor) = two_lags([3.0, 9.0], is_masked);
-            factor.whiten(&mut whitened);
+            factor.whiten(&mut whitened, 0);
             let chains = [Number::from(3.0).derivative(), Number::from(9.0)].map(through_lag);
             let variances = variances(is_masked);
             let sources = sources(&chains, &variances);
             let mut got: Vec<f64> = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| (a - b).eps).collect();
-            FactorDerivative::default().whiten(&factor, &sources, &whitened, &mut got);
+            let mut of_factor = FactorDerivative::default();
+            of_factor.begin(factor.band());
+            of_factor.whiten(&factor, &sources, &whitened, &mut got, 0);
             let step_s = 3e-4;
             let (above, below) = (residual(3.0 + step_s), residual(3.0 - step_s));
             for (k, got) in got.iter().enumerate() {
