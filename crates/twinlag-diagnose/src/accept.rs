@@ -58,8 +58,8 @@ impl Search<'_> {
             return true;
         }
         let main = model.range(index).start + main;
-        let lin = model.linearised(theta, self.observations, self.selection);
-        let Some(inverse) = dense::inverse(&dense::gram(&lin.columns)) else { return false };
+        let normal = model.normal_equations(theta, self.observations, self.selection, None);
+        let Some(inverse) = dense::inverse(&normal.products) else { return false };
         let variance = inverse[main][main] * fitted.mean_energy().max(1.0);
         theta[main] * theta[main] > threshold(1, self.policy.round_false_alarm_probability) * variance
     }

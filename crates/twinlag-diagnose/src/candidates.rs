@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
+    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
     Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report, runs,
     white_deviance,
 };
@@ -346,13 +346,14 @@ impl<'a> Search<'a> {
     fn score_gain(&self, current: &Fitted, effect: &Shared, start: &[f64], now: Option<&Linearised>) -> f64 {
         let model = current.model.with(effect.clone());
         let theta = [&current.theta[..], start].concat();
-        let lin = model.linearised_beside(&theta, self.observations, self.selection, now);
-        let slope = lin.slope();
+        let beside = now.map(|without| Beside { without, max_difference: f64::INFINITY });
+        let normal = model.normal_equations(&theta, self.observations, self.selection, beside);
+        let slope = &normal.slope;
         // Where it is singular, along the diagonal: less than it could take off, but no more
         // than it can.
-        let taken = dense::inverse(&dense::gram(&lin.columns))
-            .map_or(0.0, |inverse| dense::dot(&slope, &dense::times(&inverse, &slope)));
-        current.chi2 - (dense::dot(&lin.residual, &lin.residual) - taken)
+        let taken = dense::inverse(&normal.products)
+            .map_or(0.0, |inverse| dense::dot(slope, &dense::times(&inverse, slope)));
+        current.chi2 - (normal.energy - taken)
     }
 
     /// Where an effect is looked at first: in an excerpt of the record; in all of it where its parameter is a frequency, and of a

@@ -1,6 +1,6 @@
 //! What a search would have seen, and what no search can.
 
-use twinlag_model::{Observations, Policy, Shared, dense};
+use twinlag_model::{Beside, Observations, Policy, Shared, dense};
 
 use crate::candidates::Search;
 use crate::diagnosis::Limit;
@@ -45,9 +45,10 @@ impl Search<'_> {
         let Around { fitted, lin: now, .. } = around;
         let theta = [&fitted.theta[..], effect.starts().first()?].concat();
         let model = fitted.model.with(effect.clone());
-        let lin = model.linearised_beside(&theta, self.observations, self.selection, Some(now));
+        let beside = Beside { without: now, max_difference: f64::INFINITY };
+        let normal = model.normal_equations(&theta, self.observations, self.selection, Some(beside));
         let index = fitted.theta.len() + main;
-        Some(dense::inverse(&dense::gram(&lin.columns))?[index][index] * fitted.mean_energy().max(1.0))
+        Some(dense::inverse(&normal.products)?[index][index] * fitted.mean_energy().max(1.0))
     }
 }
 

@@ -8,7 +8,7 @@
 use std::f64::consts::{SQRT_2, TAU};
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
-use twinlag_model::{Effect, Fitted, Linearised, ModelError, Parameter, Selection, Shared, dense, score_covariance};
+use twinlag_model::{Beside, Effect, Fitted, Linearised, ModelError, NormalEquations, Parameter, Shared, dense};
 
 use crate::candidates::Search;
 
@@ -42,7 +42,7 @@ struct Point<'a> {
     fitted: &'a Fitted,
     lin: &'a Linearised,
     /// Half the second derivatives of the energy.
-    second: Vec<Vec<f64>>,
+    second: &'a [Vec<f64>],
 }
 
 impl Search<'_> {
@@ -53,8 +53,9 @@ impl Search<'_> {
     pub(crate) fn around<'a>(&self, fitted: &'a Fitted) -> Result<Around<'a>, ModelError> {
         let Fitted { model, theta, .. } = fitted;
         let lin = model.linearised(theta, self.observations, self.selection);
-        let second = model.second_derivatives(theta, self.observations, self.selection, &lin, &[]);
-        let point = Point { fitted, lin: &lin, second };
+        let normal = model.normal_equations(theta, self.observations, self.selection, None);
+        let second = model.second_derivatives(theta, self.observations, self.selection, &normal, &[]);
+        let point = Point { fitted, lin: &lin, second: &second };
         let all = self.candidates(model);
         let sized: Vec<(&Shared, usize)> = all
             .iter()
@@ -74,24 +75,20 @@ impl Search<'_> {
     ///
     /// - `start`: values of the parameters that have no neutral one, beside the size; they are held
     fn near_none(&self, point: &Point<'_>, effect: &Shared, main: usize, start: &[f64]) -> Option<Profile> {
-        let Point { fitted, lin: now, second } = point;
+        let Point { fitted, lin: without, second } = *point;
         let (observations, selection, count) = (self.observations, self.selection, fitted.theta.len());
         let parameters = effect.parameters();
         let is_held = |i: usize| i != main && parameters[i].neutral().is_none();
         let mut theta = fitted.theta.clone();
         theta.extend((0..start.len()).map(|i| if is_held(i) { start[i] } else { least_size(&parameters[i]) }));
         let model = fitted.model.with(effect.clone());
-        let mut lin = model.linearised_beside(&theta, observations, selection, Some(*now));
         // A delay takes samples away, and a second lag filters the residual once more.
-        let is_same = lin.samples == now.samples
-            && lin.residual.iter().zip(&now.residual).all(|(a, b)| (a - b).abs() < SAME_RESIDUAL);
-        if !is_same {
-            lin = model.linearised(&theta, observations, selection);
-        }
-        (0..start.len()).filter(|i| is_held(*i)).for_each(|i| lin.columns[count + i].fill(0.0));
-        let known = if is_same { &second[..] } else { &[] };
-        let second = model.second_derivatives(&theta, observations, selection, &lin, known);
-        Profile::along(count + main, &lin, &second, selection, fitted.mean_energy().max(1.0))
+        let beside = Beside { without, max_difference: SAME_RESIDUAL };
+        let mut normal = model.scored_normal_equations(&theta, observations, selection, Some(beside));
+        (0..start.len()).filter(|i| is_held(*i)).for_each(|i| normal.hold(count + i));
+        let known = if normal.is_beside { second } else { &[] };
+        let second = model.second_derivatives(&theta, observations, selection, &normal, known);
+        Profile::along(count + main, &normal, &second, fitted.mean_energy().max(1.0))
     }
 }
 
@@ -125,11 +122,10 @@ pub(crate) struct Profile {
 impl Profile {
     /// Along the parameter `at`; `None` where the others are not determined beside it.
     ///
-    /// - `lin`: the residual with its derivatives
-    /// - `second`: half the second derivatives of its energy
+    /// - `second`: half the second derivatives of the energy
     /// - `noise`: energy of the noise for each residual
-    fn along(at: usize, lin: &Linearised, second: &[Vec<f64>], selection: &Selection, noise: f64) -> Option<Self> {
-        let products = dense::gram(&lin.columns);
+    fn along(at: usize, normal: &NormalEquations, second: &[Vec<f64>], noise: f64) -> Option<Self> {
+        let products = &normal.products;
         let is_convex = (0..products.len()).all(|i| i == at || products[i][i] <= 0.0 || second[i][i] > 0.0);
         let without = |matrix: &[Vec<f64>]| {
             let mut out = matrix.to_vec();
@@ -140,13 +136,13 @@ impl Profile {
             dense::inverse(&out)
         };
         // As the covariance of a fit does.
-        let inverse = without(second).filter(|_| is_convex).or_else(|| without(&products))?;
+        let inverse = without(second).filter(|_| is_convex).or_else(|| without(products))?;
         let mut follow: Vec<f64> = dense::times(&inverse, &second[at]).iter().map(|x| -x).collect();
         follow[at] = 1.0;
         Some(Self {
-            slope: dense::dot(&follow, &lin.slope()) / noise,
+            slope: dense::dot(&follow, &normal.slope) / noise,
             curvature: dense::dot(&follow, &second[at]) / noise,
-            slope_variance: dense::dot(&follow, &dense::times(&score_covariance(lin, selection), &follow)) / noise,
+            slope_variance: dense::dot(&follow, &dense::times(&normal.slope_covariance, &follow)) / noise,
             follow,
         })
     }
@@ -290,9 +286,8 @@ mod tests {
         let bent = (at(h) - 2.0 * at(0.0) + at(-h)) / (2.0 * h * h * noise);
         assert!((bent / along.curvature - 1.0).abs() < 1.0 / 18.0 + 1.0 / 800.0, "{bent} {}", along.curvature);
 
-        let lin = model.linearised(&theta(0.0), observations, selection);
-        let products = dense::gram(&lin.columns);
-        let inverse = dense::inverse(&products).expect("all three are determined");
+        let normal = model.normal_equations(&theta(0.0), observations, selection, None);
+        let inverse = dense::inverse(&normal.products).expect("all three are determined");
         let of_products = 1.0 / (inverse[2][2] * noise);
         assert!(of_products > 1.5 * along.curvature, "{of_products} {}", along.curvature);
     }

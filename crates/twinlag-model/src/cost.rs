@@ -1,6 +1,7 @@
 //! The energy of the whitened residual as a cost, with exact derivatives.
 
 use std::cell::RefCell;
+use std::ops::Range;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
@@ -9,10 +10,12 @@ use twinlag_optimise::{Cost, Derivatives, Variable};
 use crate::dense;
 use crate::disagreement::{Disagreement, Evaluator, Moved};
 use crate::model::Model;
+use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::plant::Plant;
 use crate::selection::{Selection, Sieve};
+use crate::weighting::Weighting;
 
 /// Residuals, over all columns, from which on columns are computed side by side: below, threads cost more than they save
 /// (some tens of microseconds against as many nanoseconds for each residual).
@@ -35,6 +38,8 @@ struct Memory<'a> {
     at: Vec<f64>,
     /// Its residuals that count, and what is known beforehand.
     residual: Vec<f64>,
+    /// Where the residuals of each window end among these.
+    ends: Vec<usize>,
     sieve: Sieve,
     /// Derivatives, one column for each parameter.
     columns: Vec<Column>,
@@ -54,9 +59,20 @@ struct Column {
 }
 
 /// Residuals that count, some after the others, with their derivatives.
-struct Block<'a> {
-    residual: &'a [f64],
+pub(crate) struct Block<'a> {
+    pub(crate) residual: &'a [f64],
+    /// Their places among all.
+    pub(crate) range: Range<usize>,
+    /// Whether this is what is known beforehand, the last block.
+    pub(crate) is_prior: bool,
     columns: &'a [Column],
+}
+
+impl<'a> Block<'a> {
+    /// A column for each parameter, empty for one that is held, or whose column is known.
+    pub(crate) fn columns(&self) -> impl Iterator<Item = &'a [f64]> {
+        self.columns.iter().map(|column| &column.picked[..])
+    }
 }
 
 impl<'a> ResidualCost<'a> {
@@ -71,6 +87,7 @@ impl<'a> ResidualCost<'a> {
             evaluator: Evaluator::new(observations, model.noise_std_k()),
             at: Vec::new(),
             residual: Vec::new(),
+            ends: Vec::new(),
             sieve: Sieve::default(),
             columns: std::iter::repeat_with(Column::default).take(theta.len()).collect(),
             spare: Mutex::default(),
@@ -100,11 +117,13 @@ impl<'a> ResidualCost<'a> {
         }
         let numbers = constants(theta);
         memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
-        let Memory { evaluator, residual, sieve, .. } = memory;
+        let Memory { evaluator, residual, ends, sieve, .. } = memory;
         residual.clear();
+        ends.clear();
         for (index, window) in evaluator.windows().iter().enumerate() {
             let values = &evaluator.residual[window.residuals()];
             sieve.pick(values, evaluator.span(index), self.selection, residual);
+            ends.push(residual.len());
         }
         residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
         memory.at.clear();
@@ -115,7 +134,7 @@ impl<'a> ResidualCost<'a> {
     /// parameters before `first`, and of those that are held, are empty.
     fn walk(&self, theta: &[f64], first: usize, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
         self.evaluate(theta, memory);
-        let Memory { evaluator, residual, columns, spare, .. } = memory;
+        let Memory { evaluator, residual, ends, columns, spare, .. } = memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
         let moved = |i: usize| {
             let mut numbers = constants(theta);
@@ -144,17 +163,14 @@ impl<'a> ResidualCost<'a> {
             } else {
                 columns.iter_mut().enumerate().for_each(compute);
             }
-            // Of all parameters the values that count are those of the same samples.
-            let some = columns.iter().find(|column| column.plant.is_some());
-            let count = some.map_or(0, |column| column.picked.len());
-            visit(Block { residual: &residual[done..done + count], columns });
-            done += count;
+            let range = std::mem::replace(&mut done, ends[index])..ends[index];
+            visit(Block { residual: &residual[range.clone()], range, is_prior: false, columns });
         }
         for (i, column) in columns.iter_mut().enumerate().filter(|(_, column)| column.plant.is_some()) {
             column.picked.clear();
             column.picked.extend(self.model.knowledge(&moved(i)).map(|k| k.eps));
         }
-        visit(Block { residual: &residual[done..], columns });
+        visit(Block { residual: &residual[done..], range: done..residual.len(), is_prior: true, columns });
     }
 
     fn is_held(&self, i: usize) -> bool {
@@ -166,18 +182,30 @@ impl<'a> ResidualCost<'a> {
         let mut memory = self.memory.borrow_mut();
         let mut columns = vec![Vec::new(); theta.len()];
         self.walk(theta, first, &mut memory, |block| {
-            columns.iter_mut().zip(block.columns).for_each(|(all, column)| all.extend_from_slice(&column.picked));
+            columns.iter_mut().zip(block.columns()).for_each(|(all, column)| all.extend_from_slice(column));
         });
         let residual = memory.residual.clone();
         columns[first..].iter_mut().for_each(|column| column.resize(residual.len(), 0.0));
         Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces), residual }
     }
 
-    /// Samples of the residuals at a point.
-    pub(crate) fn samples(&self, theta: &[f64]) -> Vec<usize> {
+    /// The normal equations at a point.
+    ///
+    /// - `beside`: what is known of the columns, as [`Model::normal_equations`] has it
+    /// - `filter`: that of the covariance of the slope, where that is of interest
+    pub(crate) fn normal_equations(
+        &self,
+        theta: &[f64],
+        beside: Option<Beside<'_>>,
+        filter: Option<&Weighting>,
+    ) -> NormalEquations {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        self.selection.samples(&memory.evaluator.pieces)
+        let samples = |beside: &Beside<'_>| beside.without.samples == self.selection.samples(&memory.evaluator.pieces);
+        let known = beside.filter(|b| b.agrees_with(&memory.residual) && samples(b)).map(|beside| beside.without);
+        let mut sums = Sums::of(theta.len(), known, filter);
+        self.walk(theta, sums.known(), &mut memory, |block| sums.add(&block));
+        sums.normal_equations()
     }
 }
 
@@ -189,23 +217,9 @@ impl Cost for ResidualCost<'_> {
     }
 
     fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
-        let p = theta.len();
-        let (mut gradient, mut curvature) = (vec![0.0; p], vec![vec![0.0; p]; p]);
-        let mut memory = self.memory.borrow_mut();
-        self.walk(theta, 0, &mut memory, |Block { residual, columns }| {
-            for (i, column) in columns.iter().enumerate() {
-                gradient[i] += 2.0 * dense::dot(&column.picked, residual);
-                for (j, other) in columns[..=i].iter().enumerate() {
-                    curvature[i][j] += 2.0 * dense::dot(&column.picked, &other.picked);
-                }
-            }
-        });
-        for i in 0..p {
-            for j in 0..i {
-                curvature[j][i] = curvature[i][j];
-            }
-        }
-        Some(Derivatives { value: dense::dot(&memory.residual, &memory.residual), gradient, curvature })
+        let NormalEquations { energy, slope, products, .. } = self.normal_equations(theta, None, None);
+        let twice = |row: Vec<f64>| row.into_iter().map(|x| 2.0 * x).collect();
+        Some(Derivatives { value: energy, gradient: twice(slope), curvature: products.into_iter().map(twice).collect() })
     }
 }
 
@@ -219,13 +233,6 @@ pub struct Linearised {
     pub residual: Vec<f64>,
     /// One column for each parameter.
     pub columns: Vec<Vec<f64>>,
-}
-
-impl Linearised {
-    /// Half the first derivatives of the energy.
-    pub fn slope(&self) -> Vec<f64> {
-        self.columns.iter().map(|c| dense::dot(c, &self.residual)).collect()
-    }
 }
 
 fn constants(theta: &[f64]) -> Vec<Number> {

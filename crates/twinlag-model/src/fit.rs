@@ -5,6 +5,7 @@ use twinlag_optimise::{Budget, End, Fit, Minimiser, Optimiser, Problem};
 use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
 use crate::model::Model;
+use crate::normal::NormalEquations;
 use crate::observations::{Observations, evenly_spread};
 use crate::prepare::whole_selection;
 use crate::selection::Selection;
@@ -171,33 +172,15 @@ impl Model {
         ResidualCost::new(self, theta, observations, selection).linearised(theta, 0)
     }
 
-    /// Residual and its derivatives at a point of this model, which is another one, `known`, and an effect of no size.
-    ///
-    /// Where both have residuals for the same samples, the columns of the parameters that both have are those of
-    /// `known`: what an effect of no size does not change.
-    pub fn linearised_beside(
-        &self,
-        theta: &[f64],
-        observations: &Observations,
-        selection: &Selection,
-        known: Option<&Linearised>,
-    ) -> Linearised {
-        let cost = ResidualCost::new(self, theta, observations, selection);
-        let Some(known) = known.filter(|k| k.samples == cost.samples(theta)) else { return cost.linearised(theta, 0) };
-        let mut out = cost.linearised(theta, known.columns.len());
-        out.columns[..known.columns.len()].clone_from_slice(&known.columns);
-        out
-    }
-
     /// Half the second derivatives of the energy at `theta`, symmetric, in units of the parameters; averages over a part of a
     /// standard error either way. Of a parameter that is held, or whose column is zero, they are zero.
     ///
-    /// Products of first derivatives, [`dense::gram`] of the columns, count the noise that is in these as information on
+    /// Products of first derivatives, those of the normal equations, count the noise that is in these as information on
     /// the parameters. In quiet records there is little of it; where the noise is a tenth of what the gas does, it can make up most
     /// of them. The difference is a matter of the noise, so that of a record of more than 16 384 samples is that of eight pieces of
     /// it: off by one part in a hundred or so, the inverse root of their samples.
     ///
-    /// - `lin`: the residual at `theta` with its derivatives
+    /// - `normal`: the normal equations at `theta`
     /// - `known`: this matrix of a model without the last parameters, where these are an effect of no size that leaves its residual
     ///   as it was; otherwise empty
     pub fn second_derivatives(
@@ -205,20 +188,19 @@ impl Model {
         theta: &[f64],
         observations: &Observations,
         selection: &Selection,
-        lin: &Linearised,
+        normal: &NormalEquations,
         known: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
-        let products = dense::gram(&lin.columns);
+        let products = &normal.products;
         if observations.samples() <= MAX_CURVED_SAMPLES {
-            return self.curved(theta, observations, selection, &products, known);
+            return self.curved(theta, observations, selection, products, known);
         }
         // What noise adds to the products is the same all along the record.
         let piece = MAX_CURVED_SAMPLES / CURVED_PIECES;
         let part = observations.excerpt(evenly_spread(observations.samples(), CURVED_PIECES, piece), piece);
         let of_part = whole_selection(&part, &selection.weighting);
-        let of_lin = self.linearised(theta, &part, &of_part);
-        let part_products = dense::gram(&of_lin.columns);
-        let share = of_lin.residual.len() as f64 / lin.residual.len() as f64;
+        let NormalEquations { products: part_products, count, .. } = self.normal_equations(theta, &part, &of_part, None);
+        let share = count as f64 / normal.count as f64;
         let part_known: Vec<Vec<f64>> = part_products.iter().take(known.len()).cloned().collect();
         let curved = self.curved(theta, &part, &of_part, &part_products, &part_known);
         let at = |i: usize, j: usize| match known.get(i.max(j)) {
@@ -250,7 +232,7 @@ impl Model {
             let moved = |by: f64| {
                 let mut at = theta.to_vec();
                 at[i] = (at[i] + by).clamp(variable.lower, variable.upper);
-                (at[i] - theta[i], cost.linearised(&at, 0).slope())
+                (at[i] - theta[i], cost.normal_equations(&at, None, None).slope)
             };
             let ((up, above), (down, below)) = (moved(step), moved(-step));
             above.iter().zip(&below).map(|(above, below)| (above - below) / (up - down)).collect()
@@ -277,9 +259,9 @@ impl Model {
         theta: &[f64],
         observations: &Observations,
         selection: &Selection,
-        lin: &Linearised,
+        normal: &NormalEquations,
     ) -> Option<Vec<Vec<f64>>> {
-        let second = self.second_derivatives(theta, observations, selection, lin, &[]);
-        dense::inverse(&second).or_else(|| dense::inverse(&dense::gram(&lin.columns)))
+        let second = self.second_derivatives(theta, observations, selection, normal, &[]);
+        dense::inverse(&second).or_else(|| dense::inverse(&normal.products))
     }
 }

@@ -5,6 +5,7 @@
 //! Residuals next to a block, which share readings with it, are in neither.
 
 use crate::blocks;
+use crate::cost::Linearised;
 use crate::dense;
 use crate::fit::Fitted;
 use crate::observations::Observations;
@@ -18,52 +19,80 @@ pub fn held_out_energy(
     fitted: &Fitted,
     policy: &Policy,
 ) -> Option<f64> {
-    let lin = fitted.model.linearised(&fitted.theta, observations, selection);
-    let n = lin.samples.len();
-    let p = lin.columns.len();
     let total = observations.samples().max(1);
     let gap = policy.block_gap_samples(total, policy.held_out_blocks);
     let fold_of = |sample: usize| blocks::fold(sample, total, policy);
-    let matrix = |rows: &[usize]| -> Vec<Vec<f64>> {
-        (0..p)
-            .map(|a| (0..p).map(|b| rows.iter().map(|&k| lin.columns[a][k] * lin.columns[b][k]).sum()).collect())
-            .collect()
+    let lin = fitted.model.linearised(&fitted.theta, observations, selection);
+    let sums = |is_of: &dyn Fn(usize) -> bool| {
+        let mut sums = FoldSums::of(lin.columns.len());
+        let rows = (0..lin.samples.len()).filter(|&k| is_of(lin.samples[k]));
+        rows.for_each(|k| sums.add(&lin, k));
+        sums
     };
-    let all: Vec<usize> = (0..lin.residual.len()).collect();
-    let whole = matrix(&all);
-    let gradient: Vec<f64> = lin.columns.iter().map(|c| dense::dot(c, &lin.residual)).collect();
-    let (mut sum, mut count) = (0.0, 0usize);
+    let whole = FoldSums::of_all(&lin);
+    let (mut energy, mut count) = (0.0, 0);
     for fold in 0..policy.held_out_folds {
-        let inside: Vec<usize> = (0..n).filter(|&k| fold_of(lin.samples[k]) == fold).collect();
-        let near: Vec<usize> = (0..n)
-            .filter(|&k| {
-                let s = lin.samples[k];
-                fold_of(s) != fold
-                    && (fold_of(s.saturating_sub(gap)) == fold || fold_of((s + gap).min(total - 1)) == fold)
-            })
-            .collect();
-        let out: Vec<usize> = inside.iter().chain(&near).copied().collect();
-        let taken = matrix(&out);
-        let mut left = whole.clone();
-        for a in 0..p {
-            for b in 0..p {
-                left[a][b] -= taken[a][b];
-            }
-            // Where a fold takes all that is known of a parameter, it stays where it is.
-            left[a][a] += 1e-3 * whole[a][a];
-        }
-        let inverse = dense::inverse(&left)?;
-        let rest: Vec<f64> = (0..p)
-            .map(|a| gradient[a] - out.iter().map(|&k| lin.columns[a][k] * lin.residual[k]).sum::<f64>())
-            .collect();
-        let step = dense::times(&inverse, &rest);
-        for &k in &inside {
-            let r = lin.residual[k] - (0..p).map(|a| lin.columns[a][k] * step[a]).sum::<f64>();
-            sum += r * r;
-            count += 1;
+        let inside = sums(&|s| fold_of(s) == fold);
+        let near = sums(&|s| {
+            fold_of(s) != fold
+                && (fold_of(s.saturating_sub(gap)) == fold || fold_of((s + gap).min(total - 1)) == fold)
+        });
+        energy += inside.energy_after(&whole.step_without(&[&inside, &near])?);
+        count += inside.count;
+    }
+    (count > 0).then(|| energy / count as f64)
+}
+
+/// Sums over some residuals and their derivatives.
+struct FoldSums {
+    energy: f64,
+    count: usize,
+    slope: Vec<f64>,
+    products: Vec<Vec<f64>>,
+}
+
+impl FoldSums {
+    fn of(parameters: usize) -> Self {
+        let products = vec![vec![0.0; parameters]; parameters];
+        Self { energy: 0.0, count: 0, slope: vec![0.0; parameters], products }
+    }
+
+    /// Of all, and what is known beforehand.
+    fn of_all(lin: &Linearised) -> Self {
+        let mut out = Self::of(lin.columns.len());
+        (0..lin.residual.len()).for_each(|k| out.add(lin, k));
+        out
+    }
+
+    fn add(&mut self, lin: &Linearised, k: usize) {
+        let r = lin.residual[k];
+        self.energy += r * r;
+        self.count += 1;
+        for (a, (slope, products)) in self.slope.iter_mut().zip(&mut self.products).enumerate() {
+            let of_a = lin.columns[a][k];
+            *slope += of_a * r;
+            products.iter_mut().zip(&lin.columns).for_each(|(sum, of_b)| *sum += of_a * of_b[k]);
         }
     }
-    (count > 0).then(|| sum / count as f64)
+
+    /// The step, to be subtracted, that a fit without `parts` takes.
+    fn step_without(&self, parts: &[&Self]) -> Option<Vec<f64>> {
+        let (mut products, mut slope) = (self.products.clone(), self.slope.clone());
+        for a in 0..slope.len() {
+            for part in parts {
+                slope[a] -= part.slope[a];
+                products[a].iter_mut().zip(&part.products[a]).for_each(|(all, taken)| *all -= taken);
+            }
+            // Where a fold takes all that is known of a parameter, it stays where it is.
+            products[a][a] += 1e-3 * self.products[a][a];
+        }
+        Some(dense::times(&dense::inverse(&products)?, &slope))
+    }
+
+    /// Energy of these residuals after a step.
+    fn energy_after(&self, step: &[f64]) -> f64 {
+        self.energy - 2.0 * dense::dot(step, &self.slope) + dense::dot(step, &dense::times(&self.products, step))
+    }
 }
 
 /// Nats that `after` saves against `before` on the blocks left out, the level of the noise free.

@@ -41,38 +41,53 @@ pub(crate) struct Span<'a> {
     pub(crate) is_last: bool,
 }
 
-/// Values that count, filtered, of a piece that comes window after window: the filter reaches over the ends of windows.
+/// A filter of values that come window after window: it reaches over the ends of windows.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Sieve {
+pub(crate) struct Stream {
     /// Values that the filter reaches from the next one on.
     values: Vec<f64>,
     filtered: Vec<f64>,
-    /// Place in the piece of the first of these values, and of the next one that is filtered.
+    /// Place of the first of these values, and of the next one that is filtered.
     first: usize,
     next: usize,
+}
+
+impl Stream {
+    /// Begins again.
+    fn begin(&mut self) {
+        self.values.clear();
+        (self.first, self.next) = (0, 0);
+    }
+
+    /// The next filtered values, those of the window and of windows before it as far as the filter reaches only now, and the place
+    /// of the first of them.
+    pub(crate) fn filter(&mut self, window: &[f64], weighting: &Weighting, is_last: bool) -> (usize, &[f64]) {
+        let needless = (self.next - self.first).saturating_sub(weighting.memory());
+        self.values.drain(..needless);
+        self.first += needless;
+        self.values.extend_from_slice(window);
+        weighting.apply_into(&self.values, &mut self.filtered);
+        let unreached = if is_last { 0 } else { weighting.half() };
+        let end = (self.first + self.values.len()).saturating_sub(unreached).max(self.next);
+        let next = std::mem::replace(&mut self.next, end);
+        (next, &self.filtered[next - self.first..end - self.first])
+    }
+}
+
+/// Values of a piece that count, filtered, window after window.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sieve {
+    stream: Stream,
 }
 
 impl Sieve {
     /// Appends those that count to `out`, of the window and of those before it as far as the filter reaches only now.
     pub(crate) fn pick(&mut self, window: &[f64], span: Span<'_>, selection: &Selection, out: &mut Vec<f64>) {
-        let (weighting, first_sample) = (&selection.weighting, span.piece.first_sample);
-        if span.is_first && span.is_last {
-            weighting.apply_into(window, &mut self.filtered);
-            return selection.pick(&self.filtered, first_sample, out);
-        }
         if span.is_first {
-            self.values.clear();
-            (self.first, self.next) = (0, 0);
+            self.stream.begin();
         }
-        self.values.extend_from_slice(window);
-        weighting.apply_into(&self.values, &mut self.filtered);
-        let unreached = if span.is_last { 0 } else { weighting.half() };
-        let end = (self.first + self.values.len()).saturating_sub(unreached).max(self.next);
-        selection.pick(&self.filtered[self.next - self.first..end - self.first], first_sample + self.next, out);
-        self.next = end;
-        let needless = (end - self.first).saturating_sub(weighting.memory());
-        self.values.drain(..needless);
-        self.first += needless;
+        let (first, filtered) = self.stream.filter(window, &selection.weighting, span.is_last);
+        selection.pick(filtered, span.piece.first_sample + first, out);
     }
 }
 

@@ -10,6 +10,7 @@ use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::implied::Evaluation;
+use crate::correlation::{autocorrelation, filtered};
 use crate::influence::Influence;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
@@ -60,17 +61,6 @@ fn is_flat(
     })
 }
 
-/// Covariance of half the first derivatives of the energy, [`Linearised::slope`], for white noise: products of the columns, each
-/// filtered once more, since the noise is that of the residual before its filter; prior knowledge has unit variance.
-pub fn score_covariance(lin: &Linearised, selection: &Selection) -> Vec<Vec<f64>> {
-    let n = lin.samples.len();
-    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|c| selection.weighting.apply(&c[..n])).collect();
-    let of = |a: usize, b: usize| {
-        dense::dot(&filtered[a], &filtered[b]) + dense::dot(&lin.columns[a][n..], &lin.columns[b][n..])
-    };
-    (0..filtered.len()).map(|a| (0..filtered.len()).map(|b| of(a, b)).collect()).collect()
-}
-
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
 /// ones, for white noise or, where the residual is not that, with its own autocorrelation.
 pub fn covariance(
@@ -79,43 +69,33 @@ pub fn covariance(
     selection: &Selection,
     by_residual: bool,
 ) -> Option<Vec<Vec<f64>>> {
-    let lin = fitted.model.linearised(&fitted.theta, observations, selection);
-    let p = lin.columns.len();
-    let inverse = fitted.model.curvature(&fitted.theta, observations, selection, &lin)?;
-    let n = lin.samples.len();
-    let mut middle = score_covariance(&lin, selection);
-    if by_residual {
-        // Bartlett's window over the lags in which the residual remembers.
-        let lags = (2.0 * (n as f64).sqrt()) as usize;
-        let r = &lin.residual[..n];
-        let correlation = |lag: usize| (lag..n).map(|k| r[k] * r[k - lag]).sum::<f64>() / n as f64;
-        let products: Vec<Vec<f64>> =
-            (0..p).map(|a| (0..p).map(|b| dense::dot(&lin.columns[a][..n], &lin.columns[b][..n])).collect()).collect();
-        let energy = correlation(0);
-        let mut coloured: Vec<Vec<f64>> = products.iter().map(|row| row.iter().map(|m| m * energy).collect()).collect();
-        for lag in 1..=lags.min(n / 4) {
-            let weight = (1.0 - lag as f64 / (lags + 1) as f64) * correlation(lag);
-            for a in 0..p {
-                for b in 0..=a {
-                    let (x, y) = (&lin.columns[a][..n], &lin.columns[b][..n]);
-                    let product = dense::dot(&x[lag..], &y[..n - lag]) + dense::dot(&x[..n - lag], &y[lag..]);
-                    coloured[a][b] += weight * product;
-                    if a != b {
-                        coloured[b][a] += weight * product;
-                    }
-                }
-            }
-        }
+    let Fitted { model, theta, .. } = fitted;
+    let normal = model.scored_normal_equations(theta, observations, selection, None);
+    let inverse = model.curvature(theta, observations, selection, &normal)?;
+    let white = normal.slope_covariance;
+    let middle = if by_residual {
+        let mut coloured = coloured(&model.linearised(theta, observations, selection));
         // No less than white noise alone.
-        for a in 0..p {
-            let ratio = (coloured[a][a] / middle[a][a].max(f64::MIN_POSITIVE)).max(0.0);
-            if ratio < 1.0 {
-                coloured[a][a] = middle[a][a];
-            }
+        for (a, row) in coloured.iter_mut().enumerate() {
+            row[a] = row[a].max(white[a][a]);
         }
-        middle = coloured;
-    }
+        coloured
+    } else {
+        white
+    };
     Some(dense::product(&dense::product(&inverse, &middle), &inverse))
+}
+
+/// Covariance of half the first derivatives of the energy for noise that is correlated as the residual is: products of the columns
+/// with themselves, each filtered by its autocorrelation, under Bartlett's window over the lags in which it remembers.
+fn coloured(lin: &Linearised) -> Vec<Vec<f64>> {
+    let n = lin.samples.len();
+    let lags = (2.0 * (n as f64).sqrt()) as usize;
+    let mut kernel = autocorrelation(&lin.residual[..n], lags.min(n / 4));
+    kernel.iter_mut().enumerate().for_each(|(lag, c)| *c *= 1.0 - lag as f64 / (lags + 1) as f64);
+    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|column| filtered(&column[..n], &kernel)).collect();
+    let of = |a: usize, b: usize| dense::dot(&lin.columns[a][..n], &filtered[b]);
+    (0..filtered.len()).map(|a| (0..filtered.len()).map(|b| of(a.max(b), a.min(b))).collect()).collect()
 }
 
 /// The fit in numbers: what it leaves over, how certain it is, and what pictures need.

@@ -109,6 +109,9 @@ impl Factor {
         self.rows.clear();
         self.kept.clear();
         let mut agreeing = 0;
+        if !settles {
+            self.rows.reserve_exact(count * stride);
+        }
         let has_lead = before.is_some();
         if let Some(before) = before {
             agreeing = before.agreeing;

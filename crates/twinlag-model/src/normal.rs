@@ -1,0 +1,159 @@
+//! The normal equations of a model: sums over residuals and their derivatives, of which one window is in memory.
+
+use crate::cost::{Block, Linearised, ResidualCost};
+use crate::dense;
+use crate::model::Model;
+use crate::observations::Observations;
+use crate::selection::{Selection, Stream};
+use crate::weighting::Weighting;
+
+/// Normal equations of a whitened residual `r`, filtered, with derivatives `J` at a point: sums over the residuals that count, and
+/// over what is known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct NormalEquations {
+    /// Energy of the residual, `rᵀr`.
+    pub energy: f64,
+    /// Residuals, prior knowledge among them.
+    pub count: usize,
+    /// Half the first derivatives of the energy, `Jᵀr`.
+    pub slope: Vec<f64>,
+    /// Products of the derivatives, `JᵀJ`.
+    pub products: Vec<Vec<f64>>,
+    /// Covariance of the slope for white noise: products of the columns, each filtered once more, since the noise is that of the
+    /// residual before its filter; prior knowledge has unit variance. Zero where it was not asked for.
+    pub slope_covariance: Vec<Vec<f64>>,
+    /// Whether the columns that another model has as well are those of that model.
+    pub is_beside: bool,
+}
+
+impl NormalEquations {
+    /// Holds parameter `at`: it has no derivative.
+    pub fn hold(&mut self, at: usize) {
+        self.slope[at] = 0.0;
+        for matrix in [&mut self.products, &mut self.slope_covariance] {
+            matrix[at].fill(0.0);
+            matrix.iter_mut().for_each(|row| row[at] = 0.0);
+        }
+    }
+}
+
+/// A model that was linearised without the last effect of another, which has no size there.
+#[derive(Clone, Copy, Debug)]
+pub struct Beside<'a> {
+    /// The model without the effect.
+    pub without: &'a Linearised,
+    /// Most that a residual may differ: beyond this the columns of both are others.
+    pub max_difference: f64,
+}
+
+impl Beside<'_> {
+    pub(crate) fn agrees_with(&self, residual: &[f64]) -> bool {
+        let mut pairs = residual.iter().zip(&self.without.residual);
+        self.max_difference.is_infinite() || pairs.all(|(a, b)| (a - b).abs() < self.max_difference)
+    }
+}
+
+/// Normal equations that are summed up block by block.
+pub(crate) struct Sums<'a> {
+    out: NormalEquations,
+    known: &'a [Vec<f64>],
+    filter: Option<&'a Weighting>,
+    streams: Vec<Stream>,
+}
+
+impl<'a> Sums<'a> {
+    /// - `known`: a model whose columns are the first ones
+    pub(crate) fn of(parameters: usize, known: Option<&'a Linearised>, filter: Option<&'a Weighting>) -> Self {
+        let none = vec![vec![0.0; parameters]; parameters];
+        let out = NormalEquations {
+            energy: 0.0,
+            count: 0,
+            slope: vec![0.0; parameters],
+            products: none.clone(),
+            slope_covariance: none,
+            is_beside: known.is_some(),
+        };
+        let known = known.map_or(&[][..], |known| &known.columns);
+        Self { out, known, filter, streams: vec![Stream::default(); parameters] }
+    }
+
+    /// How many columns are known.
+    pub(crate) fn known(&self) -> usize {
+        self.known.len()
+    }
+
+    pub(crate) fn add(&mut self, block: &Block<'_>) {
+        let Self { out, known, filter, streams } = self;
+        let of_known = known.iter().map(|column| {
+            let end = block.range.end.min(column.len());
+            &column[block.range.start.min(end)..end]
+        });
+        let columns: Vec<&[f64]> = of_known.chain(block.columns().skip(known.len())).collect();
+        out.energy += dense::dot(block.residual, block.residual);
+        out.count += block.residual.len();
+        out.slope.iter_mut().zip(&columns).for_each(|(slope, column)| *slope += dense::dot(column, block.residual));
+        add_products(&mut out.products, &columns);
+        let Some(filter) = filter else { return };
+        let filtered: Vec<&[f64]> = streams
+            .iter_mut()
+            .zip(&columns)
+            .map(|(stream, column)| stream.filter(if block.is_prior { &[] } else { column }, filter, block.is_prior).1)
+            .collect();
+        add_products(&mut out.slope_covariance, &filtered);
+        if block.is_prior {
+            add_products(&mut out.slope_covariance, &columns);
+        }
+    }
+
+    pub(crate) fn normal_equations(mut self) -> NormalEquations {
+        mirror(&mut self.out.products);
+        mirror(&mut self.out.slope_covariance);
+        self.out
+    }
+}
+
+/// Adds `CᵀC` to the lower triangle.
+fn add_products(sums: &mut [Vec<f64>], columns: &[&[f64]]) {
+    for (i, a) in columns.iter().enumerate() {
+        for (sum, b) in sums[i].iter_mut().zip(&columns[..=i]) {
+            *sum += dense::dot(a, b);
+        }
+    }
+}
+
+fn mirror(matrix: &mut [Vec<f64>]) {
+    for i in 0..matrix.len() {
+        for j in 0..i {
+            matrix[j][i] = matrix[i][j];
+        }
+    }
+}
+
+impl Model {
+    /// The normal equations at a point, without [`NormalEquations::slope_covariance`].
+    ///
+    /// - `beside`: a model without the last effect. Where residuals are of the same samples, and differ by no more than they may,
+    ///   the columns of the parameters that both have are those of that model: what an effect of no size does not change
+    pub fn normal_equations(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        beside: Option<Beside<'_>>,
+    ) -> NormalEquations {
+        ResidualCost::new(self, theta, observations, selection).normal_equations(theta, beside, None)
+    }
+
+    /// The normal equations at a point, with [`NormalEquations::slope_covariance`]; else as [`Model::normal_equations`].
+    pub fn scored_normal_equations(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+        beside: Option<Beside<'_>>,
+    ) -> NormalEquations {
+        let cost = ResidualCost::new(self, theta, observations, selection);
+        cost.normal_equations(theta, beside, Some(&selection.weighting))
+    }
+}
