@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place, Policy,
-    Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report, runs,
-    white_deviance,
+    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place,
+    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
+    runs, white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -351,8 +351,8 @@ impl<'a> Search<'a> {
         let slope = &normal.slope;
         // Where it is singular, along the diagonal: less than it could take off, but no more
         // than it can.
-        let taken = dense::inverse(&normal.products)
-            .map_or(0.0, |inverse| dense::dot(slope, &dense::times(&inverse, slope)));
+        let taken =
+            dense::inverse(&normal.products).map_or(0.0, |inverse| dense::dot(slope, &dense::times(&inverse, slope)));
         current.chi2 - (normal.energy - taken)
     }
 

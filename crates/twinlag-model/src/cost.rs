@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use twinlag_optimise::{Cost, Derivatives, Variable};
 
 use crate::dense;
-use crate::disagreement::{Disagreement, Evaluator, Moved};
+use crate::disagreement::{Again, Disagreement, Evaluator, Moved};
 use crate::model::Model;
 use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
@@ -45,6 +45,7 @@ struct Memory<'a> {
     columns: Vec<Column>,
     /// Memory for as many derivatives as are computed at a time.
     spare: Mutex<Vec<Disagreement<Number>>>,
+    again: Again,
 }
 
 /// The derivative with respect to one parameter, window after window.
@@ -91,6 +92,7 @@ impl<'a> ResidualCost<'a> {
             sieve: Sieve::default(),
             columns: std::iter::repeat_with(Column::default).take(theta.len()).collect(),
             spare: Mutex::default(),
+            again: Again::default(),
         };
         let variables = model.variables(theta, observations);
         Self { model, observations, selection, variables, memory: RefCell::new(memory) }
@@ -134,8 +136,9 @@ impl<'a> ResidualCost<'a> {
     /// parameters before `first`, and of those that are held, are empty.
     fn walk(&self, theta: &[f64], first: usize, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
         self.evaluate(theta, memory);
-        let Memory { evaluator, residual, ends, columns, spare, .. } = memory;
+        let Memory { evaluator, residual, ends, columns, spare, again, .. } = memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
+        let still = self.model.plant_of(&constants(theta), self.observations);
         let moved = |i: usize| {
             let mut numbers = constants(theta);
             numbers[i] = numbers[i].derivative();
@@ -149,11 +152,12 @@ impl<'a> ResidualCost<'a> {
         let count = columns.iter().filter(|column| column.plant.is_some()).count();
         let mut done = 0;
         for (index, window) in evaluator.windows().iter().enumerate() {
+            let factor = evaluator.factor(&still, index, again);
             let compute = |(i, column): (usize, &mut Column)| {
                 let Column { plant: Some(plant), moved, sieve, picked } = column else { return };
                 let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
                 let functions = self.model.sensors_of_functions(i);
-                let values = evaluator.derivative(plant, functions, index, &mut disagreement, moved);
+                let values = evaluator.derivative(plant, functions, index, factor, &mut disagreement, moved);
                 picked.clear();
                 sieve.pick(values, evaluator.span(index), self.selection, picked);
                 spare.lock().expect("no thread panics").push(disagreement);
@@ -186,7 +190,7 @@ impl<'a> ResidualCost<'a> {
         });
         let residual = memory.residual.clone();
         columns[first..].iter_mut().for_each(|column| column.resize(residual.len(), 0.0));
-        Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces), residual }
+        Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces).collect(), residual }
     }
 
     /// The normal equations at a point.
@@ -201,8 +205,10 @@ impl<'a> ResidualCost<'a> {
     ) -> NormalEquations {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        let samples = |beside: &Beside<'_>| beside.without.samples == self.selection.samples(&memory.evaluator.pieces);
-        let known = beside.filter(|b| b.agrees_with(&memory.residual) && samples(b)).map(|beside| beside.without);
+        let pieces = &memory.evaluator.pieces;
+        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter().copied());
+        let agrees = |beside: &Beside<'_>| beside.agrees_with(&memory.residual) && has_samples(beside.without);
+        let known = beside.filter(agrees).map(|beside| beside.without);
         let mut sums = Sums::of(theta.len(), known, filter);
         self.walk(theta, sums.known(), &mut memory, |block| sums.add(&block));
         sums.normal_equations()
@@ -219,7 +225,11 @@ impl Cost for ResidualCost<'_> {
     fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
         let NormalEquations { energy, slope, products, .. } = self.normal_equations(theta, None, None);
         let twice = |row: Vec<f64>| row.into_iter().map(|x| 2.0 * x).collect();
-        Some(Derivatives { value: energy, gradient: twice(slope), curvature: products.into_iter().map(twice).collect() })
+        Some(Derivatives {
+            value: energy,
+            gradient: twice(slope),
+            curvature: products.into_iter().map(twice).collect(),
+        })
     }
 }
 
@@ -371,7 +381,10 @@ mod tests {
                 let theta: Vec<f64> = TAU_S.into_iter().chain(effect.starts().remove(0)).collect();
                 let linearised = |window_samples: usize| {
                     let cost = ResidualCost::new(&model, &theta, &observations, &selection);
-                    cost.memory.borrow_mut().evaluator.window_samples = window_samples;
+                    let mut memory = cost.memory.borrow_mut();
+                    memory.evaluator.window_samples = window_samples;
+                    memory.evaluator.max_kept_samples = window_samples;
+                    drop(memory);
                     cost.linearised(&theta, 0)
                 };
                 let (whole, windows) = (linearised(SAMPLES), linearised(37));

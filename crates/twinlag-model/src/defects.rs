@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use num_complex::Complex64;
 use twinlag_bias::{COARSE_STEP_NOISE_RATIO, estimate_noise};
@@ -152,12 +153,11 @@ pub(crate) fn spikes(
 pub(crate) fn mask(observations: &mut Observations, channel: usize, samples: &[usize]) {
     let mut first = 0;
     for stretch in &mut observations.stretches {
-        for sample in samples {
-            if let Some(masked) = sample.checked_sub(first).and_then(|k| stretch.masked[channel].get_mut(k)) {
-                *masked = true;
-            }
+        let n = stretch.len();
+        for k in samples.iter().filter_map(|sample| sample.checked_sub(first)).filter(|k| *k < n) {
+            Arc::make_mut(stretch).masked[channel][k] = true;
         }
-        first += stretch.len();
+        first += n;
     }
 }
 

@@ -5,6 +5,7 @@
 //! the rows that carry noise, as an offset does, the factor of the residual whitens the derivative as well.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::inverse::Inverse;
 use crate::number::{Number, Real};
@@ -21,6 +22,9 @@ const MASKED_NOISE_SWINGS: f64 = 20.0;
 const MIN_DISAGREEMENTS: usize = 4;
 /// Samples of a window: derivatives of one in up to a dozen numbers each, a megabyte, stay in the cache of a processor.
 const WINDOW_SAMPLES: usize = 8192;
+/// Samples of a record up to which all factors are kept for derivatives: of longer ones those that have not settled are computed
+/// once more, for a part of what one derivative costs.
+const MAX_KEPT_SAMPLES: usize = 65_536;
 /// Part of a step by which the instant of a value may differ from its sample's.
 const SAME_INSTANT_STEPS: f64 = 0.25;
 
@@ -148,9 +152,38 @@ impl Window {
         self.from..self.from + self.count
     }
 
+    /// Its disagreement, into `plain`; the first of its samples in the stretch.
+    fn disagree(
+        &self,
+        plant: &Plant,
+        observations: &Observations,
+        piece: &Piece,
+        plain: &mut Disagreement<f64>,
+    ) -> usize {
+        let period_s = observations.period_s;
+        let samples = self.samples(plant.consumed(period_s.is_some()));
+        let first = samples.start;
+        plain.inverse.invert(plant, observations.stretches[piece.stretch].cut(samples), period_s);
+        plain.compare(plant, observations.step_s());
+        debug_assert_eq!(plain.values.len(), self.lead + self.count, "as many as the operators leave");
+        first
+    }
+
     /// Its samples of the stretch.
     fn samples(&self, consumed: usize) -> Range<usize> {
         self.first - self.lead..self.first + self.count + consumed
+    }
+}
+
+/// Memory for the factor of a window that was not kept.
+pub(crate) struct Again {
+    plain: Disagreement<f64>,
+    factor: Factor,
+}
+
+impl Default for Again {
+    fn default() -> Self {
+        Self { plain: Disagreement::empty(), factor: Factor::empty() }
     }
 }
 
@@ -172,6 +205,8 @@ pub(crate) struct Evaluator<'a> {
     used: usize,
     /// Most values of a window of evenly spaced samples.
     pub(crate) window_samples: usize,
+    /// Samples up to which all factors are kept.
+    pub(crate) max_kept_samples: usize,
     /// Pieces of the last evaluation.
     pub(crate) pieces: Vec<Piece>,
     /// Its whitened residual.
@@ -182,7 +217,7 @@ impl<'a> Evaluator<'a> {
     /// - `noise_std_k`: white noise of the channels, which all plants have
     pub(crate) fn new(observations: &'a Observations, noise_std_k: [f64; 2]) -> Self {
         let of_stretch =
-            |s: &Stretch| [0, 1].map(|i| reading_variance(noise_std_k[i], &s.masked[i], observations.swing_k()));
+            |s: &Arc<Stretch>| [0, 1].map(|i| reading_variance(noise_std_k[i], &s.masked[i], observations.swing_k()));
         Self {
             observations,
             variances: observations.stretches.iter().map(of_stretch).collect(),
@@ -190,6 +225,7 @@ impl<'a> Evaluator<'a> {
             windows: Vec::new(),
             used: 0,
             window_samples: WINDOW_SAMPLES,
+            max_kept_samples: MAX_KEPT_SAMPLES,
             pieces: Vec::new(),
             residual: Vec::new(),
         }
@@ -230,37 +266,54 @@ impl<'a> Evaluator<'a> {
 
     /// The residual of the next window of the last piece.
     fn evaluate_window(&mut self, plant: &Plant, first: usize, count: usize) {
+        let is_kept = self.observations.samples() <= self.max_kept_samples;
         let Self { observations, variances, plain, windows, used, pieces, residual, .. } = self;
         if windows.len() == *used {
             windows.push(Window { piece: 0, first: 0, from: 0, count: 0, lead: 0, factor: Factor::empty() });
         }
         let (before, rest) = windows.split_at_mut(*used);
-        let before = before.last().filter(|_| first > 0).map(|before| &before.factor);
+        let mut last = before.last_mut().map(|before| &mut before.factor);
+        let before = last.as_deref().filter(|_| first > 0);
         let window = &mut rest[0];
         let lead = before.map_or(0, Factor::band);
         (window.piece, window.first, window.from) = (pieces.len() - 1, first, residual.len());
         (window.count, window.lead) = (count, lead);
         *used += 1;
         let piece = pieces.last_mut().expect("the piece of the window");
-        let stretch = &observations.stretches[piece.stretch];
-        let (period_s, step_s) = (observations.period_s, observations.step_s());
-        let samples = window.samples(plant.consumed(period_s.is_some()));
-        plain.inverse.invert(plant, stretch.cut(samples.clone()), period_s);
-        plain.compare(plant, step_s);
-        debug_assert_eq!(plain.values.len(), lead + count, "as many as the operators leave");
+        let first_reading = window.disagree(plant, observations, piece, plain);
         if first == 0 {
-            piece.first_sample += first_sample(stretch, plain.inverse.chains[0].times_s()[0], step_s);
+            let (stretch, first_s) = (&observations.stretches[piece.stretch], plain.inverse.chains[0].times_s()[0]);
+            piece.first_sample += first_sample(stretch, first_s, observations.step_s());
         }
-        let sources = plain.sources(&variances[piece.stretch], samples.start);
+        let sources = plain.sources(&variances[piece.stretch], first_reading);
         window.factor.compute(&sources, lead + count, before);
+        if !is_kept {
+            last.iter_mut().for_each(|factor| factor.shorten());
+        }
         plain.values[..lead].copy_from_slice(&residual[residual.len() - lead..]);
         window.factor.whiten(&mut plain.values, lead);
         residual.extend_from_slice(&plain.values[lead..]);
     }
 
+    /// The factor of window `index`, of the plant that was evaluated last.
+    pub(crate) fn factor<'m>(&'m self, plant: &Plant, index: usize, again: &'m mut Again) -> &'m Factor {
+        let window = &self.windows[index];
+        if window.factor.len() == window.lead + window.count {
+            return &window.factor;
+        }
+        let Again { plain, factor } = again;
+        let piece = &self.pieces[window.piece];
+        let first_reading = window.disagree(plant, self.observations, piece, plain);
+        let before = index.checked_sub(1).filter(|_| window.first > 0).map(|before| &self.windows[before].factor);
+        let sources = plain.sources(&self.variances[piece.stretch], first_reading);
+        factor.compute(&sources, window.lead + window.count, before);
+        factor
+    }
+
     /// The derivative of the residual in window `index`, at the values of the plant that was evaluated last: `plant` has them, with
     /// the derivatives of what the parameter moves.
     ///
+    /// - `factor`: that of the window
     /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
     /// - `moved`: after the window before
     pub(crate) fn derivative<'m>(
@@ -268,11 +321,12 @@ impl<'a> Evaluator<'a> {
         plant: &Plant,
         functions: [bool; 2],
         index: usize,
+        factor: &Factor,
         disagreement: &mut Disagreement<Number>,
         moved: &'m mut Moved,
     ) -> &'m [f64] {
         let Moved { factor: of_factor, values } = moved;
-        let Window { piece, first, from, count, lead, ref factor } = self.windows[index];
+        let Window { piece, first, from, count, lead, .. } = self.windows[index];
         let chains = plant.moved(functions);
         if chains == [false; 2] {
             values.clear();

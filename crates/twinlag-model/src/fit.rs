@@ -199,7 +199,8 @@ impl Model {
         let piece = MAX_CURVED_SAMPLES / CURVED_PIECES;
         let part = observations.excerpt(evenly_spread(observations.samples(), CURVED_PIECES, piece), piece);
         let of_part = whole_selection(&part, &selection.weighting);
-        let NormalEquations { products: part_products, count, .. } = self.normal_equations(theta, &part, &of_part, None);
+        let NormalEquations { products: part_products, count, .. } =
+            self.normal_equations(theta, &part, &of_part, None);
         let share = count as f64 / normal.count as f64;
         let part_known: Vec<Vec<f64>> = part_products.iter().take(known.len()).cloned().collect();
         let curved = self.curved(theta, &part, &of_part, &part_products, &part_known);

@@ -34,8 +34,7 @@ pub fn held_out_energy(
     for fold in 0..policy.held_out_folds {
         let inside = sums(&|s| fold_of(s) == fold);
         let near = sums(&|s| {
-            fold_of(s) != fold
-                && (fold_of(s.saturating_sub(gap)) == fold || fold_of((s + gap).min(total - 1)) == fold)
+            fold_of(s) != fold && (fold_of(s.saturating_sub(gap)) == fold || fold_of((s + gap).min(total - 1)) == fold)
         });
         energy += inside.energy_after(&whole.step_without(&[&inside, &near])?);
         count += inside.count;

@@ -1,13 +1,14 @@
 //! A model: two lags and the effects added so far.
 
 use std::fmt;
+use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
 use crate::effect::{Identifier, Parameter, Shared};
 use crate::implied::Evaluation;
 use crate::number::Number;
-use crate::observations::Observations;
+use crate::observations::{Observations, Stretch};
 use crate::plant::Plant;
 
 /// Longest time constant beside the length of the record: of a longer one there is no more than a drift in it.
@@ -241,8 +242,9 @@ impl Model {
         let plant = self.plant(theta, observations);
         let mut out = observations.clone();
         for stretch in &mut out.stretches {
-            for (readings, sensor) in stretch.reading_c.iter_mut().zip(&plant.sensors) {
-                for (y, t) in readings.iter_mut().zip(&stretch.time_s) {
+            let Stretch { time_s, reading_c, .. } = Arc::make_mut(stretch);
+            for (readings, sensor) in reading_c.iter_mut().zip(&plant.sensors) {
+                for (y, t) in readings.iter_mut().zip(&*time_s) {
                     *y -= sensor.reading.disturbance_at(*t).re;
                 }
             }

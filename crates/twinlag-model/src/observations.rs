@@ -91,8 +91,8 @@ pub(crate) struct Cut<'a> {
 /// Both channels of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observations {
-    /// Unbroken stretches, in order of time.
-    pub stretches: Vec<Stretch>,
+    /// Unbroken stretches, in order of time, shared by copies of the record.
+    pub stretches: Vec<Arc<Stretch>>,
     /// The sample period where samples are evenly spaced within each stretch, s.
     pub period_s: Option<f64>,
     /// Standard deviation of the more lively channel, K.
@@ -140,6 +140,7 @@ impl Observations {
         let flows: Option<Vec<(&[f64], &[f64])>> =
             stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s[..], &flow[..]))).collect();
         let flow = flows.map(|flows| Flow::new(&flows).map(Arc::new)).transpose()?;
+        let stretches = stretches.into_iter().map(Arc::new).collect();
         let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
         out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);
         Ok(out)
@@ -153,7 +154,7 @@ impl Observations {
 
     /// Number of samples.
     pub fn samples(&self) -> usize {
-        self.stretches.iter().map(Stretch::len).sum()
+        self.stretches.iter().map(|s| s.len()).sum()
     }
 
     /// First and last instant, s.
@@ -226,12 +227,12 @@ impl Observations {
                 }
                 if from + length <= n {
                     let cut = from..from + length;
-                    stretches.push(Stretch {
+                    stretches.push(Arc::new(Stretch {
                         time_s: stretch.time_s[cut.clone()].to_vec(),
                         reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
                         masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
                         flow: None,
-                    });
+                    }));
                 }
                 break;
             }

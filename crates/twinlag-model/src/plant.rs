@@ -213,7 +213,7 @@ impl Plant {
 /// How many samples a delay may reach: not so many that stretches with a tenth of the record or more are lost to it.
 pub(crate) fn reach(observations: &Observations) -> usize {
     let samples = observations.samples();
-    let mut lengths: Vec<usize> = observations.stretches.iter().map(Stretch::len).collect();
+    let mut lengths: Vec<usize> = observations.stretches.iter().map(|s| s.len()).collect();
     lengths.sort_unstable();
     let mut shorter = 0;
     let typical = lengths.into_iter().find(|n| {

@@ -23,6 +23,7 @@
 //! The lags are those of the two-lag model with gain and offset, fitted without the readings in question.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::defects::ChannelNoise;
 use crate::observations::{Observations, Stretch};
@@ -70,7 +71,7 @@ impl<'a> Judge<'a> {
         tau_s: [f64; 2],
         policy: &'a Policy,
     ) -> Self {
-        let of = |s: &Stretch| (0..s.len()).map(|k| ends.iter().any(|end| end.is_at(s, k))).collect();
+        let of = |s: &Arc<Stretch>| (0..s.len()).map(|k| ends.iter().any(|end| end.is_at(s, k))).collect();
         let in_question = observations.stretches.iter().map(of).collect();
         Self { observations, levels, tau_s, policy, in_question }
     }

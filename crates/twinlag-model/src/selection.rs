@@ -19,9 +19,9 @@ impl Selection {
     }
 
     /// Samples of the residuals of `pieces` that count.
-    pub(crate) fn samples(&self, pieces: &[Piece]) -> Vec<usize> {
+    pub(crate) fn samples(&self, pieces: &[Piece]) -> impl Iterator<Item = usize> {
         let of_piece = |p: &Piece| p.first_sample..p.first_sample + p.count;
-        pieces.iter().flat_map(of_piece).filter(|sample| self.holds(*sample)).collect()
+        pieces.iter().flat_map(of_piece).filter(|sample| self.holds(*sample))
     }
 
     /// Appends those of `filtered` values that count to `out`, the first of them of sample `first`.
@@ -122,7 +122,7 @@ mod tests {
                 out
             };
             let whole = picked(piece.count);
-            assert_eq!(whole.len(), selection.samples(&[piece]).len());
+            assert_eq!(whole.len(), selection.samples(&[piece]).count());
             for most in [31, 512, 1495] {
                 assert_eq!(picked(most), whole, "windows of {most}");
             }

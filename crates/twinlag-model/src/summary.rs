@@ -3,6 +3,7 @@
 use twinlag_cross_relation::{CHI2_95, Z_975, log_normal_interval_95, residual_tests};
 
 use crate::blocks;
+use crate::correlation::{autocorrelation, filtered};
 use crate::cost::Linearised;
 use crate::defects::ChannelNoise;
 use crate::dense;
@@ -10,7 +11,6 @@ use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::{ModelFit, TimeConstant, Trace};
 use crate::implied::Evaluation;
-use crate::correlation::{autocorrelation, filtered};
 use crate::influence::Influence;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;

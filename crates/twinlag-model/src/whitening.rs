@@ -149,6 +149,20 @@ impl Factor {
         self.agreeing = agreeing;
     }
 
+    /// Keeps no more than the next window begins with, if the rows have not settled: there are as many of them as of values.
+    pub(crate) fn shorten(&mut self) {
+        if 2 * self.rows.len() > self.kept.len() * (self.band + 1) {
+            let mut end = Self { band: self.band, agreeing: self.agreeing, ..Self::empty() };
+            end.lead(self);
+            *self = end;
+        }
+    }
+
+    /// Rows that there are, those of the lead as well.
+    pub(crate) fn len(&self) -> usize {
+        self.kept.len()
+    }
+
     /// Begins with the last rows of the window before, as many as the band.
     fn lead(&mut self, before: &Self) {
         debug_assert_eq!(before.band, self.band, "windows of one stretch");
