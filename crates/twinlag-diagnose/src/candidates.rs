@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use twinlag_model::{
     Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place,
     Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
-    runs, white_deviance,
+    white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -207,8 +207,7 @@ impl<'a> Search<'a> {
     }
 
     fn bands(&self, fitted: &Fitted) -> Bands {
-        let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
-        Bands::of(&runs(&evaluation, |s| self.selection.holds(s)))
+        Bands::of(&fitted.model.residual_runs(&fitted.theta, self.observations, |s| self.selection.holds(s)))
     }
 
     /// `−2 ln L` with a free noise level in every band.

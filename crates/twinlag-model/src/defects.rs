@@ -216,8 +216,9 @@ pub fn lines(
     if count < 64 {
         return Vec::new();
     }
-    let spectrum = Forward::of(n).transform(&run);
-    let power: Vec<f64> = spectrum.iter().map(|x| x.norm_sqr() / count as f64).collect();
+    let spectrum = Forward::once(n).transform(&run);
+    drop(run);
+    let power: Vec<f64> = spectrum.into_iter().map(|x| x.norm_sqr() / count as f64).collect();
     let mut found: HashMap<usize, f64> = HashMap::new();
     for bin in 3..power.len().saturating_sub(1) {
         let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];

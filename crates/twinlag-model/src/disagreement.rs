@@ -245,6 +245,11 @@ impl<'a> Evaluator<'a> {
 
     /// The whitened residual of `plant`, into [`Self::residual`].
     pub(crate) fn evaluate(&mut self, plant: &Plant) {
+        self.evaluate_with(plant, |_| ());
+    }
+
+    /// As [`Self::evaluate`], and visits the standard deviation of each disagreement, given those before it.
+    pub(crate) fn evaluate_with(&mut self, plant: &Plant, mut visit: impl FnMut(f64)) {
         let is_even = self.observations.period_s.is_some();
         self.pieces.clear();
         self.residual.clear();
@@ -258,6 +263,8 @@ impl<'a> Evaluator<'a> {
                 let most = if is_even { self.window_samples } else { count };
                 for first in (0..count).step_by(most) {
                     self.evaluate_window(plant, first, most.min(count - first));
+                    let window = &self.windows[self.used - 1];
+                    (window.lead..window.factor.len()).for_each(|k| visit(window.factor.row(k)[0]));
                 }
             }
             before += stretch.len();

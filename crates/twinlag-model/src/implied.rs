@@ -1,7 +1,6 @@
 //! What a model implies of a record beside its residual: gas temperatures, their difference, the noise of each reading.
 //! Computed once, where a fit has ended.
 
-use crate::chain::Chain;
 use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variance};
 use crate::inverse::Inverse;
 use crate::observations::Observations;
@@ -48,11 +47,18 @@ pub(crate) struct Part {
     /// `V⁻¹ u`.
     weighted: Vec<f64>,
     /// Both inferred inputs.
-    pub(crate) inferred: [Chain<f64>; 2],
+    pub(crate) inferred: [Inferred; 2],
     /// Values of them that come before the first disagreement.
     pub(crate) skipped: usize,
     /// Samples before this stretch.
     pub(crate) before: usize,
+}
+
+/// The gas temperature that one channel implies, °C, and how it depends on the readings.
+#[derive(Clone, Debug)]
+pub(crate) struct Inferred {
+    pub(crate) value: Vec<f64>,
+    pub(crate) rows: Rows<f64>,
 }
 
 impl Part {
@@ -100,7 +106,8 @@ impl Plant {
         let mut disagreement = Disagreement::<f64>::empty();
         disagreement.inverse.invert(self, stretch.whole(), observations.period_s);
         // What the sensors imply, before the differences that whiten extra noise.
-        let inferred = disagreement.inverse.chains.clone();
+        let chains = disagreement.inverse.chains.each_ref();
+        let inferred = chains.map(|chain| Inferred { value: chain.value.clone(), rows: chain.rows.clone() });
         disagreement.compare(self, step_s);
         let variances =
             [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
@@ -119,8 +126,7 @@ impl Plant {
         let [c1, c2] = [0, 1].map(|i| &gas[i][skipped..skipped + count]);
         out.gas_c.extend(c1.iter().zip(c2).map(|(a, b)| 0.5 * (a + b)));
         out.disagreement_k.extend(c1.iter().zip(c2).map(|(a, b)| a - b));
-        let typical = median((0..count).map(|k| factor.row(k)[0]).collect());
-        out.is_informed.extend((0..count).map(|k| factor.row(k)[0] < UNINFORMED_RATIO * typical));
+        out.is_informed.extend(is_informed(&(0..count).map(|k| factor.row(k)[0]).collect::<Vec<f64>>()));
         out.residual.extend_from_slice(&residual);
         factor.unwhiten_transposed(&mut residual);
         let rows = disagreement.reading_rows;
@@ -142,6 +148,14 @@ impl Plant {
         };
         [of_channel(0), of_channel(1), inverse.gas.rows.at(k).to_vec()]
     }
+}
+
+/// Whether each of the disagreements of a stretch says anything.
+///
+/// - `scales`: standard deviation of each, given those before it, K
+pub(crate) fn is_informed(scales: &[f64]) -> Vec<bool> {
+    let typical = median(scales.to_vec());
+    scales.iter().map(|scale| *scale < UNINFORMED_RATIO * typical).collect()
 }
 
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {

@@ -13,7 +13,6 @@ use crate::policy::Policy;
 use crate::range_end::{Judge, RangeEnd, range_ends};
 use crate::selection::Selection;
 use crate::settings::Settings;
-use crate::spectrum::runs;
 use crate::weighting::Weighting;
 
 /// Samples of a record that is looked at through excerpts first, and of each of these.
@@ -188,8 +187,7 @@ impl Prepared {
 
     /// From here on frequencies count by the spectrum of what `fitted` leaves over.
     pub fn weigh_by(&mut self, fitted: &Fitted) {
-        let evaluation = fitted.model.evaluate(&fitted.theta, &self.observations);
-        let left = runs(&evaluation, |s| self.searched.holds(s));
+        let left = fitted.model.residual_runs(&fitted.theta, &self.observations, |s| self.searched.holds(s));
         self.searched.weighting = self.searched.weighting.by_residual(&left);
         self.everything.weighting = self.searched.weighting.clone();
     }

@@ -10,6 +10,7 @@ use twinlag_transform::{Complex64, Forward, Tapered, hann};
 
 use crate::dense;
 use crate::fit::Fitted;
+use crate::implied::Evaluation;
 use crate::observations::Observations;
 use crate::plant::Place;
 use crate::selection::Selection;
@@ -30,9 +31,8 @@ struct Pairs {
 }
 
 impl Pairs {
-    fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Self {
+    fn of(fitted: &Fitted, evaluation: &Evaluation, observations: &Observations, selection: &Selection) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
-        let evaluation = plant.evaluate(observations);
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel =
@@ -71,9 +71,10 @@ impl Pairs {
 }
 
 /// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
-pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec<f64> {
+///
+/// - `evaluation`: of the fitted model
+pub(crate) fn estimated_gas(fitted: &Fitted, evaluation: &Evaluation, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
-    let evaluation = plant.evaluate(observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
     let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
     let mut out = Vec::with_capacity(evaluation.residual.len());
@@ -98,14 +99,16 @@ pub(crate) fn estimated_gas(fitted: &Fitted, observations: &Observations) -> Vec
 
 /// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
 ///
+/// - `evaluation`: of the fitted model
 /// - `is_coarse`: whether a converter is, whose rounding has no tails
 pub(crate) fn tests(
     fitted: &Fitted,
+    evaluation: &Evaluation,
     observations: &Observations,
     selection: &Selection,
     is_coarse: bool,
 ) -> Vec<ResidualTest> {
-    let pairs = Pairs::of(fitted, observations, selection);
+    let pairs = Pairs::of(fitted, evaluation, observations, selection);
     let r: Vec<f64> = pairs.residual().collect();
     if r.len() < 100 {
         return Vec::new();
@@ -244,7 +247,7 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }
-    let spectrum = Forward::of(run.len()).transform(run);
+    let spectrum = Forward::once(run.len()).transform(run);
     let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(Complex64::norm_sqr).collect();
     let half = NEIGHBOURS / 2;
     let bins = half + 1..power.len().saturating_sub(half + 1);

@@ -7,8 +7,10 @@ use num_complex::Complex64;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 use twinlag_transform::Forward;
 
+use crate::disagreement::Evaluator;
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
-use crate::implied::Evaluation;
+use crate::implied::{Evaluation, is_informed};
+use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::{Extra, Place, Plant};
 
@@ -321,21 +323,47 @@ pub fn fit_noise(
 
 /// Unbroken runs of the residuals that count and say anything.
 pub fn runs(evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+    let pairs = evaluation.residual.iter().copied().zip(evaluation.is_informed.iter().copied());
+    runs_of(evaluation.sample.iter().copied().zip(pairs), holds)
+}
+
+/// Runs of samples, each with its residual and whether this says anything.
+fn runs_of(residuals: impl Iterator<Item = (usize, (f64, bool))>, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
     let mut out: Vec<Vec<f64>> = Vec::new();
     let mut last = None;
-    for (k, sample) in evaluation.sample.iter().enumerate() {
-        if !holds(*sample) {
-            continue;
-        }
-        let is_next = last.is_some_and(|l| *sample == l + 1);
-        last = Some(*sample);
+    for (sample, (residual, is_informed)) in residuals.filter(|(sample, _)| holds(*sample)) {
+        let is_next = last.is_some_and(|l| sample == l + 1);
+        last = Some(sample);
         if !is_next || out.is_empty() {
             out.push(Vec::new());
         }
         // A masked reading takes one residual away; those around it are white all the same.
-        if let Some(run) = out.last_mut().filter(|_| evaluation.is_informed[k]) {
-            run.push(evaluation.residual[k]);
+        if let Some(run) = out.last_mut().filter(|_| is_informed) {
+            run.push(residual);
         }
     }
     out
+}
+
+impl Model {
+    /// As [`runs`] of what the model implies, in a fifth of the memory.
+    pub fn residual_runs(
+        &self,
+        theta: &[f64],
+        observations: &Observations,
+        holds: impl Fn(usize) -> bool,
+    ) -> Vec<Vec<f64>> {
+        let plant = self.plant(theta, observations);
+        let mut evaluator = Evaluator::new(observations, plant.noise_std_k);
+        let mut scales = Vec::new();
+        evaluator.evaluate_with(&plant, |scale| scales.push(scale));
+        let mut first = 0;
+        let of_piece = evaluator.pieces.iter().flat_map(|piece| {
+            let all = first..first + piece.count;
+            first = all.end;
+            let informed = is_informed(&scales[all.clone()]);
+            (piece.first_sample..).zip(evaluator.residual[all].iter().copied().zip(informed))
+        });
+        runs_of(of_piece, holds)
+    }
 }

@@ -111,7 +111,7 @@ pub fn summarise(
     let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
     let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
     let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
-    tests.extend(crate::residual::tests(fitted, observations, selection, is_coarse));
+    tests.extend(crate::residual::tests(fitted, &evaluation, observations, selection, is_coarse));
     let count: usize = residual_runs.iter().map(Vec::len).sum();
     let dof = count.saturating_sub(fitted.model.free_count()).max(1);
     let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
@@ -121,6 +121,8 @@ pub fn summarise(
     let (time_constants, difference) =
         time_constants(fitted, observations, selection, covariance.as_deref(), influence.as_ref(), policy);
     let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
+    // What it holds is as long as the record.
+    drop(influence);
     ModelFit {
         time_constants,
         difference,
@@ -213,10 +215,11 @@ fn trace(
 ) -> Trace {
     let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
     let is_judge = |s: &usize| selection.holds(*s) && blocks::is_judge(*s, observations.samples(), policy);
+    let gas_c = crate::residual::estimated_gas(fitted, &evaluation, observations);
     Trace {
         time_s: evaluation.time_s,
         residual: evaluation.residual,
-        gas_c: crate::residual::estimated_gas(fitted, observations),
+        gas_c,
         is_judge: evaluation.sample.iter().map(is_judge).collect(),
         sample: evaluation.sample,
         disagreement_k: evaluation.disagreement_k,

@@ -58,9 +58,13 @@ impl Variance {
         if self.masked.binary_search(&sample).is_ok() { self.boundless } else { self.plain }
     }
 
+    /// The first masked reading from `sample` on.
+    fn next_masked(&self, sample: usize) -> Option<usize> {
+        self.masked.get(self.masked.partition_point(|m| *m < sample)).copied()
+    }
+
     fn has_masked_in(&self, samples: std::ops::Range<usize>) -> bool {
-        let first = self.masked.partition_point(|m| *m < samples.start);
-        self.masked.get(first).is_some_and(|m| *m < samples.end)
+        self.next_masked(samples.start).is_some_and(|m| m < samples.end)
     }
 }
 
@@ -70,6 +74,15 @@ fn is_masked_around<T: Real>(sources: &[Source<'_, T>], k: usize, band: usize) -
         let first = source.reading(k);
         source.variance.has_masked_in(first.saturating_sub(band)..first + source.rows.width)
     })
+}
+
+/// The first value after `k` around which a masked reading is, where none is around `k` itself.
+fn plain_end<T: Real>(sources: &[Source<'_, T>], k: usize, band: usize) -> usize {
+    let ends = sources.iter().filter_map(|source| {
+        let masked = source.variance.next_masked(source.reading(k).saturating_sub(band))?;
+        Some((masked + 1).saturating_sub(source.rows.width + source.reading(0)))
+    });
+    ends.fold(usize::MAX, usize::min).max(k + 1)
 }
 
 /// The factor `L` of a covariance: lags `0..=band` of each row; rows that are the same are kept once.
@@ -117,10 +130,12 @@ impl Factor {
             agreeing = before.agreeing;
             self.lead(before);
         }
-        for k in self.kept.len()..count {
+        while self.kept.len() < count {
+            let k = self.kept.len();
             let is_plain = settles && !is_masked_around(sources, k, band);
             if is_plain && agreeing >= SETTLED_ROWS {
-                self.kept.push(self.kept[k - 1]);
+                let end = plain_end(sources, k, band).min(count);
+                self.kept.resize(end, self.kept[k - 1]);
                 continue;
             }
             let from = self.rows.len();

@@ -158,7 +158,9 @@ impl Table {
 
     /// Moves the numbers of a column out of the table.
     pub(crate) fn take_values(&mut self, index: usize) -> Vec<f64> {
-        std::mem::take(&mut self.columns[index].values)
+        let mut values = std::mem::take(&mut self.columns[index].values);
+        values.shrink_to_fit();
+        values
     }
 
     /// What was understood of the file so far.

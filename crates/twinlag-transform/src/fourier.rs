@@ -20,6 +20,11 @@ impl Forward {
         Self(forward(samples))
     }
 
+    /// As [`Forward::of`], of a plan that is not kept: for series as long as a record, whose plan takes three times its memory.
+    pub fn once(samples: usize) -> Self {
+        Self(RealFftPlanner::new().plan_fft_forward(samples))
+    }
+
     /// Values that go in.
     pub fn samples(&self) -> usize {
         self.0.len()
