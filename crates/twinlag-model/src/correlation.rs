@@ -80,7 +80,7 @@ mod tests {
     /// sums of a thousand values of size one are some tens of them.
     #[test]
     fn correlations_are_sums_of_products() {
-        let values: Vec<f64> = (0..1000).map(|k| ((k * k * 7 + k) as f64 * 2.399).sin()).collect();
+        let values: Vec<f64> = (0..1000).map(|k| (f64::from(k * k * 7 + k) * 2.399).sin()).collect();
         for lags in [0, 1, 12, 250] {
             let got = autocorrelation(&values, lags);
             assert_eq!(got.len(), lags + 1);

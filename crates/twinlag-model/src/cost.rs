@@ -389,7 +389,7 @@ mod tests {
                 };
                 let (whole, windows) = (linearised(SAMPLES), linearised(37));
                 assert_eq!(whole.samples, windows.samples);
-                let all = |lin: &Linearised| [&[lin.residual.clone()], &lin.columns[..]].concat();
+                let all = |lin: &Linearised| [std::slice::from_ref(&lin.residual), &lin.columns[..]].concat();
                 for (want, got) in all(&whole).iter().zip(&all(&windows)) {
                     let largest = want.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
                     for (k, (want, got)) in want.iter().zip(got).enumerate() {

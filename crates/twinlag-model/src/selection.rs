@@ -101,7 +101,7 @@ mod tests {
     fn windows_are_filtered_as_the_whole() {
         let value = |k: usize| ((k * k * 7 + k) as f64 * 2.399).sin();
         let values: Vec<f64> = (0..3000).map(value).collect();
-        let time_s = (0..3000).map(|k| k as f64).collect();
+        let time_s = (0..3000).map(f64::from).collect();
         // Slow readings with noise, so that the weights are not flat.
         let reading = |i: usize| (0..3000).map(|k| (0.02 * (k + i) as f64).sin() + 0.1 * value(k + 1000 * i)).collect();
         let stretch = Stretch::new(time_s, [reading(0), reading(1)]);
@@ -109,7 +109,7 @@ mod tests {
         let weighting = Weighting::of(&observations, [0.07; 2]);
         assert!(weighting.half() > 0);
         let counts: Vec<bool> = (0..3000).map(|k| k % 700 > 40).collect();
-        for weighting in [Weighting::default(), weighting.by_residual(&[values.clone()]), weighting] {
+        for weighting in [Weighting::default(), weighting.by_residual(std::slice::from_ref(&values)), weighting] {
             let selection = Selection { counts: counts.clone(), weighting };
             let piece = Piece { stretch: 0, count: 2990, first_sample: 4 };
             let picked = |most: usize| {
