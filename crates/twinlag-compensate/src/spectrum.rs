@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 use twinlag_transform::{Tapered, fast_length, hann};
 
 use crate::prior::Term;
@@ -32,6 +33,8 @@ const MAX_PIECES: usize = 64;
 const POOL_SHARE: f64 = 1.0 / 128.0;
 /// Records of nothing but chance in one of which a pool is taken apart.
 const CHANCE_RECORDS: f64 = 20.0;
+/// Bins that one thread takes at a time.
+const BINS_AT_ONCE: usize = 256;
 /// Overlapping pieces are worth so much less than separate ones under Hann's taper, `1/(1 + 2/36)`.
 const OVERLAPPING_WORTH: f64 = 0.947;
 
@@ -164,7 +167,8 @@ impl Periodogram {
     /// sensors together make of the gas.
     pub(crate) fn expected(&self, terms: &[Term]) -> Vec<f64> {
         let mut out = vec![[0.0; 4]; self.power.len()];
-        terms.iter().for_each(|term| self.add_shown(term, &mut out));
+        let parts = out.par_chunks_mut(BINS_AT_ONCE).enumerate();
+        parts.for_each(|(k, out)| terms.iter().for_each(|term| self.add_shown(term, k * BINS_AT_ONCE, out)));
         out.into_iter().map(|[sum, ..]| sum.max(0.0)).collect()
     }
 
@@ -172,14 +176,15 @@ impl Periodogram {
     /// that with respect to its numbers.
     pub(crate) fn shown(&self, term: &Term) -> Vec<[f64; 4]> {
         let mut out = vec![[0.0; 4]; self.power.len()];
-        self.add_shown(term, &mut out);
+        self.add_shown(term, 0, &mut out);
         out
     }
 
-    fn add_shown(&self, term: &Term, out: &mut [[f64; 4]]) {
-        add_shown(term, self.samples, self.period_s, &self.places, out);
+    /// - `from`: the bin that `out` begins with
+    fn add_shown(&self, term: &Term, from: usize, out: &mut [[f64; 4]]) {
+        add_shown(term, self.samples, self.period_s, &self.places[from..from + out.len()], out);
         for (away_hz, taken_off) in &self.flattened {
-            for ((sums, hz), share) in out.iter_mut().zip(&self.frequency_hz).zip(taken_off) {
+            for ((sums, hz), share) in out.iter_mut().zip(&self.frequency_hz[from..]).zip(&taken_off[from..]) {
                 let beyond = density_with_slopes(term, hz + away_hz);
                 sums.iter_mut().zip(beyond).for_each(|(sum, part)| *sum -= share * part);
             }

@@ -1,35 +1,32 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
+mod local;
 mod near;
 mod scan;
+mod smooth;
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::dense;
 use crate::effect::KnownEffect;
-use crate::effect::{Context, Shared, varying};
+use crate::effect::{Shared, varying};
 use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::ModelFit;
 use crate::known::Known;
+use crate::model::Model;
 use crate::observations::Observations;
 use crate::prepare::Prepared;
 use crate::selection::Selection;
 use crate::settings::{Settings, Watch, report};
 use crate::summary::summarise;
+use local::{Curve, Local};
 use near::Near;
 use scan::Scan;
+use smooth::smooth;
 
-/// Fewest coefficients of the shared change.
-const LEAST_COEFFICIENTS: usize = 3;
-/// Strengths of its curvature that are tried: the least lets it change by a tenth along the record, each is twice the one before.
-const LEAST_CURVATURE: f64 = 0.25;
-const CURVATURES: i32 = 12;
-/// A strength this much less likely than the best, in `−2 ln L`, ends the search.
-const HOPELESS_DEVIANCE: f64 = 20.0;
 /// Times that a step is looked for where the one before was found, and the largest share by which parameters move in one of them.
 const STEP_ROUNDS: usize = 6;
 const LARGEST_MOVE: f64 = 0.5;
@@ -120,7 +117,8 @@ pub fn track(
     let has_delay = constant.model.parameters().any(|p| p.is_lateness);
     let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
     let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);
-    let search = Tracker { prepared: &prepared, selection: &selection };
+    let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+    let search = Tracker { prepared: &prepared, selection: &selection, time_s: &time_s };
     let mut best = (Change::Constant, constant.clone(), score(&constant, 0.0));
     let mut consider = |change: Change, fitted: Fitted, numbers: f64| {
         // Without what is known of its shape, which the others have nothing like.
@@ -131,8 +129,8 @@ pub fn track(
             best = (change, fitted, score);
         }
     };
-    if let Some((coefficients, fitted)) = search.smooth(&constant, watch)? {
-        consider(Change::Smooth(coefficients.round() as usize), fitted, coefficients);
+    if let Some(smooth) = smooth(&search, &constant, watch)? {
+        consider(Change::Smooth(smooth.coefficients.round() as usize), smooth.fitted, smooth.coefficients);
     }
     let step = search.step(&constant, watch)?;
     if let Some((_, fitted)) = &step {
@@ -142,7 +140,6 @@ pub fn track(
     let (change, fitted, _) = best;
     let ratio = search.ratio(&fitted);
     let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels, &prepared.policy);
-    let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
     let [tau_s, log_error] = along(&fit, &time_s);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
     let log_error = is_determined.then_some(log_error);
@@ -185,6 +182,8 @@ fn score(fitted: &Fitted, numbers: f64) -> f64 {
 struct Tracker<'a> {
     prepared: &'a Prepared,
     selection: &'a Selection,
+    /// Instants of all samples, s.
+    time_s: &'a [f64],
 }
 
 impl Tracker<'_> {
@@ -195,58 +194,19 @@ impl Tracker<'_> {
         model.fit(&theta, &self.prepared.observations, self.selection, effort)
     }
 
-    /// The smooth change under which the record is most likely, and its effective number of coefficients.
-    fn smooth(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(f64, Fitted)>, ModelError> {
-        let Context { ends_s, samples, .. } = self.prepared.context;
-        let size = varying::MAX_COEFFICIENTS.min(samples / varying::SAMPLES_PER_COEFFICIENT);
-        if size < LEAST_COEFFICIENTS {
-            return Ok(None);
-        }
-        let mut start = vec![0.0; size];
-        let mut best: Option<(f64, f64, Fitted)> = None;
-        for done in 0..CURVATURES {
-            report(watch, "smooth changes", done as usize, CURVATURES as usize)?;
-            let curvature = LEAST_CURVATURE * 2.0_f64.powi(done);
-            let Some(effect) = varying::smooth(size, ends_s, samples, curvature) else { return Ok(None) };
-            let fitted = self.fit(constant, effect, &start, Effort::Finish);
-            start = fitted.theta[constant.theta.len()..].to_vec();
-            let Some((evidence, coefficients)) = self.evidence(&fitted, size, curvature) else { break };
-            let so_far = best.as_ref().map_or(f64::INFINITY, |b| b.0);
-            if evidence > so_far + HOPELESS_DEVIANCE {
-                break;
-            }
-            if evidence < so_far && fitted.end.is_usable() {
-                best = Some((evidence, coefficients, fitted));
-            }
-        }
-        Ok(best.map(|(_, coefficients, fitted)| (coefficients, fitted)))
+    /// Whether a spline of `size` coefficients is found as [`Local`] finds it.
+    fn is_local(&self, constant: &Fitted, ends_s: [f64; 2], size: usize) -> bool {
+        local::is_close(&constant.model, &constant.theta, &self.prepared.observations, self.selection, ends_s, size)
     }
 
-    /// `−2 ln` of the likelihood with the coefficients integrated out (Laplace's approximation), but for a constant, and how many of
-    /// the coefficients the record determines: all but the trace of the prior's share of the information.
-    fn evidence(&self, fitted: &Fitted, size: usize, curvature: f64) -> Option<(f64, f64)> {
-        let lin = fitted.model.linearised(&fitted.theta, &self.prepared.observations, self.selection);
-        let p = lin.columns.len();
-        let products = |from: usize| -> Vec<Vec<f64>> {
-            let dot = |a: usize, b: usize| dense::dot(&lin.columns[a][from..], &lin.columns[b][from..]);
-            (0..p).map(|a| (0..p).map(|b| dot(a, b)).collect()).collect()
-        };
-        let (all, prior) = (products(0), products(lin.samples.len()));
-        // Time constants that are held have no column.
-        let free: Vec<usize> = (0..p).filter(|&i| all[i][i] > 0.0).collect();
-        let of_free = free.iter().map(|&a| free.iter().map(|&b| all[a][b]).collect()).collect::<Vec<Vec<f64>>>();
-        // A straight line has no curvature: its coefficient has no prior.
-        let of_prior = 2.0 * (size - 1) as f64 * curvature.ln();
-        let evidence = fitted.chi2 + dense::log_determinant(&of_free)? + of_prior;
-        let inverse = dense::inverse(&all)?;
-        let known: f64 = (0..p).map(|a| dense::dot(&inverse[a], &prior[a])).sum();
-        Some((evidence, size as f64 - known))
+    fn local<'b>(&'b self, model: &'b Model, curves: Vec<Curve>) -> Local<'b> {
+        let (observations, time_s) = (&self.prepared.observations, self.time_s);
+        Local { model, curves, observations, selection: self.selection, time_s }
     }
 
     /// The step that takes most off, and the fit with it.
     fn step(&self, constant: &Fitted, watch: Watch<'_>) -> Result<Option<(ChangePoint, Fitted)>, ModelError> {
-        let time_s: Vec<f64> =
-            self.prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+        let time_s = self.time_s;
         let [first_s, last_s] = self.prepared.observations.ends_s();
         let margin_s = STEP_MARGIN_SHARE * (last_s - first_s);
         let place = |t: f64| time_s.partition_point(|time_s| *time_s < t);

@@ -40,7 +40,8 @@ const PIECES: usize = 4;
 
 /// The gas with everything that its bands rest on.
 pub(crate) struct Banded {
-    pub(crate) readings: Readings,
+    /// Instants, s.
+    pub(crate) time_s: Vec<f64>,
     pub(crate) rig: Rig,
     pub(crate) prior: Prior,
     pub(crate) gas: Gas,
@@ -53,82 +54,140 @@ pub(crate) struct Banded {
 
 /// How the gas is reconstructed by the model of a fit.
 pub(crate) struct Reconstruction<'a> {
-    fit: &'a ModelFit,
-    extended: Cow<'a, Extended>,
+    /// The model with the record, until no other parameters than those of the fit are asked for.
+    extended: Option<Extended>,
+    covariance: Option<Vec<Vec<f64>>>,
+    nominal: Nominal,
     options: &'a CompensateOptions,
     stop: &'a Stop<'a>,
 }
 
+/// Readings and rig with the parameters of the fit.
+struct Nominal {
+    theta: Vec<f64>,
+    readings: Readings,
+    rig: Rig,
+    /// What makes a temperature of the first channel's scale one of the trusted channel's: a gain and an offset, K.
+    scale: [f64; 2],
+}
+
+impl Nominal {
+    fn of(extended: &Extended, scale: impl Fn(&[f64]) -> [f64; 2]) -> Result<Self, Error> {
+        let theta = extended.parameters().to_vec();
+        let (readings, rig) = extended.rig(&theta)?;
+        Ok(Self { readings, rig, scale: scale(&theta), theta })
+    }
+}
+
+/// What is settled before the whole record is reconstructed.
+struct Settled {
+    prior: Prior,
+    ends: f64,
+    noise_factor: [f64; 2],
+    intensity: Option<Intensity>,
+    chosen: cases::Chosen,
+}
+
 impl<'a> Reconstruction<'a> {
-    pub(crate) fn of(fit: &'a ModelFit, options: &'a CompensateOptions, stop: &'a Stop<'a>) -> Result<Self, Error> {
-        let extended = Cow::Borrowed(fit.extended.as_ref().expect("a fit of a record"));
+    /// Leaves the covariance and the model of `fit` to the reconstruction.
+    pub(crate) fn of(fit: &mut ModelFit, options: &'a CompensateOptions, stop: &'a Stop<'a>) -> Result<Self, Error> {
         stop.check()?;
-        Ok(Self { fit, extended, options, stop })
+        Self::with(fit.extended.take().expect("a fit of a record"), fit.covariance.take(), options, stop)
+    }
+
+    fn with(
+        extended: Extended,
+        covariance: Option<Vec<Vec<f64>>>,
+        options: &'a CompensateOptions,
+        stop: &'a Stop<'a>,
+    ) -> Result<Self, Error> {
+        let nominal = Nominal::of(&extended, |theta| scale(&extended, options, theta))?;
+        Ok(Self { extended: Some(extended), covariance, nominal, options, stop })
     }
 
     /// This reconstruction in pieces of a long record, evenly apart; `None` of a record that is not long.
-    fn in_pieces(&self) -> Option<Self> {
-        let samples = self.extended.samples();
-        (samples > 2 * PIECES * PIECE_SAMPLES).then(|| {
-            let starts = evenly_spread(samples, PIECES, PIECE_SAMPLES);
-            let extended = Cow::Owned(self.extended.excerpt(starts, PIECE_SAMPLES));
-            Self { extended, ..*self }
-        })
+    fn in_pieces(&self) -> Result<Option<Self>, Error> {
+        let samples = self.nominal.readings.len();
+        let Some(extended) = self.extended.as_ref().filter(|_| samples > 2 * PIECES * PIECE_SAMPLES) else {
+            return Ok(None);
+        };
+        let extended = extended.excerpt(evenly_spread(samples, PIECES, PIECE_SAMPLES), PIECE_SAMPLES);
+        Self::with(extended, None, self.options, self.stop).map(Some)
     }
 
     /// The gas temperature, and how much it moves with each standard error of the model's
     /// parameters and of the prior's numbers: a column of the covariance's Cholesky factor at a
     /// time, so that what goes together moves together (JCGM 100, 5.2; of the prior Kackar and
     /// Harville 1984, Prasad and Rao 1990).
-    pub(crate) fn banded(&self) -> Result<Banded, Error> {
-        let theta = self.extended.parameters();
-        let (readings, nominal) = self.rig(theta, [1.0; 2])?;
-        let is_found = is_noise_found(self.options, &nominal);
+    pub(crate) fn banded(mut self) -> Result<Banded, Error> {
+        let Settled { prior, ends, noise_factor, intensity, chosen } = self.settled()?;
+        if !chosen.moves_the_model() {
+            self.extended = None;
+        }
+        let motion = Motion { prior: &prior, intensity: intensity.as_ref(), ends };
+        let Nominal { theta, readings, scale, .. } = &self.nominal;
+        let gas = self.gas(theta, &motion, noise_factor)?;
+        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
+        let run = |case: &Case| self.gas(&case.theta, &Motion { prior: &case.prior, ..motion }, noise_factor).ok();
+        let Moved { gas, of_model, of_prior } = chosen.moved(gas, intensity.is_some(), self.stop, run);
+        self.stop.check()?;
+        let shares = of_model.iter().zip(of_prior).map(|(model, prior)| model + prior);
+        let std_k: Vec<f64> = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
+        let parameter_std_k = of_model.into_iter().map(|v| widened_by * v.sqrt()).collect();
+        let (_, rig) = self.rig(theta, noise_factor)?;
+        let faults = faults::of(readings, &rig, *scale, &gas.gas_c, &std_k, widened_by);
+        let time_s = readings.time_s().to_vec();
+        Ok(Banded { time_s, rig, prior, gas, std_k, parameter_std_k, widened_by, faults })
+    }
+
+    /// The prior, the noise, the intensity, and how the gas temperature is to be moved; of a long record, pieces show which of
+    /// this matters.
+    fn settled(&self) -> Result<Settled, Error> {
+        let Nominal { theta, readings, rig: nominal, .. } = &self.nominal;
+        let is_found = is_noise_found(self.options, nominal);
         self.stop.say("what the gas is like", 0, 1);
         self.stop.check()?;
-        let learned = if is_found { learn_with_noise(&readings, &nominal)? } else { learn(&readings, &nominal)? };
-        let Learned { prior, sigma_priors, alternatives, mut noise_factor, ends } = learned;
-        let pieces = self.in_pieces();
+        let (_, nominal) = self.rig(theta, [1.0; 2])?;
+        let learned = if is_found { learn_with_noise(readings, &nominal)? } else { learn(readings, &nominal)? };
+        let pieces = self.in_pieces()?;
         let part = pieces.as_ref().unwrap_or(self);
+        let Learned { prior, ends, mut noise_factor, .. } = learned.clone();
         let steady = Motion { prior: &prior, intensity: None, ends };
         if is_found {
             noise_factor = part.louder(&steady, noise_factor)?;
         }
         let (_, rig) = self.rig(theta, noise_factor)?;
-        let intensity = self.intensity(part, &readings, &rig, &prior)?;
-        let motion = Motion { intensity: intensity.as_ref(), ..steady };
-        let gas = self.gas(theta, &motion, noise_factor)?;
-        let columns = self.fit.covariance.as_deref().map(columns).unwrap_or_default();
-        // The prior's share counts twice: an estimated prior takes the gas for better known than it
-        // is, by as much as it moves it. Beside an intensity, which would take most of it back, once.
-        let times = if intensity.is_some() { 1.0 } else { 2.0 };
-        let moved = |column: &Vec<f64>| theta.iter().zip(column).map(|(t, d)| t + d).collect();
-        let of_model = columns.iter().map(|column| Case { theta: moved(column), prior: &prior, moves: Moves::Model });
-        let same = |prior, moves| Case { theta: theta.to_vec(), prior, moves };
-        let of_prior = sigma_priors.iter().map(|prior| same(prior, Moves::Prior { times }));
-        let of_others = alternatives.iter().map(|(weight, prior)| same(prior, Moves::Mixture { weight: *weight }));
-        let cases = of_model.chain(of_prior).chain(of_others).collect();
-        let run = |case: &Case<'_>| self.gas(&case.theta, &Motion { prior: case.prior, ..motion }, noise_factor).ok();
+        let intensity = self.intensity(part, readings, &rig, &prior)?;
+        let cases = self.cases(learned, intensity.is_some());
         let chosen = match &pieces {
             None => cases::Chosen::all(cases),
             Some(part) => {
-                let (of_part, _) = part.rig(theta, noise_factor)?;
-                let intensity = intensity.as_ref().map(|intensity| intensity.of_part(&readings, &of_part));
+                let theta = &part.nominal.theta;
+                let intensity = intensity.as_ref().map(|intensity| intensity.of_part(readings, &part.nominal.readings));
                 let motion = Motion { intensity: intensity.as_ref(), ..steady };
                 let run =
-                    |case: &Case<'_>| part.gas(&case.theta, &Motion { prior: case.prior, ..motion }, noise_factor).ok();
+                    |case: &Case| part.gas(&case.theta, &Motion { prior: &case.prior, ..motion }, noise_factor).ok();
                 cases::Chosen::by(cases, &part.gas(theta, &motion, noise_factor)?, self.stop, run)
             }
         };
-        let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
-        let Moved { gas, of_model, of_prior } = chosen.moved(gas, intensity.is_some(), self.stop, run);
-        self.stop.check()?;
-        let parameter_std_k = of_model.iter().map(|v| widened_by * v.sqrt()).collect();
-        let shares = of_model.iter().zip(&of_prior).map(|(model, prior)| model + prior);
-        let std_k: Vec<f64> = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
-        let scale = self.scale(theta);
-        let faults = faults::of(&readings, &rig, scale, &gas.gas_c, &std_k, widened_by);
-        Ok(Banded { readings, rig, prior, gas, std_k, parameter_std_k, widened_by, faults })
+        Ok(Settled { prior, ends, noise_factor, intensity, chosen })
+    }
+
+    /// Model and prior moved, one of their numbers at a time.
+    fn cases(&self, learned: Learned, has_intensity: bool) -> Vec<Case> {
+        let Learned { prior, sigma_priors, alternatives, .. } = learned;
+        let theta = &self.nominal.theta;
+        let columns = self.covariance.as_deref().map(columns).unwrap_or_default();
+        // The prior's share counts twice: an estimated prior takes the gas for better known than it
+        // is, by as much as it moves it. Beside an intensity, which would take most of it back, once.
+        let times = if has_intensity { 1.0 } else { 2.0 };
+        let moved = |column: &Vec<f64>| theta.iter().zip(column).map(|(t, d)| t + d).collect();
+        let of_model =
+            columns.iter().map(|column| Case { theta: moved(column), prior: prior.clone(), moves: Moves::Model });
+        let same = |prior, moves| Case { theta: theta.clone(), prior, moves };
+        let of_prior = sigma_priors.into_iter().map(|prior| same(prior, Moves::Prior { times }));
+        let of_others = alternatives.into_iter().map(|(weight, prior)| same(prior, Moves::Mixture { weight }));
+        of_model.chain(of_prior).chain(of_others).collect()
     }
 
     /// How the gas's intensity changes, if it does so in `part` of the record. It is learned from the whole record, so a filter,
@@ -144,22 +203,24 @@ impl<'a> Reconstruction<'a> {
             return Ok(None);
         }
         self.stop.check()?;
-        if part.extended.samples() < readings.len() {
-            let (of_part, _) = part.rig(part.extended.parameters(), [1.0; 2])?;
-            if learn_intensity(&of_part, rig, prior)?.is_none() {
-                return Ok(None);
-            }
+        let of_part = &part.nominal.readings;
+        if of_part.len() < readings.len() && learn_intensity(of_part, rig, prior)?.is_none() {
+            return Ok(None);
         }
         Ok(learn_intensity(readings, rig, prior)?)
     }
 
-    /// What makes a temperature of the first channel's scale one of the trusted channel's: a gain and an offset, K.
-    fn scale(&self, theta: &[f64]) -> [f64; 2] {
-        if self.options.trusted == 1 { self.extended.calibration(theta) } else { [1.0, 0.0] }
+    fn model(&self) -> &Extended {
+        self.extended.as_ref().expect("kept as long as a case moves the model")
     }
 
-    fn rig(&self, theta: &[f64], noise_factor: [f64; 2]) -> Result<(Readings, Rig), Error> {
-        let (readings, mut rig) = self.extended.rig(theta)?;
+    fn rig(&self, theta: &[f64], noise_factor: [f64; 2]) -> Result<(Cow<'_, Readings>, Rig), Error> {
+        let (readings, mut rig) = if theta == self.nominal.theta {
+            (Cow::Borrowed(&self.nominal.readings), self.nominal.rig)
+        } else {
+            let (readings, rig) = self.model().rig(theta)?;
+            (Cow::Owned(readings), rig)
+        };
         rig.sensors.iter_mut().zip(noise_factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
         Ok((readings, Rig { clock: self.options.trusted, ..rig }))
     }
@@ -172,7 +233,8 @@ impl<'a> Reconstruction<'a> {
             None => reconstruct(&readings, &rig, motion.prior, form)?,
         };
         motion.take_off_what_is_beyond(&mut gas, 0.5 / readings.period_s());
-        let [gain, offset_k] = self.scale(theta);
+        let is_nominal = theta == self.nominal.theta;
+        let [gain, offset_k] = if is_nominal { self.nominal.scale } else { scale(self.model(), self.options, theta) };
         gas.gas_c.iter_mut().for_each(|c| *c = gain * *c + offset_k);
         gas.std_k.iter_mut().for_each(|k| *k *= gain.abs());
         Ok(gas)
@@ -182,7 +244,7 @@ impl<'a> Reconstruction<'a> {
     /// probable. Where the prior's spectrum does not end as the gas's does, it has pushed the noise aside: it comes back as far
     /// as the readings say.
     fn louder(&self, motion: &Motion<'_>, noise_factor: [f64; 2]) -> Result<[f64; 2], Error> {
-        let at = |factor| self.gas(self.extended.parameters(), motion, factor);
+        let at = |factor| self.gas(&self.nominal.theta, motion, factor);
         let (mut best, mut gas) = (noise_factor, at(noise_factor)?);
         if !is_excessive(&gas) {
             return Ok(best);
@@ -197,6 +259,11 @@ impl<'a> Reconstruction<'a> {
         }
         Ok(best)
     }
+}
+
+/// [`Nominal::scale`] with other parameters.
+fn scale(extended: &Extended, options: &CompensateOptions, theta: &[f64]) -> [f64; 2] {
+    if options.trusted == 1 { extended.calibration(theta) } else { [1.0, 0.0] }
 }
 
 /// How the gas moves.

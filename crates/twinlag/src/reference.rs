@@ -38,7 +38,8 @@ impl<'a> Reference<'a> {
     pub(crate) fn before_and_after(&self, core: &Core) -> Option<BeforeAfter<f64>> {
         let rmse = |fit: &ModelFit| {
             let judges = fit.trace.sample.iter().zip(&fit.trace.is_judge).filter(|(_, judges)| **judges);
-            self.rmse(&gas(fit)?.gas_c, judges.map(|(sample, _)| *sample))
+            let gas = gas(fit)?;
+            self.rmse(|k| gas.gas_c[k], judges.map(|(sample, _)| *sample))
         };
         Some(BeforeAfter { before: rmse(&core.base)?, after: rmse(&core.last)? })
     }
@@ -48,24 +49,26 @@ impl<'a> Reference<'a> {
     pub(crate) fn against(&self, gas_c: &[f64], std_k: &[f64], faster: usize) -> Option<AgainstReference> {
         let raw_c = [&self.record.t1_c, &self.record.t2_c][faster];
         let is_read = |sample: &usize| self.row_of_sample[*sample].is_some_and(|row| raw_c[row].is_finite());
-        let samples: Vec<usize> = (0..gas_c.len()).filter(is_read).collect();
-        let rmse_k = self.rmse(gas_c, samples.iter().copied())?;
-        let raw_at_samples: Vec<f64> =
-            self.row_of_sample.iter().map(|row| row.map_or(f64::NAN, |row| raw_c[row])).collect();
-        let raw_rmse_k = self.rmse(&raw_at_samples, samples.iter().copied())?;
-        let inside: Vec<bool> =
-            self.errors(gas_c, samples.iter().copied()).map(|(k, error)| error.abs() <= Z_975 * std_k[k]).collect();
-        let inside_95 = inside.iter().filter(|is_inside| **is_inside).count() as f64 / inside.len() as f64;
+        let samples = || (0..gas_c.len()).filter(is_read);
+        let rmse_k = self.rmse(|k| gas_c[k], samples())?;
+        let raw_rmse_k = self.rmse(|k| self.row_of_sample[k].map_or(f64::NAN, |row| raw_c[row]), samples())?;
+        let is_inside = self.errors(|k| gas_c[k], samples()).map(|(k, error)| error.abs() <= Z_975 * std_k[k]);
+        let (inside, all) = is_inside.fold((0.0, 0.0_f64), |(inside, all), is| (inside + f64::from(is), all + 1.0));
+        let inside_95 = inside / all;
         Some(AgainstReference { rmse_k, raw_rmse_k, inside_95 })
     }
 
     /// Samples with their errors, K, where sample and reference are there.
-    fn errors(&self, value_c: &[f64], samples: impl Iterator<Item = usize>) -> impl Iterator<Item = (usize, f64)> {
-        let errors = samples.filter_map(move |k| Some((k, value_c[k] - self.reference_c[self.row_of_sample[k]?])));
+    fn errors(
+        &self,
+        value_c: impl Fn(usize) -> f64,
+        samples: impl Iterator<Item = usize>,
+    ) -> impl Iterator<Item = (usize, f64)> {
+        let errors = samples.filter_map(move |k| Some((k, value_c(k) - self.reference_c[self.row_of_sample[k]?])));
         errors.filter(|(_, error)| error.is_finite())
     }
 
-    fn rmse(&self, value_c: &[f64], samples: impl Iterator<Item = usize>) -> Option<f64> {
+    fn rmse(&self, value_c: impl Fn(usize) -> f64, samples: impl Iterator<Item = usize>) -> Option<f64> {
         let (sum, count) =
             self.errors(value_c, samples).fold((0.0, 0.0_f64), |(sum, n), (_, error)| (sum + error * error, n + 1.0));
         (count > 0.0).then(|| (sum / count).sqrt())

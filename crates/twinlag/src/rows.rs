@@ -37,6 +37,11 @@ impl Rows {
     }
 }
 
+/// The row of each sample, as [`Rows::of_sample`] has it.
+pub(crate) fn row_of_sample(record: &Record) -> Vec<Option<usize>> {
+    record.grid().without_short(MIN_STRETCH_SAMPLES).rows().collect()
+}
+
 /// The readings of a record.
 pub(crate) fn observations(record: &Record) -> Result<Observations, Error> {
     on(record.grid().without_short(MIN_STRETCH_SAMPLES))

@@ -1,6 +1,7 @@
 //! Whittle's likelihood of a periodogram, with that of the noise in it.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use twinlag_optimise::{Cost, Derivatives};
 
 use super::part::{self, Direction, Part};
@@ -107,13 +108,17 @@ impl Cost for Whittle<'_> {
         let mut gas = vec![0.0; p.power.len()];
         let mut of_noise = gas.clone();
         let mut slopes: Vec<Vec<f64>> = Vec::new();
+        let terms: Vec<Term> = parts.iter().flat_map(Part::terms).collect();
+        let shown: Vec<Vec<[f64; 4]>> = terms.par_iter().map(|term| p.shown(term)).collect();
+        let mut rest = &shown[..];
         for part in &parts {
             if let Some(factors) = part.noise() {
                 add(&mut of_noise, &p.of_noise(factors));
                 slopes.extend(p.noise.clone());
                 continue;
             }
-            let each: Vec<Vec<[f64; 4]>> = part.terms().iter().map(|term| p.shown(term)).collect();
+            let (each, others) = rest.split_at(part.terms().len());
+            rest = others;
             each.iter().for_each(|own| gas.iter_mut().zip(own).for_each(|(sum, [value, ..])| *sum += value));
             slopes.extend((0..part.values().len()).map(|a| {
                 let directions = part.directions(a);
@@ -143,7 +148,7 @@ impl Cost for Whittle<'_> {
         let mut out = Derivatives {
             value: self.deviance(&expected),
             gradient: of_bins.iter().map(|s| dot(s, &residual)).collect(),
-            curvature: of_bins.iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
+            curvature: of_bins.par_iter().map(|a| slopes.iter().map(|b| dot(a, b)).collect()).collect(),
         };
         let mut at = 0;
         for part in &parts {

@@ -104,7 +104,7 @@ impl<'a> Near<'a> {
 }
 
 /// The piece that reaches `reach` samples around one, within its stretch.
-fn piece(
+pub(super) fn piece(
     observations: &Observations,
     selection: &Selection,
     centre: usize,

@@ -25,15 +25,15 @@ pub(super) enum Moves {
 }
 
 /// A model and prior in place of the likeliest ones.
-pub(super) struct Case<'a> {
+pub(super) struct Case {
     pub(super) theta: Vec<f64>,
-    pub(super) prior: &'a Prior,
+    pub(super) prior: Prior,
     pub(super) moves: Moves,
 }
 
 /// The cases that matter, and the mean share of the variance that the model and the prior have by others.
-pub(super) struct Chosen<'a> {
-    cases: Vec<Case<'a>>,
+pub(super) struct Chosen {
+    cases: Vec<Case>,
     of_model: f64,
     of_prior: f64,
 }
@@ -48,19 +48,19 @@ pub(super) struct Moved {
 /// What is done in the meantime.
 const TASK: &str = "how model and prior move the gas temperature";
 
-impl<'a> Chosen<'a> {
-    pub(super) const fn all(cases: Vec<Case<'a>>) -> Self {
+impl Chosen {
+    pub(super) const fn all(cases: Vec<Case>) -> Self {
         Self { cases, of_model: 0.0, of_prior: 0.0 }
     }
 
+    /// Whether any of them has other parameters of the model.
+    pub(super) fn moves_the_model(&self) -> bool {
+        self.cases.iter().any(|case| matches!(case.moves, Moves::Model))
+    }
+
     /// Those of `cases` that matter in pieces of a record, of which `gas` is the likeliest and `run` gives the others.
-    pub(super) fn by(
-        cases: Vec<Case<'a>>,
-        gas: &Gas,
-        stop: &Stop<'_>,
-        run: impl Fn(&Case<'a>) -> Option<Gas> + Sync,
-    ) -> Self {
-        let largest_and_mean = |case: &Case<'a>| {
+    pub(super) fn by(cases: Vec<Case>, gas: &Gas, stop: &Stop<'_>, run: impl Fn(&Case) -> Option<Gas> + Sync) -> Self {
+        let largest_and_mean = |case: &Case| {
             let other = run(case)?;
             let shares = (0..gas.gas_c.len()).map(|k| case.share(gas, &other, k));
             let (largest, sum) = shares.fold((0.0_f64, 0.0), |(largest, sum), s| (largest.max(s), sum + s));
@@ -68,7 +68,7 @@ impl<'a> Chosen<'a> {
         };
         let shares = in_parallel(&cases, TASK, stop, largest_and_mean);
         // One that cannot be run in pieces counts in the whole.
-        let mut ranked: Vec<(Case<'a>, (f64, f64))> =
+        let mut ranked: Vec<(Case, (f64, f64))> =
             cases.into_iter().zip(shares.into_iter().map(|share| share.unwrap_or((f64::INFINITY, 0.0)))).collect();
         ranked.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let mut out = Self::all(Vec::new());
@@ -93,7 +93,7 @@ impl<'a> Chosen<'a> {
         gas: Gas,
         has_intensity: bool,
         stop: &Stop<'_>,
-        run: impl Fn(&Case<'a>) -> Option<Gas> + Sync,
+        run: impl Fn(&Case) -> Option<Gas> + Sync,
     ) -> Moved {
         let of_others = |share: f64| gas.std_k.iter().map(|s| share * s * s).collect::<Vec<f64>>();
         let (mut of_model, mut of_prior) = (of_others(self.of_model), of_others(self.of_prior));
@@ -129,7 +129,7 @@ impl<'a> Chosen<'a> {
     }
 }
 
-impl Case<'_> {
+impl Case {
     /// The share of the variance of `gas` at sample `k` that this case adds, `other` its own gas. Twice what a mean is moved
     /// by, in standard deviations, counts as well.
     fn share(&self, gas: &Gas, other: &Gas, k: usize) -> f64 {

@@ -1,14 +1,14 @@
 //! The gas temperature of a record with its standard deviation.
 
 use twinlag_compensate::{Form, bandwidth_hz};
-use twinlag_diagnose::{Grade, Judgement, ModelFit, Reason, Verdict};
+use twinlag_diagnose::{Grade, Judgement, ModelFit, Reason, Trace, Verdict};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
 use crate::bands::{Banded, GasFault, Reconstruction};
 use crate::error::Error;
 use crate::reference::Reference;
-use crate::rows::Rows;
+use crate::rows::row_of_sample;
 use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, with_effects};
 use crate::verbs::following_both;
 use crate::verbs::with_model::with_model;
@@ -77,7 +77,7 @@ pub fn compensate_watched(
     options: &CompensateOptions,
     watch: Watch<'_>,
 ) -> Result<Compensation, Error> {
-    let Modelled { last, fit, verdict, effects, warnings, rows } = Modelled::of(record, options, watch)?;
+    let Modelled { last, mut fit, verdict, effects, warnings } = Modelled::of(record, options, watch)?;
     let judgement = judged(&last, verdict);
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
@@ -107,9 +107,9 @@ pub fn compensate_watched(
         return Ok(out);
     }
     let stop = Stop::new(watch);
-    let found = Reconstruction::of(&fit, options, &stop)?.banded()?;
+    let found = Reconstruction::of(&mut fit, options, &stop)?.banded()?;
     stop.check()?;
-    fill(&mut out, found, record, &rows, options.diagnose.characterise.best_effort);
+    fill(&mut out, found, record, options.diagnose.characterise.best_effort);
     Ok(out)
 }
 
@@ -122,7 +122,7 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>) -> Judgement {
 }
 
 /// Writes the gas temperature into the answer.
-fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows, best_effort: bool) {
+fn fill(out: &mut Compensation, found: Banded, record: &Record, best_effort: bool) {
     if found.widened_by > 1.0 {
         out.warnings.push(format!(
             "readings deviate from their predictions {:.2} times as far as noise explains; the \
@@ -147,11 +147,12 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows, bes
         return;
     }
     let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
-    let reference = Reference::of(record, &rows.of_sample);
+    let row_of_sample = if record.reference_c.is_some() { row_of_sample(record) } else { Vec::new() };
+    let reference = Reference::of(record, &row_of_sample);
     out.status = Status::Ok;
     out.gas = Some(Quality {
-        median_std_k: median(&found.std_k),
-        parameter_std_k: median(&found.parameter_std_k),
+        median_std_k: median(found.std_k.clone()),
+        parameter_std_k: median(found.parameter_std_k),
         bandwidth_hz: bandwidth_hz(&found.rig, &found.prior, out.last.record.sample_period_s),
         innovation_energy: found.gas.innovation_energy,
         widened_by: found.widened_by,
@@ -159,14 +160,19 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, rows: &Rows, bes
         reference: reference.and_then(|r| r.against(&found.gas.gas_c, &found.std_k, faster)),
         prior: found.prior,
     });
-    out.time_s = found.readings.time_s().to_vec();
+    out.time_s = found.time_s;
     (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.std_k, Some(found.rig));
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// A fit without what is for its picture.
+fn without_trace(mut fit: ModelFit) -> ModelFit {
+    fit.trace = Trace::default();
+    fit
 }
 
 /// The model, and where it comes from.
@@ -176,7 +182,6 @@ struct Modelled {
     verdict: Option<Verdict>,
     effects: Vec<NamedEffect>,
     warnings: Vec<String>,
-    rows: Rows,
 }
 
 impl Modelled {
@@ -184,7 +189,7 @@ impl Modelled {
         if let Some(model) = &options.model {
             let (last, fit) = with_model(record, Some(model), &options.diagnose.characterise)?;
             let warnings = last.warnings.clone();
-            return Ok(Self { last, fit, verdict: None, effects: Vec::new(), warnings, rows: Rows::of(record)? });
+            return Ok(Self { last, fit: without_trace(fit), verdict: None, effects: Vec::new(), warnings });
         }
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
         let effects = named(record, &core, &rows, options.diagnose.characterise.best_effort);
@@ -193,8 +198,7 @@ impl Modelled {
             verdict: Some(core.verdict),
             effects,
             warnings: core.remarks.iter().map(ToString::to_string).collect(),
-            fit: core.last,
-            rows,
+            fit: without_trace(core.last),
         })
     }
 }
