@@ -39,6 +39,9 @@ pub(crate) fn run(tested: bool) -> Result<()> {
     let start = Instant::now();
     crate::experiment::quick(&quick)?;
     println!("== experiments, two trials a cell: {:.0} s", start.elapsed().as_secs_f64());
+    let start = Instant::now();
+    crate::profile::quick()?;
+    println!("== profiles, a short record: {:.0} s", start.elapsed().as_secs_f64());
     links()
 }
 

@@ -1,10 +1,11 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
-//! `cargo xtask bench`.
+//! `cargo xtask bench`, `cargo xtask profile`.
 
 mod bench;
 mod ci;
 mod experiment;
 mod measured;
+mod profile;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -49,6 +50,8 @@ enum Task {
     Experiment(experiment::Task),
     /// Times the fits, beside what a user would otherwise write where Python with SciPy is at hand.
     Bench(bench::Bench),
+    /// Samples where the time of each verb goes, and writes the book's page on it.
+    Profile(profile::Profile),
 }
 
 fn main() -> ExitCode {
@@ -57,6 +60,7 @@ fn main() -> ExitCode {
         Task::Measured { dir, write } => measured::run(&dir, write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
+        Task::Profile(arguments) => profile::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };
     match result {

@@ -109,7 +109,12 @@ impl Named {
         Ok(())
     }
 
-    fn selection(&self) -> Selection {
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The columns that it names, if any.
+    pub(crate) fn selection(&self) -> Selection {
         let [t1, t2] = [0, 1].map(|i| self.channels.as_ref().map(|names| ColumnRef::Name(names[i].clone())));
         Selection { t1, t2, ..Selection::default() }
     }
