@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use twinlag_optimise::{Budget, Cost, Derivatives, Fit, Minimiser, Optimiser, Problem, Variable};
 
 use super::near::piece;
-use crate::cost::Linearised;
+use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
 use crate::effect::{Effect, Identifier, Parameter, Seat, Shared};
 use crate::fit::Fitted;
@@ -197,9 +197,7 @@ impl Local<'_> {
         let fit: Fit = Optimiser::LevenbergMarquardt { step_tolerance: STEP }
             .minimise(&problem, start, &BUDGET)
             .expect("the start is finite and there are derivatives");
-        let numbers: Vec<Number> = fit.x.iter().copied().map(Number::from).collect();
-        let count = self.residuals(&fit.x) + self.model.knowledge(&numbers).count();
-        let count = count as f64 * self.selection.weighting.mean();
+        let count = self.count(&fit.x) as f64 * self.selection.weighting.mean();
         Fitted {
             model: self.model.clone(),
             theta: fit.x.clone(),
@@ -210,9 +208,11 @@ impl Local<'_> {
         }
     }
 
-    /// Number of residuals that count.
-    fn residuals(&self, theta: &[f64]) -> usize {
-        crate::cost::ResidualCost::new(self.model, theta, self.observations, self.selection).samples(theta).len()
+    /// Number of residuals that count, and of what is known beforehand.
+    fn count(&self, theta: &[f64]) -> usize {
+        let cost = ResidualCost::new(self.model, theta, self.observations, self.selection);
+        cost.energy(theta);
+        cost.count()
     }
 
     /// Half the derivatives of the energy, without what is known beforehand of the effects.
