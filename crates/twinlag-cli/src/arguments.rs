@@ -172,6 +172,10 @@ pub(crate) struct Compensate {
     /// effects stay fixed.
     #[arg(long, value_name = "JSON")]
     pub(crate) model: Option<PathBuf>,
+    /// Save the model with what the gas is like, for `--model` with other records: the search for what
+    /// their gas is like begins there.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) save: Option<PathBuf>,
     /// Which readings each answer may use: smoother (the whole record), filter (those up to that
     /// instant), or lag:N (those and the next N samples).
     #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]

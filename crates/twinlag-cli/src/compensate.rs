@@ -13,7 +13,8 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure> {
-    let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
+    let views =
+        Views { picture: command.picture.as_deref(), report: command.report.as_deref(), save: command.save.as_deref() };
     let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions {
@@ -38,6 +39,9 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
         output::data(&command.out, to_stdout, &columns, ("grade", std::iter::repeat(answer.judgement.grade)))?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
+        }
+        if let Some((path, model)) = views.save.zip(answer.model(&record)) {
+            output::model(path, &model)?;
         }
     }
     if let Some(path) = views.report {

@@ -27,9 +27,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     print::notes(&record, console);
     let answer = diagnose(&record, &options, console)?;
     if let Some(path) = &command.save {
-        let model = serde_json::to_string_pretty(&answer.model())
-            .map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?;
-        output::write(path, &model)?;
+        output::model(path, &answer.model())?;
     }
     if let Some(path) = &command.report {
         output::write(path, &diagnosis_report(&record, &answer, &output::command_line())?)?;

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
+use twinlag::Model;
 use twinlag::record::{Decimals, write_csv};
 
 use crate::console::Console;
@@ -46,10 +47,12 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     Ok(())
 }
 
-/// The picture and the report that go with a table of numbers.
+/// The picture, the report and the model that go with a table of numbers.
+#[derive(Default)]
 pub(crate) struct Views<'a> {
     pub(crate) picture: Option<&'a Path>,
     pub(crate) report: Option<&'a Path>,
+    pub(crate) save: Option<&'a Path>,
 }
 
 /// Checks the outputs of a table of numbers, its picture and its report. Returns whether the table
@@ -66,10 +69,16 @@ pub(crate) fn check_data(
         return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
     }
     let table = (!to_stdout).then_some(("--out", out));
-    let views = [("--picture", views.picture), ("--report", views.report)];
+    let views = [("--picture", views.picture), ("--report", views.report), ("--save", views.save)];
     let views = views.into_iter().filter_map(|(option, path)| Some((option, path?)));
     check(record, &table.into_iter().chain(views).collect::<Vec<_>>(), force)?;
     Ok(to_stdout)
+}
+
+/// Writes a model for `--model` of other commands.
+pub(crate) fn model(path: &Path, model: &Model) -> Result<(), Failure> {
+    let text = serde_json::to_string_pretty(model);
+    write(path, text.map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?)
 }
 
 /// Writes a table of numbers, row by row, to a file or to standard output, with one column more.

@@ -13,7 +13,7 @@ use crate::print;
 use crate::progress::Progress;
 
 pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
-    let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref() };
+    let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref(), ..Views::default() };
     let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
     if let Some(rows) = command.live {
         return live::run(command, rows as usize, to_stdout, console);

@@ -68,6 +68,26 @@ fn a_saved_model_compensates_without_a_diagnosis() {
     assert!(number(&reference["rmse_K"]) < 0.3 * number(&reference["raw_rmse_K"]), "{reference}");
 }
 
+/// The model that is saved with a gas temperature says what the gas was like beside what a diagnosis saves. With it and without it
+/// the error is the same within a tenth: the search begins elsewhere, and the prior matters where readings say little.
+#[test]
+fn what_the_gas_is_like_is_saved_and_begun_with() {
+    let bench = Bench::simulated("saved-gas", RIG);
+    gas(&bench, &["--save", "model.json"]);
+    let model: Value = serde_json::from_slice(&bench.read("model.json")).expect("JSON");
+    assert_eq!(bench.run(&["diagnose", "run.csv", "--save", "other.json", "--quiet"]).code, 0);
+    let mut without: Value = model.clone();
+    let parts = without.as_object_mut().expect("an object").remove("gas").expect("what the gas is like");
+    assert!(!parts[0].as_array().expect("parts of the likeliest prior").is_empty(), "{parts}");
+    assert_eq!(without, serde_json::from_slice::<Value>(&bench.read("other.json")).expect("JSON"));
+    let rmse_k = |model: &str| {
+        let value = gas(&bench, &["--model", model, "--reference", "Tref", "--force"]);
+        number(&value["gas"]["reference"]["rmse_K"])
+    };
+    let (with, without) = (rmse_k("model.json"), rmse_k("other.json"));
+    assert!((with / without - 1.0).abs() < 0.1, "{with} K and {without} K");
+}
+
 /// A row that is missing is bridged: it is there, and less certain than its neighbours.
 #[test]
 fn missing_rows_are_bridged_with_wider_bands() {

@@ -6,6 +6,7 @@
 //! (`MacKay` 2003, chapter 28).
 
 mod holes;
+mod known;
 mod part;
 mod whittle;
 
@@ -19,6 +20,7 @@ use crate::reconstruct::MAX_STATES;
 use crate::rig::Rig;
 use crate::spectrum::{MAX_PIECE_SAMPLES, MAX_QUICK_PIECE_SAMPLES, Periodogram};
 use crate::system::states as states_of;
+pub use known::GasParts;
 use part::{Limits, Part};
 use whittle::{BINS_PER_ONE, Whittle};
 
@@ -69,6 +71,8 @@ pub struct Learned {
     /// Probability that the gas ends at half the sampling rate instead of going on as the prior does,
     /// by what folds back from beyond. Zero if learned quickly, and where lines bridge readings.
     pub ends: f64,
+    /// What `prior` and `alternatives` are made of.
+    pub parts: GasParts,
 }
 
 /// Estimates the prior that `readings` of `rig` support. The covariance of its numbers is the
@@ -80,7 +84,48 @@ pub struct Learned {
 /// # Errors
 /// [`CompensateError::TooShort`], and as [`crate::reconstruct()`].
 pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, Ask::Gas)
+    learned(readings, rig, Ask::Gas, None)
+}
+
+/// Estimates a prior as [`learn`] does, beginning with what was learned in another record.
+///
+/// Its numbers are fitted to these readings, so that they need not be right here, and parts are added that explain more than they
+/// cost. The search ends there if none is, or if this gas is likelier than what adding parts leads to from nothing; otherwise it
+/// goes on as [`learn`] does.
+///
+/// ```
+/// use twinlag_compensate::{Readings, Rig, Sensor, learn, learn_from};
+///
+/// // A gas that turns this way or that every 50 ms, through a lag; 10 s of it, and the 10 s that come after.
+/// let (mut gas_c, mut read_c, mut state) = (20.0, [20.0, 20.0], 1_u32);
+/// let mut samples = Vec::new();
+/// for k in 0..2000 {
+///     if k % 5 == 0 {
+///         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+///         gas_c = 20.0 + f64::from(state >> 16) / 65_536.0;
+///     }
+///     for (read_c, tau_s) in read_c.iter_mut().zip([0.02, 0.1]) {
+///         *read_c = gas_c + (*read_c - gas_c) * (-0.01_f64 / tau_s).exp();
+///     }
+///     samples.push(read_c);
+/// }
+/// let part = |range: std::ops::Range<usize>| {
+///     let time_s = range.clone().map(|k| 0.01 * k as f64).collect();
+///     Readings::new(time_s, [0, 1].map(|i| range.clone().map(|k| samples[k][i]).collect()))
+/// };
+/// let rig = Rig::new([Sensor::new(0.02, 0.01), Sensor::new(0.1, 0.01)]);
+/// let first = learn(&part(0..1000)?, &rig)?;
+/// let second = learn_from(&part(1000..2000)?, &rig, &first.parts)?;
+/// // Half of the power is below a frequency that the two have alike, within a factor of two.
+/// let share = |p: &twinlag_compensate::Prior| p.variance_above_k2(4.0) / p.variance_above_k2(0.1);
+/// assert!((share(&first.prior) / share(&second.prior)).ln().abs() < 0.7);
+/// # Ok::<(), twinlag_compensate::CompensateError>(())
+/// ```
+///
+/// # Errors
+/// As [`learn`].
+pub fn learn_from(readings: &Readings, rig: &Rig, known: &GasParts) -> Result<Learned, CompensateError> {
+    learned(readings, rig, Ask::Gas, Some(known))
 }
 
 /// Estimates a prior as [`learn`] does, but faster: parts are added and not exchanged, and lines of
@@ -89,7 +134,7 @@ pub fn learn(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError>
 /// # Errors
 /// As [`learn`].
 pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, Ask::GasQuickly)
+    learned(readings, rig, Ask::GasQuickly, None)
 }
 
 /// Estimates a prior as [`learn`] does, together with the noise levels of both channels. Use it if
@@ -99,7 +144,7 @@ pub fn learn_quickly(readings: &Readings, rig: &Rig) -> Result<Learned, Compensa
 /// # Errors
 /// As [`learn`].
 pub fn learn_with_noise(readings: &Readings, rig: &Rig) -> Result<Learned, CompensateError> {
-    learned(readings, rig, Ask::GasAndNoise)
+    learned(readings, rig, Ask::GasAndNoise, None)
 }
 
 /// What is asked of the readings.
@@ -111,7 +156,7 @@ enum Ask {
     GasAndNoise,
 }
 
-fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, CompensateError> {
+fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) -> Result<Learned, CompensateError> {
     rig.check()?;
     let both = |k: &usize| (0..2).all(|i| readings.reading_c(i, *k).is_some());
     let got = (0..readings.len()).filter(both).count();
@@ -129,7 +174,8 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
     let room = MAX_STATES.saturating_sub(states_of(rig, &[])).min(MAX_GAS_STATES);
     let pooled = periodogram.pooled();
     let search = Search { bins: &periodogram, periodogram: &pooled, limits, room, ask };
-    let (best, mut others) = search.run();
+    let from = from.map(|parts| parts.within(periodogram.period_s, room)).unwrap_or_default();
+    let (best, mut others) = search.run(from);
     let score = best.score();
     // What was found in pools is fitted to all bins.
     let search = Search { periodogram: &periodogram, ..search };
@@ -145,6 +191,8 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
         others.clear();
     }
     let sigma_parts = search.sigma_points(&parts);
+    let all_parts = std::iter::once(&parts[..]).chain(others.iter().map(|o| &o.parts[..]));
+    let gas_parts = GasParts::of(all_parts);
     let prior = |parts: &[Part]| Prior { level_c, terms: parts.iter().flat_map(Part::terms).collect() };
     // Kinds were equally probable before the readings.
     let weights: Vec<f64> = others.iter().map(|o| (0.5 * (score - o.score())).exp()).collect();
@@ -156,6 +204,7 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask) -> Result<Learned, Compensa
         alternatives,
         noise_factor: parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt)),
         ends,
+        parts: gas_parts,
     })
 }
 
@@ -196,20 +245,24 @@ impl Search<'_> {
     /// The likeliest parts: they are added, and then each is exchanged for what explains more in
     /// its place, until neither gains. With those of other kinds that came up on the way and are
     /// nearly as likely.
-    fn run(&self) -> (Fitted, Vec<Fitted>) {
-        let noise = if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() };
-        let first = self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()));
-        let mut seen = self.grown(first);
+    ///
+    /// - `known`: parts to begin with, where there are some
+    fn run(&self, known: Vec<Vec<Part>>) -> (Fitted, Vec<Fitted>) {
+        let known_kinds: Vec<Vec<&str>> = known.iter().map(|parts| kinds(parts)).collect();
+        let mut seen: Vec<Fitted> = known.into_par_iter().map(|parts| self.jointly(Fitted::unknown(parts))).collect();
+        let first = if seen.is_empty() { self.first() } else { likeliest(&seen) };
+        seen.extend(self.grown(first));
         let mut current = likeliest(&seen);
-        loop {
-            let others = if self.ask == Ask::GasQuickly { Vec::new() } else { self.exchanged(&current) };
-            seen.extend(others.iter().cloned());
-            let better = likeliest(&others);
-            if better.score() >= current.score() - MIN_SCORE_GAIN {
-                break;
-            }
-            seen.extend(self.grown(better));
+        let mut is_settled = known_kinds.contains(&kinds(&current.parts));
+        if !known_kinds.is_empty() && !is_settled {
+            // There is more in this gas than in that one: what is found without it has to be less likely.
+            let rivals = self.grown(self.first());
+            is_settled = current.score() <= likeliest(&rivals).score();
+            seen.extend(rivals);
             current = likeliest(&seen);
+        }
+        if !is_settled {
+            current = self.improved(current, &mut seen);
         }
         let mut told = vec![kinds(&current.parts)];
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
@@ -221,6 +274,26 @@ impl Search<'_> {
         });
         seen.truncate(MAX_ALTERNATIVES);
         (current, seen)
+    }
+
+    /// `current` with parts exchanged until that gains nothing. What comes up on the way is added to what was `seen`.
+    fn improved(&self, mut current: Fitted, seen: &mut Vec<Fitted>) -> Fitted {
+        loop {
+            let others = if self.ask == Ask::GasQuickly { Vec::new() } else { self.exchanged(&current) };
+            seen.extend(others.iter().cloned());
+            let better = likeliest(&others);
+            if better.score() >= current.score() - MIN_SCORE_GAIN {
+                return current;
+            }
+            seen.extend(self.grown(better));
+            current = likeliest(seen);
+        }
+    }
+
+    /// The single part that explains most.
+    fn first(&self) -> Fitted {
+        let noise = if self.ask == Ask::GasAndNoise { vec![Part::Noise([1.0; 2])] } else { Vec::new() };
+        self.jointly(self.best(&Fitted::unknown(noise), self.kinds().concat()))
     }
 
     /// Probability that the gas ends at half the sampling rate, and the parts of `best` as they are then: their

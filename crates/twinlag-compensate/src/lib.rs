@@ -79,7 +79,7 @@ pub use error::CompensateError;
 #[cfg(feature = "std")]
 pub use intensity::{Intensity, learn_intensity};
 #[cfg(feature = "std")]
-pub use learn::{Learned, learn, learn_quickly, learn_with_noise};
+pub use learn::{GasParts, Learned, learn, learn_from, learn_quickly, learn_with_noise};
 #[cfg(feature = "std")]
 pub use prior::Prior;
 pub use prior::Term;
@@ -100,6 +100,18 @@ pub use tracker::{Tracker, TrackerFn, TrackerState, tracker};
 #[cfg(feature = "std")]
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
-    is_send_and_sync::<(CompensateError, Filtered, Form, Gas, Learned, Prior, Readings, Rig, Sensor, Stream<4>)>();
+    is_send_and_sync::<(
+        CompensateError,
+        Filtered,
+        Form,
+        Gas,
+        GasParts,
+        Learned,
+        Prior,
+        Readings,
+        Rig,
+        Sensor,
+        Stream<4>,
+    )>();
     is_send_and_sync::<(Tracker<4>, TrackerFn, TrackerState)>();
 };

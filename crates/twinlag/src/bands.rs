@@ -7,8 +7,8 @@
 use std::borrow::Cow;
 
 use twinlag_compensate::{
-    Form, Gas, Intensity, Learned, Prior, Readings, Rig, learn, learn_intensity, learn_with_noise, reconstruct,
-    reconstruct_with,
+    Form, Gas, GasParts, Intensity, Learned, Prior, Readings, Rig, learn, learn_from, learn_intensity,
+    learn_with_noise, reconstruct, reconstruct_with,
 };
 use twinlag_diagnose::{Extended, ModelFit, evenly_spread};
 
@@ -44,6 +44,7 @@ pub(crate) struct Banded {
     pub(crate) time_s: Vec<f64>,
     pub(crate) rig: Rig,
     pub(crate) prior: Prior,
+    pub(crate) parts: GasParts,
     pub(crate) gas: Gas,
     pub(crate) std_k: Vec<f64>,
     /// The share of the model's parameters in it, K.
@@ -82,6 +83,7 @@ impl Nominal {
 /// What is settled before the whole record is reconstructed.
 struct Settled {
     prior: Prior,
+    parts: GasParts,
     ends: f64,
     noise_factor: [f64; 2],
     intensity: Option<Intensity>,
@@ -120,7 +122,7 @@ impl<'a> Reconstruction<'a> {
     /// time, so that what goes together moves together (JCGM 100, 5.2; of the prior Kackar and
     /// Harville 1984, Prasad and Rao 1990).
     pub(crate) fn banded(mut self) -> Result<Banded, Error> {
-        let Settled { prior, ends, noise_factor, intensity, chosen } = self.settled()?;
+        let Settled { prior, parts, ends, noise_factor, intensity, chosen } = self.settled()?;
         if !chosen.moves_the_model() {
             self.extended = None;
         }
@@ -137,7 +139,7 @@ impl<'a> Reconstruction<'a> {
         let (_, rig) = self.rig(theta, noise_factor)?;
         let faults = faults::of(readings, &rig, *scale, &gas.gas_c, &std_k, widened_by);
         let time_s = readings.time_s().to_vec();
-        Ok(Banded { time_s, rig, prior, gas, std_k, parameter_std_k, widened_by, faults })
+        Ok(Banded { time_s, rig, prior, parts, gas, std_k, parameter_std_k, widened_by, faults })
     }
 
     /// The prior, the noise, the intensity, and how the gas temperature is to be moved; of a long record, pieces show which of
@@ -148,10 +150,15 @@ impl<'a> Reconstruction<'a> {
         self.stop.say("what the gas is like", 0, 1);
         self.stop.check()?;
         let (_, nominal) = self.rig(theta, [1.0; 2])?;
-        let learned = if is_found { learn_with_noise(readings, &nominal)? } else { learn(readings, &nominal)? };
+        let known = self.options.model.as_ref().and_then(|model| model.gas.as_ref());
+        let learned = match known {
+            _ if is_found => learn_with_noise(readings, &nominal)?,
+            Some(known) => learn_from(readings, &nominal, known)?,
+            None => learn(readings, &nominal)?,
+        };
         let pieces = self.in_pieces()?;
         let part = pieces.as_ref().unwrap_or(self);
-        let Learned { prior, ends, mut noise_factor, .. } = learned.clone();
+        let Learned { prior, parts, ends, mut noise_factor, .. } = learned.clone();
         let steady = Motion { prior: &prior, intensity: None, ends };
         if is_found {
             noise_factor = part.louder(&steady, noise_factor)?;
@@ -170,7 +177,7 @@ impl<'a> Reconstruction<'a> {
                 cases::Chosen::by(cases, &part.gas(theta, &motion, noise_factor)?, self.stop, run)
             }
         };
-        Ok(Settled { prior, ends, noise_factor, intensity, chosen })
+        Ok(Settled { prior, parts, ends, noise_factor, intensity, chosen })
     }
 
     /// Model and prior moved, one of their numbers at a time.

@@ -1,5 +1,6 @@
 //! What a prior is learned in: single terms, and combs of lines that share a frequency.
 
+use serde::{Deserialize, Serialize};
 use twinlag_optimise::Variable;
 
 use crate::prior::Term;
@@ -37,9 +38,11 @@ pub(super) struct Limits {
 }
 
 /// One part of the gas's motion.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum Part {
     /// No part of the gas: what the variances of both channels' noise are multiplied by.
+    #[serde(skip)]
     Noise([f64; 2]),
     Single(Term),
     /// Turbulence, whose spectrum falls as `f^(−5/3)` above a corner (Kolmogorov 1941): rough terms
@@ -141,6 +144,21 @@ impl Part {
     pub(super) fn is_nothing(&self, limits: &Limits) -> bool {
         self.noise().is_none()
             && self.terms().iter().map(|t| t.std_k().powi(2)).sum::<f64>().sqrt() < MIN_SWING_SHARE * limits.swing_k
+    }
+
+    /// Whether it is of no lines at all.
+    pub(super) fn is_empty(&self) -> bool {
+        matches!(self, Self::Comb { std_k, .. } if std_k.is_empty())
+    }
+
+    /// This part where the gas is read every `period_s`.
+    pub(super) fn read_every(&self, period_s: f64) -> Self {
+        match self {
+            Self::Turbulent { std_k, corner_hz, .. } => {
+                Self::Turbulent { std_k: *std_k, corner_hz: *corner_hz, fastest_hz: 0.5 / period_s }
+            }
+            other => other.clone(),
+        }
     }
 
     /// What the variances of both channels' noise are multiplied by.

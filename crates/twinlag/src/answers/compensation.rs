@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Form, Prior, Rig};
 use twinlag_diagnose::{Judgement, Verdict};
+use twinlag_record::Record;
 
 use crate::answers::diagnosis::explained;
-use crate::answers::{Characterisation, NamedEffect, Status};
+use crate::answers::{Characterisation, FoundIn, Model, NamedEffect, Status};
 use crate::bands::GasFault;
 use crate::reference::AgainstReference;
 
@@ -78,9 +79,36 @@ pub struct Compensation {
     /// The rig, for pictures.
     #[serde(skip)]
     pub rig: Option<Rig>,
+    /// The model, to be saved.
+    #[serde(skip)]
+    pub(crate) used: Option<Model>,
 }
 
 impl Compensation {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.compensation/1";
+
+    /// The model that this rests on, with what the gas is like: to compensate other records of the same rig, which begins with
+    /// that. `None` where there is no gas temperature, and of an answer that was read from JSON.
+    ///
+    /// - `record`: the one that was compensated
+    ///
+    /// ```
+    #[doc = include_str!("../example.txt")]
+    /// let model = twinlag::compensate(&record, &CompensateOptions::default())?.model(&record).expect("determined");
+    /// assert!(model.gas.is_some());
+    /// let later = Record::from_channels(channels(2)?, SamplingChoice::Auto)?;
+    /// let answer = twinlag::compensate(&later, &CompensateOptions { model: Some(model), ..Default::default() })?;
+    /// let against = answer.gas.expect("determined").reference.expect("there is one");
+    /// assert!(against.rmse_k < 0.5 * against.raw_rmse_k);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn model(&self, record: &Record) -> Option<Model> {
+        let mut model = self.used.clone()?;
+        // A model that was given is of the record that it was found in.
+        if self.verdict.is_some() {
+            model.found_in = Some(FoundIn::of(record));
+        }
+        Some(model)
+    }
 }

@@ -179,23 +179,15 @@ impl Diagnosis {
     /// The model with the effects that were found, to be used on other records of the same rig. It has all numbers that
     /// were found, also those that this answer does not give; of an answer that was read from JSON those that it has.
     pub fn model(&self) -> Model {
-        let channels = self.last.record.channels.clone();
-        let effects = match &self.core {
-            Some(core) => core.effects.iter().map(|found| ModelEffect::found(found, &channels)).collect(),
-            None => self.effects.iter().map(ModelEffect::given).collect(),
-        };
-        let of_core = |i: usize| self.core.as_ref().and_then(|core| core.last.time_constants[i].value_s);
-        Model {
-            schema: Model::SCHEMA.into(),
-            channels,
-            time_constants_s: [0, 1].map(|i| self.last.sensors[i].time_constant_s.or_else(|| of_core(i))),
-            noise_std_k: Some([0, 1].map(|i| self.last.sensors[i].noise_std_k)),
-            effects,
-            verdict: Some(self.verdict),
-            explained_to: self.explained_to,
-            time_constant_grades: Some([0, 1].map(|i| self.last.sensors[i].judgement.clone())),
-            found_in: self.found_in.clone(),
-            made_by: self.last.made_by.clone(),
+        match &self.core {
+            Some(core) => Model::found(core, &self.last, self.found_in.clone()),
+            None => Model {
+                verdict: Some(self.verdict),
+                explained_to: self.explained_to,
+                effects: self.effects.iter().map(ModelEffect::given).collect(),
+                found_in: self.found_in.clone(),
+                ..Model::of(&self.last)
+            },
         }
     }
 

@@ -1,10 +1,11 @@
 //! A model that was found in one record, to be used on others: schema `twinlag.model/1`.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{Found, Grade, Identifier, Judgement, KnownEffect, Reason, Value, Verdict};
+use twinlag_compensate::GasParts;
+use twinlag_diagnose::{Diagnosis, Found, Grade, Identifier, Judgement, KnownEffect, Reason, Value, Verdict};
 use twinlag_record::Record;
 
-use crate::answers::{EffectNumber, FoundIn, MadeBy, NamedEffect};
+use crate::answers::{Characterisation, EffectNumber, FoundIn, MadeBy, NamedEffect};
 use crate::error::Error;
 use crate::options::Options;
 
@@ -35,6 +36,10 @@ pub struct Model {
     /// The data that it was found in; `None` as in [`Self::verdict`].
     #[serde(default)]
     pub found_in: Option<FoundIn>,
+    /// What the gas of a record was like, where one was compensated: with it the search for what the gas is like in another
+    /// record begins, and ends there if nothing else explains more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas: Option<GasParts>,
     /// What made it.
     pub made_by: MadeBy,
 }
@@ -117,7 +122,33 @@ impl Model {
             explained_to: None,
             time_constant_grades: None,
             found_in: None,
+            gas: None,
             made_by: MadeBy::with(&Options::default()),
+        }
+    }
+
+    /// What a diagnosis found, and the last of its models.
+    pub(crate) fn found(core: &Diagnosis, last: &Characterisation, found_in: Option<FoundIn>) -> Self {
+        let of_last = Self::of(last);
+        let taus = of_last.time_constants_s;
+        Self {
+            time_constants_s: [0, 1].map(|i| taus[i].or(core.last.time_constants[i].value_s)),
+            effects: core.effects.iter().map(|found| ModelEffect::found(found, &of_last.channels)).collect(),
+            verdict: Some(core.verdict),
+            explained_to: core.explained_to,
+            found_in,
+            ..of_last
+        }
+    }
+
+    /// The time constants and the noise of `last`.
+    pub(crate) fn of(last: &Characterisation) -> Self {
+        Self {
+            time_constants_s: [0, 1].map(|i| last.sensors[i].time_constant_s),
+            noise_std_k: Some([0, 1].map(|i| last.sensors[i].noise_std_k)),
+            time_constant_grades: Some([0, 1].map(|i| last.sensors[i].judgement.clone())),
+            made_by: last.made_by.clone(),
+            ..Self::of_two_lags(last.record.channels.clone())
         }
     }
 

@@ -77,7 +77,7 @@ pub fn compensate_watched(
     options: &CompensateOptions,
     watch: Watch<'_>,
 ) -> Result<Compensation, Error> {
-    let Modelled { last, mut fit, verdict, effects, warnings } = Modelled::of(record, options, watch)?;
+    let Modelled { last, mut fit, verdict, effects, warnings, model } = Modelled::of(record, options, watch)?;
     let judgement = judged(&last, verdict);
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
@@ -93,6 +93,7 @@ pub fn compensate_watched(
         last,
         warnings,
         rig: None,
+        used: None,
     };
     let is_unknown = fit.time_constants.iter().any(|t| t.value_s.is_none());
     let is_withheld = out.judgement.grade == Grade::NoGo && !options.diagnose.characterise.best_effort;
@@ -109,7 +110,9 @@ pub fn compensate_watched(
     let stop = Stop::new(watch);
     let found = Reconstruction::of(&mut fit, options, &stop)?.banded()?;
     stop.check()?;
+    let gas = Some(found.parts.clone());
     fill(&mut out, found, record, options.diagnose.characterise.best_effort);
+    out.used = out.gas.is_some().then_some(Model { gas, ..model });
     Ok(out)
 }
 
@@ -182,6 +185,8 @@ struct Modelled {
     verdict: Option<Verdict>,
     effects: Vec<NamedEffect>,
     warnings: Vec<String>,
+    /// As it is saved.
+    model: Model,
 }
 
 impl Modelled {
@@ -189,12 +194,21 @@ impl Modelled {
         if let Some(model) = &options.model {
             let (last, fit) = with_model(record, Some(model), &options.diagnose.characterise)?;
             let warnings = last.warnings.clone();
-            return Ok(Self { last, fit: without_trace(fit), verdict: None, effects: Vec::new(), warnings });
+            return Ok(Self {
+                last,
+                fit: without_trace(fit),
+                verdict: None,
+                effects: Vec::new(),
+                warnings,
+                model: model.clone(),
+            });
         }
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
         let effects = named(record, &core, &rows, options.diagnose.characterise.best_effort);
+        let last = with_effects(record, &options.diagnose, &core, &effects);
         Ok(Self {
-            last: with_effects(record, &options.diagnose, &core, &effects),
+            model: Model::found(&core, &last, None),
+            last,
             verdict: Some(core.verdict),
             effects,
             warnings: core.remarks.iter().map(ToString::to_string).collect(),

@@ -27,7 +27,8 @@ work*, which it cannot do without, in a process of its own too:
 - `read`: the same file, split into cells by the crate `csv` and these into numbers by the crate `fast-float2`;
 - `characterise`, `diagnose`: sine transforms of six series as long as the record (both channels, their residual, and this with its
   derivatives by both time constants) and Fourier transforms of three (both inferred inputs, a channel);
-- `compensate`, `track`: one pass of the causal filter, four states.
+- `compensate`, `track`: one pass of the causal filter, four states. `compensate --model` is given that the sensors are two lags, and
+  makes no diagnosis.
 
 The ratio is one of processor times, of all threads together. The memory is the most that the process has had, reading included;
 beside it stands how often both channels would fit into it. The exponent is that of the growth of the processor time since the row
@@ -38,7 +39,7 @@ above.
 /// One row of the table.
 pub(super) fn line(row: &Row) -> String {
     format!(
-        "{:12} {:>10} rows {:>9.2} s, processor {:>9.2} s{}, peak memory {}",
+        "{:18} {:>10} rows {:>9.2} s, processor {:>9.2} s{}, peak memory {}",
         row.verb.name(),
         row.took.rows,
         row.took.wall_s,

@@ -9,11 +9,15 @@ use anyhow::{Context, Result, bail};
 use rustix::time::{ClockId, clock_gettime};
 use twinlag::compensation::{Rig, Sensor, Stream, Term};
 use twinlag::record::{ColumnRef, Record, Selection};
-use twinlag::{CompensateOptions, DiagnoseOptions, Options, TrackOptions, characterise, compensate, diagnose, track};
+use twinlag::{
+    CompensateOptions, DiagnoseOptions, Model, Options, TrackOptions, characterise, compensate, diagnose, track,
+};
 use twinlag_transform::{Forward, sine_transform};
 
 use super::Took;
 use crate::bench::peak_mb;
+
+const COMPENSATE_BY_MODEL: &str = "compensate --model";
 
 /// A verb whose growth is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,11 +26,14 @@ pub(crate) enum Verb {
     Characterise,
     Diagnose,
     Compensate,
+    /// By the model of two lags, without a diagnosis.
+    CompensateByModel,
     Track,
 }
 
 impl Verb {
-    pub(crate) const ALL: [Self; 5] = [Self::Read, Self::Characterise, Self::Diagnose, Self::Compensate, Self::Track];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Read, Self::Characterise, Self::Diagnose, Self::Compensate, Self::CompensateByModel, Self::Track];
 
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -34,6 +41,7 @@ impl Verb {
             Self::Characterise => "characterise",
             Self::Diagnose => "diagnose",
             Self::Compensate => "compensate",
+            Self::CompensateByModel => COMPENSATE_BY_MODEL,
             Self::Track => "track",
         }
     }
@@ -43,7 +51,7 @@ impl Verb {
         match self {
             Self::Read => Step::Parse,
             Self::Characterise | Self::Diagnose => Step::Transforms,
-            Self::Compensate | Self::Track => Step::Filter,
+            Self::Compensate | Self::CompensateByModel | Self::Track => Step::Filter,
         }
     }
 }
@@ -126,6 +134,10 @@ pub(crate) fn on(name: &str, record: &Record) -> Result<()> {
         "characterise" => drop(black_box(characterise(record, &Options::default())?)),
         "diagnose" | "measured" => drop(black_box(diagnose(record, &DiagnoseOptions::default())?)),
         "compensate" => drop(black_box(compensate(record, &CompensateOptions::default())?)),
+        COMPENSATE_BY_MODEL => {
+            let model = Some(Model::of_two_lags(record.channels.clone()));
+            drop(black_box(compensate(record, &CompensateOptions { model, ..CompensateOptions::default() })?));
+        }
         "track" => drop(black_box(track(record, &TrackOptions::default())?)),
         "transforms" => transforms(record),
         "filter" => filter(record)?,
