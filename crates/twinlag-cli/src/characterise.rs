@@ -64,7 +64,7 @@ fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
     if answer.status == Status::Ok { grades::exit_code(&asked, &[], false, strict) } else { 4 }
 }
 
-pub(crate) fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
+fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
     if file == Path::new("-") {
         Ok(Record::from_reader(stdin(), "standard input", selection)?)
     } else {

@@ -4,7 +4,7 @@ use twinlag::diagnosis::Verdict;
 use twinlag::{CompensateOptions, DiagnoseOptions, Status};
 
 use crate::arguments::{Compensate, Trust};
-use crate::characterise::{model, read};
+use crate::characterise::{model, read_watched};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
@@ -26,7 +26,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
         form: command.form,
         trusted: usize::from(command.trust == Trust::T2),
     };
-    let record = read(&command.input.file, &command.input.columns.selection())?;
+    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));

@@ -6,7 +6,7 @@ use twinlag::{DiagnoseOptions, Diagnosis, Status};
 use twinlag_pages::diagnosis_report;
 
 use crate::arguments::Diagnose;
-use crate::characterise::read;
+use crate::characterise::read_watched;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
@@ -23,7 +23,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         without: command.without.clone(),
         ..DiagnoseOptions::default()
     };
-    let record = read(&command.input.file, &command.input.columns.selection())?;
+    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
     let answer = diagnose(&record, &options, console)?;
     if let Some(path) = &command.save {

@@ -42,7 +42,6 @@ pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgeme
     for (name, judgement) in numbers.into_iter().filter(|(_, judgement)| judgement.grade != Grade::Go) {
         for reason in judgement.because.split("; ") {
             match groups.iter_mut().find(|(grade, other, _)| (*grade, *other) == (judgement.grade, reason)) {
-                Some((_, _, names)) if names.contains(&name) => {}
                 Some((_, _, names)) => names.push(name.clone()),
                 None => groups.push((judgement.grade, reason, vec![name.clone()])),
             }

@@ -15,8 +15,40 @@ const LONG: Duration = Duration::from_secs(2);
 /// A spinner with the elapsed time. It shows on a terminal only, and disappears when dropped.
 pub(crate) struct Progress {
     bar: Option<(ProgressBar, Instant)>,
-    /// What is being done, and since when.
-    task: Mutex<(String, Instant)>,
+    task: Mutex<Running>,
+}
+
+/// What is being done.
+struct Running {
+    task: String,
+    done: usize,
+    total: usize,
+    since: Instant,
+}
+
+impl Running {
+    fn new() -> Self {
+        Self { task: String::new(), done: 0, total: 0, since: Instant::now() }
+    }
+
+    /// Takes a report. A task that begins anew, as each round of a search does, has its own time.
+    fn go_on(&mut self, task: &str, done: usize, total: usize) {
+        let begins_anew = done <= 1 && self.done > 1;
+        if self.task != task || self.total != total || begins_anew {
+            *self = Self { task: task.to_owned(), since: Instant::now(), ..Self::new() };
+        }
+        (self.done, self.total) = (done, total);
+    }
+
+    /// How far it has come after so long. A single piece of work has no count.
+    fn message(&self, elapsed: Duration) -> String {
+        let Self { task, done, total, .. } = self;
+        if *total <= 1 {
+            return task.clone();
+        }
+        let left = time_left(elapsed, *done, *total).map(|left| format!(", {} s left", left.as_secs().max(1)));
+        format!("{task}: {done} of {total}{}", left.unwrap_or_default())
+    }
 }
 
 impl Progress {
@@ -31,20 +63,15 @@ impl Progress {
     }
 
     fn showing(bar: Option<(ProgressBar, Instant)>) -> Self {
-        Self { bar, task: Mutex::new((String::new(), Instant::now())) }
+        Self { bar, task: Mutex::new(Running::new()) }
     }
 
     /// How far a verb has come, with the time that is left of its task, once that has taken two seconds; it is never cancelled
     /// from here.
     pub(crate) fn watch(&self, task: &str, done: usize, total: usize) -> ControlFlow<()> {
-        let mut current = self.task.lock().expect("no thread panics");
-        if current.0 != task {
-            *current = (task.to_owned(), Instant::now());
-        }
-        let left = time_left(current.1.elapsed(), done, total)
-            .map(|left| format!(", {} s left", left.as_secs().max(1)))
-            .unwrap_or_default();
-        self.say(|| format!("{task}: {done} of {total}{left}"));
+        let mut running = self.task.lock().expect("no thread panics");
+        running.go_on(task, done, total);
+        self.say(|| running.message(running.since.elapsed()));
         ControlFlow::Continue(())
     }
 
@@ -105,5 +132,29 @@ mod tests {
         let after = |elapsed_s, done| time_left(Duration::from_secs(elapsed_s), done, 40);
         assert_eq!(after(30, 10), Some(Duration::from_secs(90)));
         assert_eq!([after(1, 10), after(30, 0), after(30, 40)], [None; 3]);
+    }
+
+    #[test]
+    fn what_is_not_counted_has_no_count() {
+        let said = |done, total| {
+            let mut running = Running::new();
+            running.go_on("windows", done, total);
+            running.message(Duration::from_secs(30))
+        };
+        assert_eq!(said(10, 40), "windows: 10 of 40, 90 s left");
+        assert_eq!(said(0, 1), "windows");
+    }
+
+    /// Failed: the second round of a search was as fast as both rounds together.
+    #[test]
+    fn each_round_has_its_own_time() {
+        let mut running = Running::new();
+        running.go_on("candidates", 40, 40);
+        let first = running.since;
+        running.go_on("candidates", 1, 40);
+        assert!(running.since > first);
+        let second = running.since;
+        running.go_on("candidates", 2, 40);
+        assert_eq!(running.since, second);
     }
 }

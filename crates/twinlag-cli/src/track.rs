@@ -3,7 +3,7 @@
 use twinlag::{Status, TrackOptions};
 
 use crate::arguments::Track;
-use crate::characterise::{model, read};
+use crate::characterise::{model, read_watched};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
@@ -23,7 +23,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         model: command.model.as_deref().map(model).transpose()?,
         window_s: command.window,
     };
-    let record = read(&command.input.file, &command.input.columns.selection())?;
+    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));

@@ -347,13 +347,8 @@ impl Judgement {
     pub fn of(reasons: &[Reason]) -> Self {
         let grade = reasons.iter().map(Reason::grade).max().unwrap_or(Grade::Go);
         // Of a number that is not given, conditions are of no use.
-        let mut said: Vec<String> = Vec::new();
-        for clause in reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string) {
-            if !said.contains(&clause) {
-                said.push(clause);
-            }
-        }
-        let because = if said.is_empty() { WHY_GO.to_owned() } else { said.join("; ") };
+        let of_grade: Vec<String> = reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string).collect();
+        let because = if of_grade.is_empty() { WHY_GO.to_owned() } else { said_once(&of_grade) };
         Self { grade, because }
     }
 
@@ -363,8 +358,7 @@ impl Judgement {
         let more = Self::of(std::slice::from_ref(reason));
         match self.grade.cmp(&more.grade) {
             Ordering::Less => more,
-            Ordering::Equal if self.because.split("; ").any(|said| said == more.because) => self,
-            Ordering::Equal => Self { because: format!("{}; {}", self.because, more.because), ..self },
+            Ordering::Equal => Self { because: said_once(&[self.because, more.because]), ..self },
             Ordering::Greater => self,
         }
     }
@@ -396,6 +390,20 @@ impl Judgement {
     pub fn and_following(self, numbers: Self) -> Self {
         if self.grade == Grade::NoGo || self.grade > numbers.grade { self } else { numbers }
     }
+}
+
+/// Between the clauses of a text.
+const NEXT_CLAUSE: &str = "; ";
+
+/// The clauses of all these texts, each once.
+fn said_once(texts: &[String]) -> String {
+    let mut said: Vec<&str> = Vec::new();
+    for clause in texts.iter().flat_map(|text| text.split(NEXT_CLAUSE)) {
+        if !said.contains(&clause) {
+            said.push(clause);
+        }
+    }
+    said.join(NEXT_CLAUSE)
 }
 
 /// What speaks for a number that may be used.
@@ -541,6 +549,21 @@ mod tests {
 
     fn number(value: f64, interval: [f64; 2], is_positive: bool) -> Number {
         Number { value, interval_95: Some(interval), scatter: None, is_positive }
+    }
+
+    /// Whether reasons come together, one after the other, or with what something else rests on.
+    #[test]
+    fn a_clause_is_said_once() {
+        let given = Reason::Given { what: "T1 = 2 s".into() };
+        let both = Judgement::of(&[given.clone(), Reason::Biased, given.clone(), Reason::Biased]);
+        assert_eq!(both, Judgement::of(&[given.clone(), Reason::Biased]));
+        assert_eq!(both.clone().and(&Reason::Biased).and(&given), both);
+        // Failed: of a reason with two clauses the first and the second alone were compared with both.
+        let follows = Reason::Follows { from: "T1".into(), grade: Grade::Conditional, because: both.because.clone() };
+        let once = Judgement::of(std::slice::from_ref(&follows));
+        assert_eq!(once.because, format!("it follows from T1: {}", both.because));
+        assert_eq!(once.clone().and(&follows).and(&Reason::Biased), once);
+        assert_eq!(Judgement::of(&[follows, Reason::Biased]), once);
     }
 
     #[test]

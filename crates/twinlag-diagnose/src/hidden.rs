@@ -15,10 +15,18 @@ use twinlag_model::{
 use crate::candidates::{Candidate, Search};
 use crate::size::{Around, Lacking, Profile, least_size};
 
-/// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each. What is resolved in
-/// them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
+/// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each in the last look. What is
+/// resolved in them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
 const PIECES: usize = 4;
 const PIECE_SAMPLES: usize = 16_384;
+/// Samples of each piece in the looks before the last one: each takes an eighth of the time of the next.
+const FIRST_PIECES_SAMPLES: [usize; 2] = [512, 4096];
+/// Parts of the probability that the policy allows: up to the first, what would move a number is improbable enough for no further
+/// look; effects that together have no more than the second are left out of it. Of 480 numbers of two lags that leave only noise (299
+/// records of random rigs, each with an effect of a tenth or so of its usual size, 2000 to 100 000 samples) two then have another
+/// grade than by a single look at all; with parts of 1 and 0.1 it is seven.
+const SETTLED_SHARE: f64 = 0.5;
+const CLOSED_SHARE: f64 = 0.1;
 
 /// Part of the usual size of an effect below none up to which it counts as positive: bounds leave room for noise. Chosen.
 const NEGLIGIBLE_SHARE: f64 = 0.1;
@@ -54,7 +62,9 @@ pub fn pieces_of_long(samples: usize) -> Option<Vec<Range<usize>>> {
 /// # Ok::<(), twinlag_diagnose::ModelError>(())
 /// ```
 ///
-/// A record of more than 65 536 samples is judged by four pieces of it.
+/// Looks at ever longer pieces are taken until all that would move a number is improbable enough, and at those effects alone of
+/// which a shorter one has left it open: whatever part of a record makes an effect improbable, it is. A record of more than
+/// 65 536 samples is judged by four pieces of it.
 ///
 /// - `tau_s`: where to begin the fit of the two lags, s
 /// - `beside`: effects that are in the model beside these, each with its channel
@@ -70,22 +80,82 @@ pub fn unseen(
     half_s: [Option<f64>; 3],
     watch: Watch<'_>,
 ) -> Result<[Vec<Identifier>; 3], ModelError> {
+    let asked = Asked { settings, tau_s, beside, watch };
+    let most = settings.policy.hidden_effect_probability;
+    let (mut hidden, mut open): (Vec<Hidden>, Option<Vec<Identifier>>) = (Vec::new(), None);
+    for look in first_looks(observations) {
+        let is_open = |kind: Identifier| open.as_ref().is_none_or(|open| open.contains(&kind));
+        match asked.hidden(&look, is_open) {
+            Ok(found) => replace(&mut hidden, is_open, found),
+            Err(ModelError::Cancelled) => return Err(ModelError::Cancelled),
+            // What pieces cannot show, all of the record may.
+            Err(_) => continue,
+        }
+        if decisive(&hidden, &half_s, SETTLED_SHARE * most).iter().all(Vec::is_empty) {
+            return Ok([const { Vec::new() }; 3]);
+        }
+        open = Some(decisive(&hidden, &half_s, CLOSED_SHARE * most).concat());
+    }
+    let is_open = |kind: Identifier| open.as_ref().is_none_or(|open| open.contains(&kind));
     let excerpt = pieces_of_long(observations.samples())
         .map(|pieces| observations.excerpt(pieces.iter().map(|piece| piece.start), PIECE_SAMPLES));
-    let prepared = Prepared::new(excerpt.as_ref().unwrap_or(observations), settings)?;
-    let fit =
-        |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);
-    let mut fitted = fit(&Model::new(&settings.known, prepared.levels.std_k), &tau_s);
-    for (identifier, channel) in beside {
-        let search = Search::of(&prepared, settings, watch).beside(&fitted);
-        let is_it = |effect: &Shared| effect.identifier() == *identifier && effect.channel() == Some(*channel);
-        let Some(effect) = search.candidates(&fitted.model).into_iter().find(is_it) else { continue };
-        let start = effect.starts().into_iter().next().unwrap_or_default();
-        fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
+    replace(&mut hidden, is_open, asked.hidden(excerpt.as_ref().unwrap_or(observations), is_open)?);
+    let mut lists = decisive(&hidden, &half_s, most);
+    Ok([0, 1, 2].map(|i| std::mem::take(&mut lists[i])))
+}
+
+/// Puts what was `found` in the place of the effects of the kinds that were open.
+fn replace(hidden: &mut Vec<Hidden>, is_open: impl Fn(Identifier) -> bool, found: Vec<Hidden>) {
+    hidden.retain(|hidden| !is_open(hidden.effect));
+    hidden.extend(found);
+}
+
+/// Pieces of a record that is much longer, ever longer ones.
+fn first_looks(observations: &Observations) -> impl Iterator<Item = Observations> {
+    let samples = observations.samples();
+    let is_far_shorter = move |piece: &usize| 2 * PIECES * piece < samples && observations.flow().is_none();
+    let pieces = FIRST_PIECES_SAMPLES.into_iter().filter(is_far_shorter);
+    let looks = pieces.map(move |piece| observations.excerpt(evenly_spread(samples, PIECES, piece), piece));
+    // A record in short stretches has no such pieces.
+    looks.filter(move |look| look.samples() < samples)
+}
+
+/// What [`unseen`] is asked.
+struct Asked<'a> {
+    settings: &'a Settings,
+    tau_s: [f64; 2],
+    beside: &'a [(Identifier, usize)],
+    watch: Watch<'a>,
+}
+
+impl Asked<'_> {
+    /// The effects of those kinds that are `open`, as `observations` show them.
+    fn hidden(
+        &self,
+        observations: &Observations,
+        open: impl Fn(Identifier) -> bool,
+    ) -> Result<Vec<Hidden>, ModelError> {
+        let Self { settings, tau_s, beside, watch } = self;
+        let prepared = Prepared::new(observations, settings)?;
+        let fit =
+            |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);
+        let mut fitted = fit(&Model::new(&settings.known, prepared.levels.std_k), tau_s);
+        for (identifier, channel) in *beside {
+            let search = Search::of(&prepared, settings, *watch).beside(&fitted);
+            let is_it = |effect: &Shared| effect.identifier() == *identifier && effect.channel() == Some(*channel);
+            let Some(effect) = search.candidates(&fitted.model).into_iter().find(is_it) else { continue };
+            let start = effect.starts().into_iter().next().unwrap_or_default();
+            fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
+        }
+        let search = Search::of(&prepared, settings, *watch).beside(&fitted);
+        let around = search.quickly_around(&fitted, |effect| is_broad(effect) && open(effect.identifier()))?;
+        Ok(search.near(&around))
     }
-    let search = Search::of(&prepared, settings, watch).beside(&fitted);
-    let mut hidden = search.hidden(&search.around(&fitted)?, &[], &half_s);
-    Ok([0, 1, 2].map(|i| std::mem::take(&mut hidden[i])))
+}
+
+/// Whether an effect is more than a line, which a search finds wherever it matters.
+fn is_broad(effect: &Shared) -> bool {
+    !effect.about().is_narrow
 }
 
 /// An effect that may be there unseen.
@@ -105,43 +175,55 @@ impl Search<'_> {
     /// - `far`: effects that were fitted with quite other time constants, and not accepted
     /// - `half`: half the intervals; `None` of a number that has none
     pub(crate) fn hidden(&self, around: &Around<'_>, far: &[Candidate], half: &[Option<f64>]) -> Vec<Vec<Identifier>> {
-        let all: Vec<&Lacking> = around.lacking.iter().filter(|l| !l.effect.about().is_narrow).collect();
-        let prior = |effect: &Shared| self.prior_probability(effect, &all);
-        let near = all.iter().flat_map(|l| unseen_near(around.fitted, l, prior(&l.effect)));
-        let from_afar = far.iter().filter_map(|c| unseen_afar(around.fitted, c, prior(&c.effect)));
-        let hidden: Vec<Hidden> = near.chain(from_afar).collect();
-        let of = |(i, half): (usize, &Option<f64>)| {
-            let decisive = |h: &&Hidden| half.is_some_and(|half| h.shift[i] > half);
-            self.too_probable(hidden.iter().filter(decisive))
-        };
-        half.iter().enumerate().map(of).collect()
+        let mut hidden = self.near(around);
+        let all: Vec<&Shared> = around.sized.iter().filter(|effect| is_broad(effect)).collect();
+        hidden
+            .extend(far.iter().filter_map(|c| unseen_afar(around.fitted, c, self.prior_probability(&c.effect, &all))));
+        decisive(&hidden, half, self.policy.hidden_effect_probability)
     }
 
-    /// Kinds of effects without which all others are together no more probable than the policy allows.
-    fn too_probable<'h>(&self, hidden: impl Iterator<Item = &'h Hidden>) -> Vec<Identifier> {
-        let mut kinds: Vec<(Identifier, f64)> = Vec::new();
-        for Hidden { effect, probability, .. } in hidden {
-            match kinds.iter_mut().find(|(kind, _)| kind == effect) {
-                Some((_, sum)) => *sum += probability,
-                None => kinds.push((*effect, *probability)),
-            }
-        }
-        kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let from = |first: usize| kinds[first..].iter().map(|(_, probability)| probability).sum::<f64>();
-        let is_enough = |count: &usize| from(*count) <= self.policy.hidden_effect_probability;
-        let count = (0..kinds.len()).find(is_enough).unwrap_or(kinds.len());
-        kinds[..count].iter().map(|(kind, _)| *kind).collect()
+    /// The effects that a model lacks, where its time constants are.
+    fn near(&self, around: &Around<'_>) -> Vec<Hidden> {
+        let all: Vec<&Shared> = around.sized.iter().filter(|effect| is_broad(effect)).collect();
+        let lacking = around.lacking.iter().filter(|lacking| is_broad(&lacking.effect));
+        let prior = |effect: &Shared| self.prior_probability(effect, &all);
+        lacking.flat_map(|lacking| unseen_near(around.fitted, lacking, prior(&lacking.effect))).collect()
     }
 
     /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, but for those that turn
     /// phases, and the places and forms that it may have share that.
-    fn prior_probability(&self, effect: &Shared, all: &[&Lacking]) -> f64 {
-        let kind = |i: usize| all[i].effect.identifier();
+    fn prior_probability(&self, effect: &Shared, all: &[&Shared]) -> f64 {
+        let kind = |i: usize| all[i].identifier();
         let kinds = (0..all.len()).filter(|i| (0..*i).all(|other| kind(other) != kind(*i))).count();
         let forms = (0..all.len()).filter(|i| kind(*i) == effect.identifier()).count();
         let factor = if effect.about().turns_phases { self.policy.prior_phase_factor } else { 1.0 };
         factor * self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
     }
+}
+
+/// For each number the kinds of effects that would move it by more than half its interval and without which all others that would
+/// are together no more probable than `most`.
+fn decisive(hidden: &[Hidden], half: &[Option<f64>], most: f64) -> Vec<Vec<Identifier>> {
+    let of = |(i, half): (usize, &Option<f64>)| {
+        let moves = |h: &&Hidden| half.is_some_and(|half| h.shift[i] > half);
+        too_probable(hidden.iter().filter(moves), most)
+    };
+    half.iter().enumerate().map(of).collect()
+}
+
+/// Kinds of effects without which all others are together no more probable than `most`.
+fn too_probable<'h>(hidden: impl Iterator<Item = &'h Hidden>, most: f64) -> Vec<Identifier> {
+    let mut kinds: Vec<(Identifier, f64)> = Vec::new();
+    for Hidden { effect, probability, .. } in hidden {
+        match kinds.iter_mut().find(|(kind, _)| kind == effect) {
+            Some((_, sum)) => *sum += probability,
+            None => kinds.push((*effect, *probability)),
+        }
+    }
+    kinds.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let from = |first: usize| kinds[first..].iter().map(|(_, probability)| probability).sum::<f64>();
+    let count = (0..kinds.len()).find(|count| from(*count) <= most).unwrap_or(kinds.len());
+    kinds[..count].iter().map(|(kind, _)| *kind).collect()
 }
 
 /// How probable an effect is, and what it would do, for each set of values that its other parameters may begin with.

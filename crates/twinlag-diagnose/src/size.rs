@@ -24,6 +24,8 @@ pub(crate) struct Around<'a> {
     /// Candidates that the model lacks, noise among them.
     pub(crate) candidates: usize,
     /// Those of them that have a size.
+    pub(crate) sized: Vec<Shared>,
+    /// Those of these that were asked for.
     pub(crate) lacking: Vec<Lacking>,
 }
 
@@ -41,8 +43,27 @@ pub(crate) struct Lacking {
 struct Point<'a> {
     fitted: &'a Fitted,
     lin: &'a Linearised,
+    normal: &'a NormalEquations,
     /// Half the second derivatives of the energy.
     second: &'a [Vec<f64>],
+    /// Whether they do for the parameters of the model beside any effect, by [`Point::second_beside`].
+    is_enough: bool,
+}
+
+impl Point<'_> {
+    /// Half the second derivatives of the energy by the parameters of the model, beside an effect of no size which whitens the residual
+    /// once more: products of first derivatives as they are there, with what noise adds to them, residual by residual, as it is here.
+    ///
+    /// With derivatives that are taken there, none of 480 numbers of two lags (299 records of random rigs with small effects, 2000 to
+    /// 100 000 samples) has another grade, and the conditions of eight name other effects.
+    ///
+    /// - `beside`: the normal equations with the effect
+    fn second_beside(&self, beside: &NormalEquations) -> Vec<Vec<f64>> {
+        let (there, here) = (&beside.products, &self.normal.products);
+        let share = beside.count as f64 / self.normal.count as f64;
+        let at = |i: usize, j: usize| there[i][j] + share * (self.second[i][j] - here[i][j]);
+        (0..here.len()).map(|i| (0..here.len()).map(|j| at(i, j)).collect()).collect()
+    }
 }
 
 impl Search<'_> {
@@ -51,23 +72,43 @@ impl Search<'_> {
     /// # Errors
     /// [`ModelError::Cancelled`] if the watch says so.
     pub(crate) fn around<'a>(&self, fitted: &'a Fitted) -> Result<Around<'a>, ModelError> {
+        self.around_along(fitted, |_| true, false)
+    }
+
+    /// As [`Self::around`], along the sizes of those effects alone that are `wanted`, in half the time where two lags alone are fitted.
+    pub(crate) fn quickly_around<'a>(
+        &self,
+        fitted: &'a Fitted,
+        wanted: impl Fn(&Shared) -> bool,
+    ) -> Result<Around<'a>, ModelError> {
+        self.around_along(fitted, wanted, true)
+    }
+
+    fn around_along<'a>(
+        &self,
+        fitted: &'a Fitted,
+        wanted: impl Fn(&Shared) -> bool,
+        is_enough: bool,
+    ) -> Result<Around<'a>, ModelError> {
         let Fitted { model, theta, .. } = fitted;
         let lin = model.linearised(theta, self.observations, self.selection);
         let normal = model.normal_equations(theta, self.observations, self.selection, None);
         let second = model.second_derivatives(theta, self.observations, self.selection, &normal, &[]);
-        let point = Point { fitted, lin: &lin, second: &second };
+        let point = Point { fitted, lin: &lin, normal: &normal, second: &second, is_enough };
         let all = self.candidates(model);
         let sized: Vec<(&Shared, usize)> = all
             .iter()
             .filter(|effect| !effect.is_noise())
             .filter_map(|effect| Some((effect, effect.main()?)))
             .collect();
-        let lacking = self.each(&sized, |&(effect, main)| {
+        let asked: Vec<(&Shared, usize)> = sized.iter().filter(|(effect, _)| wanted(effect)).copied().collect();
+        let lacking = self.each(&asked, |&(effect, main)| {
             let starts = starts_beside_size(effect.as_ref(), main);
             let along = starts.iter().map(|start| self.near_none(&point, effect, main, start)).collect();
             Lacking { effect: effect.clone(), main, along }
         })?;
-        Ok(Around { fitted, lin, candidates: all.len(), lacking })
+        let sized = sized.into_iter().map(|(effect, _)| effect.clone()).collect();
+        Ok(Around { fitted, lin, candidates: all.len(), sized, lacking })
     }
 
     /// The energy along the size of an effect, from where it changes nothing, or from the least size that it can have; `None`
@@ -75,7 +116,7 @@ impl Search<'_> {
     ///
     /// - `start`: values of the parameters that have no neutral one, beside the size; they are held
     fn near_none(&self, point: &Point<'_>, effect: &Shared, main: usize, start: &[f64]) -> Option<Profile> {
-        let Point { fitted, lin: without, second } = *point;
+        let Point { fitted, lin: without, second, is_enough, .. } = *point;
         let (observations, selection, count) = (self.observations, self.selection, fitted.theta.len());
         let parameters = effect.parameters();
         let is_held = |i: usize| i != main && parameters[i].neutral().is_none();
@@ -86,8 +127,12 @@ impl Search<'_> {
         let beside = Beside { without, max_difference: SAME_RESIDUAL };
         let mut normal = model.scored_normal_equations(&theta, observations, selection, Some(beside));
         (0..start.len()).filter(|i| is_held(*i)).for_each(|i| normal.hold(count + i));
-        let known = if normal.is_beside { second } else { &[] };
-        let second = model.second_derivatives(&theta, observations, selection, &normal, known);
+        let known = match (normal.is_beside, is_enough) {
+            (true, _) => second.to_vec(),
+            (false, true) => point.second_beside(&normal),
+            (false, false) => Vec::new(),
+        };
+        let second = model.second_derivatives(&theta, observations, selection, &normal, &known);
         Profile::along(count + main, &normal, &second, fitted.mean_energy().max(1.0))
     }
 }

@@ -13,6 +13,10 @@ use crate::starts::{hold_known, starts};
 /// is minimised in its place: so little that one Newton step takes it back.
 const MAX_COMPRESSION_SHIFT_STANDARD_ERRORS: f64 = 1e-2;
 
+/// Readings from which on the hold that has bins shows where another one starts. Evaluations over all readings, some thirty of a grid
+/// and a dozen from each of four starts, then take several times the transforms that the bins take.
+const MIN_STAND_IN_SAMPLES: usize = 16_384;
+
 /// Where a fit of the whitened cost ended, and the cost itself, in its exact form.
 pub(crate) struct Minimised<'a> {
     pub(crate) whitened: Whitened<'a>,
@@ -101,8 +105,12 @@ fn stand_in<'a>(whitened: &Whitened<'a>, calibration: bool) -> Result<Option<Whi
     if !is_first_order || whitened.form() != Form::Banded || whitened.autoregression().iter().any(|a| !a.is_empty()) {
         return Ok(None);
     }
+    if whitened.readings().len() < MIN_STAND_IN_SAMPLES {
+        return Ok(None);
+    }
     let other = whitened.clone().with_hold(Discretisation::ZeroOrderHold)?;
-    Ok(other.is_gathered_in_pieces().then(|| other.compressed(calibration)))
+    let has_bins = other.form() == Form::Spectral || other.is_gathered_in_pieces();
+    Ok(has_bins.then(|| other.compressed(calibration)))
 }
 
 /// The lowest ends with the first time constant shorter, and with it longer.

@@ -42,6 +42,10 @@ impl Chosen {
 const SHORTEST_PERIOD_S: f64 = 1e-9;
 const LONGEST_PERIOD_S: f64 = 366.0 * 86_400.0;
 
+/// Longest unit of time after which a column may be called and be the time: those of longer ones, as `h`, `d` and `min`, stand for
+/// other quantities as well.
+const LONGEST_NAMING_UNIT_S: f64 = 1.0;
+
 /// Makes the choice, and notes what was guessed.
 ///
 /// # Errors
@@ -91,14 +95,22 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
 fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
     let free = |index: &usize| !taken.contains(index);
-    (0..columns.len()).filter(free).find(|&index| is_time(&columns[index])).or_else(|| {
+    let rises =
+        |column: &Column| column.kind() == Kind::Number && column.raw().windows(2).all(|pair| pair[1] > pair[0]);
+    let is_called_by_unit = |column: &Column| {
+        let length_s = Unit::of_time_named(column.name()).map(|(_, seconds)| seconds);
+        // A date has parts that are called so as well, which begin anew.
+        length_s.is_some_and(|length_s| length_s <= LONGEST_NAMING_UNIT_S) && rises(column)
+    };
+    let open = || (0..columns.len()).filter(free);
+    let named = open().find(|&index| is_time(&columns[index]));
+    named.or_else(|| open().find(|&index| is_called_by_unit(&columns[index]))).or_else(|| {
         // Without a telling name: the first column, if it rises from row to row and is not a row
         // number.
         let first = columns.first().filter(|_| free(&0))?;
-        let rises = first.raw().windows(2).all(|pair| pair[1] > pair[0]);
         let open =
             *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !is_apart(first, columns);
-        (first.kind() == Kind::Number && rises && open).then_some(0)
+        (rises(first) && open).then_some(0)
     })
 }
 

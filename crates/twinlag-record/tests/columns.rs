@@ -229,6 +229,17 @@ fn a_time_column_may_be_named_as_its_unit() {
     assert!(got.time_s.iter().enumerate().all(|(k, t)| (t - 0.04 * k as f64).abs() < 1e-12), "{:?}", got.time_s);
     let got = timed("ms [s]", 0.0, 40.0).expect("a record");
     assert_eq!(got.time_s[1], 40.0);
+    // Failed: it was found in the first place alone.
+    for (name, step_s) in [("s", 40.0), ("sec", 40.0), ("ms", 40e-3), ("us", 40e-6), ("µs", 40e-6), ("ns", 40e-9)] {
+        let got = record([ramp("T1", 20.0, 1.0), ramp(name, 0.0, 40.0), ramp("T2", 20.0, 0.5)]).expect("a record");
+        assert!((got.time_s[1] - step_s).abs() <= 2.0 * f64::EPSILON * step_s, "{name}: {}", got.time_s[1]);
+        assert_eq!(got.channels, ["T1", "T2"]);
+    }
+    // A part of a date begins anew, and a longer unit may be another quantity: a height, a minimum.
+    let part = NamedColumn::numbers("ms", (0..ROWS).map(|k| (k * 400 % 1000) as f64).collect::<Vec<_>>());
+    for no_time in [part, ramp("h", 0.0, 40.0), ramp("min", 0.0, 40.0)] {
+        assert!(record([ramp("T1", 20.0, 1.0), no_time, ramp("T2", 20.0, 0.5)]).is_err());
+    }
 }
 
 #[test]
