@@ -5,7 +5,7 @@ use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
 use twinlag::Model;
-use twinlag::record::{Decimals, write_csv};
+use twinlag::record::{Decimals, RecordError, write_csv};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -91,16 +91,18 @@ pub(crate) fn data<T: ToString>(
     last: (&str, impl Iterator<Item = T>),
 ) -> Result<(), Failure> {
     let cells = std::iter::once(last.0.to_owned()).chain(last.1.map(|cell| cell.to_string()));
-    let written = |out: Box<dyn Write>| {
-        let mut rows = WithCells { out, cells, is_closed: false };
-        write_csv(&mut rows, columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
-        Ok(())
+    let written = |out: &mut dyn Write, name: &str| {
+        let mut rows = WithCells { out: BufWriter::new(out), cells, is_closed: false };
+        write_csv(&mut rows, columns, Decimals::Shortest).map_err(|error| match error {
+            RecordError::CannotWrite { reason } => Failure::Other(format!("{name}: cannot be written: {reason}")),
+            other => twinlag::Error::from(other).into(),
+        })
     };
     if to_stdout {
-        return written(Box::new(stdout().lock()));
+        return written(&mut stdout().lock(), "standard output");
     }
-    let file = File::create(out).map_err(|e| cannot_be_written(out, &e))?;
-    written(Box::new(BufWriter::new(file)))
+    let mut file = File::create(out).map_err(|e| cannot_be_written(out, &e))?;
+    written(&mut file, &out.display().to_string())
 }
 
 /// A table that gets a cell at the end of each row.

@@ -82,11 +82,15 @@ impl Intensity {
         }
     }
 
-    /// The factors of some of the `readings` that they are of, found by their instants.
-    #[must_use]
-    pub fn of_part(&self, readings: &Readings, part: &Readings) -> Self {
+    /// The factors of some of the `readings` that they are of, found by their instants: of an instant between two of theirs that of
+    /// the later one.
+    ///
+    /// # Errors
+    /// [`CompensateError::Lengths`] for another number of factors than of readings.
+    pub fn of_part(&self, readings: &Readings, part: &Readings) -> Result<Self, CompensateError> {
+        self.check(readings)?;
         let place = |time_s: &f64| readings.time_s().partition_point(|t| t < time_s).min(self.factors.len() - 1);
-        Self { factors: part.time_s().iter().map(|t| self.factors[place(t)]).collect() }
+        Ok(Self { factors: part.time_s().iter().map(|t| self.factors[place(t)]).collect() })
     }
 
     /// The factors.

@@ -89,7 +89,8 @@ impl Periodogram {
         let all = (span_s / period_s).round() as usize + 1;
         let count = if all > max_piece_samples { 2 * all.div_ceil(max_piece_samples) - 1 } else { 1 };
         let samples = fast_length(2 * all / (count + 1));
-        let (count, worth) = if count > MAX_PIECES { (MAX_PIECES, 1.0) } else { (count, OVERLAPPING_WORTH) };
+        let count = count.min(MAX_PIECES);
+        let worth = if count * samples > all { OVERLAPPING_WORTH } else { 1.0 };
         let tapered = Tapered::new(taper(samples));
         let frequency_hz: Vec<f64> = (1..samples.div_ceil(2)).map(|j| j as f64 / (samples as f64 * period_s)).collect();
         let weights_at = |hz: f64| rig.sensors.map(|s| s.response(hz).conj() / s.noise_density_k2_per_hz(hz, period_s));

@@ -21,8 +21,8 @@ use crate::prior::Term;
 /// critical damping are taken as that far away. Rounding is below 1e-7 with it.
 const MIN_FROM_CRITICAL: f64 = 1e-6;
 /// Least decay of an exponential over a piece: what lasts for twenty pieces shows as what lasts for ever, but for
-/// [`MIN_DECAY`]`/2π` of a bin, by which it is wider. Rounding is below 1e-6 with it: half turns are known within 1e-16, which is 3e-11 of
-/// `0.05/16384`, and slopes go with the third power of that.
+/// [`MIN_DECAY`]`/2π` of a bin, by which it is wider. Rounding is below 1e-6 with it: half turns are known within 1e-16, which is
+/// 3e-11 of `0.05/16384`, and slopes go with the third power of that.
 const MIN_DECAY: f64 = 0.05;
 /// Decay over a piece after which nothing is left, `e^−40`.
 const NOTHING_LEFT: f64 = 40.0;

@@ -19,6 +19,9 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x4, Matrix4, Vector3};
 use crate::error::CostError;
 use crate::readings::Readings;
 
+/// Rows that are factorised at a time. Chosen: 100 kB, which stays in the cache.
+const ROWS_AT_A_TIME: usize = 4096;
+
 /// How the difference equation is solved for the two time constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DifferenceEquationEstimator {
@@ -238,8 +241,6 @@ fn smallest_direction(columns: &[Vector3<f64>], spread: &Matrix3<f64>) -> Result
     let first = (v[(0, last)] - lower[(1, 0)] * second - lower[(2, 0)] * third) / lower[(0, 0)];
     Ok([first / third, second / third])
 }
-/// Rows that are factorised at a time.
-const ROWS_AT_A_TIME: usize = 4096;
 
 /// The `[λ, κ]` for which `λ x0 + κ x1 + x2` has the least sum of squares over all rows `x`, by orthogonal factorisation of some
 /// rows at a time below the triangle of those before: as exact as of all at once.

@@ -64,10 +64,10 @@ impl<const P: usize> Sums<P> {
 /// let cost = Whitened::new(&readings, Discretisation::ZeroOrderHold, [0.1, 0.2])?;
 /// let theta = [0.03, 0.1];
 /// let influences = cost.influences(&theta);
-/// // Each product of two derivatives, summed, is half the matrix of Gauss and Newton.
+/// // Products of derivatives, summed, are the information: the inverse of the bound of Cramér and Rao.
 /// let products = influences.products();
-/// let hessian = cost.cramer_rao(&theta, &[0]).expect("determined");
-/// assert!((products[0][0] * hessian[0][0] - 1.0).abs() < 1e-2);
+/// let bound = cost.cramer_rao(&theta, &[0]).expect("determined");
+/// assert!((products[0][0] * bound[0][0] - 1.0).abs() < 1e-2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -86,7 +86,7 @@ impl<const P: usize> Influences<P> {
 
     /// Scatter between parts of the record of the sum of parameters that each residual moves by `weights · d`.
     ///
-    /// `None` of less than sixteen residuals, or where nothing has an influence.
+    /// `None` of fewer than sixteen sums, or where nothing has an influence.
     pub fn scatter(&self, weights: &[f64; P], standard_error: f64) -> Option<PartScatter> {
         let of = |all: &[Sums<P>]| -> Option<Scatter> { between(all.iter().map(|s| s.term(weights)), standard_error) };
         Some(PartScatter { along: of(&self.along)?, by_frequency: of(&self.by_frequency)? })
@@ -154,6 +154,7 @@ impl<const P: usize> Gathering<P> {
 impl Whitened<'_> {
     /// What each whitened residual at `theta` does to the parameters.
     pub fn influences<const P: usize>(&self, theta: &[f64; P]) -> Influences<P> {
+        const { assert!(P <= 6, "a pair of sensors has six parameters") };
         let pair: Pair<DualSVec64<P>> = Pair::variables(theta);
         let samples = self.readings().len();
         let mut all = Gathering {

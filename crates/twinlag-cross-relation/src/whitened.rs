@@ -137,7 +137,9 @@ impl<'a> Whitened<'a> {
     /// Whether compression takes the bins of pieces, which are not kept.
     pub fn is_gathered_in_pieces(&self) -> bool {
         let is_one_step = matches!(self.model.hold, Discretisation::ZeroOrderHold | Discretisation::Bilinear);
-        is_one_step && self.model.is_white() && self.transformed.is_none() && self.readings.len() > MAX_KEPT_BINS
+        let is_even = self.readings.even_period_s().is_some();
+        let is_long = self.readings.len() > MAX_KEPT_BINS;
+        is_one_step && is_even && is_long && self.model.is_white() && self.transformed.is_none()
     }
 
     /// This cost without compression.
@@ -166,7 +168,8 @@ impl<'a> Whitened<'a> {
         Ok(self)
     }
 
-    /// This cost for another hold, without transforming again where both take the same transforms.
+    /// This cost, with white noise, for another hold, without transforming again where both take the same transforms;
+    /// [`Self::with_autoregression`] comes after it.
     ///
     /// # Errors
     /// As [`Whitened::new`].

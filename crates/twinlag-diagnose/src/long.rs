@@ -5,7 +5,7 @@
 //! from there: every effect that is still missing is screened against all residuals, and what stands out is fitted to all. Effects
 //! with quite other time constants, each of which costs a fit, are fitted to the whole where the pieces do not exclude them.
 
-use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Watch, evenly_spread};
+use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Shared, Watch, evenly_spread};
 
 use crate::candidates::{Candidate, Search};
 use crate::moves::{Move, State, Taken};
@@ -75,7 +75,10 @@ impl<'a> State<'a> {
     /// An effect that pieces showed, with fits to the whole record.
     fn taken_in_whole(&self, taken: Taken) -> Taken {
         let candidate = Candidate { fitted: self.current.clone(), ..taken.candidate };
-        let in_whole = |tie: Candidate| Candidate { fitted: self.fitted(&tie.fitted, Effort::Compare), ..tie };
+        let in_whole = |tie: Candidate| {
+            let fitted = self.fitted(&with_levels_of(&self.current, &tie.fitted), Effort::Compare);
+            Candidate { fitted, ..tie }
+        };
         Taken { candidate, ties: taken.ties.into_iter().map(in_whole).collect() }
     }
 }
@@ -84,10 +87,20 @@ impl Search<'_> {
     /// Effects with quite other time constants that pieces do not exclude, fitted to the whole record beside `current`.
     pub(crate) fn far_in_whole(&self, current: &Fitted, far: &[Candidate]) -> Result<Vec<Candidate>, ModelError> {
         let robust_before = self.robust(current);
-        let fits = |far: &&Candidate| far.fitted.model.effects.len() == current.model.effects.len() + 1;
-        let far: Vec<&Candidate> = far.iter().filter(fits).collect();
+        let is_beside = |far: &&Candidate| {
+            let (effects, own) = (&far.fitted.model.effects, &current.model.effects);
+            let is_same = |(a, b): (&Shared, &Shared)| a.identifier() == b.identifier() && a.channel() == b.channel();
+            effects.len() == own.len() + 1 && effects.iter().zip(own).all(is_same)
+        };
+        let of_whole = |far: &Candidate| Candidate { fitted: with_levels_of(current, &far.fitted), ..far.clone() };
+        let far: Vec<Candidate> = far.iter().filter(is_beside).map(of_whole).collect();
         self.each(&far, |far| self.finished(current, far, robust_before))
     }
+}
+
+/// A fit of pieces with the noise levels of `current`: energies compare under the same levels alone.
+fn with_levels_of(current: &Fitted, fitted: &Fitted) -> Fitted {
+    Fitted { model: fitted.model.clone().with_noise(current.model.noise_std_k()), ..fitted.clone() }
 }
 
 /// Whether time constants of two fits differ.

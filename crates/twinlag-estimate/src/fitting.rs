@@ -45,10 +45,10 @@ pub(crate) fn add(all: &mut Evaluations, more: Evaluations) {
 
 /// Minimises `whitened` with `priors` over `variables` from `own` starts, or from those of the record where there are none.
 ///
-/// Where the record allows it, in the compressed form; then again from there in the exact one if
-/// the bound on what that can have moved (where long segments were gathered in pieces: a Newton step of the exact cost) is above a
-/// hundredth of a standard error, or if there was no end to be had: squares rounded before they are summed leave the compressed cost rougher, by
-/// the square of the signal over the noise, which solvers that compare values feel.
+/// Where the record allows it, in the compressed form; then again from there in the exact one if that may have moved a parameter by
+/// more than a hundredth of a standard error, or if no fit ended well: squares that are rounded before they are summed leave the
+/// compressed cost rougher, by the square of the signal over the noise, which solvers that compare values feel. How far it may have
+/// moved is a bound, or a Newton step of the exact cost where long segments were gathered in pieces.
 pub(crate) fn minimise_whitened<'a, const P: usize>(
     whitened: Whitened<'a>,
     priors: &[Prior],

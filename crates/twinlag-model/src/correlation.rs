@@ -76,8 +76,9 @@ pub(crate) fn filtered(values: &[f64], kernel: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Against sums over the products themselves: a transform of 128 values rounds each to some 1e-15 of the largest, and the
-    /// sums of a thousand values of size one are some tens of them.
+    /// Against sums over the products themselves. A transform of `N ≤ 2048` values rounds each by `ε √(log₂ N)`, 7e-16 of their root
+    /// mean square, and a product of two by twice that. The correlation is a mean of a thousand, so below 1.5e-15; the filter, whose
+    /// kernel sums to 11, below 1.6e-14. The bounds are some six times these.
     #[test]
     fn correlations_are_sums_of_products() {
         let values: Vec<f64> = (0..1000).map(|k| (f64::from(k * k * 7 + k) * 2.399).sin()).collect();

@@ -31,10 +31,10 @@ const MAX_ITERATIONS: u64 = 40;
 /// of a time constant.
 const LOOK_STEP: f64 = 2e-2;
 const STEP: f64 = 1e-7;
-/// Deviance that a fit need not find: a hundredth of the least that decides between models, some ten, and the square of a
-/// hundredth of a standard error. In a curved valley in which the record hardly determines anything each of dozens of iterations
-/// gains a tenth.
+/// Deviance that a fit need not find where models are compared: a hundredth of the least that decides between them, some ten. In a
+/// curved valley, where the record hardly determines anything, each of dozens of iterations gains as much.
 const COMPARED_DEVIANCE: f64 = 0.1;
+/// Deviance that the last fit need not find: the square of a hundredth of a standard error.
 const FINISHED_DEVIANCE: f64 = 1e-4;
 /// Evaluations for each iteration.
 const EVALUATIONS_PER_ITERATION: u64 = 4;
@@ -44,7 +44,7 @@ const EVALUATIONS_PER_ITERATION: u64 = 4;
 pub enum Effort {
     /// A few iterations, enough to rank it.
     Look,
-    /// To a tenth of a nat or so, enough to compare models.
+    /// To a tenth of a unit of deviance, enough to compare models.
     Compare,
     /// Until no parameter moves by a hundredth of its standard error.
     Finish,
@@ -193,7 +193,7 @@ impl Model {
     ) -> Vec<Vec<f64>> {
         let products = &normal.products;
         if observations.samples() <= MAX_CURVED_SAMPLES {
-            return self.curved(theta, observations, selection, products, known);
+            return self.curved(theta, observations, selection, products, 1.0, known);
         }
         // What noise adds to the products is the same all along the record.
         let piece = MAX_CURVED_SAMPLES / CURVED_PIECES;
@@ -201,9 +201,12 @@ impl Model {
         let of_part = whole_selection(&part, &selection.weighting);
         let NormalEquations { products: part_products, count, .. } =
             self.normal_equations(theta, &part, &of_part, None);
-        let share = count as f64 / normal.count as f64;
+        let share = count as f64 / normal.count.max(1) as f64;
+        if count == 0 {
+            return self.curved(theta, observations, selection, products, 1.0, known);
+        }
         let part_known: Vec<Vec<f64>> = part_products.iter().take(known.len()).cloned().collect();
-        let curved = self.curved(theta, &part, &of_part, &part_products, &part_known);
+        let curved = self.curved(theta, &part, &of_part, &part_products, share, &part_known);
         let at = |i: usize, j: usize| match known.get(i.max(j)) {
             Some(_) => known[i][j],
             None => products[i][j] + (curved[i][j] - part_products[i][j]) / share,
@@ -212,12 +215,15 @@ impl Model {
     }
 
     /// The second derivatives of [`Self::second_derivatives`], all from the residual of `observations`.
+    ///
+    /// - `share`: the part of the record that these are, whose standard errors are longer by its root
     fn curved(
         &self,
         theta: &[f64],
         observations: &Observations,
         selection: &Selection,
         products: &[Vec<f64>],
+        share: f64,
         known: &[Vec<f64>],
     ) -> Vec<Vec<f64>> {
         let (p, first) = (theta.len(), known.len());
@@ -229,7 +235,7 @@ impl Model {
             if is_still(i) {
                 return vec![0.0; p];
             }
-            let step = CURVATURE_STEP_SE / products[i][i].sqrt();
+            let step = CURVATURE_STEP_SE * (share / products[i][i]).sqrt();
             let moved = |by: f64| {
                 let mut at = theta.to_vec();
                 at[i] = (at[i] + by).clamp(variable.lower, variable.upper);

@@ -5,9 +5,9 @@
 //! Residuals next to a block, which share readings with it, are in neither.
 
 use crate::blocks;
-use crate::cost::Linearised;
 use crate::dense;
 use crate::fit::Fitted;
+use crate::normal::NormalEquations;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::Selection;
@@ -23,75 +23,44 @@ pub fn held_out_energy(
     let gap = policy.block_gap_samples(total, policy.held_out_blocks);
     let fold_of = |sample: usize| blocks::fold(sample, total, policy);
     let lin = fitted.model.linearised(&fitted.theta, observations, selection);
-    let sums = |is_of: &dyn Fn(usize) -> bool| {
-        let mut sums = FoldSums::of(lin.columns.len());
-        let rows = (0..lin.samples.len()).filter(|&k| is_of(lin.samples[k]));
+    let sums = |rows: &mut dyn Iterator<Item = usize>| {
+        let mut sums = NormalEquations::none(lin.columns.len());
         rows.for_each(|k| sums.add(&lin, k));
         sums
     };
-    let whole = FoldSums::of_all(&lin);
+    let of_samples =
+        |is_of: &dyn Fn(usize) -> bool| sums(&mut (0..lin.samples.len()).filter(|&k| is_of(lin.samples[k])));
+    // What is known beforehand is in no fold.
+    let whole = sums(&mut (0..lin.residual.len()));
     let (mut energy, mut count) = (0.0, 0);
     for fold in 0..policy.held_out_folds {
-        let inside = sums(&|s| fold_of(s) == fold);
-        let near = sums(&|s| {
+        let inside = of_samples(&|s| fold_of(s) == fold);
+        let near = of_samples(&|s| {
             fold_of(s) != fold && (fold_of(s.saturating_sub(gap)) == fold || fold_of((s + gap).min(total - 1)) == fold)
         });
-        energy += inside.energy_after(&whole.step_without(&[&inside, &near])?);
+        energy += energy_after(&inside, &step_without(&whole, &[&inside, &near])?);
         count += inside.count;
     }
     (count > 0).then(|| energy / count as f64)
 }
 
-/// Sums over some residuals and their derivatives.
-struct FoldSums {
-    energy: f64,
-    count: usize,
-    slope: Vec<f64>,
-    products: Vec<Vec<f64>>,
+/// The step, to be subtracted, that a fit to all without `parts` takes.
+fn step_without(all: &NormalEquations, parts: &[&NormalEquations]) -> Option<Vec<f64>> {
+    let (mut products, mut slope) = (all.products.clone(), all.slope.clone());
+    for a in 0..slope.len() {
+        for part in parts {
+            slope[a] -= part.slope[a];
+            products[a].iter_mut().zip(&part.products[a]).for_each(|(all, taken)| *all -= taken);
+        }
+        // Where a fold takes all that is known of a parameter, it stays where it is.
+        products[a][a] += 1e-3 * all.products[a][a];
+    }
+    Some(dense::times(&dense::inverse(&products)?, &slope))
 }
 
-impl FoldSums {
-    fn of(parameters: usize) -> Self {
-        let products = vec![vec![0.0; parameters]; parameters];
-        Self { energy: 0.0, count: 0, slope: vec![0.0; parameters], products }
-    }
-
-    /// Of all, and what is known beforehand.
-    fn of_all(lin: &Linearised) -> Self {
-        let mut out = Self::of(lin.columns.len());
-        (0..lin.residual.len()).for_each(|k| out.add(lin, k));
-        out
-    }
-
-    fn add(&mut self, lin: &Linearised, k: usize) {
-        let r = lin.residual[k];
-        self.energy += r * r;
-        self.count += 1;
-        for (a, (slope, products)) in self.slope.iter_mut().zip(&mut self.products).enumerate() {
-            let of_a = lin.columns[a][k];
-            *slope += of_a * r;
-            products.iter_mut().zip(&lin.columns).for_each(|(sum, of_b)| *sum += of_a * of_b[k]);
-        }
-    }
-
-    /// The step, to be subtracted, that a fit without `parts` takes.
-    fn step_without(&self, parts: &[&Self]) -> Option<Vec<f64>> {
-        let (mut products, mut slope) = (self.products.clone(), self.slope.clone());
-        for a in 0..slope.len() {
-            for part in parts {
-                slope[a] -= part.slope[a];
-                products[a].iter_mut().zip(&part.products[a]).for_each(|(all, taken)| *all -= taken);
-            }
-            // Where a fold takes all that is known of a parameter, it stays where it is.
-            products[a][a] += 1e-3 * self.products[a][a];
-        }
-        Some(dense::times(&dense::inverse(&products)?, &slope))
-    }
-
-    /// Energy of these residuals after a step.
-    fn energy_after(&self, step: &[f64]) -> f64 {
-        self.energy - 2.0 * dense::dot(step, &self.slope) + dense::dot(step, &dense::times(&self.products, step))
-    }
+/// Energy of residuals after a step.
+fn energy_after(of: &NormalEquations, step: &[f64]) -> f64 {
+    of.energy - 2.0 * dense::dot(step, &of.slope) + dense::dot(step, &dense::times(&of.products, step))
 }
 
 /// Nats that `after` saves against `before` on the blocks left out, the level of the noise free.

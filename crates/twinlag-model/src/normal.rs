@@ -28,6 +28,31 @@ pub struct NormalEquations {
 }
 
 impl NormalEquations {
+    /// Of no residuals.
+    pub(crate) fn none(parameters: usize) -> Self {
+        let none = vec![vec![0.0; parameters]; parameters];
+        Self {
+            energy: 0.0,
+            count: 0,
+            slope: vec![0.0; parameters],
+            products: none.clone(),
+            slope_covariance: none,
+            is_beside: false,
+        }
+    }
+
+    /// Adds one residual, that in place `k`.
+    pub(crate) fn add(&mut self, lin: &Linearised, k: usize) {
+        let r = lin.residual[k];
+        self.energy += r * r;
+        self.count += 1;
+        for (a, (slope, products)) in self.slope.iter_mut().zip(&mut self.products).enumerate() {
+            let of_a = lin.columns[a][k];
+            *slope += of_a * r;
+            products.iter_mut().zip(&lin.columns).for_each(|(sum, of_b)| *sum += of_a * of_b[k]);
+        }
+    }
+
     /// Holds parameter `at`: it has no derivative.
     pub fn hold(&mut self, at: usize) {
         self.slope[at] = 0.0;
@@ -65,15 +90,7 @@ pub(crate) struct Sums<'a> {
 impl<'a> Sums<'a> {
     /// - `known`: a model whose columns are the first ones
     pub(crate) fn of(parameters: usize, known: Option<&'a Linearised>, filter: Option<&'a Weighting>) -> Self {
-        let none = vec![vec![0.0; parameters]; parameters];
-        let out = NormalEquations {
-            energy: 0.0,
-            count: 0,
-            slope: vec![0.0; parameters],
-            products: none.clone(),
-            slope_covariance: none,
-            is_beside: known.is_some(),
-        };
+        let out = NormalEquations { is_beside: known.is_some(), ..NormalEquations::none(parameters) };
         let known = known.map_or(&[][..], |known| &known.columns);
         Self { out, known, filter, streams: vec![Stream::default(); parameters] }
     }

@@ -166,7 +166,8 @@ impl Factor {
 
     /// Keeps no more than the next window begins with, if the rows have not settled: there are as many of them as of values.
     pub(crate) fn shorten(&mut self) {
-        if 2 * self.rows.len() > self.kept.len() * (self.band + 1) {
+        // A window no longer than the band is its own end.
+        if self.kept.len() > self.band && 2 * self.rows.len() > self.kept.len() * (self.band + 1) {
             let mut end = Self { band: self.band, agreeing: self.agreeing, ..Self::empty() };
             end.lead(self);
             *self = end;

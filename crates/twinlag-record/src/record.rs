@@ -471,7 +471,7 @@ fn note_kelvins(values_c: [&[f64]; 2], origin: &Origin<'_>, notes: &mut Vec<Note
             notes.push(Note::ColdKelvin { column: origin.columns[i].clone(), reading_k });
         }
     }
-    // Most records are settled by counting: whose differences are mostly below a limit, their median is.
+    // The median of most records is settled by counting: where less than half of the differences reach a limit, it does not.
     let limit_k = -ABSOLUTE_ZERO_C - NEAR_ICE_POINT_K;
     let apart = || values_c[0].iter().zip(values_c[1]).map(|(a, b)| a - b).filter(|apart_k| !apart_k.is_nan());
     let [all, above, below] = apart().fold([0_usize; 3], |[all, above, below], apart_k| {
@@ -480,7 +480,7 @@ fn note_kelvins(values_c: [&[f64]; 2], origin: &Origin<'_>, notes: &mut Vec<Note
     if 2 * above < all && 2 * below < all {
         return;
     }
-    let Some(apart_k) = median(values_c[0].iter().zip(values_c[1]).map(|(a, b)| a - b)) else { return };
+    let Some(apart_k) = median(apart()) else { return };
     if (apart_k.abs() + ABSOLUTE_ZERO_C).abs() < NEAR_ICE_POINT_K {
         let [first, second, _] = origin.columns.clone();
         let (upper, lower) = if apart_k > 0.0 { (first, second) } else { (second, first) };

@@ -368,9 +368,9 @@ fn is_single(stamp: f64) -> bool {
 }
 
 fn off_grid(position: f64) -> f64 {
-    // Beyond 2^43 the fraction of a double is no better than a thousandth.
-    // Adding this leaves no fraction, without a call for each stamp.
+    /// 1.5 · 2⁵²: a double of this size has no fraction, so that adding and subtracting it rounds, without a call for each stamp.
     const NO_FRACTION: f64 = 6_755_399_441_055_744.0;
+    // Beyond 2^43 the fraction of a double is no better than a thousandth.
     if position.abs() > 8e12 { 1.0 } else { (position - ((position + NO_FRACTION) - NO_FRACTION)).abs() }
 }
 

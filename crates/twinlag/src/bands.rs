@@ -170,7 +170,8 @@ impl<'a> Reconstruction<'a> {
             None => cases::Chosen::all(cases),
             Some(part) => {
                 let theta = &part.nominal.theta;
-                let intensity = intensity.as_ref().map(|intensity| intensity.of_part(readings, &part.nominal.readings));
+                let of_part = |intensity: &Intensity| intensity.of_part(readings, &part.nominal.readings);
+                let intensity = intensity.as_ref().map(of_part).transpose()?;
                 let motion = Motion { intensity: intensity.as_ref(), ..steady };
                 let run =
                     |case: &Case| part.gas(&case.theta, &Motion { prior: &case.prior, ..motion }, noise_factor).ok();

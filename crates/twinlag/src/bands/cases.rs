@@ -10,7 +10,8 @@ use crate::parallel::in_parallel;
 use crate::watch::Stop;
 
 /// Share of a variance that cases which are left out may move it by, all together and at the sample that they move most: 2 % of a
-/// standard deviation. Their mean share is added, so that what is left is less.
+/// standard deviation. The mean share of the model and of the prior is added, so that less is left out; other priors are left out
+/// altogether.
 const MAX_LEFT_OUT_SHARE: f64 = 0.04;
 
 /// What a case says of the gas temperature.
@@ -68,8 +69,8 @@ impl Chosen {
         };
         let shares = in_parallel(&cases, TASK, stop, largest_and_mean);
         // One that cannot be run in pieces counts in the whole.
-        let mut ranked: Vec<(Case, (f64, f64))> =
-            cases.into_iter().zip(shares.into_iter().map(|share| share.unwrap_or((f64::INFINITY, 0.0)))).collect();
+        let known = |share: Option<(f64, f64)>| share.filter(|s| s.1.is_finite()).unwrap_or((f64::INFINITY, 0.0));
+        let mut ranked: Vec<(Case, (f64, f64))> = cases.into_iter().zip(shares.into_iter().map(known)).collect();
         ranked.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let mut out = Self::all(Vec::new());
         let mut left_out = 0.0;
