@@ -1,8 +1,8 @@
 //! Where the time of each verb goes: `cargo xtask profile`.
 //!
-//! Each verb runs in a process of its own, which samples its own stack by processor time: it reads a record, does the work of the verb
-//! and writes what came out, again and again until there are samples enough. It runs on one thread, so that every stack reaches from
-//! the verb down to what it does; on more threads the work is the same.
+//! Each verb runs in a process of its own, which samples its own stack by processor time: it reads a record, does the work of
+//! the verb and writes what came out, again and again until there are samples enough. It runs on one thread, so that every
+//! stack reaches from the verb down to what it does; on more threads the work is the same.
 
 mod doc;
 mod flame;
@@ -110,7 +110,7 @@ fn profiles(verb: Verb, subjects: &[Subject], arguments: &Profile, left_out: &mu
         if let Some(expected_s) = growth.filter(|expected_s| *expected_s > arguments.limit) {
             let (verb, rows, limit) = (verb.name(), &subject.name, arguments.limit);
             left_out.push(format!(
-                "`{verb}` of {rows} rows: it would take some {expected_s:.0} s of processor time, and more than {limit:.0} s are not waited for"
+                "`{verb}` of {rows} rows: it would take some {expected_s:.0} s, and more than {limit:.0} s are not waited for"
             ));
             continue;
         }
