@@ -1,8 +1,8 @@
 //! Where the time of each verb goes: `cargo xtask profile`.
 //!
-//! Each verb runs in a process of its own, which samples its own stack by processor time: it reads a record, does the work of the verb
-//! and writes what came out, again and again until there are samples enough. It runs on one thread, so that every stack reaches from
-//! the verb down to what it does; on more threads the work is the same.
+//! Each verb runs in a process of its own, which samples its own stack by processor time: it reads a record, does the work of
+//! the verb and writes what came out, again and again until there are samples enough. It runs on one thread, so that every
+//! stack reaches from the verb down to what it does; on more threads the work is the same.
 
 mod doc;
 mod flame;
@@ -37,14 +37,14 @@ pub(crate) struct Profile {
     /// A folder of measured records, as for `measured`: one of each campaign is profiled as well.
     #[arg(long, value_name = "DIR", conflicts_with = "quick")]
     measured: Option<PathBuf>,
-    /// A verb that would take longer is not asked for more rows, s.
+    /// A verb that would take more processor time is not asked for more rows, s.
     #[arg(long, default_value_t = 600.0)]
     limit: f64,
     /// One verb, in a process of its own.
     #[arg(long, hide = true, requires = "file")]
     step: Option<Named>,
-    /// For how long it is sampled at least, s.
-    #[arg(long, hide = true, default_value_t = SAMPLED_S)]
+    /// Processor time for which each verb is sampled at least, s.
+    #[arg(long, default_value_t = SAMPLED_S)]
     seconds: f64,
     /// The record of that step.
     #[arg(hide = true)]
@@ -98,7 +98,7 @@ pub(crate) fn run(arguments: &Profile) -> Result<()> {
     for verb in Verb::ALL {
         verbs.push(OfVerb { verb, profiles: profiles(verb, &subjects, arguments, &mut left_out) });
     }
-    page::write(&verbs, &left_out)
+    page::write(&verbs, arguments.seconds, &left_out)
 }
 
 /// A verb on all records that it does not take too long for.
@@ -110,7 +110,7 @@ fn profiles(verb: Verb, subjects: &[Subject], arguments: &Profile, left_out: &mu
         if let Some(expected_s) = growth.filter(|expected_s| *expected_s > arguments.limit) {
             let (verb, rows, limit) = (verb.name(), &subject.name, arguments.limit);
             left_out.push(format!(
-                "`{verb}` of {rows} rows: it would take some {expected_s:.0} s, and {limit:.0} s are waited for"
+                "`{verb}` of {rows} rows: it would take some {expected_s:.0} s, and more than {limit:.0} s are not waited for"
             ));
             continue;
         }

@@ -15,16 +15,17 @@ use twinlag_model::{
 use crate::candidates::{Candidate, Search};
 use crate::size::{Around, Lacking, Profile, least_size};
 
-/// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each in the last look. What is
-/// resolved in them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the largest.
+/// Pieces of a longer record that are looked at for effects that two lags may hide, and the samples of each in the last look.
+/// What is resolved in them is in the whole; of what is not, they say more often that it may be there. Chosen: a second for the
+/// largest.
 const PIECES: usize = 4;
 const PIECE_SAMPLES: usize = 16_384;
 /// Samples of each piece in the looks before the last one: each takes an eighth of the time of the next.
 const FIRST_PIECES_SAMPLES: [usize; 2] = [512, 4096];
-/// Parts of the probability that the policy allows: up to the first, what would move a number is improbable enough for no further
-/// look; effects that together have no more than the second are left out of it. Of 480 numbers of two lags that leave only noise (299
-/// records of random rigs, each with an effect of a tenth or so of its usual size, 2000 to 100 000 samples) two then have another
-/// grade than by a single look at all; with parts of 1 and 0.1 it is seven.
+/// Parts of the probability that the policy allows: up to the first, what would move a number is improbable enough for no
+/// further look; effects that together have no more than the second are left out of it. Of 480 numbers of two lags that leave
+/// only noise (299 records of random rigs, each with an effect of a tenth or so of its usual size, 2000 to 100 000 samples) two
+/// then have another grade than by a single look at all; with parts of 1 and 0.1 it is seven.
 const SETTLED_SHARE: f64 = 0.5;
 const CLOSED_SHARE: f64 = 0.1;
 

@@ -51,8 +51,9 @@ struct Point<'a> {
 }
 
 impl Point<'_> {
-    /// Half the second derivatives of the energy by the parameters of the model, beside an effect of no size which whitens the residual
-    /// once more: products of first derivatives as they are there, with what noise adds to them, residual by residual, as it is here.
+    /// Half the second derivatives of the energy by the parameters of the model, beside an effect of no size which whitens the
+    /// residual once more: products of first derivatives as they are there, with what noise adds to them, residual by residual,
+    /// as it is here.
     ///
     /// With derivatives that are taken there, none of 480 numbers of two lags (299 records of random rigs with small effects, 2000 to
     /// 100 000 samples) has another grade, and the conditions of eight name other effects.
@@ -75,7 +76,8 @@ impl Search<'_> {
         self.around_along(fitted, |_| true, false)
     }
 
-    /// As [`Self::around`], along the sizes of those effects alone that are `wanted`, in half the time where two lags alone are fitted.
+    /// As [`Self::around`], along the sizes of those effects alone that are `wanted`, in half the time where two lags alone are
+    /// fitted.
     pub(crate) fn quickly_around<'a>(
         &self,
         fitted: &'a Fitted,

@@ -42,8 +42,8 @@ impl Chosen {
 const SHORTEST_PERIOD_S: f64 = 1e-9;
 const LONGEST_PERIOD_S: f64 = 366.0 * 86_400.0;
 
-/// Longest unit of time after which a column may be called and be the time: those of longer ones, as `h`, `d` and `min`, stand for
-/// other quantities as well.
+/// Longest unit of time after which a column may be called and be the time: those of longer ones, as `h`, `d` and `min`, stand
+/// for other quantities as well.
 const LONGEST_NAMING_UNIT_S: f64 = 1.0;
 
 /// Makes the choice, and notes what was guessed.

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use twinlag::record::Decimals;
 use twinlag::signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
 
-pub(crate) use step::{Named, Step, Verb};
+pub(crate) use step::{Named, Step, Verb, processor_s};
 
 use crate::experiment::record_of;
 use crate::root;

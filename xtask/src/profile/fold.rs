@@ -1,7 +1,7 @@
 //! Stacks as they are sampled, folded to what is ours in them.
 //!
-//! A frame of ours is named by its module, which is the file that its source lies in, and its function. What lies between two frames of
-//! ours is left out; what lies below the last one is one frame: the crate that it ends in.
+//! A frame of ours is named by its module, which is the file that its source lies in, and its function. What lies between two
+//! frames of ours is left out; what lies below the last one is one frame: the crate that it ends in.
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -15,7 +15,8 @@ const IMAGES: &str = "images/profiles";
 const PICTURED: &str = "1e5";
 /// Share in itself from which a module has a row, and with all that it calls.
 const LEAST_OWN: f64 = 0.04;
-/// Share with all that it calls from which a function has a row, unless it has nearly all of each record, or has as much as another.
+/// Share with all that it calls from which a function has a row, unless it has nearly all of each record, or has as much as
+/// another.
 const LEAST_WITH_CALLS: f64 = 0.08;
 const MOST_ROWS: usize = 12;
 const NEARLY_ALL: f64 = 0.9;
@@ -30,29 +31,29 @@ const HEAD: &str = "\
 
 Where the processor time of each verb goes. `cargo xtask profile --measured DIR` samples anew and writes this page.
 
-Each verb runs in a process of its own, again and again for at least ten seconds: it reads the file, does its work and writes what
-came out. The process samples its stack 199 times a second of processor time. It runs on one thread, so that every stack reaches
-from the verb down; on more threads the work is the same, and the times are shorter. Shares of 5 % are known to about half a
-percent. For each verb there are two tables:
+Each verb runs in a process of its own, again and again for at least SECONDS s of processor time: it reads the file, does its
+work and writes what came out. The process samples its stack 199 times a second of that time. It runs on one thread, so that
+every stack reaches from the verb down; on more threads the work is the same, and it ends sooner. For each verb there are two
+tables:
 
-- *spent in*: the modules of this repository that the samples lie in, with the libraries that they call; those that have 4 % of some
-  record;
-- *spent for*: functions above the numerics, with all that they call; the twelve with most, of those that have 8 % of some record.
-  Shares of a function and of one that it calls overlap.
+- *spent in*: the modules of this repository that the samples lie in, with the libraries that they call; those that have 4 %
+  of some record;
+- *spent for*: functions above the numerics, with all that they call; the twelve with most, of those that have 8 % of some
+  record. Shares of a function and of one that it calls overlap.
 
-Columns `1e4` to `1e6` are simulated records of so many rows, those of [Long records](scale.md); the others, one of each campaign of
-[Measured data](measured-data.md). In a flame graph a frame is as wide as its share; what has less than one percent is left out,
-and a library is one frame. Opened by itself, a graph can be searched and zoomed.
+Columns `1e4` to `1e6` are simulated records of so many rows, those of [Long records](scale.md); the others, one of each
+campaign of [Measured data](measured-data.md). In a flame graph a frame is as wide as its share; what has less than one
+percent is left out, and a library is one frame. Opened by itself, a graph can be searched and zoomed.
 ";
 
-pub(super) fn write(verbs: &[OfVerb], left_out: &[String]) -> Result<()> {
+pub(super) fn write(verbs: &[OfVerb], seconds: f64, left_out: &[String]) -> Result<()> {
     let source = root()?.join("docs/src");
     let images = source.join(IMAGES);
     if images.exists() {
         fs::remove_dir_all(&images)?;
     }
     fs::create_dir_all(&images)?;
-    let mut page = HEAD.to_owned();
+    let mut page = HEAD.replace("SECONDS", &seconds.to_string());
     for OfVerb { verb, profiles } in verbs {
         let name = verb.name();
         let _ = write!(page, "\n## `{name}`\n\n{}", tables(profiles)?);
@@ -128,7 +129,11 @@ fn spent(profiles: &[Profiled], of_each: &[BTreeMap<String, Part>]) -> Result<St
     let mut modules: Vec<&String> = all.into_iter().filter(|module| most(module) >= LEAST_OWN).collect();
     modules.sort_by(|a, b| most(b).total_cmp(&most(a)));
     let mut out = head("spent in", profiles);
-    out += &cells("one run, s".into(), String::new(), profiles.iter().map(|profile| seconds(profile.sampled.run_s())));
+    out += &cells(
+        "processor time of one run, s".into(),
+        String::new(),
+        profiles.iter().map(|profile| seconds(profile.sampled.run_s())),
+    );
     for module in modules {
         let shares = of_each.iter().map(|parts| share(parts.get(module).map(|part| &part.own)));
         out += &cells(format!("`{module}`"), doc::of_module(module)?, shares);

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::io::{Write, sink};
 use std::path::Path;
-use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use pprof::ProfilerGuardBuilder;
@@ -14,7 +13,7 @@ use twinlag::record::{Decimals, Record, write_csv};
 use twinlag::{CompensateOptions, DiagnoseOptions, Options, TrackOptions, characterise, compensate, diagnose, track};
 
 use super::fold;
-use crate::bench::scale::Named;
+use crate::bench::scale::{Named, processor_s};
 
 /// Samples a second: a prime, so that no work that repeats itself keeps step with them.
 const FREQUENCY_HZ: i32 = 199;
@@ -26,8 +25,8 @@ const BLIND: [&str; 2] = ["libgcc", "vdso"];
 pub(crate) struct Sampled {
     /// Times that the verb was run.
     pub(super) runs: usize,
-    /// What all runs took, s.
-    pub(super) wall_s: f64,
+    /// Processor time of all runs, s.
+    pub(super) processor_s: f64,
     /// How often a stack was met: its frames, the outermost first, with `;` between.
     pub(super) stacks: BTreeMap<String, usize>,
 }
@@ -37,9 +36,9 @@ impl Sampled {
         self.stacks.values().sum()
     }
 
-    /// What one run took, s.
+    /// Processor time of one run, s.
     pub(super) fn run_s(&self) -> f64 {
-        self.wall_s / self.runs as f64
+        self.processor_s / self.runs as f64
     }
 
     pub(super) fn line(&self) -> String {
@@ -50,17 +49,17 @@ impl Sampled {
     }
 }
 
-/// Runs a verb for at least so many seconds and says on standard output what was sampled.
+/// Runs a verb for at least so many seconds of processor time and says on standard output what was sampled.
 pub(super) fn run(step: &Named, file: &Path, seconds: f64) -> Result<()> {
     // All on this thread: a stack that begins on another one does not say who asked for the work.
     ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global()?;
     let guard = ProfilerGuardBuilder::default().frequency(FREQUENCY_HZ).blocklist(&BLIND).build()?;
-    let start = Instant::now();
+    let before_s = processor_s();
     let mut sampled = Sampled::default();
-    while sampled.wall_s < seconds {
+    while sampled.processor_s < seconds {
         whole(step, file)?;
         sampled.runs += 1;
-        sampled.wall_s = start.elapsed().as_secs_f64();
+        sampled.processor_s = processor_s() - before_s;
     }
     for (frames, count) in guard.report().build()?.data {
         let stack = fold::stack(&frames.frames);

@@ -146,11 +146,13 @@ pub(crate) fn on(name: &str, record: &Record) -> Result<()> {
     Ok(())
 }
 
+/// Processor time of all threads of this process so far, s.
+pub(crate) fn processor_s() -> f64 {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32).as_secs_f64()
+}
+
 fn timed(work: impl FnOnce() -> Result<usize>) -> Result<Took> {
-    let processor_s = || {
-        let now = clock_gettime(ClockId::ProcessCPUTime);
-        Duration::new(now.tv_sec.unsigned_abs(), now.tv_nsec.unsigned_abs() as u32).as_secs_f64()
-    };
     let (start, before_s) = (Instant::now(), processor_s());
     let rows = work()?;
     Ok(Took { rows, wall_s: start.elapsed().as_secs_f64(), processor_s: processor_s() - before_s, peak_mb: peak_mb() })
