@@ -9,6 +9,7 @@ mod smooth;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -35,6 +36,8 @@ const LARGEST_MOVE: f64 = 0.5;
 /// Share of the record at either end in which a step is not distinguished from a slope of the
 /// start.
 const STEP_MARGIN_SHARE: f64 = 0.05;
+/// Samples whose time constants are computed at a time.
+const SAMPLES_AT_ONCE: usize = 4096;
 /// Part of a standard error by which a parameter is moved for derivatives.
 const DERIVATIVE_STEP_SE: f64 = 0.01;
 /// 95 % point of the evidence against the true instant of a step, `(1 − exp(−x/2))² = 0.95`: the likelihood of instants is a random walk
@@ -150,6 +153,12 @@ pub fn track(
 
 /// Both time constants at `time_s`, and the standard errors of their logarithms.
 fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
+    let parts: Vec<[[Vec<f64>; 2]; 2]> = time_s.par_chunks(SAMPLES_AT_ONCE).map(|part| part_along(fit, part)).collect();
+    [0, 1].map(|what| [0, 1].map(|i| parts.iter().flat_map(|part| part[what][i].iter().copied()).collect()))
+}
+
+/// [`along`] at some instants: what each parameter moves there takes as much memory as there are parameters.
+fn part_along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
     let extended = fit.extended.as_ref().expect("a fit of a record");
     let theta = extended.parameters();
     let tau_s = extended.time_constants_s(theta, time_s);
