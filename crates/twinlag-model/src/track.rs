@@ -134,7 +134,9 @@ pub fn track(
             best = (change, fitted, score);
         }
     };
+    let mut local = None;
     if let Some(smooth) = smooth(&search, &constant, watch)? {
+        local = smooth.local;
         consider(Change::Smooth(smooth.coefficients.round() as usize), smooth.fitted, smooth.coefficients);
     }
     let step = search.step(&constant, watch)?;
@@ -143,7 +145,7 @@ pub fn track(
         consider(Change::Step, fitted.clone(), 3.0);
     }
     let (change, fitted, _) = best;
-    let ratio = search.ratio(&fitted);
+    let ratio = search.ratio(&fitted, local.filter(|_| matches!(change, Change::Smooth(_))));
     let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels, &prepared.policy);
     let [tau_s, log_error] = along(&fit, &time_s);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
@@ -269,9 +271,19 @@ impl Tracker<'_> {
         Scan::of(&before, &changed.linearised(&after, observations, selection), within)
     }
 
-    fn ratio(&self, fitted: &Fitted) -> RatioTest {
-        let effect = varying::ratio(self.prepared.context.ends_s);
-        let other = self.fit(fitted, effect, &[0.0; varying::RATIO_SIZE], Effort::Finish);
+    /// - `curve`: the spline of the fit, where its columns are those of [`Local`]
+    fn ratio(&self, fitted: &Fitted, curve: Option<Curve>) -> RatioTest {
+        let ends_s = self.prepared.context.ends_s;
+        let (effect, start) = (varying::ratio(ends_s), [0.0; varying::RATIO_SIZE]);
+        let other = match curve {
+            Some(curve) => {
+                let model = fitted.model.with(effect);
+                let of_ratio = Curve { effect: model.effects.len() - 1, ends_s, of_ratio: true };
+                let start: Vec<f64> = fitted.theta.iter().copied().chain(start).collect();
+                self.local(&model, vec![curve, of_ratio]).fit(&start)
+            }
+            None => self.fit(fitted, effect, &start, Effort::Finish),
+        };
         let statistic = (score(fitted, 0.0) - score(&other, 0.0)).max(0.0);
         let chi2 = ChiSquared::new(varying::RATIO_SIZE as f64).expect("a positive number of degrees of freedom");
         RatioTest { statistic, degrees_of_freedom: varying::RATIO_SIZE, p_value: chi2.sf(statistic) }
