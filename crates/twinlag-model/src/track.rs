@@ -1,5 +1,7 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
+#[cfg(test)]
+mod fixture;
 mod local;
 mod near;
 mod scan;
@@ -7,6 +9,7 @@ mod smooth;
 
 use std::ops::Range;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -33,6 +36,8 @@ const LARGEST_MOVE: f64 = 0.5;
 /// Share of the record at either end in which a step is not distinguished from a slope of the
 /// start.
 const STEP_MARGIN_SHARE: f64 = 0.05;
+/// Samples whose time constants are computed at a time.
+const SAMPLES_AT_ONCE: usize = 4096;
 /// Part of a standard error by which a parameter is moved for derivatives.
 const DERIVATIVE_STEP_SE: f64 = 0.01;
 /// 95 % point of the evidence against the true instant of a step, `(1 − exp(−x/2))² = 0.95`: the likelihood of instants is a random walk
@@ -129,7 +134,9 @@ pub fn track(
             best = (change, fitted, score);
         }
     };
+    let mut local = None;
     if let Some(smooth) = smooth(&search, &constant, watch)? {
+        local = smooth.local;
         consider(Change::Smooth(smooth.coefficients.round() as usize), smooth.fitted, smooth.coefficients);
     }
     let step = search.step(&constant, watch)?;
@@ -138,7 +145,7 @@ pub fn track(
         consider(Change::Step, fitted.clone(), 3.0);
     }
     let (change, fitted, _) = best;
-    let ratio = search.ratio(&fitted);
+    let ratio = search.ratio(&fitted, local.filter(|_| matches!(change, Change::Smooth(_))));
     let fit = summarise(&fitted, &prepared.observations, &selection, &prepared.levels, &prepared.policy);
     let [tau_s, log_error] = along(&fit, &time_s);
     let is_determined = fit.time_constants.iter().all(|t| t.value_s.is_some()) && fit.covariance.is_some();
@@ -148,6 +155,12 @@ pub fn track(
 
 /// Both time constants at `time_s`, and the standard errors of their logarithms.
 fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
+    let parts: Vec<[[Vec<f64>; 2]; 2]> = time_s.par_chunks(SAMPLES_AT_ONCE).map(|part| part_along(fit, part)).collect();
+    [0, 1].map(|what| [0, 1].map(|i| parts.iter().flat_map(|part| part[what][i].iter().copied()).collect()))
+}
+
+/// [`along`] at some instants: what each parameter moves there takes as much memory as there are parameters.
+fn part_along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
     let extended = fit.extended.as_ref().expect("a fit of a record");
     let theta = extended.parameters();
     let tau_s = extended.time_constants_s(theta, time_s);
@@ -258,9 +271,19 @@ impl Tracker<'_> {
         Scan::of(&before, &changed.linearised(&after, observations, selection), within)
     }
 
-    fn ratio(&self, fitted: &Fitted) -> RatioTest {
-        let effect = varying::ratio(self.prepared.context.ends_s);
-        let other = self.fit(fitted, effect, &[0.0; varying::RATIO_SIZE], Effort::Finish);
+    /// - `curve`: the spline of the fit, where its columns are those of [`Local`]
+    fn ratio(&self, fitted: &Fitted, curve: Option<Curve>) -> RatioTest {
+        let ends_s = self.prepared.context.ends_s;
+        let (effect, start) = (varying::ratio(ends_s), [0.0; varying::RATIO_SIZE]);
+        let other = match curve {
+            Some(curve) => {
+                let model = fitted.model.with(effect);
+                let of_ratio = Curve { effect: model.effects.len() - 1, ends_s, of_ratio: true };
+                let start: Vec<f64> = fitted.theta.iter().copied().chain(start).collect();
+                self.local(&model, vec![curve, of_ratio]).fit(&start)
+            }
+            None => self.fit(fitted, effect, &start, Effort::Finish),
+        };
         let statistic = (score(fitted, 0.0) - score(&other, 0.0)).max(0.0);
         let chi2 = ChiSquared::new(varying::RATIO_SIZE as f64).expect("a positive number of degrees of freedom");
         RatioTest { statistic, degrees_of_freedom: varying::RATIO_SIZE, p_value: chi2.sf(statistic) }

@@ -435,3 +435,73 @@ pub(super) fn is_close(
     }
     off < COLUMN_ERROR * COLUMN_ERROR * all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::varying;
+    use crate::track::fixture::{Fixture, TAU_S};
+
+    const SAMPLES: usize = 3000;
+    const SIZE: usize = 9;
+    const ENDS_S: [f64; 2] = [0.0, SAMPLES as f64 - 1.0];
+
+    fn fixture() -> Fixture {
+        Fixture::of(SAMPLES, |t| 1.0 + 0.2 * (std::f64::consts::TAU * t / 1500.0).sin())
+    }
+
+    /// Knots are 300 s apart and the filters reach over time constants, so that columns are off by `2.4 (4/300)²`, 4e-4 of their length
+    /// (the root mean square of the second derivative of a B-spline is 2.4 of its own, in distances of knots): products of columns of
+    /// unit length by twice that, and the slope by that times the length of the residual where both lie alike. The bound is three times
+    /// that. The energy is that of the same residual.
+    #[test]
+    fn sums_are_those_of_all_columns() {
+        let fixture = fixture();
+        let tracker = fixture.tracker();
+        let smooth = varying::smooth(SIZE, ENDS_S, SAMPLES, 2.0).expect("enough samples");
+        let model = fixture.constant.model.with(smooth).with(varying::ratio(ENDS_S));
+        let values = (0..SIZE + varying::RATIO_SIZE).map(|k| 0.1 * (1.9 * k as f64).sin());
+        let theta: Vec<f64> = TAU_S.into_iter().chain(values).collect();
+        let curve = |effect, of_ratio| Curve { effect, ends_s: ENDS_S, of_ratio };
+        let got = tracker.local(&model, vec![curve(0, false), curve(1, true)]).normal(&theta);
+        let lin = model.linearised(&theta, &tracker.prepared.observations, tracker.selection);
+        let want = Normal::of(&lin, prior(&model, &theta).len());
+        let tol = 3.0 * 2.4 * (TAU_S[1] / 300.0).powi(2);
+        assert!((got.energy / want.energy - 1.0).abs() < 1e-10, "{} and {}", got.energy, want.energy);
+        let length = |a: usize| want.products[a][a].sqrt();
+        for a in 0..theta.len() {
+            let off = (got.slope[a] - want.slope[a]).abs() / (length(a) * want.energy.sqrt());
+            assert!(off < tol, "slope {a}: {} and {}", got.slope[a], want.slope[a]);
+            for b in 0..theta.len() {
+                let off = (got.products[a][b] - want.products[a][b]).abs() / (length(a) * length(b));
+                assert!(off < 2.0 * tol, "{a}, {b}: {} and {}", got.products[a][b], want.products[a][b]);
+            }
+        }
+    }
+
+    /// A fit from these columns is one from all columns, to the hundredth of a standard error that they may be off by; and the columns
+    /// of knots as close as three time constants are not taken for such.
+    #[test]
+    fn a_fit_ends_where_the_exact_one_does() {
+        let fixture = fixture();
+        let tracker = fixture.tracker();
+        let (observations, selection) = (&tracker.prepared.observations, tracker.selection);
+        let constant = &fixture.constant;
+        let is_close = |size: usize| is_close(&constant.model, &constant.theta, observations, selection, ENDS_S, size);
+        assert!(is_close(SIZE) && !is_close(250));
+        let smooth = varying::smooth(SIZE, ENDS_S, SAMPLES, 2.0).expect("enough samples");
+        let model = constant.model.with(smooth);
+        let start: Vec<f64> = constant.theta.iter().copied().chain([0.0; SIZE]).collect();
+        let got = tracker.local(&model, vec![Curve { effect: 0, ends_s: ENDS_S, of_ratio: false }]).fit(&start);
+        let want = model.fit(&start, observations, selection, crate::fit::Effort::Finish);
+        let lin = model.linearised(&want.theta, observations, selection);
+        let covariance = dense::inverse(&dense::gram(&lin.columns)).expect("determined");
+        assert_eq!(got.count, want.count);
+        for a in 0..start.len() {
+            let off = (got.theta[a] - want.theta[a]).abs() / covariance[a][a].sqrt();
+            // Either fit ends within a hundredth of a standard error of its own minimum.
+            assert!(off < 3.0 * COLUMN_ERROR, "{a}: {} and {}, {off} standard errors", got.theta[a], want.theta[a]);
+        }
+        assert!(got.chi2 >= want.chi2 * (1.0 - 1e-9) && got.chi2 - want.chi2 < (start.len() as f64) * 10.0 * DEVIANCE);
+    }
+}

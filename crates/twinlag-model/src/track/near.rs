@@ -121,3 +121,87 @@ pub(super) fn piece(
     let counts = selection.counts.get(cut)?.to_vec();
     Some((part, Selection { counts, weighting: selection.weighting.clone() }))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::fixture::Fixture;
+
+    const STEP_S: f64 = 800.5;
+
+    /// Half the time constants' sum later: the record is a hundred reaches long, and looked at in a piece.
+    fn fixture() -> Fixture {
+        Fixture::of(1800, |t| if t < STEP_S { 1.0 } else { 1.3 })
+    }
+
+    fn instants_s() -> Vec<f64> {
+        (0..1800).map(|k| f64::from(k) - 0.5).collect()
+    }
+
+    /// The fit with a step some samples beside it.
+    fn looked(tracker: &Tracker<'_>, constant: &Fitted, sample: usize) -> Fitted {
+        tracker.fit(constant, varying::step(instants_s()[sample]), &[0.2], Effort::Finish)
+    }
+
+    /// The energy of the whole record with a step at `sample`.
+    fn whole(tracker: &Tracker<'_>, fitted: &Fitted, sample: usize) -> f64 {
+        let constant = fitted.model.without(fitted.model.effects.len() - 1);
+        let model = constant.with(varying::step(instants_s()[sample]));
+        model.energy(&fitted.theta, &tracker.prepared.observations, tracker.selection)
+    }
+
+    /// What the start of the piece leaves of the whitening at the first of the samples, a reach away, is `e⁻⁴`, 2 % of a residual: of
+    /// differences of energies twice that.
+    #[test]
+    fn a_piece_has_the_differences_of_the_whole_record() {
+        let fixture = fixture();
+        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let fitted = looked(&tracker, &fixture.constant, 803);
+        let near = Near::of(&tracker, &fitted, 803, &instants_s);
+        assert!(near.piece.is_some() && near.is_near(803 + near.reach) && !near.is_near(803 + 3 * near.reach));
+        let least = (near.energy(801), whole(&tracker, &fitted, 801));
+        for sample in (803 - near.reach..803 + near.reach).step_by(3) {
+            let (got, want) = (near.energy(sample) - least.0, whole(&tracker, &fitted, sample) - least.1);
+            assert!((got - want).abs() < 0.04 * want.abs() + 0.1, "{sample}: {got}, want {want}");
+        }
+    }
+
+    /// Of all samples around, one after the other.
+    #[test]
+    fn the_likeliest_sample_has_the_least_energy_of_the_whole_record() {
+        let fixture = fixture();
+        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let fitted = looked(&tracker, &fixture.constant, 807);
+        let near = Near::of(&tracker, &fitted, 807, &instants_s);
+        let got = near.likeliest(807, &(100..1700));
+        let around = 807 - near.reach..807 + near.reach;
+        let want = around.min_by(|a, b| whole(&tracker, &fitted, *a).total_cmp(&whole(&tracker, &fitted, *b)));
+        assert_eq!(Some(got), want);
+        let none_far = Scan { energies: Vec::new(), best: (got, 0.0, Vec::new()) };
+        let [low, high] = near.interval(got, &none_far, 7.352);
+        assert!(low <= 801 && 801 <= high, "{low} to {high}: the time constants change at 800.5 s");
+        // A bound ends the search.
+        assert!(near.likeliest(807, &(805..1700)) >= 805);
+    }
+
+    /// The ends are the last samples in a row, of those around, whose energy is within the limit, and an instant far away that the scan has as likely
+    /// is within as well.
+    #[test]
+    fn the_interval_ends_where_the_energy_passes_the_limit() {
+        let fixture = fixture();
+        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let fitted = looked(&tracker, &fixture.constant, 801);
+        let near = Near::of(&tracker, &fitted, 801, &instants_s);
+        let best = near.likeliest(801, &(100..1700));
+        let none_far = Scan { energies: Vec::new(), best: (best, 0.0, Vec::new()) };
+        for limit in [7.35, 40.0, 400.0] {
+            let is_likely = |sample: &usize| near.is_near(*sample) && near.energy(*sample) - near.energy(best) < limit;
+            let low = (0..=best).rev().take_while(is_likely).last().unwrap_or(best);
+            let high = (best..1800).take_while(is_likely).last().unwrap_or(best);
+            assert_eq!(near.interval(best, &none_far, limit), [low, high], "{limit}");
+        }
+        let far = Scan { energies: vec![(300, 5.0), (1500, 8.0)], best: (best, 0.0, Vec::new()) };
+        let [low, high] = near.interval(best, &far, 7.35);
+        assert!(low == 300 && high < 900, "{low} to {high}");
+    }
+}

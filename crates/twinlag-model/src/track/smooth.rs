@@ -24,6 +24,8 @@ pub(super) struct Smooth {
     /// Coefficients that the record determines.
     pub(super) coefficients: f64,
     pub(super) fitted: Fitted,
+    /// The spline, where it was fitted from columns of [`super::local::Local`].
+    pub(super) local: Option<Curve>,
     strength: usize,
 }
 
@@ -93,7 +95,8 @@ impl Search<'_> {
             }
             at = there;
             if best.as_ref().is_none_or(|(so_far, _)| evidence < *so_far) {
-                best = Some((evidence, Smooth { coefficients, fitted, strength }));
+                let local = self.is_local.then_some(self.curve);
+                best = Some((evidence, Smooth { coefficients, fitted, local, strength }));
             }
         }
         Ok(best.map(|(_, smooth)| smooth))
