@@ -1,6 +1,6 @@
 //! Least-squares fits of a model to the whitened disagreement.
 
-use twinlag_optimise::{Budget, End, Fit, Minimiser, Optimiser, Problem};
+use twinlag_optimise::{Budget, Cost, End, Fit, Minimiser, Optimiser, Problem, Variable};
 
 use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
@@ -107,6 +107,23 @@ impl Fitted {
     }
 }
 
+/// The minimum of `cost`, the energy of so many residuals, from `start`.
+pub(crate) fn minimised(
+    cost: &dyn Cost,
+    variables: Vec<Variable>,
+    start: &[f64],
+    residuals: usize,
+    effort: Effort,
+) -> Fit {
+    let (iterations, step_tolerance, deviance) = effort.limits();
+    let problem = Problem::new(cost, variables).expect("bounds are in order and the time constants are free");
+    // What is left over, whatever it is, is the unit of deviances.
+    let problem = problem.with_resolution(deviance / residuals.max(1) as f64);
+    let budget = Budget { iterations, evaluations: EVALUATIONS_PER_ITERATION * iterations };
+    let solver = Optimiser::LevenbergMarquardt { step_tolerance };
+    solver.minimise(&problem, start, &budget).expect("the start is finite and there are derivatives")
+}
+
 impl Model {
     /// The fit from `start`, noise parameters held.
     ///
@@ -114,16 +131,7 @@ impl Model {
     /// If both time constants are held, or `start` is not finite.
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
-        let (iterations, step_tolerance, deviance) = effort.limits();
-        let residuals = selection.counts.iter().filter(|counts| **counts).count();
-        let problem = Problem::new(&cost, cost.variables.clone());
-        let problem = problem.expect("bounds are in order and the time constants are free");
-        // What is left over, whatever it is, is the unit of deviances.
-        let problem = problem.with_resolution(deviance / residuals.max(1) as f64);
-        let budget = Budget { iterations, evaluations: EVALUATIONS_PER_ITERATION * iterations };
-        let fit = Optimiser::LevenbergMarquardt { step_tolerance }
-            .minimise(&problem, start, &budget)
-            .expect("the start is finite and there are derivatives");
+        let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
         let count = cost.count() as f64 * selection.weighting.mean();
         Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
     }

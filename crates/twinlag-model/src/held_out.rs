@@ -31,7 +31,7 @@ pub fn held_out_energy(
     let of_samples =
         |is_of: &dyn Fn(usize) -> bool| sums(&mut (0..lin.samples.len()).filter(|&k| is_of(lin.samples[k])));
     // What is known beforehand is in no fold.
-    let whole = sums(&mut (0..lin.residual.len()));
+    let whole = NormalEquations::of(&lin, lin.residual.len());
     let (mut energy, mut count) = (0.0, 0);
     for fold in 0..policy.held_out_folds {
         let inside = of_samples(&|s| fold_of(s) == fold);

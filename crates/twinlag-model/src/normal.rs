@@ -41,6 +41,13 @@ impl NormalEquations {
         }
     }
 
+    /// Of the first `rows` residuals.
+    pub(crate) fn of(lin: &Linearised, rows: usize) -> Self {
+        let mut out = Self::none(lin.columns.len());
+        (0..rows).for_each(|k| out.add(lin, k));
+        out
+    }
+
     /// Adds one residual, that in place `k`.
     pub(crate) fn add(&mut self, lin: &Linearised, k: usize) {
         let r = lin.residual[k];

@@ -18,6 +18,11 @@ impl Selection {
         self.counts.get(sample).copied().unwrap_or(false)
     }
 
+    /// How many samples count.
+    pub(crate) fn counted(&self) -> usize {
+        self.counts.iter().filter(|counts| **counts).count()
+    }
+
     /// Samples of the residuals of `pieces` that count.
     pub(crate) fn samples(&self, pieces: &[Piece]) -> impl Iterator<Item = usize> {
         let of_piece = |p: &Piece| p.first_sample..p.first_sample + p.count;

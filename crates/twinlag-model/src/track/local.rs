@@ -20,14 +20,14 @@ use std::sync::Arc;
 
 use num_dual::DualNum;
 use rayon::prelude::*;
-use twinlag_optimise::{Budget, Cost, Derivatives, Fit, Minimiser, Optimiser, Problem, Variable};
+use twinlag_optimise::{Cost, Derivatives, Variable};
 
 use super::near::piece;
 use crate::cost::{Linearised, ResidualCost};
-use crate::dense;
 use crate::effect::{Effect, Identifier, Parameter, Seat, Shared};
-use crate::fit::Fitted;
+use crate::fit::{Effort, Fitted, minimised};
 use crate::model::Model;
+use crate::normal::NormalEquations;
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::plant::Plant;
@@ -36,11 +36,6 @@ use crate::spline::{Spline, on_knots, weights};
 
 /// Share of its length by which a column may be off: a hundredth of a standard error.
 const COLUMN_ERROR: f64 = 0.01;
-/// Deviance that a fit need not find: the square of that.
-const DEVIANCE: f64 = COLUMN_ERROR * COLUMN_ERROR;
-/// Relative step at which a fit ends, and its most iterations and evaluations.
-const STEP: f64 = 1e-7;
-const BUDGET: Budget = Budget { iterations: 40, evaluations: 160 };
 /// Samples whose products are added up before those of others are: the sums are the same on any number of threads.
 const SUMMED_SAMPLES: usize = 16_384;
 /// B-splines that reach a sample.
@@ -55,30 +50,6 @@ pub(super) struct Curve {
     pub(super) ends_s: [f64; 2],
     /// Whether it is the ratio of the time constants that changes by it.
     pub(super) of_ratio: bool,
-}
-
-/// Half the second and first derivatives of an energy at a point, and the energy.
-pub(super) struct Normal {
-    pub(super) products: Vec<Vec<f64>>,
-    pub(super) slope: Vec<f64>,
-    pub(super) energy: f64,
-}
-
-impl Normal {
-    /// From columns, without the last `left_out` rows.
-    pub(super) fn of(lin: &Linearised, left_out: usize) -> Self {
-        let n = lin.residual.len() - left_out;
-        let (residual, p) = (&lin.residual[..n], lin.columns.len());
-        let mut products = vec![vec![0.0; p]; p];
-        for a in 0..p {
-            for b in 0..=a {
-                products[a][b] = dense::dot(&lin.columns[a][..n], &lin.columns[b][..n]);
-                products[b][a] = products[a][b];
-            }
-        }
-        let slope = lin.columns.iter().map(|c| dense::dot(&c[..n], residual)).collect();
-        Self { products, slope, energy: dense::dot(residual, residual) }
-    }
 }
 
 /// A function of time, s.
@@ -190,13 +161,8 @@ impl Columns {
 impl Local<'_> {
     /// The fit from `start`.
     pub(super) fn fit(&self, start: &[f64]) -> Fitted {
-        let samples = self.selection.counts.iter().filter(|counts| **counts).count();
         let variables = self.model.variables(start, self.observations);
-        let problem = Problem::new(self, variables).expect("bounds are in order and the time constants are free");
-        let problem = problem.with_resolution(DEVIANCE / samples.max(1) as f64);
-        let fit: Fit = Optimiser::LevenbergMarquardt { step_tolerance: STEP }
-            .minimise(&problem, start, &BUDGET)
-            .expect("the start is finite and there are derivatives");
+        let fit = minimised(self, variables, start, self.selection.counted(), Effort::Finish);
         let count = self.count(&fit.x) as f64 * self.selection.weighting.mean();
         Fitted {
             model: self.model.clone(),
@@ -216,7 +182,7 @@ impl Local<'_> {
     }
 
     /// Half the derivatives of the energy, without what is known beforehand of the effects.
-    pub(super) fn normal(&self, theta: &[f64]) -> Normal {
+    pub(super) fn normal(&self, theta: &[f64]) -> NormalEquations {
         let columns = self.columns(theta);
         let dimension =
             columns.others.len() + columns.shapes.iter().map(|s| s.coefficients.len() + 1).sum::<usize>() + 1;
@@ -243,10 +209,12 @@ impl Local<'_> {
             .map(|by| (0..dimension).map(|a| by.iter().map(|(b, x)| full(a, *b) * x).sum()).collect())
             .collect();
         let along = |by: &[(usize, f64)], row: &[f64]| by.iter().map(|(b, x)| row[*b] * x).sum::<f64>();
-        Normal {
+        NormalEquations {
             products: by.iter().map(|by| times.iter().map(|row| along(by, row)).collect()).collect(),
             slope: times.iter().map(|row| row[last]).collect(),
             energy: full(last, last),
+            count: columns.lin.residual.len(),
+            ..NormalEquations::none(theta.len())
         }
     }
 
@@ -365,7 +333,7 @@ impl Cost for Local<'_> {
     }
 
     fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
-        let Normal { mut products, mut slope, mut energy } = self.normal(theta);
+        let NormalEquations { mut products, mut slope, mut energy, .. } = self.normal(theta);
         let prior = prior(self.model, theta);
         for row in &prior {
             energy += row.value * row.value;
@@ -419,7 +387,10 @@ pub(super) fn is_close(
     };
     let samples = observations.samples();
     let reach = (3.0 * knot_s / observations.step_s()) as usize;
-    let part = piece(observations, selection, samples / 2, reach.min(samples));
+    // The middle of the B-spline, which reaches over four intervals.
+    let centre_s = ends_s[0] + (middle as f64 - 1.0) * knot_s;
+    let centre = observations.stretches.iter().flat_map(|s| &s.time_s).take_while(|t| **t < centre_s).count();
+    let part = piece(observations, selection, centre.min(samples - 1), reach.min(samples));
     let (observations, selection) = part.as_ref().map_or((observations, selection), |(o, s)| (o, s));
     let middle_s = 0.5 * observations.ends_s().iter().sum::<f64>();
     let exact = Given::shared(Arc::new(move |time_s| bump(time_s).re), true, false);
@@ -439,6 +410,7 @@ pub(super) fn is_close(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dense;
     use crate::effect::varying;
     use crate::track::fixture::{Fixture, TAU_S};
 
@@ -465,7 +437,7 @@ mod tests {
         let curve = |effect, of_ratio| Curve { effect, ends_s: ENDS_S, of_ratio };
         let got = tracker.local(&model, vec![curve(0, false), curve(1, true)]).normal(&theta);
         let lin = model.linearised(&theta, &tracker.prepared.observations, tracker.selection);
-        let want = Normal::of(&lin, prior(&model, &theta).len());
+        let want = NormalEquations::of(&lin, lin.residual.len() - prior(&model, &theta).len());
         let tol = 3.0 * 2.4 * (TAU_S[1] / 300.0).powi(2);
         assert!((got.energy / want.energy - 1.0).abs() < 1e-10, "{} and {}", got.energy, want.energy);
         let length = |a: usize| want.products[a][a].sqrt();
@@ -493,7 +465,7 @@ mod tests {
         let model = constant.model.with(smooth);
         let start: Vec<f64> = constant.theta.iter().copied().chain([0.0; SIZE]).collect();
         let got = tracker.local(&model, vec![Curve { effect: 0, ends_s: ENDS_S, of_ratio: false }]).fit(&start);
-        let want = model.fit(&start, observations, selection, crate::fit::Effort::Finish);
+        let want = model.fit(&start, observations, selection, Effort::Finish);
         let lin = model.linearised(&want.theta, observations, selection);
         let covariance = dense::inverse(&dense::gram(&lin.columns)).expect("determined");
         assert_eq!(got.count, want.count);
@@ -502,6 +474,9 @@ mod tests {
             // Either fit ends within a hundredth of a standard error of its own minimum.
             assert!(off < 3.0 * COLUMN_ERROR, "{a}: {} and {}, {off} standard errors", got.theta[a], want.theta[a]);
         }
-        assert!(got.chi2 >= want.chi2 * (1.0 - 1e-9) && got.chi2 - want.chi2 < (start.len() as f64) * 10.0 * DEVIANCE);
+        assert!(
+            got.chi2 >= want.chi2 * (1.0 - 1e-9)
+                && got.chi2 - want.chi2 < (start.len() as f64) * 10.0 * COLUMN_ERROR.powi(2)
+        );
     }
 }

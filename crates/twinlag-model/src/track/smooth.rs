@@ -4,13 +4,14 @@
 //! strength, the energy is a parabola of the parameters, from which the minimum and the likelihood with any other strength follow
 //! (O'Sullivan 1986): so a fit is made for the likeliest strength alone, and again where it shows another one to be likelier.
 
-use super::local::{Curve, Normal, Prior, prior};
+use super::local::{Curve, Prior, prior};
 use super::{LARGEST_MOVE, Tracker};
 use crate::dense;
 use crate::effect::{Context, varying};
 use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::model::Model;
+use crate::normal::NormalEquations;
 use crate::settings::{Watch, report};
 
 /// Fewest coefficients of the shared change.
@@ -36,7 +37,7 @@ fn curvature(strength: usize) -> f64 {
 
 /// The energy about a point, without what is known of the shape beforehand, and the rows of that for the least strength.
 struct Expansion {
-    normal: Normal,
+    normal: NormalEquations,
     prior: Vec<Prior>,
     theta: Vec<f64>,
     /// Where the coefficients begin.
@@ -116,7 +117,8 @@ impl Search<'_> {
             self.tracker.local(&model, vec![self.curve]).normal(theta)
         } else {
             let (observations, selection) = (&self.tracker.prepared.observations, self.tracker.selection);
-            Normal::of(&model.linearised(theta, observations, selection), prior.len())
+            let lin = model.linearised(theta, observations, selection);
+            NormalEquations::of(&lin, lin.residual.len() - prior.len())
         };
         Some(Expansion { normal, prior, theta: theta.to_vec(), first: theta.len() - self.size })
     }
@@ -134,7 +136,7 @@ impl Expansion {
     fn proposal(&self, strength: usize, size: usize) -> Option<Proposal> {
         let (p, curvature) = (self.theta.len(), curvature(strength));
         let share = (LEAST_CURVATURE / curvature).powi(2);
-        let Normal { products, slope, energy } = &self.normal;
+        let NormalEquations { products, slope, energy, .. } = &self.normal;
         let (mut all, mut slope, mut least) = (products.clone(), slope.clone(), *energy);
         for row in &self.prior {
             least += share * row.value * row.value;
