@@ -135,6 +135,11 @@ pub enum Reason {
         /// Whether that is the record at hand.
         is_own: bool,
     },
+    /// A model without effects is used on another record than its own.
+    NothingInModel {
+        /// The record that the model was found in, where that is known.
+        source: Option<String>,
+    },
     /// A model is used that did not explain its own record.
     ModelNotExplained {
         /// What was said of that record.
@@ -293,6 +298,11 @@ impl fmt::Display for Reason {
             Self::HeldAtModel { source, .. } => write!(
                 f,
                 "right if the sensors are those of {} and the numbers of the model exact: the interval does not cover that",
+                source.as_deref().unwrap_or("the model")
+            ),
+            Self::NothingInModel { source } => write!(
+                f,
+                "right if the sensors are those of {}, and two first-order lags are all there is to them",
                 source.as_deref().unwrap_or("the model")
             ),
             Self::ModelNotExplained { .. }

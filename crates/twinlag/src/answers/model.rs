@@ -188,6 +188,9 @@ impl Model {
         let held: Vec<&ModelEffect> =
             self.effects.iter().filter(|e| e.is_of_the_rig() && !fitted_again.contains(&e.effect)).collect();
         if held.is_empty() {
+            let is_own = self.found_in.as_ref().is_some_and(|data| data.is(record));
+            let source = self.found_in.as_ref().map(|data| data.source.clone());
+            out.extend((!is_own).then_some(Reason::NothingInModel { source }));
             return out;
         }
         let no_go: Vec<String> =
