@@ -24,7 +24,7 @@ impl Blocks {
         self.forward.samples() - 2 * self.lags
     }
 
-    /// `Σ kernel[|j|] values[k + j]` for `|j|` of no more than the lags, with a kernel that a block begins with, mirrored at the end.
+    /// `Σ kernel[|j|] values[k + j]` for `|j|` of no more than the lags, with a kernel from its middle on.
     fn filter(&self, values: &[f64], kernel: &[f64]) -> Vec<f64> {
         let (n, lags) = (self.forward.samples(), self.lags);
         let mut mirrored = vec![0.0; n];

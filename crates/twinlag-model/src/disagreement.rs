@@ -20,7 +20,7 @@ use crate::whitening::{Factor, FactorDerivative, Source, Variance};
 const MASKED_NOISE_SWINGS: f64 = 20.0;
 /// Fewest disagreements of a stretch: one of fewer is left out.
 const MIN_DISAGREEMENTS: usize = 4;
-/// Samples of a window: derivatives of one in up to a dozen numbers each, a megabyte, stay in the cache of a processor.
+/// Samples of a window: what a derivative of one works on, some twenty numbers for each sample, is a megabyte. Chosen.
 const WINDOW_SAMPLES: usize = 8192;
 /// Samples of a record up to which all factors are kept for derivatives: of longer ones those that have not settled are computed
 /// once more, for a part of what one derivative costs.

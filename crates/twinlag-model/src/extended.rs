@@ -53,11 +53,6 @@ impl Extended {
         Self { observations: Arc::new(self.observations.excerpt(starts, length)), ..self.clone() }
     }
 
-    /// Number of samples of the record.
-    pub fn samples(&self) -> usize {
-        self.observations.samples()
-    }
-
     /// Each effect with its channel and the names of its parameters.
     fn seats(&self) -> impl Iterator<Item = (Identifier, Option<usize>, Vec<&str>)> {
         let names = |e: &Shared| e.parameters().iter().map(|p| p.name).collect();
