@@ -42,6 +42,9 @@ pub(crate) struct Bench {
     /// Samples of these records, in place of 20 000: what is found in so many must be found in more.
     #[arg(long, requires = "diagnose", value_name = "ROWS")]
     rows: Option<usize>,
+    /// One kind of record alone, by its name in the output, with the moves of its diagnosis.
+    #[arg(long, requires = "diagnose", value_name = "NAME")]
+    kind: Option<String>,
     /// Times the causal filter that takes readings sample by sample in place of the fits, and says how much memory it takes.
     #[arg(long, conflicts_with_all = ["million", "diagnose"])]
     stream: bool,
@@ -94,7 +97,7 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
         return million(arguments.trials);
     }
     if arguments.diagnose {
-        return closed_loop(arguments.rows.unwrap_or(LONG));
+        return closed_loop(arguments.rows.unwrap_or(LONG), arguments.kind.as_deref());
     }
     if arguments.stream {
         return stream::run();
@@ -205,10 +208,13 @@ fn million(trials: Option<u64>) -> Result<()> {
 /// Samples of the records of which the closed loop is timed.
 const LONG: usize = 20_000;
 
-/// How long a diagnosis of all effects takes, for each kind of record.
-fn closed_loop(rows: usize) -> Result<()> {
+/// How long a diagnosis of all effects takes, for each kind of record, or for the one called `only`.
+fn closed_loop(rows: usize, only: Option<&str>) -> Result<()> {
+    let kinds: Vec<Kind> = Kind::ALL.into_iter().filter(|k| only.is_none_or(|name| name == k.name())).collect();
+    let names = Kind::ALL.map(Kind::name).join(", ");
+    ensure!(!kinds.is_empty(), "no kind of record is called '{}': one of {names}", only.unwrap_or_default());
     let mut slowest = (0.0, "none");
-    for kind in Kind::ALL {
+    for &kind in &kinds {
         let drawn = undeclared(&[kind], 1.0, None, 1)?;
         let mut sampled = drawn.rig.record().clone();
         sampled.samples = rows;
@@ -221,13 +227,16 @@ fn closed_loop(rows: usize) -> Result<()> {
         let seconds = start.elapsed().as_secs_f64();
         let named: Vec<&str> = answer.effects.iter().map(|e| e.effect.name()).collect();
         println!("{:36} {seconds:6.2} s   {}", kind.name(), named.join(", "));
+        if only.is_some() {
+            println!("{}", serde_json::to_string_pretty(&answer.moves)?);
+        }
         if seconds > slowest.0 {
             slowest = (seconds, kind.name());
         }
     }
     println!(
         "the slowest of {} records of {rows} samples takes {:.2} s ({}), on {} processors",
-        Kind::ALL.len(),
+        kinds.len(),
         slowest.0,
         slowest.1,
         Options::default().threads

@@ -8,12 +8,12 @@ use rayon::prelude::*;
 use twinlag_optimise::{Cost, Derivatives, Variable};
 
 use crate::dense;
+use crate::directions::{Direction, Directions, constants};
 use crate::disagreement::{Again, Disagreement, Evaluator, Moved};
 use crate::model::Model;
 use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
 use crate::observations::Observations;
-use crate::plant::Plant;
 use crate::selection::{Selection, Sieve};
 use crate::weighting::Weighting;
 
@@ -41,18 +41,16 @@ struct Memory<'a> {
     /// Where the residuals of each window end among these.
     ends: Vec<usize>,
     sieve: Sieve,
-    /// Derivatives, one column for each parameter.
+    /// Derivatives, one column for each direction.
     columns: Vec<Column>,
     /// Memory for as many derivatives as are computed at a time.
     spare: Mutex<Vec<Disagreement<Number>>>,
     again: Again,
 }
 
-/// The derivative with respect to one parameter, window after window.
+/// The derivative in one direction, window after window.
 #[derive(Default)]
 struct Column {
-    /// The model with this derivative; `None` of a parameter that is held, or whose column is known.
-    plant: Option<Plant>,
     moved: Moved,
     sieve: Sieve,
     /// Derivatives of the residuals that count.
@@ -70,7 +68,8 @@ pub(crate) struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// A column for each parameter, empty for one that is held, or whose column is known.
+    /// A column for each direction, and of what is known beforehand one for each parameter; empty where none is computed, and where
+    /// all of it is zero.
     pub(crate) fn columns(&self) -> impl Iterator<Item = &'a [f64]> {
         self.columns.iter().map(|column| &column.picked[..])
     }
@@ -90,7 +89,7 @@ impl<'a> ResidualCost<'a> {
             residual: Vec::new(),
             ends: Vec::new(),
             sieve: Sieve::default(),
-            columns: std::iter::repeat_with(Column::default).take(theta.len()).collect(),
+            columns: Vec::new(),
             spare: Mutex::default(),
             again: Again::default(),
         };
@@ -132,47 +131,59 @@ impl<'a> ResidualCost<'a> {
         memory.at.extend_from_slice(theta);
     }
 
-    /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end; columns of the
-    /// parameters before `first`, and of those that are held, are empty.
-    fn walk(&self, theta: &[f64], first: usize, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
+    /// The directions of the parameters from `first` on.
+    fn directions(&self, theta: &[f64], first: usize) -> Directions {
+        Directions::of(self.model, theta, first, |i| self.is_held(i), self.observations)
+    }
+
+    /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which derivatives
+    /// are those with respect to the parameters from `first` on that are not held.
+    fn walk(
+        &self,
+        theta: &[f64],
+        (directions, first): (&Directions, usize),
+        memory: &mut Memory<'_>,
+        mut visit: impl FnMut(Block<'_>),
+    ) {
         self.evaluate(theta, memory);
         let Memory { evaluator, residual, ends, columns, spare, again, .. } = memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
         let still = self.model.plant_of(&constants(theta), self.observations);
-        let moved = |i: usize| {
-            let mut numbers = constants(theta);
-            numbers[i] = numbers[i].derivative();
-            numbers
-        };
-        for (i, column) in columns.iter_mut().enumerate() {
-            let is_computed = i >= first && !self.is_held(i);
-            column.plant = is_computed.then(|| self.model.plant_of(&moved(i), self.observations));
-            column.picked.clear();
-        }
-        let count = columns.iter().filter(|column| column.plant.is_some()).count();
+        columns.resize_with(directions.all.len(), Column::default);
+        let count = directions.all.iter().filter(|direction| direction.plant.is_some()).count();
         let mut done = 0;
         for (index, window) in evaluator.windows().iter().enumerate() {
             let factor = evaluator.factor(&still, index, again);
-            let compute = |(i, column): (usize, &mut Column)| {
-                let Column { plant: Some(plant), moved, sieve, picked } = column else { return };
-                let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
-                let functions = self.model.sensors_of_functions(i);
-                let values = evaluator.derivative(plant, functions, index, factor, &mut disagreement, moved);
+            let compute = |(column, direction): (&mut Column, &Direction)| {
+                let Column { moved, sieve, picked } = column;
                 picked.clear();
+                if direction.plant.is_none() {
+                    return;
+                }
+                let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
+                let values = evaluator.derivative(direction, index, factor, &mut disagreement, moved);
                 sieve.pick(values, evaluator.span(index), self.selection, picked);
+                if picked.iter().all(|value| *value == 0.0) {
+                    picked.clear();
+                }
                 spare.lock().expect("no thread panics").push(disagreement);
             };
             if count > 1 && count * window.residuals().len() >= MIN_PARALLEL_VALUES {
-                columns.par_iter_mut().enumerate().for_each(compute);
+                columns.par_iter_mut().zip(&directions.all).for_each(compute);
             } else {
-                columns.iter_mut().enumerate().for_each(compute);
+                columns.iter_mut().zip(&directions.all).for_each(compute);
             }
             let range = std::mem::replace(&mut done, ends[index])..ends[index];
             visit(Block { residual: &residual[range.clone()], range, is_prior: false, columns });
         }
-        for (i, column) in columns.iter_mut().enumerate().filter(|(_, column)| column.plant.is_some()) {
+        columns.resize_with(theta.len(), Column::default);
+        for (i, column) in columns.iter_mut().enumerate() {
             column.picked.clear();
-            column.picked.extend(self.model.knowledge(&moved(i)).map(|k| k.eps));
+            if i >= first && !self.is_held(i) {
+                let mut moved = constants(theta);
+                moved[i] = moved[i].derivative();
+                column.picked.extend(self.model.knowledge(&moved).map(|k| k.eps));
+            }
         }
         visit(Block { residual: &residual[done..], range: done..residual.len(), is_prior: true, columns });
     }
@@ -185,8 +196,23 @@ impl<'a> ResidualCost<'a> {
     pub(crate) fn linearised(&self, theta: &[f64], first: usize) -> Linearised {
         let mut memory = self.memory.borrow_mut();
         let mut columns = vec![Vec::new(); theta.len()];
-        self.walk(theta, first, &mut memory, |block| {
-            columns.iter_mut().zip(block.columns()).for_each(|(all, column)| all.extend_from_slice(column));
+        let directions = self.directions(theta, first);
+        self.walk(theta, (&directions, first), &mut memory, |block| {
+            let end = block.range.end;
+            let of_directions: Vec<&[f64]> = block.columns().collect();
+            for (i, all) in columns.iter_mut().enumerate().skip(first) {
+                match directions.of_parameters.as_ref().filter(|_| !block.is_prior) {
+                    None => all.extend_from_slice(of_directions[i]),
+                    Some(of_parameters) => {
+                        all.resize(end, 0.0);
+                        for (part, weight) in &of_parameters[i] {
+                            let parts = all[block.range.start..].iter_mut().zip(of_directions[*part]);
+                            parts.for_each(|(sum, x)| *sum += weight * x);
+                        }
+                    }
+                }
+                all.resize(end, 0.0);
+            }
         });
         let residual = memory.residual.clone();
         columns[first..].iter_mut().for_each(|column| column.resize(residual.len(), 0.0));
@@ -209,8 +235,10 @@ impl<'a> ResidualCost<'a> {
         let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter().copied());
         let agrees = |beside: &Beside<'_>| beside.agrees_with(&memory.residual) && has_samples(beside.without);
         let known = beside.filter(agrees).map(|beside| beside.without);
-        let mut sums = Sums::of(theta.len(), known, filter);
-        self.walk(theta, sums.known(), &mut memory, |block| sums.add(&block));
+        let first = known.map_or(0, |known| known.columns.len());
+        let directions = self.directions(theta, first);
+        let mut sums = Sums::of(&directions, known, filter);
+        self.walk(theta, (&directions, first), &mut memory, |block| sums.add(&block));
         sums.normal_equations()
     }
 }
@@ -243,10 +271,6 @@ pub struct Linearised {
     pub residual: Vec<f64>,
     /// One column for each parameter.
     pub columns: Vec<Vec<f64>>,
-}
-
-fn constants(theta: &[f64]) -> Vec<Number> {
-    theta.iter().copied().map(Number::from).collect()
 }
 
 #[cfg(test)]
@@ -380,7 +404,7 @@ mod tests {
         }
     }
 
-    /// Residuals and derivatives of a record that is whitened in windows are those of the whole, to rounding. Readings of 400 K are
+    /// Residuals and derivatives of a record that is whitened in windows, or derived in blocks, are those of the whole, to rounding. Readings of 400 K are
     /// rounded to 5e-14 K, 1e-12 of the noise of 0.05 K, and a whitened value adds up some tens: 3e-11. A derivative of the factor
     /// counts as settled at 1e-13, and some hundred rows follow each other: 1e-11. The bound is twice their sum, 1e-10 of the largest.
     #[test]
@@ -391,22 +415,25 @@ mod tests {
             for effect in effects(&context) {
                 let model = Model::new(&[], [0.05, 0.07]).with(effect.clone());
                 let theta: Vec<f64> = TAU_S.into_iter().chain(effect.starts().remove(0)).collect();
-                let linearised = |window_samples: usize| {
+                let linearised = |window_samples: usize, block_samples: usize| {
                     let cost = ResidualCost::new(&model, &theta, &observations, &selection);
                     let mut memory = cost.memory.borrow_mut();
                     memory.evaluator.window_samples = window_samples;
                     memory.evaluator.max_kept_samples = window_samples;
+                    memory.evaluator.block_samples = block_samples;
                     drop(memory);
                     cost.linearised(&theta, 0)
                 };
-                let (whole, windows) = (linearised(SAMPLES), linearised(37));
-                assert_eq!(whole.samples, windows.samples);
-                let all = |lin: &Linearised| [std::slice::from_ref(&lin.residual), &lin.columns[..]].concat();
-                for (want, got) in all(&whole).iter().zip(&all(&windows)) {
-                    let largest = want.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-                    for (k, (want, got)) in want.iter().zip(got).enumerate() {
-                        let name = effect.identifier().name();
-                        assert!((got - want).abs() <= 1e-10 * largest, "{kind:?}, {name}, {k}: {got}, and {want}");
+                let whole = linearised(SAMPLES, SAMPLES);
+                for cut in [linearised(37, SAMPLES), linearised(SAMPLES, 16), linearised(64, 5)] {
+                    assert_eq!(whole.samples, cut.samples);
+                    let all = |lin: &Linearised| [std::slice::from_ref(&lin.residual), &lin.columns[..]].concat();
+                    for (want, got) in all(&whole).iter().zip(&all(&cut)) {
+                        let largest = want.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                        for (k, (want, got)) in want.iter().zip(got).enumerate() {
+                            let name = effect.identifier().name();
+                            assert!((got - want).abs() <= 1e-10 * largest, "{kind:?}, {name}, {k}: {got}, and {want}");
+                        }
                     }
                 }
             }

@@ -7,13 +7,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::directions::Direction;
 use crate::inverse::Inverse;
 use crate::number::{Number, Real};
 use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
 use crate::rows::Rows;
 use crate::selection::Span;
-use crate::whitening::{Factor, FactorDerivative, Source, Variance};
+use crate::whitening::{DERIVATIVE_ROUNDING, Factor, FactorDerivative, Source, Variance};
 
 /// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
 /// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
@@ -22,6 +23,10 @@ const MASKED_NOISE_SWINGS: f64 = 20.0;
 const MIN_DISAGREEMENTS: usize = 4;
 /// Samples of a window: what a derivative of one works on, some twenty numbers for each sample, is a megabyte. Chosen.
 const WINDOW_SAMPLES: usize = 8192;
+/// Values of a block, of which a part of a direction is computed or not, and the bands that it has at least: what a block computes
+/// beside its own values, for the operators and the lead, is some bands. Chosen.
+const BLOCK_SAMPLES: usize = 512;
+const BLOCK_BANDS: usize = 4;
 /// Samples of a record up to which all factors are kept for derivatives: of longer ones those that have not settled are computed
 /// once more, for a part of what one derivative costs.
 const MAX_KEPT_SAMPLES: usize = 65_536;
@@ -187,12 +192,53 @@ impl Default for Again {
     }
 }
 
+/// Values of a window that are derived at a time.
+struct Block<'a> {
+    window: &'a Window,
+    /// The first of them in the window.
+    first: usize,
+    /// Values without the lead.
+    count: usize,
+    /// Last values before them, which they are correlated with.
+    lead: usize,
+}
+
+impl Block<'_> {
+    /// Its samples of the stretch.
+    fn samples(&self, consumed: usize) -> Range<usize> {
+        let first = self.window.first + self.first;
+        first - self.lead..first + self.count + consumed
+    }
+}
+
 /// The derivative along a record, window after window.
 #[derive(Default)]
 pub(crate) struct Moved {
     factor: FactorDerivative,
     /// Derivatives of the last window that was computed, its lead first.
     values: Vec<f64>,
+    /// The largest of the stretch.
+    largest: f64,
+}
+
+impl Moved {
+    /// Begins a stretch whose factor has bands of `band`.
+    fn begin(&mut self, band: usize) {
+        self.factor.begin(band);
+        self.values.clear();
+        self.largest = 0.0;
+    }
+
+    /// Goes past a block where nothing moves, if there is nothing left of what moved before; whether there is not.
+    fn passes(&mut self, block: &Block<'_>) -> bool {
+        let before = &self.values[self.values.len() - block.lead..];
+        let is_still = before.iter().all(|v| v.abs() <= DERIVATIVE_ROUNDING * self.largest);
+        let passes = is_still && self.factor.passes(block.count);
+        if passes {
+            self.values.resize(self.values.len() + block.count, 0.0);
+        }
+        passes
+    }
 }
 
 /// Evaluates plants of one record, one after the other.
@@ -207,6 +253,8 @@ pub(crate) struct Evaluator<'a> {
     pub(crate) window_samples: usize,
     /// Samples up to which all factors are kept.
     pub(crate) max_kept_samples: usize,
+    /// Values of a block of a window, or as many as some bands.
+    pub(crate) block_samples: usize,
     /// Pieces of the last evaluation.
     pub(crate) pieces: Vec<Piece>,
     /// Its whitened residual.
@@ -226,6 +274,7 @@ impl<'a> Evaluator<'a> {
             used: 0,
             window_samples: WINDOW_SAMPLES,
             max_kept_samples: MAX_KEPT_SAMPLES,
+            block_samples: BLOCK_SAMPLES,
             pieces: Vec::new(),
             residual: Vec::new(),
         }
@@ -298,7 +347,7 @@ impl<'a> Evaluator<'a> {
             last.iter_mut().for_each(|factor| factor.shorten());
         }
         plain.values[..lead].copy_from_slice(&residual[residual.len() - lead..]);
-        window.factor.whiten(&mut plain.values, lead);
+        window.factor.whiten(&mut plain.values, 0, lead);
         residual.extend_from_slice(&plain.values[lead..]);
     }
 
@@ -317,49 +366,88 @@ impl<'a> Evaluator<'a> {
         factor
     }
 
-    /// The derivative of the residual in window `index`, at the values of the plant that was evaluated last: `plant` has them, with
-    /// the derivatives of what the parameter moves.
+    /// The derivative of the residual in window `index`, at the values of the plant that was evaluated last, block after block:
+    /// blocks that the direction does not reach are zero, and cost nothing.
     ///
+    /// - `direction`: the plant with the derivatives of what it moves
     /// - `factor`: that of the window
-    /// - `functions`: in which of the sensors functions of time or temperature may depend on the parameter
     /// - `moved`: after the window before
     pub(crate) fn derivative<'m>(
         &self,
-        plant: &Plant,
-        functions: [bool; 2],
+        direction: &Direction,
         index: usize,
         factor: &Factor,
         disagreement: &mut Disagreement<Number>,
         moved: &'m mut Moved,
     ) -> &'m [f64] {
-        let Moved { factor: of_factor, values } = moved;
-        let Window { piece, first, from, count, lead, .. } = self.windows[index];
-        let chains = plant.moved(functions);
+        let Direction { plant: Some(plant), functions, support_s } = direction else { return &[] };
+        let window = &self.windows[index];
+        let chains = plant.moved(*functions);
         if chains == [false; 2] {
-            values.clear();
-            values.resize(count, 0.0);
-            return values;
+            moved.values.clear();
+            moved.values.resize(window.count, 0.0);
+            return &moved.values;
         }
-        let stretch = self.pieces[piece].stretch;
+        if window.first == 0 {
+            moved.begin(factor.band());
+        }
+        // Rows of delays along uneven samples are as wide as those of the whole window need.
+        let is_one = support_s.is_none() || self.observations.period_s.is_none() && plant.delay_s.is_some();
+        let most = if is_one { window.count } else { self.block_samples.max(BLOCK_BANDS * factor.band()) };
+        moved.values.drain(..moved.values.len() - window.lead);
+        for first in (0..window.count).step_by(most.max(1)) {
+            let block = Block {
+                window,
+                first,
+                count: most.min(window.count - first),
+                lead: factor.band().min(window.first + first),
+            };
+            let is_idle = support_s.is_some_and(|support_s| !self.reaches(support_s, plant, &block));
+            if is_idle && moved.passes(&block) {
+                continue;
+            }
+            self.derive(plant, chains, &block, factor, disagreement, moved);
+        }
+        &moved.values[window.lead..]
+    }
+
+    /// Whether samples of a block are between two instants.
+    fn reaches(&self, support_s: [f64; 2], plant: &Plant, block: &Block<'_>) -> bool {
+        let samples = block.samples(plant.consumed(self.observations.period_s.is_some()));
+        let time_s = &self.observations.stretches[self.pieces[block.window.piece].stretch].time_s;
+        time_s[samples.start] <= support_s[1] && time_s[samples.end - 1] >= support_s[0]
+    }
+
+    /// The derivatives of a block, after those before it.
+    fn derive(
+        &self,
+        plant: &Plant,
+        chains: [bool; 2],
+        block: &Block<'_>,
+        factor: &Factor,
+        disagreement: &mut Disagreement<Number>,
+        moved: &mut Moved,
+    ) {
+        let Moved { factor: of_factor, values, largest } = moved;
+        let Block { window, first, count, lead } = *block;
+        let stretch = self.pieces[window.piece].stretch;
         let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
-        let samples = self.windows[index].samples(plant.consumed(period_s.is_some()));
+        let samples = block.samples(plant.consumed(period_s.is_some()));
         let cut = self.observations.stretches[stretch].cut(samples.clone());
         disagreement.inverse.invert_moved(plant, cut, period_s, chains);
         disagreement.compare(plant, step_s);
-        // The last values of the window before are whitened.
-        values.drain(..values.len() - lead);
         values.extend(disagreement.values[lead..].iter().map(|v| v.eps));
-        if first == 0 {
-            of_factor.begin(factor.band());
-        }
+        let from = values.len() - count - lead;
+        let values = &mut values[from..];
         let mut sources = disagreement.sources(&self.variances[stretch], samples.start);
         sources.retain(|source| !source.rows.is_constant());
+        let at = window.lead + first - lead;
         if sources.is_empty() && of_factor.passes(count) {
-            factor.whiten(values, lead);
+            factor.whiten(values, at, lead);
         } else {
-            let residual = &self.residual[from - lead..from + count];
-            of_factor.whiten(factor, &sources, residual, values, lead);
+            let residual = &self.residual[window.from + first - lead..window.from + first + count];
+            of_factor.whiten(factor, at, &sources, residual, values, lead);
         }
-        &values[lead..]
+        *largest = values[lead..].iter().fold(*largest, |most, v| most.max(v.abs()));
     }
 }

@@ -37,6 +37,7 @@ pub use identifier::Identifier;
 pub use known::KnownEffect;
 pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
 
+use crate::directions::Parts;
 use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::Plant;
@@ -74,6 +75,12 @@ pub trait Effect: Send + Sync {
 
     /// Puts the effect into the model. Derivatives of the cost come from the arithmetic with `values`.
     fn install(&self, values: &[Number], plant: &mut Plant);
+
+    /// Parts by which derivatives are computed in place of those by each parameter: of an effect whose parameters change a function
+    /// along the record, and that is quicker to compute where each part acts. By default there are none.
+    fn parts(&self, _values: &[f64]) -> Option<Parts> {
+        None
+    }
 
     /// Which of [`Self::parameters`] is the size of the effect, counted from 0; `None` where none is, as in a function of
     /// time.

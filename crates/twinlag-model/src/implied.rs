@@ -114,7 +114,7 @@ impl Plant {
         let mut residual = std::mem::take(&mut disagreement.values);
         let mut factor = Factor::empty();
         factor.compute(&disagreement.sources(&variances, 0), residual.len(), None);
-        factor.whiten(&mut residual, 0);
+        factor.whiten(&mut residual, 0, 0);
         let count = residual.len();
         let times_s = &disagreement.inverse.chains[0].times_s()[..count];
         let start = before + first_sample(stretch, times_s[0], step_s);

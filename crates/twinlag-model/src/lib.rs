@@ -7,6 +7,7 @@ mod correlation;
 mod cost;
 mod defects;
 pub mod dense;
+mod directions;
 mod disagreement;
 mod effect;
 mod error;
@@ -40,6 +41,7 @@ mod whitening;
 
 pub use cost::Linearised;
 pub use defects::{ChannelNoise, levels, line_channel, lines};
+pub use directions::{Install, Part, Parts};
 pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
     candidates, described_by,

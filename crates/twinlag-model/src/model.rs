@@ -220,11 +220,16 @@ impl Model {
 
     /// The rig with these parameters, and the derivative that they carry.
     pub(crate) fn plant_of(&self, theta: &[Number], observations: &Observations) -> Plant {
-        let mut plant = Plant::new(observations, [theta[0], theta[1]], self.noise_std_k);
+        let mut plant = self.two_lags(theta, observations);
         for (index, effect) in self.effects.iter().enumerate() {
             effect.install(&theta[self.range(index)], &mut plant);
         }
         plant
+    }
+
+    /// The rig without effects.
+    pub(crate) fn two_lags(&self, theta: &[Number], observations: &Observations) -> Plant {
+        Plant::new(observations, [theta[0], theta[1]], self.noise_std_k)
     }
 
     /// In which of the sensors a parameter may change functions of time or temperature: those of the effect's seat.

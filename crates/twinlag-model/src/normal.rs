@@ -2,6 +2,7 @@
 
 use crate::cost::{Block, Linearised, ResidualCost};
 use crate::dense;
+use crate::directions::Directions;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::selection::{Selection, Stream};
@@ -88,7 +89,9 @@ impl Beside<'_> {
 
 /// Normal equations that are summed up block by block.
 pub(crate) struct Sums<'a> {
+    /// Between directions, and with the last block between parameters.
     out: NormalEquations,
+    directions: &'a Directions,
     known: &'a [Vec<f64>],
     filter: Option<&'a Weighting>,
     streams: Vec<Stream>,
@@ -96,19 +99,18 @@ pub(crate) struct Sums<'a> {
 
 impl<'a> Sums<'a> {
     /// - `known`: a model whose columns are the first ones
-    pub(crate) fn of(parameters: usize, known: Option<&'a Linearised>, filter: Option<&'a Weighting>) -> Self {
-        let out = NormalEquations { is_beside: known.is_some(), ..NormalEquations::none(parameters) };
+    pub(crate) fn of(directions: &'a Directions, known: Option<&'a Linearised>, filter: Option<&'a Weighting>) -> Self {
+        let count = directions.all.len();
+        let out = NormalEquations { is_beside: known.is_some(), ..NormalEquations::none(count) };
         let known = known.map_or(&[][..], |known| &known.columns);
-        Self { out, known, filter, streams: vec![Stream::default(); parameters] }
-    }
-
-    /// How many columns are known.
-    pub(crate) fn known(&self) -> usize {
-        self.known.len()
+        Self { out, directions, known, filter, streams: vec![Stream::default(); count] }
     }
 
     pub(crate) fn add(&mut self, block: &Block<'_>) {
-        let Self { out, known, filter, streams } = self;
+        if block.is_prior {
+            self.finish_directions();
+        }
+        let Self { out, known, filter, .. } = self;
         let of_known = known.iter().map(|column| {
             let end = block.range.end.min(column.len());
             &column[block.range.start.min(end)..end]
@@ -118,15 +120,33 @@ impl<'a> Sums<'a> {
         out.count += block.residual.len();
         out.slope.iter_mut().zip(&columns).for_each(|(slope, column)| *slope += dense::dot(column, block.residual));
         add_products(&mut out.products, &columns);
-        let Some(filter) = filter else { return };
-        let filtered: Vec<&[f64]> = streams
-            .iter_mut()
-            .zip(&columns)
-            .map(|(stream, column)| stream.filter(if block.is_prior { &[] } else { column }, filter, block.is_prior).1)
-            .collect();
-        add_products(&mut out.slope_covariance, &filtered);
-        if block.is_prior {
+        if filter.is_some() && block.is_prior {
             add_products(&mut out.slope_covariance, &columns);
+        } else if filter.is_some() {
+            let zeros = vec![0.0; block.residual.len()];
+            self.add_filtered(
+                &columns.iter().map(|column| if column.is_empty() { &zeros } else { *column }).collect::<Vec<_>>(),
+                false,
+            );
+        }
+    }
+
+    /// Adds products of columns that are filtered once more.
+    fn add_filtered(&mut self, columns: &[&[f64]], is_last: bool) {
+        let Self { out, filter: Some(filter), streams, .. } = self else { return };
+        let filtered: Vec<&[f64]> =
+            streams.iter_mut().zip(columns).map(|(stream, column)| stream.filter(column, filter, is_last).1).collect();
+        add_products(&mut out.slope_covariance, &filtered);
+    }
+
+    /// From directions to parameters.
+    fn finish_directions(&mut self) {
+        self.add_filtered(&vec![&[][..]; self.directions.all.len()], true);
+        let Self { out, directions, .. } = self;
+        out.slope = directions.along_parameters(std::mem::take(&mut out.slope));
+        for matrix in [&mut out.products, &mut out.slope_covariance] {
+            mirror(matrix);
+            *matrix = directions.between_parameters(std::mem::take(matrix));
         }
     }
 
@@ -139,7 +159,7 @@ impl<'a> Sums<'a> {
 
 /// Adds `CᵀC` to the lower triangle.
 fn add_products(sums: &mut [Vec<f64>], columns: &[&[f64]]) {
-    for (i, a) in columns.iter().enumerate() {
+    for (i, a) in columns.iter().enumerate().filter(|(_, column)| !column.is_empty()) {
         for (sum, b) in sums[i].iter_mut().zip(&columns[..=i]) {
             *sum += dense::dot(a, b);
         }

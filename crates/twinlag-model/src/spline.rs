@@ -72,6 +72,34 @@ impl Spline {
     }
 }
 
+/// Splines with the values of one and a derivative that acts in a part of the record each, and of which of them its derivatives by
+/// the free coefficients consist, with their weights: by each B-spline, and by the mean.
+pub(crate) fn parts(from_s: f64, to_s: f64, free: &[f64]) -> (Vec<(Spline, [f64; 2])>, Vec<Vec<(usize, f64)>>) {
+    let numbers: Vec<Number> = free.iter().copied().map(Number::from).collect();
+    let spline = Spline::new(from_s, to_s, &numbers);
+    let count = spline.coefficients.len();
+    let intervals = count - 3;
+    let at_s = |interval: usize| from_s + (to_s - from_s) * interval as f64 / intervals as f64;
+    let bump = |l: usize| {
+        let mut out = spline.clone();
+        out.coefficients[l] = out.coefficients[l].derivative();
+        let first_s = if l <= 3 { f64::NEG_INFINITY } else { at_s(l - 3) };
+        let last_s = if l + 1 >= intervals { f64::INFINITY } else { at_s(l + 1) };
+        (out, [first_s, last_s])
+    };
+    let mut level = spline.clone();
+    level.mean.eps = -1.0;
+    let parts = (0..count).map(bump).chain([(level, [f64::NEG_INFINITY, f64::INFINITY])]).collect();
+    let of_free = |i: usize| {
+        let mut moved = numbers.clone();
+        moved[i] = moved[i].derivative();
+        let moved = Spline::new(from_s, to_s, &moved);
+        let of_bumps = moved.coefficients.iter().map(|c| c.eps).enumerate().filter(|(_, weight)| *weight != 0.0);
+        of_bumps.chain([(count, -moved.mean.eps)]).collect()
+    };
+    (parts, (0..free.len()).map(of_free).collect())
+}
+
 /// The coefficients on knots: the first is minus the sum of the others.
 pub(crate) fn on_knots<T: DualNum + Copy>(free: &[T]) -> Vec<T> {
     let sum: T = free.iter().copied().sum();

@@ -16,7 +16,7 @@ const SETTLED_ROWS: usize = 6;
 /// Relative difference that rounding makes.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// Relative difference of derivatives that does not count: they enter a step of a solver, not an estimate.
-const DERIVATIVE_ROUNDING: f64 = 1e-13;
+pub(crate) const DERIVATIVE_ROUNDING: f64 = 1e-13;
 
 /// Noise that enters the disagreement through rows of weights.
 pub(crate) struct Source<'a, T> {
@@ -204,10 +204,11 @@ impl Factor {
 
     /// `L⁻¹ u` in place.
     ///
+    /// - `at`: the row that belongs to the first value
     /// - `lead`: so many values are whitened already
-    pub(crate) fn whiten(&self, u: &mut [f64], lead: usize) {
+    pub(crate) fn whiten(&self, u: &mut [f64], at: usize, lead: usize) {
         for k in lead..u.len() {
-            let row = self.row(k);
+            let row = self.row(at + k);
             let reach = self.band.min(k);
             let (before, rest) = u.split_at_mut(k);
             rest[0] = (rest[0] - backwards(&row[1..=reach], &before[k - reach..])) / row[0];
@@ -276,9 +277,11 @@ impl FactorDerivative {
     /// - `residual`: `r`
     /// - `values`: the derivative of `u`, and then of `r`
     /// - `lead`: so many values are whitened already
+    /// - `at`: the row of `factor` that belongs to the first value
     pub(crate) fn whiten(
         &mut self,
         factor: &Factor,
+        at: usize,
         sources: &[Source<'_, Number>],
         residual: &[f64],
         values: &mut [f64],
@@ -293,16 +296,16 @@ impl FactorDerivative {
         let first = self.end - lead;
         for k in lead..values.len() {
             let reach = band.min(k);
-            let of_factor = factor.row(k);
+            let of_factor = factor.row(at + k);
             // Where the factor has settled, its derivative does soon after.
-            let is_settled = factor.is_settled(k);
+            let is_settled = factor.is_settled(at + k);
             if !(is_settled && self.agreeing >= SETTLED_ROWS) {
                 if self.is_kept {
                     // All rows in reach were the one that was kept.
                     self.recent.chunks_exact_mut(stride).for_each(|row| row.copy_from_slice(&self.row));
                 }
                 let is_plain = settles && (is_settled || !is_masked_around(sources, k, band));
-                self.next_row(factor, sources, k, first, is_plain);
+                self.next_row(factor, at, sources, k, first, is_plain);
                 let largest = self.row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
                 self.largest = self.largest.max(largest);
                 let before = &self.recent[(first + k + stride - 1) % stride * stride..][..stride];
@@ -321,10 +324,18 @@ impl FactorDerivative {
     }
 
     /// Row `k` of `dL`, of a window with `first` values before it.
-    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, first: usize, is_plain: bool) {
+    fn next_row(
+        &mut self,
+        factor: &Factor,
+        at: usize,
+        sources: &[Source<'_, Number>],
+        k: usize,
+        first: usize,
+        is_plain: bool,
+    ) {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
-        let l = factor.row(k);
+        let l = factor.row(at + k);
         for lag in (0..=reach).rev() {
             let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
             if lag == 0 {
@@ -333,7 +344,7 @@ impl FactorDerivative {
                 self.row[0] = 0.5 * entry / l[0];
                 continue;
             }
-            let other = factor.row(k - lag);
+            let other = factor.row(at + k - lag);
             let d_other = &self.recent[(first + k - lag) % stride * stride..][..stride];
             for older in lag + 1..=reach {
                 entry -= self.row[older] * other[older - lag] + l[older] * d_other[older - lag];
@@ -442,7 +453,7 @@ mod tests {
     fn the_banded_factor_is_that_of_the_dense_matrix() {
         let (u, factor) = two_lags([3.0, 9.0], true);
         let mut whitened = u.clone();
-        factor.whiten(&mut whitened, 0);
+        factor.whiten(&mut whitened, 0, 0);
         let (m, [_, variance]) = (u.len(), variances(true));
         let dense_rows = |rows: &Rows<f64>| -> Vec<Vec<f64>> {
             (0..m)
@@ -477,18 +488,18 @@ mod tests {
         for is_masked in [false, true] {
             let residual = |tau_s: f64| {
                 let (mut u, factor) = two_lags([tau_s, 9.0], is_masked);
-                factor.whiten(&mut u, 0);
+                factor.whiten(&mut u, 0, 0);
                 u
             };
             let (mut whitened, factor) = two_lags([3.0, 9.0], is_masked);
-            factor.whiten(&mut whitened, 0);
+            factor.whiten(&mut whitened, 0, 0);
             let chains = [Number::from(3.0).derivative(), Number::from(9.0)].map(through_lag);
             let variances = variances(is_masked);
             let sources = sources(&chains, &variances);
             let mut got: Vec<f64> = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| (a - b).eps).collect();
             let mut of_factor = FactorDerivative::default();
             of_factor.begin(factor.band());
-            of_factor.whiten(&factor, &sources, &whitened, &mut got, 0);
+            of_factor.whiten(&factor, 0, &sources, &whitened, &mut got, 0);
             let step_s = 3e-4;
             let (above, below) = (residual(3.0 + step_s), residual(3.0 - step_s));
             for (k, got) in got.iter().enumerate() {

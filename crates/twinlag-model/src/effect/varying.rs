@@ -7,13 +7,14 @@ use std::sync::Arc;
 use num_dual::DualNum;
 use twinlag_optimise::Variable;
 
+use crate::directions::{Part, Parts};
 use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
 use crate::flow::Flow;
 use crate::number::{Number, TimeFunction};
 use crate::plant::Plant;
-use crate::spline::{Spline, on_knots};
+use crate::spline::{Spline, on_knots, parts};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
     .in_words(
@@ -120,6 +121,18 @@ fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, Mod
     Ok(described_by(known, candidates(context)))
 }
 
+fn function(spline: Spline) -> TimeFunction {
+    Arc::new(move |time_s| spline.at(time_s))
+}
+
+/// A relative change of both time constants, or of the second alone, which is one of their ratio.
+fn install(change: TimeFunction, of_ratio: bool, plant: &mut Plant) {
+    if !of_ratio {
+        plant.sensors[0].changes.push(change.clone());
+    }
+    plant.sensors[1].changes.push(change);
+}
+
 impl Effect for Varying {
     fn seat(&self) -> &Seat {
         &self.seat
@@ -132,8 +145,7 @@ impl Effect for Varying {
     fn install(&self, values: &[Number], plant: &mut Plant) {
         let change: TimeFunction = match &self.of {
             Of::Time { ends_s: [first_s, last_s], .. } | Of::Ratio { ends_s: [first_s, last_s] } => {
-                let spline = Spline::new(*first_s, *last_s, values);
-                Arc::new(move |time_s| spline.at(time_s))
+                function(Spline::new(*first_s, *last_s, values))
             }
             Of::Flow(flow) => {
                 let (exponent, flow) = (values[0], flow.clone());
@@ -144,10 +156,18 @@ impl Effect for Varying {
                 Arc::new(move |time_s| if time_s < at_s { Number::from(0.0) } else { change })
             }
         };
-        if !matches!(self.of, Of::Ratio { .. }) {
-            plant.sensors[0].changes.push(change.clone());
-        }
-        plant.sensors[1].changes.push(change);
+        install(change, matches!(self.of, Of::Ratio { .. }), plant);
+    }
+
+    fn parts(&self, values: &[f64]) -> Option<Parts> {
+        let (Of::Time { ends_s, .. } | Of::Ratio { ends_s }) = self.of else { return None };
+        let (splines, of_parameters) = parts(ends_s[0], ends_s[1], values);
+        let of_ratio = matches!(self.of, Of::Ratio { .. });
+        let part = |(spline, support_s): (Spline, [f64; 2])| {
+            let change = function(spline);
+            Part::new(support_s, Arc::new(move |plant| install(change.clone(), of_ratio, plant)))
+        };
+        Some(Parts::new(splines.into_iter().map(part).collect(), of_parameters))
     }
 
     fn main(&self) -> Option<usize> {
