@@ -8,13 +8,14 @@ use twinlag_model::{
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
+use crate::faster::Faster;
 use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
 use crate::if_known::{IfKnown, if_known};
 use crate::judge::{Circumstances, Judgements};
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
 use crate::moves::{Move, State, Taken};
-use crate::naming::{Tie, judge_effect, name, of_defect, widen};
+use crate::naming::{Tie, judge_effect, name, of_defect, of_faster, widen};
 use crate::remark::Remark;
 
 /// Most samples of a changing mean that stands for a filter where no spectrum says which
@@ -36,6 +37,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut last = summary(&with_effects, &state, policy);
     let mut remarks = remarks_of(&state.moves);
     let all = state.prepared.observations.samples();
+    remarks.extend(state.faster.as_ref().map(Faster::remark));
     remarks.extend(state.searched_samples.map(|samples| Remark::SearchedInPieces { samples, all }));
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
@@ -49,7 +51,8 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     remarks.extend(is_refused.then_some(Remark::SingleTone));
     remarks.extend(drop_coherent_noise(&mut found, &last, policy));
     let has_noise = with_effects.model.noise().is_some();
-    let excess = excess(&last, has_noise).filter(|excess| excess.share <= policy.explained_excess_share);
+    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.faster.is_none();
+    let excess = excess(&last, has_noise).filter(is_bounded);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
     let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
@@ -165,8 +168,9 @@ fn remarks_of(moves: &[Move]) -> Vec<Remark> {
 /// Defects and effects, each with its place in the model `last`, if it is in there.
 fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
     let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, fit)));
+    let faster = state.faster.iter().map(|faster| (None, of_faster(faster)));
     let named = state.taken.iter().enumerate();
-    defects.chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
+    defects.chain(faster).chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
 }
 
 /// Takes a noise out of what is named where the residual goes with the gas, which no noise does; its spectrum is what the fit is
@@ -254,6 +258,7 @@ fn basis(
 /// - `left`: what is left over, where that is more than intervals can cover
 fn verdict(state: &State<'_>, is_nothing_found: bool, left: Option<&Unexplained>, policy: &Policy) -> Verdict {
     match (is_nothing_found, left) {
+        _ if state.faster.is_some() => Verdict::PartlyExplained,
         (true, None) => Verdict::Adequate,
         (true, Some(_)) => Verdict::Unexplained,
         (false, None) if effects(state) <= policy.most_distinguished_effects => Verdict::Explained,

@@ -6,6 +6,7 @@ use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unre
 use crate::conclude::conclude;
 use crate::diagnosis::Diagnosis;
 use crate::excitation::{SINGLE, tones};
+use crate::faster::faster;
 use crate::long::pieces;
 use crate::moves::{Proposal, State};
 
@@ -38,7 +39,15 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
         Some(pieces) => {
             let mut part = State::new(Prepared::new(&pieces, settings)?, settings, watch);
             search(&mut part, settings, can_learn)?;
-            State::carried(part, prepared, settings, watch)
+            let faster = if can_learn { faster(observations, &part, settings, watch)? } else { None };
+            match faster {
+                Some((stretch, faster)) => {
+                    let mut state = State::carried(stretch, prepared, settings, watch);
+                    state.faster = Some(faster);
+                    return conclude(state, settings, tones);
+                }
+                None => State::carried(part, prepared, settings, watch),
+            }
         }
         None => State::new(prepared, settings, watch),
     };
@@ -47,7 +56,7 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
 }
 
 /// Moves on as long as there is a move.
-fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
+pub(crate) fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
     while can_learn && state.taken.len() < settings.policy.most_effects && advance(state, settings)? {}
     Ok(())
 }

@@ -53,6 +53,13 @@ pub struct Found {
     pub masked: Vec<Masked>,
 }
 
+impl Found {
+    /// Whether the model has it: not so an effect that a stretch of the record shows, and that is in no number of the whole.
+    pub fn is_in_the_model(&self) -> bool {
+        self.evidence.is_none() || !self.parameters.is_empty()
+    }
+}
+
 /// Neighbouring readings of one channel that are left out of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]

@@ -41,6 +41,7 @@ mod diagnose;
 mod diagnosis;
 mod evidence;
 mod excitation;
+mod faster;
 mod grade;
 mod hidden;
 mod if_known;

@@ -16,8 +16,10 @@ const MAX_SEARCHED_SAMPLES: usize = 49_152;
 /// takes a tenth.
 const PIECES: usize = 12;
 const PIECE_SAMPLES: usize = 2048;
+/// Samples of all of them.
+pub(crate) const SEARCHED_SAMPLES: usize = PIECES * PIECE_SAMPLES;
 /// Deviance by which the pieces exclude an effect: odds of one to a hundred and fifty.
-const EXCLUDED_DEVIANCE: f64 = 10.0;
+pub(crate) const EXCLUDED_DEVIANCE: f64 = 10.0;
 /// Factor within which time constants are the same: a screening of the effect has looked there.
 const SAME_TAU_FACTOR: f64 = 1.1;
 
@@ -142,7 +144,7 @@ mod tests {
         let answer = diagnose(&observations, &settings, &watch).expect("a diagnosis");
         let named: Vec<Identifier> = answer.effects.iter().map(|e| e.effect).collect();
         assert_eq!(named, [Identifier::SECOND_ORDER]);
-        assert_eq!(answer.remarks, [Remark::SearchedInPieces { samples: PIECES * PIECE_SAMPLES, all: SAMPLES }]);
+        assert_eq!(answer.remarks, [Remark::SearchedInPieces { samples: SEARCHED_SAMPLES, all: SAMPLES }]);
         let of_pieces = diagnose(&pieces(&observations).expect("long"), &settings, &watch).expect("a diagnosis");
         for ((whole, part), tau_s) in
             answer.last.time_constants.iter().zip(&of_pieces.last.time_constants).zip([0.012, 0.060])
@@ -167,6 +169,6 @@ mod tests {
         let shreds = (0..60).map(|i| stretch(1000, 2000 * i)).collect();
         assert!(pieces(&observations(shreds)).is_none());
         let long = observations(vec![stretch(MAX_SEARCHED_SAMPLES + 1, 0)]);
-        assert_eq!(pieces(&long).expect("long").samples(), PIECES * PIECE_SAMPLES);
+        assert_eq!(pieces(&long).expect("long").samples(), SEARCHED_SAMPLES);
     }
 }

@@ -7,6 +7,7 @@ use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::evidence::Evidence;
+use crate::faster::Faster;
 use crate::rank::{LookAlike, successor, worth};
 use crate::remark::Remark;
 
@@ -155,6 +156,8 @@ pub(crate) struct State<'a> {
     pub(crate) searched_samples: Option<usize>,
     /// Effects with such time constants that these pieces do not exclude.
     pub(crate) far_in_pieces: Option<Vec<Candidate>>,
+    /// A change of the time constants that is too fast for a model of the whole record.
+    pub(crate) faster: Option<Faster>,
 }
 
 impl<'a> State<'a> {
@@ -178,6 +181,7 @@ impl<'a> State<'a> {
             far: Vec::new(),
             searched_samples: None,
             far_in_pieces: None,
+            faster: None,
         }
     }
 
@@ -257,6 +261,15 @@ impl<'a> State<'a> {
             ties: identifiers(&ties),
         };
         Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
+    }
+
+    /// Takes effect `index` out of the model, and gives it; what was compared with it beside it is forgotten.
+    pub(crate) fn take_out(&mut self, index: usize) -> Taken {
+        let (model, theta) = self.current.without(index);
+        self.current = Fitted { model, theta, ..self.current.clone() };
+        self.taken.iter_mut().for_each(|taken| taken.ties.clear());
+        self.far.clear();
+        self.taken.remove(index)
     }
 
     /// Gives effect `index` a parameter more, now that more is known.

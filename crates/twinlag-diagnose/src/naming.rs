@@ -11,10 +11,11 @@ use twinlag_optimise::{End, Scale};
 use crate::candidates::is_inside_bounds;
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
+use crate::faster::Faster;
 use crate::grade::{Judgement, Number, Reason};
 use crate::judge::Circumstances;
 use crate::moves::Taken;
-use crate::remark::Remark;
+use crate::remark::{Remark, to_digits_of};
 
 /// Relative change of an end of an interval that is worth a remark.
 const NOTICEABLE: f64 = 1e-3;
@@ -98,6 +99,28 @@ fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Op
         standard_error: error,
         interval_95: error.map(|error| [value - Z_975 * error, value + Z_975 * error]),
         unit: derived.unit.into(),
+    }
+}
+
+/// A change that is too fast for a model of the whole record, without numbers: its own are those of a stretch.
+pub(crate) fn of_faster(faster: &Faster) -> Found {
+    let Faster { taken, ends_s: [from_s, to_s], seen_in, looked_in } = faster;
+    let effect = &taken.candidate.effect;
+    let [from, to] = [from_s, to_s].map(|t| to_digits_of(to_s - from_s, *t));
+    let seen = format!(
+        "seen between {from} and {to} s, and in {seen_in} of {looked_in} such stretches; it is faster than a model of the whole \
+         record can follow, and in none of its numbers"
+    );
+    Found {
+        effect: effect.identifier(),
+        channel: effect.channel(),
+        fitted_in: effect.channel(),
+        parameters: Vec::new(),
+        judgements: Vec::new(),
+        evidence: Some(Evidence::of(&taken.candidate)),
+        alternatives: Vec::new(),
+        seen: Some(seen),
+        masked: Vec::new(),
     }
 }
 

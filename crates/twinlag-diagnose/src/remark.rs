@@ -62,6 +62,13 @@ pub enum Remark {
     },
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
+    /// Something changes faster than a model of the whole record can follow.
+    FasterThanTheWhole {
+        /// The effect.
+        effect: Identifier,
+        /// Ends of the stretch that showed it, s.
+        ends_s: [f64; 2],
+    },
     /// The search looked at pieces of the record first.
     SearchedInPieces {
         /// Samples of the pieces.
@@ -103,15 +110,22 @@ impl Remark {
             Self::Contradicted { .. } => 1,
             Self::LagAlone => 2,
             Self::BiasUnknown { .. } => 3,
-            Self::ModelErrorAsNoise => 4,
-            Self::Widened { .. } => 5,
-            Self::NoiseLowered => 6,
-            Self::Replaced { .. } => 7,
-            Self::OtherChannel { .. } => 8,
-            Self::Needless { .. } => 9,
-            Self::SearchedInPieces { .. } => 10,
+            Self::FasterThanTheWhole { .. } => 4,
+            Self::ModelErrorAsNoise => 5,
+            Self::Widened { .. } => 6,
+            Self::NoiseLowered => 7,
+            Self::Replaced { .. } => 8,
+            Self::OtherChannel { .. } => 9,
+            Self::Needless { .. } => 10,
+            Self::SearchedInPieces { .. } => 11,
         }
     }
+}
+
+/// A number with as many decimals as `size` has with three digits.
+pub(crate) fn to_digits_of(size: f64, number: f64) -> String {
+    let decimals = (2.0 - size.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{number:.decimals$}")
 }
 
 /// What it means for whoever wants to use the numbers, and what to do.
@@ -169,6 +183,13 @@ impl fmt::Display for Remark {
                 "{effect} was first placed in the other channel, but explains more in this one: if the rig says otherwise, \
                  believe the rig"
             ),
+            Self::FasterThanTheWhole { effect, ends_s: [from_s, to_s] } => write!(
+                f,
+                "{effect} goes up and down too often along this record for a model of all of it. Cut the record into parts of about \
+                 {} s, as the one from {} s on in which it was found, and diagnose these",
+                to_digits_of(to_s - from_s, to_s - from_s),
+                to_digits_of(to_s - from_s, *from_s)
+            ),
             Self::SearchedInPieces { samples, all } => write!(
                 f,
                 "effects were searched for in {samples} of {all} samples, spread over the record; what was found was fitted to all \
@@ -203,6 +224,7 @@ mod tests {
             Remark::Contradicted { what: "T1 = 0.8 s".into(), instead: "T1 = 0.4 s".into(), deviations: 9.7 },
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown { is_one_known: false },
+            Remark::FasterThanTheWhole { effect: Identifier::VARYING_TIME_CONSTANT, ends_s: [480.0, 504.6] },
             Remark::SearchedInPieces { samples: 24_576, all: 1_000_000 },
         ];
         let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();

@@ -133,7 +133,12 @@ impl Model {
         let taus = of_last.time_constants_s;
         Self {
             time_constants_s: [0, 1].map(|i| taus[i].or(core.last.time_constants[i].value_s)),
-            effects: core.effects.iter().map(|found| ModelEffect::found(found, &of_last.channels)).collect(),
+            effects: core
+                .effects
+                .iter()
+                .filter(|found| found.is_in_the_model())
+                .map(|found| ModelEffect::found(found, &of_last.channels))
+                .collect(),
             verdict: Some(core.verdict),
             explained_to: core.explained_to,
             found_in,

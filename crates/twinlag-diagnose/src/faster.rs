@@ -1,0 +1,110 @@
+//! Time constants that change faster along a long record than a smooth change over all of it can follow.
+//!
+//! A smooth change has some twenty coefficients, however long the record is: what swings a hundred times along it is beyond them,
+//! and looks like noise of the gas in pieces that lie far apart. Consecutive samples, as many as a search takes in, show it. Where
+//! they do, it is named with what was seen; no number of the whole record can hold it.
+
+use twinlag_model::{
+    Effort, Fitted, ModelError, Observations, Prepared, Settings, Shared, Watch, candidates, evenly_spread,
+};
+
+use crate::diagnose::search;
+use crate::long::{EXCLUDED_DEVIANCE, SEARCHED_SAMPLES};
+use crate::moves::{State, Taken};
+use crate::rank::worth;
+use crate::remark::Remark;
+
+/// Stretches of consecutive samples, spread evenly over the record: the middle one is searched, the others confirm.
+const STRETCHES: usize = 3;
+
+/// Such a change.
+pub(crate) struct Faster {
+    pub(crate) taken: Taken,
+    /// Ends of the stretch that was searched, s.
+    pub(crate) ends_s: [f64; 2],
+    /// Stretches that show it, that one among them, and all that were looked at.
+    pub(crate) seen_in: usize,
+    pub(crate) looked_in: usize,
+}
+
+impl Faster {
+    pub(crate) fn remark(&self) -> Remark {
+        Remark::FasterThanTheWhole { effect: self.taken.candidate.effect.identifier(), ends_s: self.ends_s }
+    }
+}
+
+/// What a stretch of a long record shows where its pieces left something to noise or to nothing; `None` where it shows no change of
+/// the time constants, or explains no more than what the pieces showed.
+pub(crate) fn faster<'a>(
+    observations: &Observations,
+    pieces: &State<'_>,
+    settings: &'a Settings,
+    watch: Watch<'a>,
+) -> Result<Option<(State<'a>, Faster)>, ModelError> {
+    if !pieces.has_noise() && pieces.current.mean_energy() < settings.policy.incomplete_energy {
+        return Ok(None);
+    }
+    let starts: Vec<usize> = evenly_spread(observations.samples(), STRETCHES, SEARCHED_SAMPLES).collect();
+    let stretch = |place: usize| {
+        let out = observations.excerpt(std::iter::once(starts[place]), SEARCHED_SAMPLES);
+        (out.samples() == SEARCHED_SAMPLES).then_some(out)
+    };
+    // Where the record has a gap there is none.
+    let Some(middle) = stretch(STRETCHES / 2) else { return Ok(None) };
+    let mut state = State::new(Prepared::new(&middle, settings)?, settings, watch);
+    search(&mut state, settings, true)?;
+    let Some(index) = state.taken.iter().position(|taken| is_change_along_the_record(&taken.candidate.effect)) else {
+        return Ok(None);
+    };
+    let of_pieces = without_noise(&pieces.current, &state.prepared);
+    let of_stretch = without_noise(&state.current, &state.prepared);
+    if deviance(&of_pieces, &of_stretch) < EXCLUDED_DEVIANCE {
+        return Ok(None);
+    }
+    let (mut seen_in, mut looked_in) = (1, 1);
+    for other in (0..STRETCHES).filter(|place| *place != STRETCHES / 2).filter_map(stretch) {
+        let prepared = Prepared::new(&other, settings)?;
+        looked_in += 1;
+        seen_in += usize::from(shows(&state, index, &prepared, settings));
+    }
+    let ends_s = middle.ends_s();
+    let taken = state.take_out(index);
+    Ok(Some((state, Faster { taken, ends_s, seen_in, looked_in })))
+}
+
+fn is_change_along_the_record(effect: &Shared) -> bool {
+    effect.about().changes_time_constants && effect.is_of_the_record()
+}
+
+/// Deviance that the second of two fits to the same samples saves, parameters counted.
+fn deviance(one: &Fitted, other: &Fitted) -> f64 {
+    let parameters = |fitted: &Fitted| fitted.theta.len() as f64;
+    other.count * (one.mean_energy() / other.mean_energy()).ln()
+        - (parameters(other) - parameters(one)) * other.count.ln()
+}
+
+/// A model without its noise, which explains whatever is left over, fitted to a record.
+fn without_noise(fitted: &Fitted, prepared: &Prepared) -> Fitted {
+    let (mut model, mut theta) = (fitted.model.clone(), fitted.theta.clone());
+    while let Some(noise) = model.noise() {
+        theta.drain(model.range(noise));
+        model = model.without(noise);
+    }
+    let model = model.with_noise(prepared.levels.std_k);
+    model.fit(&theta, &prepared.observations, &prepared.searched, Effort::Compare)
+}
+
+/// Whether another stretch shows the change in place `index` of what was found in one.
+fn shows(state: &State<'_>, index: usize, prepared: &Prepared, settings: &Settings) -> bool {
+    let effect = state.taken[index].candidate.effect.identifier();
+    let Some(change) = candidates(&[effect], &prepared.context).into_iter().find(is_change_along_the_record) else {
+        return false;
+    };
+    let (without, theta) = state.current.without(index);
+    let without = without_noise(&Fitted { model: without, theta, ..state.current.clone() }, prepared);
+    let model = without.model.with(change.clone());
+    let theta = [&without.theta[..], &change.starts()[0]].concat();
+    let with = model.fit(&theta, &prepared.observations, &prepared.searched, Effort::Compare);
+    let gain = with.count * (without.mean_energy() / with.mean_energy()).ln();
+    gain > worth(change.parameters().len(), with.count, &settings.policy)
+}
