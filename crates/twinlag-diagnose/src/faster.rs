@@ -108,3 +108,54 @@ fn shows(state: &State<'_>, index: usize, prepared: &Prepared, settings: &Settin
     let gain = with.count * (without.mean_energy() / with.mean_energy()).ln();
     gain > worth(change.parameters().len(), with.count, &settings.policy)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+    use std::ops::ControlFlow;
+
+    use twinlag_model::{Identifier, Stretch};
+    use twinlag_signal::{Flow, FlowSine, Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+    use super::*;
+    use crate::diagnose::diagnose;
+    use crate::diagnosis::Verdict;
+    use crate::remark::Remark;
+
+    const SAMPLES: usize = 60_000;
+    const SAMPLE_PERIOD_S: f64 = 0.001;
+
+    /// Turbulence that sensors of 12 and 60 ms read, both with time constants that swing by a quarter `swings` times.
+    fn swinging(swings: f64) -> Observations {
+        let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 }));
+        let mut sensors = [Sensor::new("T1", 0.012), Sensor::new("T2", 0.060)];
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.2)));
+        let rig = Rig::new(3, Record::new(SAMPLES, SAMPLE_PERIOD_S), gas, sensors).expect("a valid rig");
+        let period_s = SAMPLES as f64 * SAMPLE_PERIOD_S / swings;
+        let rig = rig.with_flow(Flow::Sine(FlowSine::new(0.25, period_s, 0.1 * TAU))).expect("a valid rig");
+        let record = rig.simulate().expect("finite numbers");
+        let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+        Observations::new(vec![stretch], Some(SAMPLE_PERIOD_S)).expect("a record")
+    }
+
+    /// A swing of 6000 samples goes up and down ten times along the record, which nineteen coefficients cannot follow, and four times
+    /// along a stretch. It is named, with where it was seen, and no number of the whole record is said to hold.
+    #[test]
+    fn what_swings_often_along_a_long_record_is_named_without_numbers() {
+        let (observations, settings) = (swinging(10.0), Settings::default());
+        let watch = |_: &str, _, _| ControlFlow::Continue(());
+        let answer = diagnose(&observations, &settings, &watch).expect("a diagnosis");
+        assert_eq!(answer.verdict, Verdict::PartlyExplained);
+        let named: Vec<Identifier> = answer.effects.iter().map(|e| e.effect).collect();
+        assert_eq!(named, [Identifier::VARYING_TIME_CONSTANT]);
+        let found = &answer.effects[0];
+        assert!(found.parameters.is_empty() && !found.is_in_the_model());
+        assert!(found.seen.as_ref().is_some_and(|seen| seen.contains("3 of 3")), "{:?}", found.seen);
+        let cut = SEARCHED_SAMPLES as f64 * SAMPLE_PERIOD_S;
+        assert!(answer.remarks.iter().any(|remark| matches!(
+            remark,
+            Remark::FasterThanTheWhole { ends_s: [from_s, to_s], .. } if (to_s - from_s - cut).abs() < 2.0 * SAMPLE_PERIOD_S
+        )));
+        assert!(answer.judgements.time_constants.iter().all(|j| j.grade == crate::grade::Grade::NoGo));
+    }
+}
