@@ -280,3 +280,41 @@ impl Model {
         dense::inverse(&second).or_else(|| dense::inverse(&normal.products))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::fixture::{TAU_S, observations};
+    use crate::weighting::Weighting;
+
+    /// Half of what the tones are, and as much as the slower sensor shows of them.
+    /// Half of what the tones are together.
+    const LOUD_K: f64 = 2.0;
+
+    /// Of a record of twice as many samples as are taken whole, second derivatives are those of all samples: what noise adds to the
+    /// products is off by the inverse root of the pieces' samples, one part in 128, and it is a part of them. The bound on each is
+    /// three times that of the root of the diagonal. That part is large enough to be seen: a tenth of them and more.
+    #[test]
+    fn second_derivatives_by_pieces_are_those_of_the_whole() {
+        let observations = observations(2 * MAX_CURVED_SAMPLES, LOUD_K, |_| 1.0);
+        let model = Model::new(&[], [LOUD_K; 2]);
+        let selection = whole_selection(&observations, &Weighting::default());
+        let normal = model.normal_equations(&TAU_S, &observations, &selection, None);
+        let by_pieces = model.second_derivatives(&TAU_S, &observations, &selection, &normal, &[]);
+        let whole = model.curved(&TAU_S, &observations, &selection, &normal.products, 1.0, &[]);
+        let tol = 3.0 / (MAX_CURVED_SAMPLES as f64).sqrt();
+        for i in 0..2 {
+            assert!(
+                normal.products[i][i] > 1.1 * whole[i][i],
+                "noise is seen: {} and {}",
+                normal.products[i][i],
+                whole[i][i]
+            );
+            for j in 0..2 {
+                let scale = (normal.products[i][i] * normal.products[j][j]).sqrt();
+                let off = (by_pieces[i][j] - whole[i][j]).abs() / scale;
+                assert!(off < tol, "{i}, {j}: {} and {}", by_pieces[i][j], whole[i][j]);
+            }
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! Time constants along the record, in flow that changes: a smooth change that both share, or a step; whether their ratio stays.
 
 #[cfg(test)]
-mod fixture;
+pub(crate) mod fixture;
 mod local;
 mod near;
 mod scan;

@@ -11,13 +11,13 @@ use crate::settings::Settings;
 use crate::track::Tracker;
 
 /// Time constants, s; samples are 1 s apart.
-pub(super) const TAU_S: [f64; 2] = [1.5, 4.0];
+pub(crate) const TAU_S: [f64; 2] = [1.5, 4.0];
 const NOISE_K: f64 = 0.05;
 const STEPS_PER_SAMPLE: usize = 16;
 
 /// Tones of up to a fifth of the sampling rate through both lags, whose time constants have `factor` of time, integrated in steps in
-/// which it hardly changes, and noise.
-fn observations(samples: usize, factor: impl Fn(f64) -> f64) -> Observations {
+/// which it hardly changes, and noise of `noise_k`.
+pub(crate) fn observations(samples: usize, noise_k: f64, factor: impl Fn(f64) -> f64) -> Observations {
     let tones: Vec<(f64, f64)> =
         (0..30).map(|k| (0.2 * (f64::from(k) + 0.5) / 30.0, 2.399 * f64::from(k * k))).collect();
     let gas_k = |t: f64| tones.iter().map(|(hz, phase)| (TAU * hz * t + phase).sin()).sum::<f64>();
@@ -32,7 +32,7 @@ fn observations(samples: usize, factor: impl Fn(f64) -> f64) -> Observations {
         for i in 0..2 {
             // Twelve uniform numbers have unit variance together, and are normal enough.
             let noise: f64 = (0..12).map(|_| uniform()).sum();
-            reading_c[i].push(300.0 + at_k[i] + NOISE_K * noise);
+            reading_c[i].push(300.0 + at_k[i] + noise_k * noise);
         }
         for step in 0..STEPS_PER_SAMPLE {
             let t = k as f64 + (step as f64 + 0.5) / STEPS_PER_SAMPLE as f64;
@@ -57,7 +57,7 @@ pub(super) struct Fixture {
 
 impl Fixture {
     pub(super) fn of(samples: usize, factor: impl Fn(f64) -> f64) -> Self {
-        let observations = observations(samples, factor);
+        let observations = observations(samples, NOISE_K, factor);
         let settings = Settings { noise_std_k: Some([NOISE_K; 2]), ..Settings::default() };
         let Known { prepared, fitted, .. } = Known::of(&observations, &settings, &[]).expect("a sound record");
         let selection = prepared.everything.clone();
