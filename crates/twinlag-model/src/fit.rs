@@ -287,7 +287,6 @@ mod tests {
     use crate::track::fixture::{TAU_S, observations};
     use crate::weighting::Weighting;
 
-    /// Half of what the tones are, and as much as the slower sensor shows of them.
     /// Half of what the tones are together.
     const LOUD_K: f64 = 2.0;
 
