@@ -37,9 +37,8 @@ impl<'a> Reference<'a> {
     /// gas temperature that the smoother reconstructs with each.
     pub(crate) fn before_and_after(&self, core: &Core) -> Option<BeforeAfter<f64>> {
         let rmse = |fit: &ModelFit| {
-            let judges = fit.trace.sample.iter().zip(&fit.trace.is_judge).filter(|(_, judges)| **judges);
             let gas = gas(fit)?;
-            self.rmse(|k| gas.gas_c[k], judges.map(|(sample, _)| *sample))
+            self.rmse(|k| gas.gas_c[k], fit.trace.judged.iter().cloned().flatten())
         };
         Some(BeforeAfter { before: rmse(&core.base)?, after: rmse(&core.last)? })
     }
