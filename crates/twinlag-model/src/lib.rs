@@ -63,7 +63,7 @@ pub use policy::Policy;
 pub use prepare::Prepared;
 pub use selection::Selection;
 pub use settings::{Settings, Watch, report};
-pub use spectrum::{Bands, fit_noise, runs, white_deviance};
+pub use spectrum::{Bands, fit_noise, white_deviance};
 pub use spline::Spline;
 pub use summary::{covariance, is_unresolved, summarise};
 pub use trace::{Line, ResidualPart, Trace};

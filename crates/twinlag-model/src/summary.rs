@@ -13,6 +13,7 @@ use crate::influence::Influence;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::policy::Policy;
+use crate::residual::Pairs;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
 use crate::trace::Trace;
@@ -146,8 +147,8 @@ impl Left {
         levels: &ChannelNoise,
         policy: &Policy,
     ) -> Self {
-        let evaluation = fitted.model.evaluate(&fitted.theta, observations);
-        let residual_runs = runs(&evaluation, |s| selection.holds(s));
+        let details = fitted.model.details(&fitted.theta, observations);
+        let residual_runs = runs(&details, |s| selection.holds(s));
         let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
         let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
         let count: usize = residual_runs.iter().map(Vec::len).sum();
@@ -155,9 +156,10 @@ impl Left {
         let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
         let bands = Bands::of(&residual_runs);
         drop(residual_runs);
+        let pairs = Pairs::of(fitted, &details, observations, selection);
+        let trace = Trace::of(fitted, details, &bands, observations, selection, policy);
         let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
-        tests.extend(crate::residual::tests(fitted, &evaluation, observations, selection, is_coarse));
-        let trace = Trace::of(fitted, &evaluation, &bands, observations, selection, policy);
+        tests.extend(crate::residual::tests(fitted, &pairs, observations, is_coarse));
         Self { tests, chi2_per_dof, trace }
     }
 }

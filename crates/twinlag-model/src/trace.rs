@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::blocks;
 use crate::fit::Fitted;
-use crate::implied::Evaluation;
+use crate::implied::Details;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::Selection;
@@ -31,20 +31,19 @@ impl Line {
     /// All values, or of more than 65 536 the smallest and the largest of as many neighbours as leave so many; a stretch begins with
     /// NaN then, but for the first.
     ///
-    /// - `begins`: where stretches begin
-    fn thinned(time_s: &[f64], value: &[f64], begins: &[usize]) -> Self {
+    /// - `stretches`: their places among the values
+    fn thinned(time_s: &[f64], value: Vec<f64>, stretches: impl Iterator<Item = Range<usize>>) -> Self {
         if value.len() <= MAX_POINTS {
-            return Self { time_s: time_s.to_vec(), value: value.to_vec() };
+            return Self { time_s: time_s.to_vec(), value };
         }
         let together = value.len().div_ceil(MAX_POINTS / 2);
         let mut out = Self::default();
-        let ends = begins.iter().skip(1).copied().chain([value.len()]);
-        for (from, to) in begins.iter().copied().zip(ends).filter(|(from, to)| from < to) {
+        for Range { start, end } in stretches.filter(|stretch| !stretch.is_empty()) {
             if !out.value.is_empty() {
-                out.push(time_s[from], f64::NAN);
+                out.push(time_s[start], f64::NAN);
             }
-            for first in (from..to).step_by(together) {
-                let neighbours = first..(first + together).min(to);
+            for first in (start..end).step_by(together) {
+                let neighbours = first..(first + together).min(end);
                 let by_value = |a: &usize, b: &usize| value[*a].total_cmp(&value[*b]);
                 let extremes = [neighbours.clone().min_by(by_value), neighbours.max_by(by_value)];
                 let [one, other] = extremes.map(|k| k.expect("a neighbour"));
@@ -76,8 +75,7 @@ pub struct ResidualPart {
 }
 
 impl ResidualPart {
-    fn of(evaluation: &Evaluation, range: Range<usize>) -> Self {
-        let Evaluation { time_s, residual, .. } = evaluation;
+    fn of(time_s: &[f64], residual: &[f64], range: Range<usize>) -> Self {
         let (ends_s, count) = ([time_s[range.start], time_s[range.end - 1]], range.len());
         Self { ends_s, count, mean_square: residual[range].iter().map(|r| r * r).sum::<f64>() / count as f64 }
     }
@@ -105,11 +103,11 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// - `evaluation`: of the fitted model
+    /// - `details`: of the fitted model
     /// - `bands`: of its residual
     pub(crate) fn of(
         fitted: &Fitted,
-        evaluation: &Evaluation,
+        mut details: Details,
         bands: &Bands,
         observations: &Observations,
         selection: &Selection,
@@ -117,28 +115,28 @@ impl Trace {
     ) -> Self {
         let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
         let is_judge = |s: usize| selection.holds(s) && blocks::is_judge(s, observations.samples(), policy);
-        let Evaluation { time_s, residual, sample, begins, .. } = evaluation;
-        let gas_c = crate::residual::estimated_gas(fitted, evaluation, observations);
-        let n = residual.len();
+        let gas_c = crate::residual::estimated_gas(fitted, std::mem::take(&mut details.parts), observations);
+        let residual = std::mem::take(&mut details.residual);
+        let (time_s, n) = (&details.time_s, residual.len());
         let size = n.div_ceil(SHOWN_PARTS).max(1);
-        let parts = (0..n).step_by(size).map(|from| ResidualPart::of(evaluation, from..(from + size).min(n)));
+        let parts = (0..n).step_by(size).map(|from| ResidualPart::of(time_s, &residual, from..(from + size).min(n)));
         Self {
-            residual: Line::thinned(time_s, residual, begins),
             parts: parts.collect(),
-            worst: worst(evaluation),
-            judged: ranges(sample.iter().copied().filter(|s| is_judge(*s))),
-            gas_change_k: gas_change_k(fitted, sample, &gas_c, observations),
-            gas_c: Line::thinned(time_s, &gas_c, begins),
+            worst: worst(time_s, &residual),
+            residual: Line::thinned(time_s, residual, details.stretches()),
+            judged: ranges(details.sample().filter(|s| is_judge(*s))),
+            gas_change_k: gas_change_k(fitted, details.sample(), &gas_c, observations),
+            gas_c: Line::thinned(time_s, gas_c, details.stretches()),
             bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
         }
     }
 }
 
 /// The one of [`NAMED_PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
-fn worst(evaluation: &Evaluation) -> Option<ResidualPart> {
-    let n = evaluation.residual.len();
+fn worst(time_s: &[f64], residual: &[f64]) -> Option<ResidualPart> {
+    let n = residual.len();
     let parts = (0..NAMED_PARTS).map(|i| i * n / NAMED_PARTS..(i + 1) * n / NAMED_PARTS);
-    let parts = parts.filter(|part| !part.is_empty()).map(|part| ResidualPart::of(evaluation, part));
+    let parts = parts.filter(|part| !part.is_empty()).map(|part| ResidualPart::of(time_s, residual, part));
     parts.max_by(|a, b| a.mean_square.total_cmp(&b.mean_square))
 }
 
@@ -157,12 +155,17 @@ fn ranges(numbers: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
 /// Root mean square of what the gas temperature differs from the reading of the faster sensor, where that is there, K.
 ///
 /// - `sample`: the sample of each gas temperature, rising
-fn gas_change_k(fitted: &Fitted, sample: &[usize], gas_c: &[f64], observations: &Observations) -> f64 {
+fn gas_change_k(
+    fitted: &Fitted,
+    sample: impl Iterator<Item = usize>,
+    gas_c: &[f64],
+    observations: &Observations,
+) -> f64 {
     let faster = usize::from(fitted.theta[1] < fitted.theta[0]);
     let readings = observations.stretches.iter().flat_map(|s| s.reading_c[faster].iter().zip(&s.masked[faster]));
     let mut readings = readings.enumerate();
-    let there = sample.iter().zip(gas_c).filter_map(|(sample, gas_c)| {
-        let (_, (reading_c, is_masked)) = readings.find(|(k, _)| k == sample)?;
+    let there = sample.zip(gas_c).filter_map(|(sample, gas_c)| {
+        let (_, (reading_c, is_masked)) = readings.find(|(k, _)| *k == sample)?;
         (!is_masked).then_some(gas_c - reading_c)
     });
     let (sum, count) = there.fold((0.0, 0.0_f64), |(sum, n), change_k| (sum + change_k.powi(2), n + 1.0));
@@ -177,8 +180,8 @@ mod tests {
     #[test]
     fn the_worst_part_is_a_tenth() {
         let worst_of = |residual: Vec<f64>| {
-            let time_s = (0..residual.len()).map(|k| k as f64).collect();
-            worst(&Evaluation { residual, time_s, ..Evaluation::default() }).map(|part| (part.ends_s, part.count))
+            let time_s: Vec<f64> = (0..residual.len()).map(|k| k as f64).collect();
+            worst(&time_s, &residual).map(|part| (part.ends_s, part.count))
         };
         let mut residual = vec![1.0; 1009];
         residual[1008] = 3.0;
@@ -194,7 +197,7 @@ mod tests {
         let n = 3 * MAX_POINTS + 17;
         let time_s: Vec<f64> = (0..n).map(|k| if k < 70_000 { k as f64 } else { k as f64 + 500.0 }).collect();
         let value: Vec<f64> = (0..n).map(|k| ((k * k * 7 + k) as f64 * 2.399).sin()).collect();
-        let line = Line::thinned(&time_s, &value, &[0, 70_000]);
+        let line = Line::thinned(&time_s, value.clone(), [0..70_000, 70_000..n].into_iter());
         assert!(line.value.len() <= MAX_POINTS + 2, "{}", line.value.len());
         assert!(line.time_s.is_sorted());
         let points: Vec<(u64, u64)> =
@@ -207,7 +210,7 @@ mod tests {
         }
         let gaps: Vec<f64> = line.time_s.iter().zip(&line.value).filter(|(_, v)| v.is_nan()).map(|(t, _)| *t).collect();
         assert_eq!(gaps, [70_500.0]);
-        let short = Line::thinned(&time_s[..900], &value[..900], &[0]);
+        let short = Line::thinned(&time_s[..900], value[..900].to_vec(), std::iter::once(0..900));
         assert_eq!((&short.time_s[..], &short.value[..]), (&time_s[..900], &value[..900]));
     }
 
