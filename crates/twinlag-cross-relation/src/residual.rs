@@ -123,9 +123,9 @@ fn two_sided(deviate: f64) -> f64 {
 }
 
 /// Residuals of an unbroken run up to which its spectrum is that of the whole run.
-const MAX_WHOLE_RESIDUALS: usize = 1 << 19;
+pub(crate) const MAX_WHOLE_RESIDUALS: usize = 1 << 19;
 /// Residuals of the pieces of longer runs: their transforms have a power of two.
-const PIECE_RESIDUALS: usize = (1 << 17) - 1;
+pub(crate) const PIECE_RESIDUALS: usize = (1 << 17) - 1;
 /// Neighbouring residuals of longer runs that are added to one for the slow end of the spectrum.
 const RESIDUALS_ADDED: usize = 64;
 /// The slow end of the spectrum of sums, in cycles from sum to sum: there they keep 98.7 % of the power, `(sin x/x)²` of `π/16`.

@@ -177,8 +177,7 @@ impl<'a> Search<'a> {
     /// leaves over.
     pub(crate) fn beside(mut self, current: &Fitted) -> Self {
         self.context.tau_s = [current.theta[0], current.theta[1]];
-        let evaluation = current.model.evaluate(&current.theta, self.observations);
-        let found = lines(self.observations, &evaluation, |s| self.selection.holds(s), self.policy);
+        let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy);
         self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
         self
     }
@@ -229,8 +228,8 @@ impl<'a> Search<'a> {
         }
         let energy = |fitted: &Fitted| {
             let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
-            let pairs = evaluation.residual.iter().zip(&evaluation.sample);
-            let held = pairs.filter(|(_, s)| self.selection.holds(**s));
+            let pairs = evaluation.residual.iter().zip(evaluation.sample());
+            let held = pairs.filter(|(_, s)| self.selection.holds(*s));
             held.fold((0.0, 0.0), |(sum, n), (r, _)| (sum + r * r, n + 1.0))
         };
         let ((b, n), (a, _)) = (energy(before), energy(after));

@@ -71,6 +71,9 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         let half = half_intervals(&last, &found, &with_effects);
         circumstances.hide(&search.hidden(around, &state.far, &half));
     }
+    // What is left over may hide an effect of any size.
+    let limits = around.as_ref().map_or_else(Vec::new, |around| search.limits(around));
+    drop(around);
     let mut judgements = circumstances.judge(&mut last);
     let mut base_judgements = if verdict == Verdict::Adequate {
         circumstances.judge(&mut base)
@@ -93,8 +96,6 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         remarks.push(Remark::BiasUnknown { is_one_known: !settings.known.is_empty() });
     }
     remarks.sort_by_key(Remark::importance);
-    // What is left over may hide an effect of any size.
-    let limits = around.as_ref().map_or_else(Vec::new, |around| search.limits(around));
     Ok(Diagnosis {
         verdict,
         effects,
@@ -282,15 +283,10 @@ fn errors(state: &State<'_>, unmasked: Option<&Fitted>, fits: [&ModelFit; 2]) ->
         // out.
         let faster_s = fitted.theta[0].min(fitted.theta[1]);
         let half = (faster_s / observations.step_s()).clamp(1.0, MOST_SMOOTHED_SAMPLES) as usize;
-        let ends = evaluation.begins.iter().skip(1).copied().chain([evaluation.disagreement_k.len()]);
-        let apart: Vec<f64> = evaluation
-            .begins
-            .iter()
-            .zip(ends)
-            .flat_map(|(from, to)| filter.smooth_or_mean(&evaluation.disagreement_k[*from..to], half))
-            .collect();
+        let smoothed = |stretch| filter.smooth_or_mean(&evaluation.disagreement_k[stretch], half);
+        let apart: Vec<f64> = evaluation.stretches().flat_map(smoothed).collect();
         [&evaluation.residual, &apart].map(|values| {
-            let pairs = values.iter().zip(&evaluation.sample).filter(|(_, s)| prepared.judges(**s));
+            let pairs = values.iter().zip(evaluation.sample()).filter(|(_, s)| prepared.judges(*s));
             let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), (v, _)| (sum + v * v, n + 1.0));
             (sum / count.max(1.0)).sqrt()
         })

@@ -54,7 +54,7 @@ fn tones_of(y: &[f64], policy: &Policy, noise_k: impl FnOnce() -> Option<f64>) -
     let weight: f64 = tapered.iter().sum();
     let level = tapered.iter().zip(y).map(|(w, y)| w * y).sum::<f64>() / weight;
     tapered.iter_mut().zip(y).for_each(|(w, y)| *w *= y - level);
-    let plan = Forward::of(n);
+    let plan = Forward::once(n);
     let mut spectrum = vec![Complex64::ZERO; plan.bins()];
     plan.transform_into(&mut tapered, &mut spectrum, &mut Vec::new());
     drop(tapered);

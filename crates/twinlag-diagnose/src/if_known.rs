@@ -8,7 +8,7 @@
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::CHI2_95;
 use twinlag_model::{
-    Effort, Fitted, Identifier, KnownTimeConstant, ModelFit, Observations, Policy, TimeConstant, Value, summarise,
+    Effort, Fitted, Identifier, KnownTimeConstant, Observations, Policy, TimeConstant, Value, summarise,
 };
 
 use crate::grade::{Basis, Grade, Judgement, Reason, excess};
@@ -216,22 +216,11 @@ fn held(tau_s: f64, fitted: &Fitted, state: &State<'_>, policy: &Policy) -> Held
         other: fit.time_constants[1],
         difference: fit.difference,
         effects: state.taken.iter().enumerate().map(of_effect).collect(),
-        gas_change_k: gas_change_k(fitted, &fit, &prepared.observations),
+        gas_change_k: fit.trace.gas_change_k,
         deviance: 0.0,
         is_excluded: None,
         judgement,
     }
-}
-
-/// Root mean square of what the gas temperature differs from the reading of the faster sensor, where that is there, K.
-fn gas_change_k(fitted: &Fitted, fit: &ModelFit, observations: &Observations) -> f64 {
-    let faster = usize::from(fitted.theta[1] < fitted.theta[0]);
-    let reading_c: Vec<f64> = observations.channel(faster).collect();
-    let is_masked: Vec<bool> = observations.stretches.iter().flat_map(|s| s.masked[faster].iter().copied()).collect();
-    let there = fit.trace.sample.iter().zip(&fit.trace.gas_c).filter(|(sample, _)| !is_masked[**sample]);
-    let (sum, count) =
-        there.fold((0.0, 0.0_f64), |(sum, n), (sample, gas_c)| (sum + (gas_c - reading_c[*sample]).powi(2), n + 1.0));
-    (sum / count.max(1.0)).sqrt()
 }
 
 #[cfg(test)]

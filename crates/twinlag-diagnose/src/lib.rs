@@ -67,9 +67,9 @@ pub use limits::NEVER_TESTABLE;
 pub use moves::Move;
 pub use remark::Remark;
 pub use twinlag_model::{
-    About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, ModelError, ModelFit,
-    Observations, Policy, RatioTest, Settings, Stretch, TimeConstant, Trace, Track, Value, Watch, evenly_spread,
-    fit_with, track,
+    About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, Line, ModelError,
+    ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track, Value,
+    Watch, evenly_spread, fit_with, track,
 };
 
 /// A diagnosis may go to any thread, and be read by several.

@@ -7,14 +7,19 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use twinlag_bias::{COARSE_STEP_NOISE_RATIO, estimate_noise};
 use twinlag_cross_relation::{Readings, Segment, Steps};
-use twinlag_transform::{Forward, hann};
+use twinlag_transform::{Forward, fast_length, hann};
 
+use crate::fit::Fitted;
 use crate::implied::{Evaluation, Part, median};
 use crate::observations::Observations;
 use crate::policy::Policy;
 
 /// Bins beside a line that it is held against: beyond the window's main lobe.
 const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
+
+/// Values up to which a series is transformed as long as it is. The transform of a large prime factor takes six times the memory of
+/// others, and of a long series that is more than the record.
+pub(crate) const MAX_TRANSFORMED_AS_IT_IS: usize = 1 << 19;
 
 /// Noise of the channels: as third differences show it, or as a model leaves it over.
 #[derive(Clone, Copy, Debug)]
@@ -93,17 +98,12 @@ fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
 /// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
 /// particular.
-pub(crate) fn spikes(
-    observations: &Observations,
-    evaluation: &Evaluation,
-    far: f64,
-    policy: &Policy,
-) -> [Vec<usize>; 2] {
+pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, policy: &Policy) -> [Vec<usize>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
         let mut ranks = Vec::new();
-        for part in &evaluation.parts {
+        for part in parts {
             let stretch = &observations.stretches[part.stretch];
             let n = stretch.len();
             if n < 16 {
@@ -194,30 +194,31 @@ fn tone(values: impl Iterator<Item = (usize, f64)>, omega: f64) -> Complex64 {
     sum
 }
 
-/// Lines that stick out of the residual: frequencies in Hz, strongest first, each far beyond what its neighbours are.
-pub fn lines(
-    observations: &Observations,
-    evaluation: &Evaluation,
-    holds: impl Fn(usize) -> bool,
-    policy: &Policy,
-) -> Vec<f64> {
+/// Lines that stick out of the residual of `fitted`: frequencies in Hz, strongest first, each far beyond what its neighbours are.
+pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize) -> bool, policy: &Policy) -> Vec<f64> {
     let Some(period_s) = observations.period_s else { return Vec::new() };
+    let Evaluation { residual, samples, .. } = fitted.model.evaluate(&fitted.theta, observations);
     // What does not count is zero; twice the length, so that no frequency is far from a bin.
-    let Some(last) = evaluation.sample.iter().max() else { return Vec::new() };
-    let n = 2 * (last + 1);
+    let Some(last) = samples.iter().filter(|samples| !samples.is_empty()).map(|samples| samples.end - 1).max() else {
+        return Vec::new();
+    };
+    let n = padded_length(2 * (last + 1));
     let mut run = vec![0.0; n];
     let mut count = 0usize;
-    for (r, sample) in evaluation.residual.iter().zip(&evaluation.sample) {
-        if holds(*sample) {
-            run[*sample] = *r;
+    for (r, sample) in residual.iter().zip(samples.into_iter().flatten()) {
+        if holds(sample) {
+            run[sample] = *r;
             count += 1;
         }
     }
+    drop(residual);
     if count < 64 {
         return Vec::new();
     }
-    let spectrum = Forward::once(n).transform(&run);
-    drop(run);
+    let plan = Forward::once(n);
+    let mut spectrum = vec![Complex64::ZERO; plan.bins()];
+    plan.transform_into(&mut run, &mut spectrum, &mut Vec::new());
+    drop((plan, run));
     let power: Vec<f64> = spectrum.into_iter().map(|x| x.norm_sqr() / count as f64).collect();
     let mut found: HashMap<usize, f64> = HashMap::new();
     for bin in 3..power.len().saturating_sub(1) {
@@ -238,11 +239,21 @@ pub fn lines(
             }
         }
     }
-    let ratio = |bin: usize| gas_line_ratio(evaluation, TAU * bin as f64 / n as f64);
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let evaluation = fitted.model.evaluate(&fitted.theta, observations);
+    let ratio = |bin: usize| gas_line_ratio(&evaluation, TAU * bin as f64 / n as f64);
     let mut out: Vec<(usize, f64)> =
         found.into_iter().filter(|(bin, _)| ratio(*bin) >= policy.most_gas_line_ratio).collect();
     out.sort_by(|a, b| b.1.total_cmp(&a.1));
     out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
+}
+
+/// Values to transform of a record with so many, zeros after them counted: of a long one no more than a thirty-second more, so that no
+/// large prime factor takes several times the memory.
+fn padded_length(samples: usize) -> usize {
+    if samples <= MAX_TRANSFORMED_AS_IT_IS { samples } else { fast_length(samples + samples / 32) }
 }
 
 /// Amplitude of a line at `omega` radians per sample in the difference of both inferred inputs, over that in their mean: 2 where
@@ -250,7 +261,7 @@ pub fn lines(
 fn gas_line_ratio(evaluation: &Evaluation, omega: f64) -> f64 {
     let amplitude = |values: &[f64]| -> f64 {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        tone(evaluation.sample.iter().copied().zip(values.iter().map(|v| v - mean)), omega).norm()
+        tone(evaluation.sample().zip(values.iter().map(|v| v - mean)), omega).norm()
     };
     amplitude(&evaluation.disagreement_k) / amplitude(&evaluation.gas_c)
 }

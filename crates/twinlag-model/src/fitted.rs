@@ -6,6 +6,7 @@ use twinlag_optimise::Fit;
 
 use crate::effect::Identifier;
 use crate::extended::Extended;
+use crate::trace::Trace;
 
 /// A fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,26 +35,6 @@ pub struct TimeConstant {
     pub interval_95_s: Option<[f64; 2]>,
     /// How far it moves between parts of the record; `None` where it has no standard error.
     pub scatter: Option<PartScatter>,
-}
-
-/// A fit as a picture needs it.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Trace {
-    /// Instants, s.
-    pub time_s: Vec<f64>,
-    /// Whitened residual.
-    pub residual: Vec<f64>,
-    /// The sample, counted through the stretches, that each belongs to.
-    pub sample: Vec<usize>,
-    /// Whether the sample is of the blocks that judge.
-    pub is_judge: Vec<bool>,
-    /// Estimated gas temperature, °C: both inferred inputs together, without the frequencies in which there is only noise.
-    pub gas_c: Vec<f64>,
-    /// Difference of both, K.
-    pub disagreement_k: Vec<f64>,
-    /// Power of the residual in bands: frequency in Hz, power, degrees of freedom.
-    pub bands: Vec<[f64; 3]>,
 }
 
 /// One model of the record.

@@ -1,6 +1,9 @@
 //! What a model implies of a record beside its residual: gas temperatures, their difference, the noise of each reading.
 //! Computed once, where a fit has ended.
 
+use std::ops::Range;
+
+use crate::chain::Chain;
 use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variance};
 use crate::inverse::Inverse;
 use crate::observations::Observations;
@@ -14,26 +17,65 @@ const UNINFORMED_RATIO: f64 = 10.0;
 /// Samples around the middle of a record, beside the reach of a delay, from which the paths of noise are taken.
 const PATH_SAMPLES: usize = 16;
 
-/// The whitened disagreement of a whole record, and what it is made of.
+/// The whitened disagreement of a whole record, and the gas temperatures that it is of.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Evaluation {
     /// Whitened residual.
     pub residual: Vec<f64>,
-    /// The sample, counted through all stretches, in the middle of each residual's reach.
-    pub sample: Vec<usize>,
-    /// Its instant, s.
-    pub time_s: Vec<f64>,
     /// Mean of the two inferred gas temperatures, smoothed by the operators, °C.
     pub gas_c: Vec<f64>,
     /// Their difference, K.
     pub disagreement_k: Vec<f64>,
+    /// The sample, counted through all stretches, in the middle of each residual's reach: neighbours in each stretch.
+    pub samples: Vec<Range<usize>>,
+}
+
+impl Evaluation {
+    /// The sample of each residual.
+    pub fn sample(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.samples.iter().cloned().flatten()
+    }
+
+    /// The places of the residuals of each stretch.
+    pub fn stretches(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        places(&self.samples)
+    }
+}
+
+/// The whitened disagreement of a whole record, and what it is made of.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Details {
+    /// Whitened residual.
+    pub(crate) residual: Vec<f64>,
+    /// Its instants, s.
+    pub(crate) time_s: Vec<f64>,
     /// Whether it says anything: one for each masked reading does not.
-    pub is_informed: Vec<bool>,
-    /// Where stretches begin among the residuals.
-    pub begins: Vec<usize>,
+    pub(crate) is_informed: Vec<bool>,
+    /// Its samples, as [`Evaluation`] has them.
+    pub(crate) samples: Vec<Range<usize>>,
     /// Details by stretch.
     pub(crate) parts: Vec<Part>,
+}
+
+impl Details {
+    /// The sample of each residual.
+    pub(crate) fn sample(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.samples.iter().cloned().flatten()
+    }
+
+    /// The places of the residuals of each stretch.
+    pub(crate) fn stretches(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        places(&self.samples)
+    }
+}
+
+/// Ranges as long, one after the other.
+fn places(samples: &[Range<usize>]) -> impl Iterator<Item = Range<usize>> + '_ {
+    samples.iter().scan(0, |end, samples| {
+        let first = std::mem::replace(end, *end + samples.len());
+        Some(first..*end)
+    })
 }
 
 /// One stretch with its factor.
@@ -86,51 +128,90 @@ impl Part {
     }
 }
 
+/// One stretch whitened.
+struct Whitened {
+    /// Both inferred inputs, before the differences that whiten extra noise.
+    inferred: [Inferred; 2],
+    rows: [Rows<f64>; 2],
+    variances: [Variance; 2],
+    residual: Vec<f64>,
+    time_s: Vec<f64>,
+    samples: Range<usize>,
+    factor: Factor,
+}
+
 impl Plant {
-    /// The whitened disagreement along the record, with all that it implies.
+    /// The whitened disagreement along the record, and the gas temperatures that it is of.
     pub fn evaluate(&self, observations: &Observations) -> Evaluation {
         let mut out = Evaluation::default();
-        let mut before = 0;
-        for (index, stretch) in observations.stretches.iter().enumerate() {
-            out.begins.push(out.sample.len());
-            if is_long_enough(stretch, self, observations.period_s.is_some()) {
-                self.evaluate_stretch(observations, index, before, &mut out);
+        self.each_whitened(observations, |index, _, Whitened { inferred, residual, samples, .. }| {
+            let start_c = observations.stretches[index].start_c();
+            let [mut mean_c, mut difference_k] = inferred.map(|inferred| {
+                let mut gas = inferred.value;
+                self.undo_slow(&mut gas, start_c, observations.step_s());
+                gas.drain(..self.extra.len());
+                gas.truncate(residual.len());
+                gas
+            });
+            for (a, b) in mean_c.iter_mut().zip(&mut difference_k) {
+                (*a, *b) = (0.5 * (*a + *b), *a - *b);
             }
-            before += stretch.len();
-        }
+            append(&mut out.residual, residual);
+            append(&mut out.gas_c, mean_c);
+            append(&mut out.disagreement_k, difference_k);
+            out.samples.push(samples);
+        });
         out
     }
 
-    fn evaluate_stretch(&self, observations: &Observations, index: usize, before: usize, out: &mut Evaluation) {
+    /// The whitened disagreement along the record, with all that it is made of.
+    pub(crate) fn details(&self, observations: &Observations) -> Details {
+        let mut out = Details::default();
+        self.each_whitened(observations, |stretch, before, whitened| {
+            let Whitened { inferred, rows, variances, residual, time_s, samples, factor } = whitened;
+            out.is_informed.extend(is_informed(&(0..residual.len()).map(|k| factor.row(k)[0]).collect::<Vec<f64>>()));
+            let mut weighted = residual.clone();
+            factor.unwhiten_transposed(&mut weighted);
+            append(&mut out.residual, residual);
+            append(&mut out.time_s, time_s);
+            out.samples.push(samples);
+            let skipped = self.extra.len();
+            out.parts.push(Part { stretch, rows, variances, weighted, inferred, skipped, before });
+        });
+        out
+    }
+
+    /// Visits each stretch that is long enough, with its place and the samples before it.
+    fn each_whitened(&self, observations: &Observations, mut visit: impl FnMut(usize, usize, Whitened)) {
+        let mut before = 0;
+        for (index, stretch) in observations.stretches.iter().enumerate() {
+            if is_long_enough(stretch, self, observations.period_s.is_some()) {
+                visit(index, before, self.whitened(observations, index, before));
+            }
+            before += stretch.len();
+        }
+    }
+
+    fn whitened(&self, observations: &Observations, index: usize, before: usize) -> Whitened {
         let (stretch, step_s) = (&observations.stretches[index], observations.step_s());
         let mut disagreement = Disagreement::<f64>::empty();
         disagreement.inverse.invert(self, stretch.whole(), observations.period_s);
         // What the sensors imply, before the differences that whiten extra noise.
-        let chains = disagreement.inverse.chains.each_ref();
-        let inferred = chains.map(|chain| Inferred { value: chain.value.clone(), rows: chain.rows.clone() });
+        let undifferenced = (!self.extra.is_empty()).then(|| disagreement.inverse.chains.clone());
         disagreement.compare(self, step_s);
+        let mut residual = std::mem::take(&mut disagreement.values);
+        // What is as long as the record, and not needed any more, goes.
+        let chains = std::mem::replace(&mut disagreement.inverse, Inverse::empty()).chains;
+        let time_s = chains[0].times_s()[..residual.len()].to_vec();
+        let inferred = undifferenced.unwrap_or(chains).map(|Chain { value, rows, .. }| Inferred { value, rows });
         let variances =
             [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
-        let mut residual = std::mem::take(&mut disagreement.values);
         let mut factor = Factor::empty();
         factor.compute(&disagreement.sources(&variances, 0), residual.len(), None);
         factor.whiten(&mut residual, 0, 0);
-        let count = residual.len();
-        let times_s = &disagreement.inverse.chains[0].times_s()[..count];
-        let start = before + first_sample(stretch, times_s[0], step_s);
-        out.sample.extend(start..start + count);
-        out.time_s.extend_from_slice(times_s);
-        let skipped = self.extra.len();
-        let mut gas = [0, 1].map(|i| inferred[i].value.clone());
-        gas.iter_mut().for_each(|gas| self.undo_slow(gas, stretch.start_c(), step_s));
-        let [c1, c2] = [0, 1].map(|i| &gas[i][skipped..skipped + count]);
-        out.gas_c.extend(c1.iter().zip(c2).map(|(a, b)| 0.5 * (a + b)));
-        out.disagreement_k.extend(c1.iter().zip(c2).map(|(a, b)| a - b));
-        out.is_informed.extend(is_informed(&(0..count).map(|k| factor.row(k)[0]).collect::<Vec<f64>>()));
-        out.residual.extend_from_slice(&residual);
-        factor.unwhiten_transposed(&mut residual);
-        let rows = disagreement.reading_rows;
-        out.parts.push(Part { stretch: index, rows, variances, weighted: residual, inferred, skipped, before });
+        let start = before + first_sample(stretch, time_s[0], step_s);
+        let samples = start..start + residual.len();
+        Whitened { inferred, rows: disagreement.reading_rows, variances, residual, time_s, samples, factor }
     }
 
     /// The rows, in the middle of the record, by which noise of either channel and of the gas enters the disagreement.
@@ -147,6 +228,15 @@ impl Plant {
             rows.at(k).to_vec()
         };
         [of_channel(0), of_channel(1), inverse.gas.rows.at(k).to_vec()]
+    }
+}
+
+/// Puts `values` after those that there are.
+fn append(all: &mut Vec<f64>, values: Vec<f64>) {
+    if all.is_empty() {
+        *all = values;
+    } else {
+        all.extend(values);
     }
 }
 

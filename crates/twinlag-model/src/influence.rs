@@ -44,7 +44,10 @@ impl<'a> Influence<'a> {
         }
         let breaks = (1..n).filter(|k| samples[*k] != samples[*k - 1] + 1);
         let ends: Vec<usize> = std::iter::once(0).chain(breaks).chain([n]).collect();
-        let runs = |values: &[f64]| -> Vec<Vec<f64>> { ends.windows(2).map(|w| values[w[0]..w[1]].to_vec()).collect() };
-        PartScatter::of(&runs(&residual[..n]), &runs(&influence), variance.max(0.0).sqrt())
+        PartScatter::of(&runs(residual, &ends), &runs(&influence, &ends), variance.max(0.0).sqrt())
     }
+}
+
+fn runs<'a>(values: &'a [f64], ends: &[usize]) -> Vec<&'a [f64]> {
+    ends.windows(2).map(|w| &values[w[0]..w[1]]).collect()
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use twinlag_optimise::Variable;
 
 use crate::effect::{Identifier, Parameter, Shared};
-use crate::implied::Evaluation;
+use crate::implied::{Details, Evaluation};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
 use crate::plant::Plant;
@@ -260,6 +260,10 @@ impl Model {
     /// What the model implies of the record.
     pub fn evaluate(&self, theta: &[f64], observations: &Observations) -> Evaluation {
         self.plant(theta, observations).evaluate(observations)
+    }
+
+    pub(crate) fn details(&self, theta: &[f64], observations: &Observations) -> Details {
+        self.plant(theta, observations).details(observations)
     }
 
     /// Shortest and longest that a fit takes a time constant to be, s.

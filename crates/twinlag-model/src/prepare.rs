@@ -130,13 +130,13 @@ impl Prepared {
     }
 
     pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
-        let evaluation = base.model.evaluate(&base.theta, &self.observations);
+        let parts = base.model.details(&base.theta, &self.observations).parts;
         let mut new = [Vec::new(), Vec::new()];
         let policy = &self.policy;
         for (round, far) in
             [policy.spike_standard_deviations, policy.further_spike_standard_deviations].into_iter().enumerate()
         {
-            let spikes = defects::spikes(&self.observations, &evaluation, far, policy);
+            let spikes = defects::spikes(&self.observations, &parts, far, policy);
             for i in 0..2 {
                 // Where there are some there are smaller ones.
                 if round == 0 || !new[i].is_empty() {

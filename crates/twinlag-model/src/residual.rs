@@ -6,11 +6,12 @@
 
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use twinlag_cross_relation::{ResidualTest, TestName};
-use twinlag_transform::{Complex64, Forward, Tapered, hann};
+use twinlag_transform::{Complex64, Forward, Tapered, fast_length, hann};
 
+use crate::defects::MAX_TRANSFORMED_AS_IT_IS;
 use crate::dense;
 use crate::fit::Fitted;
-use crate::implied::Evaluation;
+use crate::implied::{Details, Inferred, Part};
 use crate::observations::Observations;
 use crate::plant::Place;
 use crate::selection::Selection;
@@ -24,21 +25,22 @@ const GAS_POWER_RATIO: f64 = 3.0;
 const ENERGY_PARTS: usize = 20;
 
 /// Residual and estimated input where they count, in unbroken runs.
-struct Pairs {
+pub(crate) struct Pairs {
     runs: Vec<(Vec<f64>, Vec<f64>)>,
     /// White noise of the reading that stands for the input, K.
     noise_std_k: f64,
 }
 
 impl Pairs {
-    fn of(fitted: &Fitted, evaluation: &Evaluation, observations: &Observations, selection: &Selection) -> Self {
+    /// - `details`: of the fitted model
+    pub(crate) fn of(fitted: &Fitted, details: &Details, observations: &Observations, selection: &Selection) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel =
             usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
         let mut cleaned = vec![f64::NAN; observations.samples()];
-        for part in &evaluation.parts {
+        for part in &details.parts {
             let stretch = &observations.stretches[part.stretch];
             let noise = part.noise_of(channel, stretch.len());
             for (k, (y, n)) in stretch.reading_c[channel].iter().zip(noise).enumerate() {
@@ -47,15 +49,15 @@ impl Pairs {
         }
         let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
         let mut last = None;
-        for (k, sample) in evaluation.sample.iter().enumerate().filter(|(_, s)| selection.holds(**s)) {
-            if last.is_none_or(|l| *sample != l + 1) {
+        for (k, sample) in details.sample().enumerate().filter(|(_, s)| selection.holds(*s)) {
+            if last.is_none_or(|l| sample != l + 1) {
                 runs.push((Vec::new(), Vec::new()));
             }
-            last = Some(*sample);
-            if evaluation.is_informed[k] {
+            last = Some(sample);
+            if details.is_informed[k] {
                 let run = runs.last_mut().expect("begun");
-                run.0.push(evaluation.residual[k]);
-                run.1.push(cleaned[*sample]);
+                run.0.push(details.residual[k]);
+                run.1.push(cleaned[sample]);
             }
         }
         Self { runs, noise_std_k: plant.noise_std_k[channel] }
@@ -72,26 +74,28 @@ impl Pairs {
 
 /// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
 ///
-/// - `evaluation`: of the fitted model
-pub(crate) fn estimated_gas(fitted: &Fitted, evaluation: &Evaluation, observations: &Observations) -> Vec<f64> {
+/// - `parts`: of the fitted model
+pub(crate) fn estimated_gas(fitted: &Fitted, parts: Vec<Part>, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
     let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
-    let mut out = Vec::with_capacity(evaluation.residual.len());
-    for part in &evaluation.parts {
+    let mut out = Vec::with_capacity(parts.iter().map(Part::len).sum());
+    for part in parts {
         let stretch = &observations.stretches[part.stretch];
         let noise = part.noise_of(channel, stretch.len());
-        let chain = &part.inferred[channel];
-        let mut gas: Vec<f64> = (0..part.len())
-            .map(|k| {
-                let k = k + part.skipped;
-                let first = chain.rows.start + k;
-                let taken = chain.rows.at(k).iter().enumerate();
-                let taken: f64 = taken.map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum();
-                chain.value[k] - taken
-            })
-            .collect();
+        let (skipped, count) = (part.skipped, part.len());
+        let [one, two] = part.inferred;
+        let Inferred { value: mut gas, rows } = if channel == 0 { one } else { two };
+        gas.drain(..skipped);
+        gas.truncate(count);
+        for (k, gas) in gas.iter_mut().enumerate() {
+            let k = k + skipped;
+            let first = rows.start + k;
+            let taken = rows.at(k).iter().enumerate();
+            *gas -= taken.map(|(j, c)| c * noise.get(first + j).copied().unwrap_or(0.0)).sum::<f64>();
+        }
         plant.undo_slow(&mut gas, stretch.start_c(), observations.step_s());
+        drop(noise);
         out.extend(filter.smooth(&gas));
     }
     out
@@ -99,29 +103,22 @@ pub(crate) fn estimated_gas(fitted: &Fitted, evaluation: &Evaluation, observatio
 
 /// Coherence with the estimated input, dependence on its level and rate, on time, tails, lines, and readings that repeat.
 ///
-/// - `evaluation`: of the fitted model
+/// - `pairs`: of the fitted model
 /// - `is_coarse`: whether a converter is, whose rounding has no tails
-pub(crate) fn tests(
-    fitted: &Fitted,
-    evaluation: &Evaluation,
-    observations: &Observations,
-    selection: &Selection,
-    is_coarse: bool,
-) -> Vec<ResidualTest> {
-    let pairs = Pairs::of(fitted, evaluation, observations, selection);
+pub(crate) fn tests(fitted: &Fitted, pairs: &Pairs, observations: &Observations, is_coarse: bool) -> Vec<ResidualTest> {
     let r: Vec<f64> = pairs.residual().collect();
     if r.len() < 100 {
         return Vec::new();
     }
     let mut out = Vec::new();
-    out.extend(coherence(&pairs));
-    out.extend(level(&pairs, &r));
-    out.push(rate(&pairs, &r));
+    out.extend(coherence(pairs));
+    out.extend(level(pairs, &r));
+    out.push(rate(pairs, &r));
     out.push(time(&r));
     if !is_coarse {
         out.push(tails(&r));
     }
-    out.extend(lines(&pairs));
+    out.extend(lines(pairs));
     out.extend(repeated_values(observations, fitted.model.noise_std_k()));
     out
 }
@@ -179,8 +176,9 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
 fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
     const CLASSES: usize = 10;
     let x: Vec<f64> = pairs.input().collect();
-    let mut order: Vec<usize> = (0..x.len()).collect();
-    order.sort_by(|&a, &b| x[a].total_cmp(&x[b]));
+    let mut order: Vec<u32> = (0..x.len() as u32).collect();
+    order.sort_by(|&a, &b| x[a as usize].total_cmp(&x[b as usize]));
+    drop(x);
     let variance = dense::dot(r, r) / r.len() as f64;
     let size = r.len() / CLASSES;
     if variance <= 0.0 || size < 10 {
@@ -190,7 +188,7 @@ fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
         .chunks(size)
         .take(CLASSES)
         .map(|class| {
-            let sum: f64 = class.iter().map(|&k| r[k]).sum();
+            let sum: f64 = class.iter().map(|&k| r[k as usize]).sum();
             sum * sum / (class.len() as f64 * variance)
         })
         .sum();
@@ -247,7 +245,10 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }
-    let spectrum = Forward::once(run.len()).transform(run);
+    // The last hundredth of a long one is left out for that.
+    let count = if run.len() > MAX_TRANSFORMED_AS_IT_IS { fast_length(run.len()) } else { run.len() };
+    let run = &run[..count];
+    let spectrum = Forward::once(count).transform(run);
     let power: Vec<f64> = spectrum[1..(run.len() - 1) / 2].iter().map(Complex64::norm_sqr).collect();
     let half = NEIGHBOURS / 2;
     let bins = half + 1..power.len().saturating_sub(half + 1);
@@ -269,7 +270,7 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
 fn repeated_values(observations: &Observations, noise_std_k: [f64; 2]) -> Option<ResidualTest> {
     let of_channel = |i: usize| -> Option<(f64, f64)> {
         let mut values: Vec<f64> = observations.channel(i).collect();
-        values.sort_by(f64::total_cmp);
+        values.sort_unstable_by(f64::total_cmp);
         let apart = values.windows(2).map(|w| w[1] - w[0]);
         let step_k = apart.filter(|d| *d > 1e-9 * observations.swing_k()).fold(f64::INFINITY, f64::min);
         if step_k > noise_std_k[i] {

@@ -9,7 +9,7 @@ use twinlag_transform::Forward;
 
 use crate::disagreement::Evaluator;
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
-use crate::implied::{Evaluation, is_informed};
+use crate::implied::{Details, is_informed};
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::{Extra, Place, Plant};
@@ -322,9 +322,9 @@ pub fn fit_noise(
 }
 
 /// Unbroken runs of the residuals that count and say anything.
-pub fn runs(evaluation: &Evaluation, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
-    let pairs = evaluation.residual.iter().copied().zip(evaluation.is_informed.iter().copied());
-    runs_of(evaluation.sample.iter().copied().zip(pairs), holds)
+pub(crate) fn runs(details: &Details, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
+    let pairs = details.residual.iter().copied().zip(details.is_informed.iter().copied());
+    runs_of(details.sample().zip(pairs), holds)
 }
 
 /// Runs of samples, each with its residual and whether this says anything.
@@ -346,7 +346,7 @@ fn runs_of(residuals: impl Iterator<Item = (usize, (f64, bool))>, holds: impl Fn
 }
 
 impl Model {
-    /// As [`runs`] of what the model implies, in a fifth of the memory.
+    /// Unbroken runs of the residuals that count and say anything.
     pub fn residual_runs(
         &self,
         theta: &[f64],

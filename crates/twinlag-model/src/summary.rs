@@ -1,22 +1,22 @@
 //! A fitted model in numbers: time constants with their intervals, tests, and what pictures need.
 
-use twinlag_cross_relation::{CHI2_95, Z_975, log_normal_interval_95, residual_tests};
+use twinlag_cross_relation::{CHI2_95, ResidualTest, Z_975, log_normal_interval_95, residual_tests};
 
-use crate::blocks;
 use crate::correlation::{autocorrelation, filtered};
 use crate::cost::Linearised;
 use crate::defects::ChannelNoise;
 use crate::dense;
 use crate::extended::Extended;
 use crate::fit::{Effort, Fitted};
-use crate::fitted::{ModelFit, TimeConstant, Trace};
-use crate::implied::Evaluation;
+use crate::fitted::{ModelFit, TimeConstant};
 use crate::influence::Influence;
 use crate::model::MAX_TAU_SPANS;
 use crate::observations::Observations;
 use crate::policy::Policy;
+use crate::residual::Pairs;
 use crate::selection::Selection;
 use crate::spectrum::{Bands, runs};
+use crate::trace::Trace;
 
 /// Whether a time constant is shorter than the samples resolve, or as long as the record. One that is known need not be
 /// resolved, and beside it the other may be as short as its interval allows: it is how far one sensor lags behind the other.
@@ -106,15 +106,7 @@ pub fn summarise(
     levels: &ChannelNoise,
     policy: &Policy,
 ) -> ModelFit {
-    let evaluation = fitted.model.evaluate(&fitted.theta, observations);
-    let residual_runs = runs(&evaluation, |s| selection.holds(s));
-    let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
-    let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
-    let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
-    tests.extend(crate::residual::tests(fitted, &evaluation, observations, selection, is_coarse));
-    let count: usize = residual_runs.iter().map(Vec::len).sum();
-    let dof = count.saturating_sub(fitted.model.free_count()).max(1);
-    let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
+    let Left { tests, chi2_per_dof, trace } = Left::of(fitted, observations, selection, levels, policy);
     let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
     let covariance = covariance(fitted, observations, selection, rejects);
     let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
@@ -136,7 +128,39 @@ pub fn summarise(
         covariance,
         scatter,
         extended: Some(Extended::new(fitted, observations)),
-        trace: trace(fitted, evaluation, &Bands::of(&residual_runs), observations, selection, policy),
+        trace,
+    }
+}
+
+/// What a fit leaves over.
+struct Left {
+    tests: Vec<ResidualTest>,
+    chi2_per_dof: f64,
+    trace: Trace,
+}
+
+impl Left {
+    fn of(
+        fitted: &Fitted,
+        observations: &Observations,
+        selection: &Selection,
+        levels: &ChannelNoise,
+        policy: &Policy,
+    ) -> Self {
+        let details = fitted.model.details(&fitted.theta, observations);
+        let residual_runs = runs(&details, |s| selection.holds(s));
+        let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
+        let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
+        let count: usize = residual_runs.iter().map(Vec::len).sum();
+        let dof = count.saturating_sub(fitted.model.free_count()).max(1);
+        let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
+        let bands = Bands::of(&residual_runs);
+        drop(residual_runs);
+        let pairs = Pairs::of(fitted, &details, observations, selection);
+        let trace = Trace::of(fitted, details, &bands, observations, selection, policy);
+        let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
+        tests.extend(crate::residual::tests(fitted, &pairs, observations, is_coarse));
+        Self { tests, chi2_per_dof, trace }
     }
 }
 
@@ -203,26 +227,4 @@ fn time_constant(value_s: f64, variance: Option<f64>, policy: &Policy) -> TimeCo
 
 fn standard_error(variance: Option<f64>) -> Option<f64> {
     variance.filter(|v| v.is_finite() && *v > 0.0).map(f64::sqrt)
-}
-
-fn trace(
-    fitted: &Fitted,
-    evaluation: Evaluation,
-    bands: &Bands,
-    observations: &Observations,
-    selection: &Selection,
-    policy: &Policy,
-) -> Trace {
-    let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
-    let is_judge = |s: &usize| selection.holds(*s) && blocks::is_judge(*s, observations.samples(), policy);
-    let gas_c = crate::residual::estimated_gas(fitted, &evaluation, observations);
-    Trace {
-        time_s: evaluation.time_s,
-        residual: evaluation.residual,
-        gas_c,
-        is_judge: evaluation.sample.iter().map(is_judge).collect(),
-        sample: evaluation.sample,
-        disagreement_k: evaluation.disagreement_k,
-        bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
-    }
 }

@@ -1,13 +1,11 @@
 //! Pictures of the residual before and after.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use twinlag::diagnosis::ModelFit;
+use twinlag::diagnosis::{ModelFit, ResidualPart};
 use twinlag_report::{Axis, Chart, Colour, Figure, Series};
 
 const NOISE: &str = "95 % of white noise";
 pub(crate) const WIDTH_PX: f64 = 900.0;
-/// Parts of the record whose mean energies are shown.
-const TIME_FIGURE_PARTS: usize = 100;
 /// A step longer than this multiple of the usual one is a gap.
 const GAP_STEPS: f64 = 10.0;
 
@@ -52,7 +50,9 @@ pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
 pub(crate) fn time_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
     let largest: Vec<f64> = models
         .iter()
-        .map(|m| m.fit.trace.residual.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs())))
+        .map(|m| {
+            m.fit.trace.residual.value.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs()))
+        })
         .collect();
     // One scale for both, unless the smaller would then be a line.
     let widest = largest.iter().copied().fold(0.0, f64::max);
@@ -67,25 +67,20 @@ pub(crate) fn time_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
         let limit = 1.08 * if common { widest } else { *largest };
         let axis = Axis::linear("residual");
         let axis = if limit > 0.0 { axis.range(-limit, limit) } else { axis };
-        let lines = [self::trace("", &trace.time_s, &trace.residual, *colour)];
+        let lines = [self::trace("", &trace.residual.time_s, &trace.residual.value, *colour)];
         if let Some(chart) = chart(*name, [Axis::linear("time (s)"), axis], lines) {
             figure = figure.panel(chart);
             any = true;
         }
-        let size = trace.residual.len().min(trace.time_s.len()).div_ceil(TIME_FIGURE_PARTS).max(1);
-        let (mut x, mut y) = (Vec::new(), Vec::new());
-        for (times, values) in trace.time_s.chunks(size).zip(trace.residual.chunks(size)) {
-            // A short last part would be outside the range of the others.
-            if values.len() == size {
-                x.push(times[0]);
-                y.push((values.iter().map(|r| r * r).sum::<f64>() / size as f64).sqrt());
-                ends = [ends[0].min(times[0]), ends[1].max(times[size - 1])];
-            }
-        }
-        // The last part is as long as the others.
-        if let (Some(end), Some(last)) = (trace.time_s.get((y.len() * size).saturating_sub(1)), y.last().copied()) {
-            x.push(*end);
-            y.push(last);
+        let size = trace.parts.first().map_or(1, |part| part.count);
+        // A short last part would be outside the range of the others.
+        let parts_shown: Vec<&ResidualPart> = trace.parts.iter().filter(|part| part.count == size).collect();
+        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
+            parts_shown.iter().map(|part| (part.ends_s[0], part.mean_square.sqrt())).unzip();
+        if let (Some(first), Some(last)) = (parts_shown.first(), parts_shown.last()) {
+            ends = [ends[0].min(first.ends_s[0]), ends[1].max(last.ends_s[1])];
+            x.push(last.ends_s[1]);
+            y.push(last.mean_square.sqrt());
         }
         if y.iter().any(|v| v.is_finite() && *v > 0.0) {
             fewest = fewest.min(size);

@@ -6,6 +6,8 @@ use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{BeforeAfter, Diagnosis as Core, ModelFit};
 use twinlag_record::Record;
 
+use crate::rows::RowOfSample;
+
 /// How good the gas temperature is, measured against a trusted one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -24,12 +26,12 @@ pub struct AgainstReference {
 pub(crate) struct Reference<'a> {
     record: &'a Record,
     reference_c: &'a [f64],
-    row_of_sample: &'a [Option<usize>],
+    row_of_sample: &'a RowOfSample,
 }
 
 impl<'a> Reference<'a> {
     /// - `row_of_sample`: the row of the record that each sample is
-    pub(crate) fn of(record: &'a Record, row_of_sample: &'a [Option<usize>]) -> Option<Self> {
+    pub(crate) fn of(record: &'a Record, row_of_sample: &'a RowOfSample) -> Option<Self> {
         Some(Self { record, reference_c: record.reference_c.as_deref()?, row_of_sample })
     }
 
@@ -37,9 +39,8 @@ impl<'a> Reference<'a> {
     /// gas temperature that the smoother reconstructs with each.
     pub(crate) fn before_and_after(&self, core: &Core) -> Option<BeforeAfter<f64>> {
         let rmse = |fit: &ModelFit| {
-            let judges = fit.trace.sample.iter().zip(&fit.trace.is_judge).filter(|(_, judges)| **judges);
             let gas = gas(fit)?;
-            self.rmse(|k| gas.gas_c[k], judges.map(|(sample, _)| *sample))
+            self.rmse(|k| gas.gas_c[k], fit.trace.judged.iter().cloned().flatten())
         };
         Some(BeforeAfter { before: rmse(&core.base)?, after: rmse(&core.last)? })
     }
@@ -48,10 +49,10 @@ impl<'a> Reference<'a> {
     /// - `faster`: the channel that lags less, 0 or 1
     pub(crate) fn against(&self, gas_c: &[f64], std_k: &[f64], faster: usize) -> Option<AgainstReference> {
         let raw_c = [&self.record.t1_c, &self.record.t2_c][faster];
-        let is_read = |sample: &usize| self.row_of_sample[*sample].is_some_and(|row| raw_c[row].is_finite());
+        let is_read = |sample: &usize| self.row_of_sample.get(*sample).is_some_and(|row| raw_c[row].is_finite());
         let samples = || (0..gas_c.len()).filter(is_read);
         let rmse_k = self.rmse(|k| gas_c[k], samples())?;
-        let raw_rmse_k = self.rmse(|k| self.row_of_sample[k].map_or(f64::NAN, |row| raw_c[row]), samples())?;
+        let raw_rmse_k = self.rmse(|k| self.row_of_sample.get(k).map_or(f64::NAN, |row| raw_c[row]), samples())?;
         let is_inside = self.errors(|k| gas_c[k], samples()).map(|(k, error)| error.abs() <= Z_975 * std_k[k]);
         let (inside, all) = is_inside.fold((0.0, 0.0_f64), |(inside, all), is| (inside + f64::from(is), all + 1.0));
         let inside_95 = inside / all;
@@ -64,7 +65,7 @@ impl<'a> Reference<'a> {
         value_c: impl Fn(usize) -> f64,
         samples: impl Iterator<Item = usize>,
     ) -> impl Iterator<Item = (usize, f64)> {
-        let errors = samples.filter_map(move |k| Some((k, value_c(k) - self.reference_c[self.row_of_sample[k]?])));
+        let errors = samples.filter_map(move |k| Some((k, value_c(k) - self.reference_c[self.row_of_sample.get(k)?])));
         errors.filter(|(_, error)| error.is_finite())
     }
 

@@ -11,18 +11,50 @@ use crate::options::Options;
 /// Samples of a stretch below which it is left out.
 const MIN_STRETCH_SAMPLES: usize = 8;
 
+/// The row of a record that each sample through all stretches is, in runs of neighbours.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RowOfSample {
+    /// First sample and first row of each run, and how long it is; in order.
+    runs: Vec<[usize; 3]>,
+}
+
+impl RowOfSample {
+    pub(crate) fn of(record: &Record) -> Self {
+        Self::in_runs(record.grid().without_short(MIN_STRETCH_SAMPLES).rows())
+    }
+
+    /// - `rows`: that of each sample, `None` for one that is missing from the record
+    fn in_runs(rows: impl Iterator<Item = Option<usize>>) -> Self {
+        let mut runs: Vec<[usize; 3]> = Vec::new();
+        for (sample, row) in rows.enumerate().filter_map(|(sample, row)| Some((sample, row?))) {
+            match runs.last_mut() {
+                Some([first, first_row, count]) if [*first + *count, *first_row + *count] == [sample, row] => {
+                    *count += 1
+                }
+                _ => runs.push([sample, row, 1]),
+            }
+        }
+        Self { runs }
+    }
+
+    /// The row of a sample; `None` of one that is missing from the record.
+    pub(crate) fn get(&self, sample: usize) -> Option<usize> {
+        let run = self.runs.partition_point(|[first, ..]| *first <= sample).checked_sub(1)?;
+        let [first, row, count] = self.runs[run];
+        (sample < first + count).then(|| row + (sample - first))
+    }
+}
+
 /// Readings, and the row of the record that each is.
 pub(crate) struct Rows {
     pub(crate) observations: Observations,
-    /// The row of each sample through all stretches; `None` for one that is missing from the
-    /// record.
-    pub(crate) of_sample: Vec<Option<usize>>,
+    pub(crate) of_sample: RowOfSample,
 }
 
 impl Rows {
     pub(crate) fn of(record: &Record) -> Result<Self, Error> {
         let grid = record.grid().without_short(MIN_STRETCH_SAMPLES);
-        let of_sample = grid.rows().collect();
+        let of_sample = RowOfSample::in_runs(grid.rows());
         Ok(Self { observations: on(grid)?, of_sample })
     }
 
@@ -30,16 +62,11 @@ impl Rows {
     pub(crate) fn place(&self, masked: &mut Masked, record: &Record) {
         for (sample, time_s) in masked.rows.iter_mut().zip(&mut masked.time_s) {
             // Only a reading that is there can be left out.
-            if let Some(row) = self.of_sample[*sample] {
+            if let Some(row) = self.of_sample.get(*sample) {
                 (*sample, *time_s) = (record.place_of(row).number(), record.time_s[row]);
             }
         }
     }
-}
-
-/// The row of each sample, as [`Rows::of_sample`] has it.
-pub(crate) fn row_of_sample(record: &Record) -> Vec<Option<usize>> {
-    record.grid().without_short(MIN_STRETCH_SAMPLES).rows().collect()
 }
 
 /// The readings of a record.
@@ -70,4 +97,20 @@ pub(crate) fn settings_of(options: &Options) -> Settings {
         Some(KnownTimeConstant { sensor, value_s: k.value, std_s: k.std })
     });
     Settings { noise_std_k: options.noise_std_k, known: known.collect(), ..Settings::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples before, between and behind rows, and rows that are left out between two stretches.
+    #[test]
+    fn each_sample_has_its_row() {
+        let rows = [None, Some(2), Some(3), None, None, Some(4), Some(9), Some(10), None];
+        let of_sample = RowOfSample::in_runs(rows.into_iter());
+        let got: Vec<Option<usize>> = (0..rows.len()).map(|sample| of_sample.get(sample)).collect();
+        assert_eq!(got, rows);
+        assert_eq!(of_sample.runs.len(), 3);
+        assert_eq!(RowOfSample::default().get(0), None);
+    }
 }

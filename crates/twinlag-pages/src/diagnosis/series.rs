@@ -46,8 +46,8 @@ impl Page<'_> {
         let (from, to) = (*time_s.first()?, *time_s.last()?);
         let mut series = Vec::new();
         if let Some(core) = self.core() {
-            let fitted = &core.last.trace;
-            let (gas_s, gas_c): (Vec<f64>, Vec<f64>) = pairs(&fitted.time_s, &fitted.gas_c, from, to).unzip();
+            let gas = &core.last.trace.gas_c;
+            let (gas_s, gas_c): (Vec<f64>, Vec<f64>) = pairs(&gas.time_s, &gas.value, from, to).unzip();
             series.push(trace("gas, inferred", &gas_s, &gas_c, Colour::Green));
         }
         if let Some(reference) = &record.reference_c {

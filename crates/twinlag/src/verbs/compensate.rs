@@ -8,7 +8,7 @@ use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality
 use crate::bands::{Banded, GasFault, Reconstruction};
 use crate::error::Error;
 use crate::reference::Reference;
-use crate::rows::row_of_sample;
+use crate::rows::RowOfSample;
 use crate::verbs::diagnose::{DiagnoseOptions, Diagnosed, named, with_effects};
 use crate::verbs::following_both;
 use crate::verbs::with_model::with_model;
@@ -150,7 +150,7 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, best_effort: boo
         return;
     }
     let faster = usize::from(found.rig.sensors[1].tau_s < found.rig.sensors[0].tau_s);
-    let row_of_sample = if record.reference_c.is_some() { row_of_sample(record) } else { Vec::new() };
+    let row_of_sample = if record.reference_c.is_some() { RowOfSample::of(record) } else { RowOfSample::default() };
     let reference = Reference::of(record, &row_of_sample);
     out.status = Status::Ok;
     out.gas = Some(Quality {
