@@ -32,9 +32,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let policy = &settings.policy;
     // Before is before everything: with the defects of the data in it.
     let unmasked = state.prepared.unmasked(&state.base);
-    let mut base = base_fit(&state, unmasked.as_ref(), policy);
     let with_effects = to_the_end(&state.current, &state);
     let mut last = summary(&with_effects, &state, policy);
+    let is_base = unmasked.is_none() && state.taken.is_empty() && state.base.theta == state.current.theta;
+    let mut base = if is_base { last.clone() } else { base_fit(&state, unmasked.as_ref(), policy) };
     let mut remarks = remarks_of(&state.moves);
     let all = state.prepared.observations.samples();
     remarks.extend(state.faster.as_ref().map(Faster::remark));
