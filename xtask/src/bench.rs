@@ -229,6 +229,8 @@ fn closed_loop(rows: usize, only: Option<&str>) -> Result<()> {
         println!("{:36} {seconds:6.2} s   {}", kind.name(), named.join(", "));
         if only.is_some() {
             println!("{}", serde_json::to_string_pretty(&answer.moves)?);
+            println!("{:?}: {}", answer.verdict, answer.remarks.join("; "));
+            println!("{}", serde_json::to_string(&answer.last)?);
         }
         if seconds > slowest.0 {
             slowest = (seconds, kind.name());

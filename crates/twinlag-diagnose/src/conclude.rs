@@ -175,11 +175,12 @@ fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>
     defects.chain(faster).chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
 }
 
-/// Takes a noise out of what is named where the residual goes with the gas, which no noise does; its spectrum is what the fit is
-/// weighted by all the same.
+/// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what the fit
+/// is weighted by all the same.
 fn drop_coherent_noise(found: &mut Vec<(Option<usize>, Found)>, last: &ModelFit, policy: &Policy) -> Option<Remark> {
-    let is_coherent =
-        last.tests.iter().any(|t| t.test == TestName::Coherence && t.p_value < policy.rejection_p_value());
+    let is_coherent = last.tests.iter().any(|t| {
+        t.test == TestName::Coherence && t.p_value < policy.rejection_p_value() && t.statistic > policy.noise_coherence
+    });
     let named = found.len();
     found.retain(|(_, f)| !(is_coherent && f.effect.is_noise()));
     (found.len() < named).then_some(Remark::ModelErrorAsNoise)
