@@ -278,9 +278,8 @@ impl<'a> Evaluator<'a> {
         if windows.len() == *used {
             windows.push(Window { piece: 0, first: 0, from: 0, count: 0, lead: 0, factor: Factor::empty() });
         }
-        let (before, rest) = windows.split_at_mut(*used);
-        let mut last = before.last_mut().map(|before| &mut before.factor);
-        let before = last.as_deref().filter(|_| first > 0);
+        let (earlier, rest) = windows.split_at_mut(*used);
+        let before = earlier.last().filter(|_| first > 0).map(|before| &before.factor);
         let window = &mut rest[0];
         let lead = before.map_or(0, Factor::band);
         (window.piece, window.first, window.from) = (pieces.len() - 1, first, residual.len());
@@ -293,9 +292,10 @@ impl<'a> Evaluator<'a> {
             piece.first_sample += first_sample(stretch, first_s, observations.step_s());
         }
         let sources = plain.sources(&variances[piece.stretch], first_reading);
-        window.factor.compute(&sources, lead + count, before);
-        if !is_kept {
-            last.iter_mut().for_each(|factor| factor.shorten());
+        let like = earlier.iter().map(|window| &window.factor).find(|factor| factor.is_plain());
+        window.factor.compute(&sources, lead + count, before, like);
+        if !is_kept && let Some(last) = earlier.last_mut() {
+            last.factor.shorten();
         }
         plain.values[..lead].copy_from_slice(&residual[residual.len() - lead..]);
         window.factor.whiten(&mut plain.values, lead);
@@ -313,7 +313,7 @@ impl<'a> Evaluator<'a> {
         let first_reading = window.disagree(plant, self.observations, piece, plain);
         let before = index.checked_sub(1).filter(|_| window.first > 0).map(|before| &self.windows[before].factor);
         let sources = plain.sources(&self.variances[piece.stretch], first_reading);
-        factor.compute(&sources, window.lead + window.count, before);
+        factor.compute(&sources, window.lead + window.count, before, None);
         factor
     }
 

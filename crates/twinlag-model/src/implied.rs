@@ -113,7 +113,7 @@ impl Plant {
             [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
         let mut residual = std::mem::take(&mut disagreement.values);
         let mut factor = Factor::empty();
-        factor.compute(&disagreement.sources(&variances, 0), residual.len(), None);
+        factor.compute(&disagreement.sources(&variances, 0), residual.len(), None, None);
         factor.whiten(&mut residual, 0);
         let count = residual.len();
         let times_s = &disagreement.inverse.chains[0].times_s()[..count];

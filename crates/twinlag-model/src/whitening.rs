@@ -96,11 +96,13 @@ pub(crate) struct Factor {
     same: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
+    /// Whether it begins a stretch and no masked reading enters it: then nothing but `same` decides its rows.
+    is_plain: bool,
 }
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0 }
+        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0, is_plain: false }
     }
 
     /// Values before one that it is correlated with.
@@ -111,7 +113,14 @@ impl Factor {
     /// Becomes the factor of the covariance of `count` values, in its own memory.
     ///
     /// - `before`: that of the window before, where the first of the values are a lead
-    pub(crate) fn compute(&mut self, sources: &[Source<'_, f64>], count: usize, before: Option<&Self>) {
+    /// - `like`: that of another stretch, whose rows may be the same
+    pub(crate) fn compute(
+        &mut self,
+        sources: &[Source<'_, f64>],
+        count: usize,
+        before: Option<&Self>,
+        like: Option<&Self>,
+    ) {
         self.band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
         let (band, stride) = (self.band, self.band + 1);
         let settles = sources.iter().all(|s| s.rows.is_same()) && count > band;
@@ -121,6 +130,12 @@ impl Factor {
         }
         self.rows.clear();
         self.kept.clear();
+        self.is_plain =
+            before.is_none() && settles && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count;
+        let is_alike = |like: &&Self| like.is_plain && like.len() >= count && like.same == self.same;
+        if let Some(like) = like.filter(is_alike).filter(|_| self.is_plain) {
+            return self.begin_as(like, count);
+        }
         let mut agreeing = 0;
         if !settles {
             self.rows.reserve_exact(count * stride);
@@ -162,6 +177,19 @@ impl Factor {
             self.kept.push((from / stride) as u32);
         }
         self.agreeing = agreeing;
+    }
+
+    /// Whether it begins a stretch and no masked reading enters it.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.is_plain
+    }
+
+    /// Becomes the first `count` rows of another.
+    fn begin_as(&mut self, like: &Self, count: usize) {
+        self.kept.extend_from_slice(&like.kept[..count]);
+        let rows = like.kept[count - 1] as usize + 1;
+        self.rows.extend_from_slice(&like.rows[..rows * (self.band + 1)]);
+        self.agreeing = if count == like.len() { like.agreeing } else { 0 };
     }
 
     /// Keeps no more than the next window begins with, if the rows have not settled: there are as many of them as of values.
@@ -228,14 +256,23 @@ impl Factor {
     }
 }
 
-/// The derivative of a factor: its last rows, value `k` of the stretch in place `k mod stride`.
+/// The derivative of a factor, row after row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactorDerivative {
-    recent: Vec<f64>,
-    row: Vec<f64>,
+    now: Last,
     same: Vec<f64>,
     /// Values of the stretch up to the end of the last window.
     end: usize,
+    /// The first window of an earlier stretch.
+    first: Remembered,
+}
+
+/// The last rows of the derivative of a factor.
+#[derive(Clone, Debug, Default)]
+struct Last {
+    /// Value `k` of the stretch in place `k mod stride`.
+    recent: Vec<f64>,
+    row: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
     /// Whether the last row stands for those that follow.
@@ -244,22 +281,50 @@ pub(crate) struct FactorDerivative {
     largest: f64,
 }
 
+/// The first window of a stretch that no masked reading enters: covariances decide its rows.
+#[derive(Clone, Debug, Default)]
+struct Remembered {
+    /// Entries of a row of the covariance, and of its derivative.
+    same: [Vec<f64>; 2],
+    /// Rows up to the one that stands for those that follow, or to the end of the window.
+    rows: Vec<f64>,
+    /// Values of the window.
+    count: usize,
+    /// The last rows at its end.
+    after: Last,
+}
+
+impl Remembered {
+    fn begin(&mut self, same: [&Vec<f64>; 2]) {
+        self.same.iter_mut().zip(same).for_each(|(own, same)| own.clone_from(same));
+        self.rows.clear();
+        self.count = 0;
+    }
+
+    /// Whether these are the rows of a window of `count` values.
+    fn is_of(&self, same: [&Vec<f64>; 2], count: usize) -> bool {
+        self.count >= count && self.same[0] == *same[0] && self.same[1] == *same[1]
+    }
+}
+
 impl FactorDerivative {
     /// Begins a stretch whose factor has bands of `band`.
     pub(crate) fn begin(&mut self, band: usize) {
         let stride = band + 1;
-        self.recent.clear();
-        self.recent.resize(stride * stride, 0.0);
-        self.row.clear();
-        self.row.resize(stride, 0.0);
-        (self.end, self.agreeing, self.is_kept, self.largest) = (0, 0, false, 0.0);
+        let Last { recent, row, agreeing, is_kept, largest } = &mut self.now;
+        recent.clear();
+        recent.resize(stride * stride, 0.0);
+        row.clear();
+        row.resize(stride, 0.0);
+        (self.end, *agreeing, *is_kept, *largest) = (0, 0, false, 0.0);
     }
 
     /// Goes past `count` values where no source has derivatives, if there is nothing left of those before; whether there is not.
     pub(crate) fn passes(&mut self, count: usize) -> bool {
-        let stride = self.row.len();
-        let rows = if self.is_kept { &self.row } else { &self.recent };
-        let is_still = rows.iter().all(|d| d.abs() <= DERIVATIVE_ROUNDING * self.largest);
+        let Last { recent, row, is_kept, largest, .. } = &self.now;
+        let stride = row.len();
+        let rows = if *is_kept { row } else { recent };
+        let is_still = rows.iter().all(|d| d.abs() <= DERIVATIVE_ROUNDING * largest);
         if is_still {
             let end = self.end + count;
             self.begin(stride - 1);
@@ -284,40 +349,69 @@ impl FactorDerivative {
         values: &mut [f64],
         lead: usize,
     ) {
-        let (band, stride) = (factor.band, factor.band + 1);
+        let stride = factor.band + 1;
         let settles = !factor.same.is_empty();
         self.same.clear();
         if settles {
             self.same.extend((0..stride).map(|lag| derivative_of_same(sources, lag)));
         }
         let first = self.end - lead;
-        for k in lead..values.len() {
-            let reach = band.min(k);
-            let of_factor = factor.row(k);
-            // Where the factor has settled, its derivative does soon after.
-            let is_settled = factor.is_settled(k);
-            if !(is_settled && self.agreeing >= SETTLED_ROWS) {
-                if self.is_kept {
-                    // All rows in reach were the one that was kept.
-                    self.recent.chunks_exact_mut(stride).for_each(|row| row.copy_from_slice(&self.row));
-                }
-                let is_plain = settles && (is_settled || !is_masked_around(sources, k, band));
-                self.next_row(factor, sources, k, first, is_plain);
-                let largest = self.row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-                self.largest = self.largest.max(largest);
-                let before = &self.recent[(first + k + stride - 1) % stride * stride..][..stride];
-                let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest;
-                let has_settled = is_settled && self.row.iter().zip(before).all(agrees);
-                self.agreeing = if has_settled { self.agreeing + 1 } else { 0 };
-                self.recent[(first + k) % stride * stride..][..stride].copy_from_slice(&self.row);
+        let begins = factor.is_plain && self.end == 0;
+        if begins && self.first.is_of([&factor.same, &self.same], values.len()) {
+            self.end = values.len();
+            let Remembered { rows, after, count, .. } = &self.first;
+            let last = rows.len() / stride - 1;
+            for k in 0..values.len() {
+                let row = &rows[k.min(last) * stride..][..stride];
+                whiten_next(factor.row(k), row, residual, values, k);
             }
-            self.is_kept = is_settled && self.agreeing >= SETTLED_ROWS;
-            let (before, rest) = values.split_at_mut(k);
-            let from_factor = backwards(&self.row[..=reach], &residual[k - reach..=k]);
-            let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
-            rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
+            if values.len() == *count {
+                self.now.clone_from(after);
+            }
+            return;
+        }
+        if begins {
+            self.first.begin([&factor.same, &self.same]);
+        }
+        for k in lead..values.len() {
+            let is_new = self.advance(factor, sources, k, first);
+            if begins && is_new {
+                self.first.rows.extend_from_slice(&self.now.row);
+            }
+            whiten_next(factor.row(k), &self.now.row, residual, values, k);
         }
         self.end = first + values.len();
+        if begins {
+            self.first.count = values.len();
+            self.first.after.clone_from(&self.now);
+        }
+    }
+
+    /// Goes to row `k` of `dL`; whether it had to be computed.
+    fn advance(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, first: usize) -> bool {
+        let (band, stride) = (factor.band, factor.band + 1);
+        // Where the factor has settled, its derivative does soon after.
+        let is_settled = factor.is_settled(k);
+        let is_new = !(is_settled && self.now.agreeing >= SETTLED_ROWS);
+        if is_new {
+            if self.now.is_kept {
+                // All rows in reach were the one that was kept.
+                let Last { recent, row, .. } = &mut self.now;
+                recent.chunks_exact_mut(stride).for_each(|recent| recent.copy_from_slice(row));
+            }
+            let is_plain = !factor.same.is_empty() && (is_settled || !is_masked_around(sources, k, band));
+            self.next_row(factor, sources, k, first, is_plain);
+            let Last { recent, row, agreeing, largest, .. } = &mut self.now;
+            let largest_here = row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+            *largest = largest.max(largest_here);
+            let before = &recent[(first + k + stride - 1) % stride * stride..][..stride];
+            let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest_here;
+            let has_settled = is_settled && row.iter().zip(before).all(agrees);
+            *agreeing = if has_settled { *agreeing + 1 } else { 0 };
+            recent[(first + k) % stride * stride..][..stride].copy_from_slice(row);
+        }
+        self.now.is_kept = is_settled && self.now.agreeing >= SETTLED_ROWS;
+        is_new
     }
 
     /// Row `k` of `dL`, of a window with `first` values before it.
@@ -325,22 +419,32 @@ impl FactorDerivative {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
         let l = factor.row(k);
+        let Last { recent, row, .. } = &mut self.now;
         for lag in (0..=reach).rev() {
             let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
             if lag == 0 {
-                let products = l[1..=reach].iter().zip(&self.row[1..=reach]).map(|(l, dl)| l * dl);
+                let products = l[1..=reach].iter().zip(&row[1..=reach]).map(|(l, dl)| l * dl);
                 entry -= 2.0 * products.sum::<f64>();
-                self.row[0] = 0.5 * entry / l[0];
+                row[0] = 0.5 * entry / l[0];
                 continue;
             }
             let other = factor.row(k - lag);
-            let d_other = &self.recent[(first + k - lag) % stride * stride..][..stride];
+            let d_other = &recent[(first + k - lag) % stride * stride..][..stride];
             for older in lag + 1..=reach {
-                entry -= self.row[older] * other[older - lag] + l[older] * d_other[older - lag];
+                entry -= row[older] * other[older - lag] + l[older] * d_other[older - lag];
             }
-            self.row[lag] = (entry - l[lag] * d_other[0]) / other[0];
+            row[lag] = (entry - l[lag] * d_other[0]) / other[0];
         }
     }
+}
+
+/// Value `k` of `L dr = du − dL r`, in place of that of `du`.
+fn whiten_next(of_factor: &[f64], of_derivative: &[f64], residual: &[f64], values: &mut [f64], k: usize) {
+    let reach = k.min(of_factor.len() - 1);
+    let (before, rest) = values.split_at_mut(k);
+    let from_factor = backwards(&of_derivative[..=reach], &residual[k - reach..=k]);
+    let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
+    rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
 }
 
 /// `Σ weights[i] values[n − 1 − i]`, the last value last: where it has only just been computed, all others are added up before.
@@ -431,7 +535,7 @@ mod tests {
     fn two_lags(tau_s: [f64; 2], is_masked: bool) -> (Vec<f64>, Factor) {
         let chains = tau_s.map(through_lag);
         let mut factor = Factor::empty();
-        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len(), None);
+        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len(), None, None);
         let u = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| *a - *b).collect();
         (u, factor)
     }
