@@ -200,25 +200,34 @@ impl Weighting {
         }
     }
 
-    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, block by block, so
-    /// that the sums stay where they are fast.
+    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, for as many values side by side as
+    /// registers hold sums.
     fn smooth_inside(&self, values: &[f64], out: &mut [f64]) {
-        const BLOCK: usize = 512;
+        const LANES: usize = 16;
         let half = self.half();
         let count = (values.len() + 1).saturating_sub(self.taps.len());
-        for from in (0..count).step_by(BLOCK) {
-            let n = BLOCK.min(count - from);
-            let sums = &mut out[from + half..from + half + n];
-            let middle = &values[from + half..from + half + n];
-            sums.iter_mut().zip(middle).for_each(|(sum, v)| *sum = self.taps[half] * v);
-            for lag in 1..=half {
-                let tap = self.taps[half + lag];
-                let (before, after) = (&values[from + half - lag..][..n], &values[from + half + lag..][..n]);
-                for ((sum, a), b) in sums.iter_mut().zip(before).zip(after) {
-                    *sum += tap * (a + b);
-                }
+        let whole = count - count % LANES;
+        for from in (0..whole).step_by(LANES) {
+            let around = &values[from..][..2 * half + LANES];
+            out[from + half..][..LANES].copy_from_slice(&self.sums::<LANES>(around));
+        }
+        for from in whole..count {
+            out[from + half] = self.sums::<1>(&values[from..][..=2 * half])[0];
+        }
+    }
+
+    /// `N` filtered values of those `around` them.
+    fn sums<const N: usize>(&self, around: &[f64]) -> [f64; N] {
+        let half = self.half();
+        let of = |from: usize| -> &[f64; N] { around[from..].first_chunk().expect("as many as the filter reaches") };
+        let mut sums = of(half).map(|v| self.taps[half] * v);
+        for (lag, tap) in self.taps[half..].iter().enumerate().skip(1) {
+            let (before, after) = (of(half - lag), of(half + lag));
+            for ((sum, a), b) in sums.iter_mut().zip(before).zip(after) {
+                *sum += tap * (a + b);
             }
         }
+        sums
     }
 }
 

@@ -270,8 +270,9 @@ pub(crate) struct FactorDerivative {
 /// The last rows of the derivative of a factor.
 #[derive(Clone, Debug, Default)]
 struct Last {
-    /// Value `k` of the stretch in place `k mod stride`.
+    /// A ring: after the row in place `at` comes the next one.
     recent: Vec<f64>,
+    at: usize,
     row: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
@@ -311,7 +312,8 @@ impl FactorDerivative {
     /// Begins a stretch whose factor has bands of `band`.
     pub(crate) fn begin(&mut self, band: usize) {
         let stride = band + 1;
-        let Last { recent, row, agreeing, is_kept, largest } = &mut self.now;
+        let Last { recent, at, row, agreeing, is_kept, largest } = &mut self.now;
+        *at = 0;
         recent.clear();
         recent.resize(stride * stride, 0.0);
         row.clear();
@@ -374,7 +376,7 @@ impl FactorDerivative {
             self.first.begin([&factor.same, &self.same]);
         }
         for k in lead..values.len() {
-            let is_new = self.advance(factor, sources, k, first);
+            let is_new = self.advance(factor, sources, k);
             if begins && is_new {
                 self.first.rows.extend_from_slice(&self.now.row);
             }
@@ -388,7 +390,7 @@ impl FactorDerivative {
     }
 
     /// Goes to row `k` of `dL`; whether it had to be computed.
-    fn advance(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, first: usize) -> bool {
+    fn advance(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize) -> bool {
         let (band, stride) = (factor.band, factor.band + 1);
         // Where the factor has settled, its derivative does soon after.
         let is_settled = factor.is_settled(k);
@@ -400,41 +402,44 @@ impl FactorDerivative {
                 recent.chunks_exact_mut(stride).for_each(|recent| recent.copy_from_slice(row));
             }
             let is_plain = !factor.same.is_empty() && (is_settled || !is_masked_around(sources, k, band));
-            self.next_row(factor, sources, k, first, is_plain);
-            let Last { recent, row, agreeing, largest, .. } = &mut self.now;
-            let largest_here = row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-            *largest = largest.max(largest_here);
-            let before = &recent[(first + k + stride - 1) % stride * stride..][..stride];
+            self.next_row(factor, sources, k, is_plain);
+            let Last { recent, at, row, agreeing, largest, .. } = &mut self.now;
+            let larger = |most: f64, d: &f64| if d.abs() > most { d.abs() } else { most };
+            let largest_here = row.iter().fold(0.0, larger);
+            *largest = larger(*largest, &largest_here);
+            let before = &recent[*at * stride..][..stride];
             let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest_here;
             let has_settled = is_settled && row.iter().zip(before).all(agrees);
             *agreeing = if has_settled { *agreeing + 1 } else { 0 };
-            recent[(first + k) % stride * stride..][..stride].copy_from_slice(row);
+            *at = if *at == band { 0 } else { *at + 1 };
+            recent[*at * stride..][..stride].copy_from_slice(row);
         }
         self.now.is_kept = is_settled && self.now.agreeing >= SETTLED_ROWS;
         is_new
     }
 
-    /// Row `k` of `dL`, of a window with `first` values before it.
-    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, first: usize, is_plain: bool) {
+    /// Row `k` of `dL`, after the one in place `at`.
+    fn next_row(&mut self, factor: &Factor, sources: &[Source<'_, Number>], k: usize, is_plain: bool) {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
-        let l = factor.row(k);
-        let Last { recent, row, .. } = &mut self.now;
-        for lag in (0..=reach).rev() {
+        let l = &factor.row(k)[..=reach];
+        let Last { recent, at, row, .. } = &mut self.now;
+        for lag in (1..=reach).rev() {
             let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
-            if lag == 0 {
-                let products = l[1..=reach].iter().zip(&row[1..=reach]).map(|(l, dl)| l * dl);
-                entry -= 2.0 * products.sum::<f64>();
-                row[0] = 0.5 * entry / l[0];
-                continue;
-            }
-            let other = factor.row(k - lag);
-            let d_other = &recent[(first + k - lag) % stride * stride..][..stride];
-            for older in lag + 1..=reach {
-                entry -= row[older] * other[older - lag] + l[older] * d_other[older - lag];
+            let other = &factor.row(k - lag)[..=reach - lag];
+            // The row before is in place `at`.
+            let place = if *at + 1 >= lag { *at + 1 - lag } else { *at + 1 + stride - lag };
+            let d_other = &recent[place * stride..][..=reach - lag];
+            let of_row = row[lag + 1..=reach].iter().zip(&l[lag + 1..]);
+            for ((dl, l), (other, d_other)) in of_row.zip(other[1..].iter().zip(&d_other[1..])) {
+                entry -= dl * other + l * d_other;
             }
             row[lag] = (entry - l[lag] * d_other[0]) / other[0];
         }
+        let mut entry = if is_plain { self.same[0] } else { derivative_of_covariance(sources, k, 0) };
+        let products = l[1..].iter().zip(&row[1..]).map(|(l, dl)| l * dl);
+        entry -= 2.0 * products.sum::<f64>();
+        row[0] = 0.5 * entry / l[0];
     }
 }
 
@@ -492,7 +497,7 @@ fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, p
         }
         let products = now.iter().zip(&then[lag..]).map(|(a, b)| product(*a, *b));
         let first = source.reading(k);
-        sum += if variance.has_masked_in(first..first + now.len()) {
+        sum += if !variance.masked.is_empty() && variance.has_masked_in(first..first + now.len()) {
             products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
         } else {
             variance.plain * products.sum::<f64>()
