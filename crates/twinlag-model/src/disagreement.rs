@@ -13,7 +13,7 @@ use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
 use crate::rows::Rows;
 use crate::selection::Span;
-use crate::whitening::{Factor, FactorDerivative, Source, Variance};
+use crate::whitening::{Adjoint, Factor, FactorDerivative, Source, Variance};
 
 /// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
 /// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
@@ -332,28 +332,21 @@ impl<'a> Evaluator<'a> {
         disagreement: &mut Disagreement<Number>,
         moved: &'m mut Moved,
     ) -> &'m [f64] {
-        let Moved { factor: of_factor, values } = moved;
-        let Window { piece, first, from, count, lead, .. } = self.windows[index];
-        let chains = plant.moved(functions);
-        if chains == [false; 2] {
-            values.clear();
-            values.resize(count, 0.0);
-            return values;
+        let Window { first, from, count, lead, .. } = self.windows[index];
+        if plant.moved(functions) == [false; 2] {
+            moved.values.clear();
+            moved.values.resize(count, 0.0);
+            return &moved.values;
         }
-        let stretch = self.pieces[piece].stretch;
-        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
-        let samples = self.windows[index].samples(plant.consumed(period_s.is_some()));
-        let cut = self.observations.stretches[stretch].cut(samples.clone());
-        disagreement.inverse.invert_moved(plant, cut, period_s, chains);
-        disagreement.compare(plant, step_s);
+        self.move_window(plant, functions, index, disagreement);
+        let sources = self.moved_sources(plant, index, disagreement);
+        let Moved { factor: of_factor, values } = moved;
         // The last values of the window before are whitened.
         values.drain(..values.len() - lead);
         values.extend(disagreement.values[lead..].iter().map(|v| v.eps));
         if first == 0 {
             of_factor.begin(factor.band());
         }
-        let mut sources = disagreement.sources(&self.variances[stretch], samples.start);
-        sources.retain(|source| !source.rows.is_constant());
         if sources.is_empty() && of_factor.passes(count) {
             factor.whiten(values, lead);
         } else {
@@ -361,5 +354,62 @@ impl<'a> Evaluator<'a> {
             of_factor.whiten(factor, &sources, residual, values, lead);
         }
         &values[lead..]
+    }
+
+    /// Half the derivative of the energy that window `index` adds; else as [`Self::derivative`].
+    ///
+    /// - `adjoint`: of [`Self::adjoint`]
+    pub(crate) fn slope(
+        &self,
+        plant: &Plant,
+        functions: [bool; 2],
+        index: usize,
+        factor: &Factor,
+        disagreement: &mut Disagreement<Number>,
+        adjoint: &Adjoint,
+    ) -> f64 {
+        let Window { from, count, lead, .. } = self.windows[index];
+        if plant.moved(functions) == [false; 2] {
+            return 0.0;
+        }
+        self.move_window(plant, functions, index, disagreement);
+        let sources = self.moved_sources(plant, index, disagreement);
+        let of_values: f64 =
+            disagreement.values[lead..].iter().zip(&adjoint.by_value[from..]).map(|(v, by)| v.eps * by).sum();
+        of_values + adjoint.slope(factor, &sources, from - lead..from + count, lead)
+    }
+
+    /// From half the gradient of an energy by the whitened residual, to that by the disagreement and its covariance.
+    pub(crate) fn adjoint(&self, plant: &Plant, gradient: Vec<f64>, again: &mut Again) -> Adjoint {
+        let mut out = Adjoint::begin(gradient, self.windows().first().map_or(0, |window| window.factor.band()));
+        for index in (0..self.used).rev() {
+            let Window { from, count, lead, .. } = self.windows[index];
+            out.go_back(self.factor(plant, index, again), &self.residual, from - lead..from + count, lead);
+        }
+        out
+    }
+
+    /// The disagreement of window `index` with its derivative.
+    fn move_window(&self, plant: &Plant, functions: [bool; 2], index: usize, disagreement: &mut Disagreement<Number>) {
+        let Self { observations, windows, pieces, .. } = self;
+        let period_s = observations.period_s;
+        let samples = windows[index].samples(plant.consumed(period_s.is_some()));
+        let cut = observations.stretches[pieces[windows[index].piece].stretch].cut(samples);
+        disagreement.inverse.invert_moved(plant, cut, period_s, plant.moved(functions));
+        disagreement.compare(plant, observations.step_s());
+    }
+
+    /// What brings noise into the disagreement of window `index` by a derivative.
+    fn moved_sources<'d>(
+        &'d self,
+        plant: &Plant,
+        index: usize,
+        disagreement: &'d Disagreement<Number>,
+    ) -> Vec<Source<'d, Number>> {
+        let samples = self.windows[index].samples(plant.consumed(self.observations.period_s.is_some()));
+        let variances = &self.variances[self.pieces[self.windows[index].piece].stretch];
+        let mut sources = disagreement.sources(variances, samples.start);
+        sources.retain(|source| !source.rows.is_constant());
+        sources
     }
 }

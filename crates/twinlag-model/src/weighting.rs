@@ -200,6 +200,30 @@ impl Weighting {
         }
     }
 
+    /// What each of `values` adds to the products of filtered values with `weights`, one for each of them: the filter transposed.
+    pub(crate) fn transposed(&self, weights: &[f64]) -> Vec<f64> {
+        let n = weights.len();
+        let of_smooth: Vec<f64> = if self.prediction.is_empty() {
+            weights.to_vec()
+        } else {
+            let begin = self.prediction.len() - 1;
+            let lags = |k: usize| begin.saturating_sub(k)..self.prediction.len().min(n - k);
+            (0..n).map(|k| lags(k).map(|lag| self.prediction[lag] * weights[k + lag]).sum()).collect()
+        };
+        if self.taps.is_empty() {
+            return of_smooth;
+        }
+        let half = self.half();
+        // Nothing is filtered where the filter reaches past an end, and both ends take part in what is.
+        let inside = half..n.saturating_sub(half).max(half);
+        let mut wide = vec![0.0; n + 2 * half];
+        wide[half + inside.start.min(n)..half + inside.end.min(n)]
+            .copy_from_slice(&of_smooth[inside.start.min(n)..inside.end.min(n)]);
+        let mut out = vec![0.0; wide.len()];
+        self.smooth_inside(&wide, &mut out);
+        out[half..half + n].to_vec()
+    }
+
     /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, for as many values side by side as
     /// registers hold sums.
     fn smooth_inside(&self, values: &[f64], out: &mut [f64]) {

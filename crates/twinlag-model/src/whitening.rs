@@ -244,7 +244,12 @@ impl Factor {
 
     /// `L⁻ᵀ r` in place: of a whitened residual `V⁻¹ u`.
     pub(crate) fn unwhiten_transposed(&self, r: &mut [f64]) {
-        for k in (0..r.len()).rev() {
+        self.unwhiten_transposed_from(r, 0);
+    }
+
+    /// As [`Self::unwhiten_transposed`] of the values after a lead, from which it takes off what they have in common.
+    pub(crate) fn unwhiten_transposed_from(&self, r: &mut [f64], lead: usize) {
+        for k in (lead..r.len()).rev() {
             let row = self.row(k);
             let (before, rest) = r.split_at_mut(k);
             let w = rest[0] / row[0];
@@ -253,6 +258,84 @@ impl Factor {
                 *b -= l * w;
             }
         }
+    }
+}
+
+/// How an energy depends on the disagreement `u` and on its covariance `V`: derivatives by each, with `r = L⁻¹ u` and `q` that by `r`.
+/// That by `u` is `w = L⁻ᵀ q`, that by `L` is `−w rᵀ`, and what follows for `V = L Lᵀ` is the factorisation gone through backwards
+/// (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm").
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Adjoint {
+    /// By each value of the disagreement.
+    pub(crate) by_value: Vec<f64>,
+    /// By each entry of its covariance, lags `0..=band` of each row; and by those of `L`, where no row after it has been gone through.
+    by_covariance: Vec<f64>,
+}
+
+impl Adjoint {
+    /// - `gradient`: `q` of all values
+    pub(crate) fn begin(gradient: Vec<f64>, band: usize) -> Self {
+        let by_covariance = vec![0.0; gradient.len() * (band + 1)];
+        Self { by_value: gradient, by_covariance }
+    }
+
+    /// Goes through the rows of a window, the last one first, after the windows that follow it.
+    ///
+    /// - `residual`: `r` of all values
+    /// - `all`: values of the window, its lead among them
+    pub(crate) fn go_back(&mut self, factor: &Factor, residual: &[f64], all: std::ops::Range<usize>, lead: usize) {
+        let (stride, first) = (factor.band + 1, all.start);
+        factor.unwhiten_transposed_from(&mut self.by_value[all.clone()], lead);
+        let by = &mut self.by_covariance[first * stride..all.end * stride];
+        let residual = &residual[all];
+        for k in (lead..residual.len()).rev() {
+            let reach = factor.band.min(k);
+            let w = self.by_value[first + k];
+            let (before, rest) = by.split_at_mut(k * stride);
+            let own = &mut rest[..=reach];
+            own.iter_mut().zip(residual[..=k].iter().rev()).for_each(|(by, r)| *by -= w * r);
+            let l = &factor.row(k)[..=reach];
+            own[0] *= 0.5 / l[0];
+            let of_diagonal = 2.0 * own[0];
+            own[1..].iter_mut().zip(&l[1..]).for_each(|(by, l)| *by -= of_diagonal * l);
+            for lag in 1..=reach {
+                let other = factor.row(k - lag);
+                let by_other = &mut before[(k - lag) * stride..][..stride];
+                own[lag] /= other[0];
+                let by_entry = own[lag];
+                by_other[0] -= by_entry * l[lag];
+                for older in lag + 1..=reach {
+                    own[older] -= by_entry * other[older - lag];
+                    by_other[older - lag] -= by_entry * l[older];
+                }
+            }
+        }
+    }
+
+    /// How fast the energy changes with the covariance of a window.
+    ///
+    /// - `sources`: what makes the covariance, with derivatives; a source whose rows have none may be left out
+    pub(crate) fn slope(
+        &self,
+        factor: &Factor,
+        sources: &[Source<'_, Number>],
+        all: std::ops::Range<usize>,
+        lead: usize,
+    ) -> f64 {
+        let (band, count) = (factor.band, all.len());
+        let by = &self.by_covariance[all.start * (band + 1)..all.end * (band + 1)];
+        let rows = by.chunks_exact(band + 1).enumerate().skip(lead);
+        let is_same = sources.iter().all(|source| source.rows.is_same());
+        if is_same && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count {
+            let mut sums = vec![0.0; band + 1];
+            rows.for_each(|(_, row)| sums.iter_mut().zip(row).for_each(|(sum, by)| *sum += by));
+            return sums.iter().enumerate().map(|(lag, by)| by * derivative_of_same(sources, lag)).sum();
+        }
+        let of_row = |(k, row): (usize, &[f64])| -> f64 {
+            let entries = row.iter().enumerate().take(k + 1);
+            entries.map(|(lag, by)| by * derivative_of_covariance(sources, k, lag)).sum()
+        };
+        rows.map(of_row).sum()
     }
 }
 
