@@ -20,8 +20,9 @@ use crate::spectral::Sloped;
 const SETTLED_RELATIVE: f64 = 4.0 * f64::EPSILON;
 /// Rows that must agree with the one before before the factor counts as settled.
 const SETTLED_ROWS: usize = MAX_COEFFICIENTS;
-/// Coefficients of a row of two first-order lags in white noise, whatever the hold.
+/// Coefficients of a row in white noise at most, whatever the hold: of first-order lags, and of those with second ones.
 const SHORT: usize = 3;
+const MIDDLE: usize = 5;
 
 /// Calls `visit` with each whitened residual of `segment` and its derivatives by the first `Q` parameters, in order of time.
 pub(crate) fn sweep<const P: usize, const Q: usize>(
@@ -37,9 +38,10 @@ pub(crate) fn sweep<const P: usize, const Q: usize>(
     };
     let first = row(model, pair, first_step_s);
     let longest = first.data.iter().chain(&first.noise).map(|c| c.as_slice().len()).max();
-    // Rows of two lags are short, and what is kept of them is moved from row to row.
+    // Most rows are short, and what is kept of them is moved from row to row.
     match longest {
         Some(0..=SHORT) => sweep_rows::<P, Q, SHORT>(segment, model, pair, first, visit),
+        Some(0..=MIDDLE) => sweep_rows::<P, Q, MIDDLE>(segment, model, pair, first, visit),
         _ => sweep_rows::<P, Q, MAX_COEFFICIENTS>(segment, model, pair, first, visit),
     }
 }
@@ -92,6 +94,7 @@ fn sweep_rows<const P: usize, const Q: usize, const N: usize>(
             match (width, band) {
                 (2, 1) => settled.sweep::<2, 1>([&y1[k..], &y2[k..]], &before, visit),
                 (3, 2) => settled.sweep::<3, 2>([&y1[k..], &y2[k..]], &before, visit),
+                (5, 4) => settled.sweep::<5, 4>([&y1[k..], &y2[k..]], &before, visit),
                 _ => settled.sweep_any(width, band, [&y1[k..], &y2[k..]], before, visit),
             }
             return;
