@@ -271,3 +271,28 @@ fn spectrum(observations: &Observations, channel: usize) -> Vec<f64> {
     }
     sum.iter().map(|s| s / count.max(1.0)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `(F v)ᵀ w` is `vᵀ (Fᵀ w)`. Both are sums of some 200 values times 50 taps of size one: rounding leaves 1e4 · 1.1e-16.
+    #[test]
+    fn the_transposed_filter_has_the_products_of_the_filter() {
+        let value = |k: usize| ((k * k * 7 + k) as f64 * 2.399).sin();
+        let taps: Vec<f64> = (0..49_usize).map(|j| 1.0 / (1.0 + j.abs_diff(24) as f64)).collect();
+        let prediction = vec![1.0, -0.6, 0.2];
+        for (taps, prediction) in
+            [(vec![], vec![]), (taps.clone(), vec![]), (vec![], prediction.clone()), (taps, prediction)]
+        {
+            let weighting = Weighting { taps, prediction };
+            for n in [1, 2, 30, 49, 50, 200] {
+                let values: Vec<f64> = (0..n).map(value).collect();
+                let weights: Vec<f64> = (0..n).map(|k| value(k + 1000)).collect();
+                let (want, got) = (weighting.apply(&values), weighting.transposed(&weights));
+                let (want, got) = (dense::dot(&want, &weights), dense::dot(&got, &values));
+                assert!((got - want).abs() < 1.1e-12, "{n} values: {got}, and {want}");
+            }
+        }
+    }
+}
