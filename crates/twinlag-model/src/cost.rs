@@ -192,8 +192,9 @@ impl<'a> ResidualCost<'a> {
         visit(Block { residual: &residual[done..], range: done..residual.len(), is_prior: true, columns });
     }
 
-    /// Half the first derivatives of the energy, `Jᵀr`, without the columns of `J`: what it gains by the disagreement and by its
-    /// covariance is the same for all parameters. Variances of masked readings are so large that this would lose digits to them.
+    /// Half the first derivatives of the energy, `Jᵀr`, without the columns of `J`: what it gains by the disagreement and by
+    /// its covariance is the same for all parameters. Variances of masked readings are so large that this would lose digits to
+    /// them.
     pub(crate) fn slope(&self, theta: &[f64]) -> Vec<f64> {
         let is_masked = |stretch: &Arc<Stretch>| stretch.masked.iter().flatten().any(|is_masked| *is_masked);
         if self.observations.stretches.iter().any(is_masked) {
@@ -475,9 +476,9 @@ mod tests {
         }
     }
 
-    /// The slope of the energy without columns is that of columns, and of a record in windows that of the whole: both are sums of some
-    /// hundred products, each with the rounding of the test above, 1e-10 of the largest residual and derivative at most. The bound is
-    /// that of the product of their lengths.
+    /// The slope of the energy without columns is that of columns, and of a record in windows that of the whole: both are sums
+    /// of some hundred products, each with the rounding of the test above, 1e-10 of the largest residual and derivative at
+    /// most. The bound is that of the product of their lengths.
     #[test]
     fn the_slope_is_that_of_the_columns() {
         for (kind, is_cut) in [(Kind::Even, false), (Kind::Uneven, false), (Kind::Even, true)] {

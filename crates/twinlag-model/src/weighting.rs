@@ -200,7 +200,8 @@ impl Weighting {
         }
     }
 
-    /// What each of `values` adds to the products of filtered values with `weights`, one for each of them: the filter transposed.
+    /// What each of `values` adds to the products of filtered values with `weights`, one for each of them: the filter
+    /// transposed.
     pub(crate) fn transposed(&self, weights: &[f64]) -> Vec<f64> {
         let n = weights.len();
         let of_smooth: Vec<f64> = if self.prediction.is_empty() {
@@ -224,8 +225,8 @@ impl Weighting {
         out[half..half + n].to_vec()
     }
 
-    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, for as many values side by side as
-    /// registers hold sums.
+    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, for as many values side by
+    /// side as registers hold sums.
     fn smooth_inside(&self, values: &[f64], out: &mut [f64]) {
         const LANES: usize = 16;
         let half = self.half();

@@ -261,14 +261,15 @@ impl Factor {
     }
 }
 
-/// How an energy depends on the disagreement `u` and on its covariance `V`: derivatives by each, with `r = L⁻¹ u` and `q` that by `r`.
-/// That by `u` is `w = L⁻ᵀ q`, that by `L` is `−w rᵀ`, and what follows for `V = L Lᵀ` is the factorisation gone through backwards
-/// (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm").
+/// How an energy depends on the disagreement `u` and on its covariance `V`: derivatives by each, with `r = L⁻¹ u` and `q` that
+/// by `r`. That by `u` is `w = L⁻ᵀ q`, that by `L` is `−w rᵀ`, and what follows for `V = L Lᵀ` is the factorisation gone
+/// through backwards (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm").
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Adjoint {
     /// By each value of the disagreement.
     pub(crate) by_value: Vec<f64>,
-    /// By each entry of its covariance, lags `0..=band` of each row; and by those of `L`, where no row after it has been gone through.
+    /// By each entry of its covariance, lags `0..=band` of each row; and by those of `L`, where no row after it has been gone
+    /// through.
     by_covariance: Vec<f64>,
 }
 

@@ -19,8 +19,8 @@ pub enum SamplingKind {
     /// Every step is the period, within a hundredth of it or the grid that stamps are printed on.
     Uniform,
     /// Stamps lie on a grid that is coarse beside the period, and steps differ by one unit of it,
-    /// as 3 s and 4 s with stamps of 1 s, or every stamp is at most a unit from the rounded one and the unit is short beside the
-    /// period: the samples are taken as evenly spaced.
+    /// as 3 s and 4 s with stamps of 1 s, or every stamp is at most a unit from the rounded one and the unit is short beside
+    /// the period: the samples are taken as evenly spaced.
     Rounded,
     /// Steps differ: each is used as stamped.
     Irregular,
@@ -53,12 +53,12 @@ const MAX_DIGITS: i32 = 15;
 const SINGLE_DIGITS: i32 = 7;
 /// Departure, in periods, below which stamps count as even.
 const EXACT_PERIODS: f64 = 0.01;
-/// Part of its unit by which a stamp may differ from the instant that it was rounded from, and a hundredth more, as of grids; with the
-/// unit either way by which a clock is off that is read just before or after its last digit changes.
+/// Part of its unit by which a stamp may differ from the instant that it was rounded from, and a hundredth more, as of grids;
+/// with the unit either way by which a clock is off that is read just before or after its last digit changes.
 const ROUNDED_UNITS: f64 = 0.51;
 const OFF_BY_ONE_UNITS: f64 = 1.51;
-/// Unit of a clock whose stamps may be off by one, in periods, at most: if the samples jitter and not the clock, what is made of them
-/// is off by 0.8 units rms, a sixtieth of what a reading changes by from sample to sample. Chosen.
+/// Unit of a clock whose stamps may be off by one, in periods, at most: if the samples jitter and not the clock, what is made
+/// of them is off by 0.9 units rms, a sixtieth of what a reading changes by from sample to sample. Chosen.
 const MAX_OFF_BY_ONE_PERIODS: f64 = 0.02;
 
 impl Sampling {
@@ -411,9 +411,9 @@ mod tests {
         assert!((got.stamp_resolution_s.unwrap() - 1e-5).abs() < 1e-12);
     }
 
-    /// A clock with a unit of a hundredth of the period that is off by one either way leaves departures of 1.5 units, 1.5e-5 s, at most,
-    /// and the slope of n points 0.96 units (of one either way and rounding) times √12 n^-3/2: ten of these are 1.1e-10 s. Off by three
-    /// it jitters. Failed: steps differ by 2 %, and each was used as stamped.
+    /// A clock with a unit of a hundredth of the period that is off by one either way leaves departures of 1.5 units, 1.5e-5 s,
+    /// at most, and the slope of n points 0.87 units (of one either way and rounding) times √12 n^-3/2: ten of these are
+    /// 1.1e-10 s. Off by three it jitters. Failed: steps differ by 2 %, and each was used as stamped.
     #[test]
     fn stamps_that_are_off_by_one_in_their_last_digit_are_even() {
         let stamps = |most: i32| -> Vec<f64> {
