@@ -20,24 +20,44 @@ use crate::spectral::Sloped;
 const SETTLED_RELATIVE: f64 = 4.0 * f64::EPSILON;
 /// Rows that must agree with the one before before the factor counts as settled.
 const SETTLED_ROWS: usize = MAX_COEFFICIENTS;
+/// Coefficients of a row in white noise at most, whatever the hold: of first-order lags, and of those with second ones.
+const SHORT: usize = 3;
+const MIDDLE: usize = 5;
 
 /// Calls `visit` with each whitened residual of `segment` and its derivatives by the first `Q` parameters, in order of time.
 pub(crate) fn sweep<const P: usize, const Q: usize>(
     segment: &Segment,
     model: &HoldAndNoise,
     pair: &Pair<DualSVec64<P>>,
-    mut visit: impl FnMut(f64, &[f64; Q]),
+    visit: impl FnMut(f64, &[f64; Q]),
 ) {
-    type Dual<const P: usize> = DualSVec64<P>;
     const { assert!(Q <= P, "no more derivatives than parameters") };
-    let variance = model.white_variance();
-    let (y1, y2) = (segment.y1(), segment.y2());
-    let zero = Dual::<P>::from_re(0.0);
     let first_step_s = match segment.steps() {
         Steps::Even(step_s) => *step_s,
         Steps::Uneven(steps) => steps[0],
     };
     let first = row(model, pair, first_step_s);
+    let longest = first.data.iter().chain(&first.noise).map(|c| c.as_slice().len()).max();
+    // Most rows are short, and what is kept of them is moved from row to row.
+    match longest {
+        Some(0..=SHORT) => sweep_rows::<P, Q, SHORT>(segment, model, pair, first, visit),
+        Some(0..=MIDDLE) => sweep_rows::<P, Q, MIDDLE>(segment, model, pair, first, visit),
+        _ => sweep_rows::<P, Q, MAX_COEFFICIENTS>(segment, model, pair, first, visit),
+    }
+}
+
+/// [`sweep`] of rows that have `N` coefficients at most.
+fn sweep_rows<const P: usize, const Q: usize, const N: usize>(
+    segment: &Segment,
+    model: &HoldAndNoise,
+    pair: &Pair<DualSVec64<P>>,
+    first: Row<DualSVec64<P>>,
+    mut visit: impl FnMut(f64, &[f64; Q]),
+) {
+    type Dual<const P: usize> = DualSVec64<P>;
+    let variance = model.white_variance();
+    let (y1, y2) = (segment.y1(), segment.y2());
+    let zero = Dual::<P>::from_re(0.0);
     let width = first.data[0].as_slice().len();
     let band = first.noise.iter().map(|c| c.as_slice().len()).max().expect("two channels") - 1;
 
@@ -53,12 +73,12 @@ pub(crate) fn sweep<const P: usize, const Q: usize>(
         sum
     };
     let is_even = matches!(segment.steps(), Steps::Even(_));
-    let fixed = std::array::from_fn::<_, MAX_COEFFICIENTS, _>(|lag| covariance(&first, &first, lag));
+    let fixed = std::array::from_fn::<_, N, _>(|lag| covariance(&first, &first, lag));
 
     // The last `band` rows, newest first: filter, factor (lags 0..=band) and residual.
     let mut rows = [first; 2];
-    let mut factors = [[zero; MAX_COEFFICIENTS]; MAX_COEFFICIENTS];
-    let mut residuals = [zero; MAX_COEFFICIENTS];
+    let mut factors = [[zero; N]; N];
+    let mut residuals = [zero; N];
     let mut agreeing = 0;
     for k in 0..(y1.len() + 1).saturating_sub(width) {
         if let Steps::Uneven(steps) = segment.steps() {
@@ -68,10 +88,13 @@ pub(crate) fn sweep<const P: usize, const Q: usize>(
         }
         if agreeing >= SETTLED_ROWS {
             let settled = Settled::new([0, 1].map(|i| rows[0].data[i].as_slice()), &factors[0][..=band], pair.offset);
-            let before = residuals.map(sloped);
+            let none = (0.0, [0.0; Q]);
+            let before: [Sloped<Q>; MAX_COEFFICIENTS] =
+                std::array::from_fn(|i| residuals.get(i).map_or(none, |r| sloped(*r)));
             match (width, band) {
                 (2, 1) => settled.sweep::<2, 1>([&y1[k..], &y2[k..]], &before, visit),
                 (3, 2) => settled.sweep::<3, 2>([&y1[k..], &y2[k..]], &before, visit),
+                (5, 4) => settled.sweep::<5, 4>([&y1[k..], &y2[k..]], &before, visit),
                 _ => settled.sweep_any(width, band, [&y1[k..], &y2[k..]], before, visit),
             }
             return;
@@ -84,7 +107,7 @@ pub(crate) fn sweep<const P: usize, const Q: usize>(
 
         // Row k of L: entry `lag` multiplies residual k − lag. Oldest first, as each needs the
         // older ones.
-        let mut factor = [zero; MAX_COEFFICIENTS];
+        let mut factor = [zero; N];
         let reach = band.min(k);
         for lag in (0..=reach).rev() {
             let mut entry = if is_even { fixed[lag] } else { covariance(&rows[0], &rows[lag], lag) };
@@ -207,8 +230,8 @@ impl<const Q: usize> Settled<Q> {
 }
 
 /// Whether two rows of the factor are the same to rounding, derivatives included.
-fn agree<const P: usize>(now: &[DualSVec64<P>; MAX_COEFFICIENTS], before: &[DualSVec64<P>; MAX_COEFFICIENTS]) -> bool {
-    let parts = |row: &[DualSVec64<P>; MAX_COEFFICIENTS]| row.map(parts);
+fn agree<const P: usize, const N: usize>(now: &[DualSVec64<P>; N], before: &[DualSVec64<P>; N]) -> bool {
+    let parts = |row: &[DualSVec64<P>; N]| row.map(parts);
     let (now, before) = (parts(now), parts(before));
     let size = now[0].0;
     let slope = |p: usize| now.iter().map(|x| x.1[p].abs()).fold(0.0, f64::max);

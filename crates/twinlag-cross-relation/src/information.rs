@@ -100,7 +100,18 @@ impl Whitened<'_> {
         prior_std: &[f64; P],
         middle: ScoreVariance,
     ) -> Option<[[f64; P]; P]> {
-        let full = self.observed_information(theta);
+        self.covariance_by(&self.observed_information(theta), theta, free, prior_std, middle)
+    }
+
+    /// As [`Self::covariance`], by what [`Self::observed_information`] gives at `theta`.
+    pub fn covariance_by<const P: usize>(
+        &self,
+        full: &[[f64; P]; P],
+        theta: &[f64; P],
+        free: &[usize],
+        prior_std: &[f64; P],
+        middle: ScoreVariance,
+    ) -> Option<[[f64; P]; P]> {
         let score = match middle {
             ScoreVariance::WhiteNoise => {
                 let noise = self.noise_noise(theta);
@@ -112,7 +123,7 @@ impl Whitened<'_> {
         let known = |m: &[[f64; P]; P]| -> [[f64; P]; P] {
             std::array::from_fn(|i| std::array::from_fn(|j| m[i][j] + if i == j { prior_std[i].powi(-2) } else { 0.0 }))
         };
-        sandwich(&known(&full), &known(&score), free)
+        sandwich(&known(full), &known(&score), free)
     }
 
     /// Score test of parameters that were not fitted: whether letting the `tested` ones float would

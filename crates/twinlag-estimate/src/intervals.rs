@@ -43,20 +43,22 @@ impl TauIntervals {
 /// `covariance` with what the uncertainty of found levels adds: the weights that they give move the
 /// minimum by `−A⁻¹ ½ (∂J(θ; s') − ∂J(θ; s))`, `A` half the Hessian with the priors' part, for
 /// levels `s'` one standard error off.
+///
+/// - `inverse`: `A⁻¹`
 pub(crate) fn with_level_uncertainty<const P: usize>(
     whitened: &Whitened<'_>,
     theta: &[f64; P],
     free: &[usize],
     covariance: &[[f64; P]; P],
     levels: &NoiseLevels,
-    priors: &[Prior],
+    inverse: impl FnOnce() -> Option<[[f64; P]; P]>,
 ) -> [[f64; P]; P] {
     let mut out = *covariance;
     let error: [f64; 2] = [0, 1].map(|i| levels.log_covariance[i][i].sqrt());
     if error == [0.0; 2] {
         return out;
     }
-    let Some(inverse) = inverse(whitened, theta, free, priors) else { return out };
+    let Some(inverse) = inverse() else { return out };
     let here = whitened.evaluate(theta).gradient;
     let shift = |channel: usize| -> [f64; P] {
         let mut std_k = whitened.noise_std();
@@ -80,14 +82,12 @@ pub(crate) fn with_level_uncertainty<const P: usize>(
     out
 }
 
-/// Inverse of half the Hessian with the priors' part, over the `free` parameters.
-fn inverse<const P: usize>(
-    whitened: &Whitened<'_>,
-    theta: &[f64; P],
+/// Inverse of half the Hessian, `information`, with the priors' part, over the `free` parameters.
+pub(crate) fn inverse<const P: usize>(
+    mut information: [[f64; P]; P],
     free: &[usize],
     priors: &[Prior],
 ) -> Option<[[f64; P]; P]> {
-    let mut information = whitened.observed_information(theta);
     for prior in priors {
         information[prior.index][prior.index] += 1.0 / (prior.std * prior.std);
     }
@@ -110,17 +110,24 @@ impl<const P: usize> Minimum<'_, '_, P> {
     /// does not describe it.
     pub(crate) fn intervals(&self, always: bool) -> TauIntervals {
         let mut out = TauIntervals::quadratic(&self.theta, self.covariance);
+        let inverse = inverse(self.whitened.observed_information(&self.theta), self.free, self.priors);
         for i in (0..2).filter(|i| self.free.contains(i)) {
-            (out.interval_95_s[i], out.basis[i]) = self.interval(i, always);
+            (out.interval_95_s[i], out.basis[i]) = self.interval_beside(i, inverse.as_ref(), always);
         }
         out
     }
 
     /// Interval of the time constant `i` alone, which is free.
     pub(crate) fn interval(&self, i: usize, always: bool) -> ([f64; 2], IntervalBasis) {
+        let inverse = inverse(self.whitened.observed_information(&self.theta), self.free, self.priors);
+        self.interval_beside(i, inverse.as_ref(), always)
+    }
+
+    /// - `inverse`: of half the Hessian with the priors' part
+    fn interval_beside(&self, i: usize, inverse: Option<&[[f64; P]; P]>, always: bool) -> ([f64; 2], IntervalBasis) {
         let Self { theta, free, variables, .. } = self;
         let ends = log_normal_interval_95(theta[i], self.covariance[i][i].sqrt());
-        let Some(inverse) = inverse(self.whitened, theta, free, self.priors) else {
+        let Some(inverse) = inverse else {
             return (ends, IntervalBasis::StandardError);
         };
         let cost = self.whitened.clone();

@@ -13,7 +13,7 @@ use twinlag_sensor::Discretisation;
 
 use crate::error::EstimateError;
 use crate::fitting::{add, free, minimise_whitened, polish};
-use crate::intervals::{Minimum, TauIntervals, with_level_uncertainty};
+use crate::intervals::{Minimum, TauIntervals, inverse, with_level_uncertainty};
 use crate::levels::NoiseLevels;
 use crate::objective::{EstimatorCost, Objective, Prior};
 use crate::outcome::Solved;
@@ -328,8 +328,10 @@ impl<'a, const P: usize> WhitenedFit<'a, P> {
             return None;
         }
         let (theta, free) = (self.theta(), self.free());
-        let covariance = self.whitened.covariance(&theta, &free, &self.prior_std(), middle)?;
-        Some(with_level_uncertainty(&self.whitened, &theta, &free, &covariance, &self.levels, &self.priors))
+        let information = self.whitened.observed_information(&theta);
+        let covariance = self.whitened.covariance_by(&information, &theta, &free, &self.prior_std(), middle)?;
+        let inverse = || inverse(information, &free, &self.priors);
+        Some(with_level_uncertainty(&self.whitened, &theta, &free, &covariance, &self.levels, inverse))
     }
 
     /// 95 % intervals of both time constants for that `covariance`; by the profile of the cost

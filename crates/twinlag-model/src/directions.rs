@@ -99,12 +99,10 @@ impl Directions {
                 continue;
             }
             for i in range {
-                let mut numbers = constants(theta);
-                numbers[i] = numbers[i].derivative();
                 let is_computed = i >= first && !is_held(i);
                 of_parameters.push(vec![(out.all.len(), 1.0)]);
                 out.all.push(Direction {
-                    plant: is_computed.then(|| model.plant_of(&numbers, observations)),
+                    plant: is_computed.then(|| model.plant_of(&moved(theta, i), observations)),
                     functions: model.sensors_of_functions(i),
                     support_s: None,
                 });
@@ -152,4 +150,11 @@ impl Model {
 /// Numbers without a derivative.
 pub(crate) fn constants(theta: &[f64]) -> Vec<Number> {
     theta.iter().copied().map(Number::from).collect()
+}
+
+/// Numbers with the derivative by parameter `i`.
+pub(crate) fn moved(theta: &[f64], i: usize) -> Vec<Number> {
+    let mut out = constants(theta);
+    out[i] = out[i].derivative();
+    out
 }

@@ -14,7 +14,7 @@ use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant};
 use crate::rows::Rows;
 use crate::selection::Span;
-use crate::whitening::{DERIVATIVE_ROUNDING, Factor, FactorDerivative, Source, Variance};
+use crate::whitening::{Adjoint, DERIVATIVE_ROUNDING, Factor, FactorDerivative, Source, Variance};
 
 /// Noise of a masked reading, in times the swing: far beyond what the reading could say, and not so far that rounding
 /// is lost to it (the square of a ratio of 1e7 to the noise is what double precision holds).
@@ -209,6 +209,17 @@ impl Block<'_> {
         let first = self.window.first + self.first;
         first - self.lead..first + self.count + consumed
     }
+
+    /// Its values, counted through all pieces, those of its lead among them.
+    fn values(&self) -> Range<usize> {
+        let first = self.window.from + self.first;
+        first - self.lead..first + self.count
+    }
+
+    /// The row of the window's factor that belongs to its first value.
+    fn from_row(&self) -> usize {
+        self.window.lead + self.first - self.lead
+    }
 }
 
 /// The derivative along a record, window after window.
@@ -327,9 +338,8 @@ impl<'a> Evaluator<'a> {
         if windows.len() == *used {
             windows.push(Window { piece: 0, first: 0, from: 0, count: 0, lead: 0, factor: Factor::empty() });
         }
-        let (before, rest) = windows.split_at_mut(*used);
-        let mut last = before.last_mut().map(|before| &mut before.factor);
-        let before = last.as_deref().filter(|_| first > 0);
+        let (earlier, rest) = windows.split_at_mut(*used);
+        let before = earlier.last().filter(|_| first > 0).map(|before| &before.factor);
         let window = &mut rest[0];
         let lead = before.map_or(0, Factor::band);
         (window.piece, window.first, window.from) = (pieces.len() - 1, first, residual.len());
@@ -342,9 +352,10 @@ impl<'a> Evaluator<'a> {
             piece.first_sample += first_sample(stretch, first_s, observations.step_s());
         }
         let sources = plain.sources(&variances[piece.stretch], first_reading);
-        window.factor.compute(&sources, lead + count, before);
-        if !is_kept {
-            last.iter_mut().for_each(|factor| factor.shorten());
+        let like = earlier.iter().map(|window| &window.factor).find(|factor| factor.is_plain());
+        window.factor.compute(&sources, lead + count, before, like);
+        if !is_kept && let Some(last) = earlier.last_mut() {
+            last.factor.shorten();
         }
         plain.values[..lead].copy_from_slice(&residual[residual.len() - lead..]);
         window.factor.whiten(&mut plain.values, 0, lead);
@@ -362,7 +373,7 @@ impl<'a> Evaluator<'a> {
         let first_reading = window.disagree(plant, self.observations, piece, plain);
         let before = index.checked_sub(1).filter(|_| window.first > 0).map(|before| &self.windows[before].factor);
         let sources = plain.sources(&self.variances[piece.stretch], first_reading);
-        factor.compute(&sources, window.lead + window.count, before);
+        factor.compute(&sources, window.lead + window.count, before, None);
         factor
     }
 
@@ -380,10 +391,9 @@ impl<'a> Evaluator<'a> {
         disagreement: &mut Disagreement<Number>,
         moved: &'m mut Moved,
     ) -> &'m [f64] {
-        let Direction { plant: Some(plant), functions, support_s } = direction else { return &[] };
+        let Direction { plant: Some(plant), functions, .. } = direction else { return &[] };
         let window = &self.windows[index];
-        let chains = plant.moved(*functions);
-        if chains == [false; 2] {
+        if plant.moved(*functions) == [false; 2] {
             moved.values.clear();
             moved.values.resize(window.count, 0.0);
             return &moved.values;
@@ -391,62 +401,128 @@ impl<'a> Evaluator<'a> {
         if window.first == 0 {
             moved.begin(factor.band());
         }
-        // Rows of delays along uneven samples are as wide as those of the whole window need.
-        let is_one = support_s.is_none() || self.observations.period_s.is_none() && plant.delay_s.is_some();
-        let most = if is_one { window.count } else { self.block_samples.max(BLOCK_BANDS * factor.band()) };
         moved.values.drain(..moved.values.len() - window.lead);
-        for first in (0..window.count).step_by(most.max(1)) {
-            let block = Block {
-                window,
-                first,
-                count: most.min(window.count - first),
-                lead: factor.band().min(window.first + first),
-            };
-            let is_idle = support_s.is_some_and(|support_s| !self.reaches(support_s, plant, &block));
-            if is_idle && moved.passes(&block) {
-                continue;
+        for block in self.blocks(direction, plant, window, factor.band()) {
+            if self.reaches(direction, plant, &block) || !moved.passes(&block) {
+                self.derive(direction, plant, &block, factor, disagreement, moved);
             }
-            self.derive(plant, chains, &block, factor, disagreement, moved);
         }
         &moved.values[window.lead..]
     }
 
-    /// Whether samples of a block are between two instants.
-    fn reaches(&self, support_s: [f64; 2], plant: &Plant, block: &Block<'_>) -> bool {
+    /// Half the derivative of the energy that window `index` adds; else as [`Self::derivative`].
+    ///
+    /// - `adjoint`: of [`Self::adjoint`]
+    pub(crate) fn slope(
+        &self,
+        direction: &Direction,
+        index: usize,
+        factor: &Factor,
+        disagreement: &mut Disagreement<Number>,
+        adjoint: &Adjoint,
+    ) -> f64 {
+        let Direction { plant: Some(plant), functions, .. } = direction else { return 0.0 };
+        if plant.moved(*functions) == [false; 2] {
+            return 0.0;
+        }
+        let blocks = self.blocks(direction, plant, &self.windows[index], factor.band());
+        let of_block = |block: Block<'_>| {
+            let Block { lead, .. } = block;
+            self.move_block(direction, plant, &block, disagreement);
+            let sources = self.moved_sources(plant, &block, disagreement);
+            let all = block.values();
+            let by = &adjoint.by_value[all.start + lead..];
+            let of_values: f64 = disagreement.values[lead..].iter().zip(by).map(|(v, by)| v.eps * by).sum();
+            of_values + adjoint.slope(factor.band(), &sources, all, lead)
+        };
+        blocks.filter(|block| self.reaches(direction, plant, block)).map(of_block).sum()
+    }
+
+    /// From half the gradient of an energy by the whitened residual, to that by the disagreement and its covariance.
+    pub(crate) fn adjoint(&self, plant: &Plant, gradient: Vec<f64>, again: &mut Again) -> Adjoint {
+        let mut out = Adjoint::begin(gradient, self.windows().first().map_or(0, |window| window.factor.band()));
+        for index in (0..self.used).rev() {
+            let Window { from, count, lead, .. } = self.windows[index];
+            out.go_back(self.factor(plant, index, again), &self.residual, from - lead..from + count, lead);
+        }
+        out
+    }
+
+    /// The blocks of a window: of a direction that acts everywhere there is one.
+    fn blocks<'w>(
+        &self,
+        direction: &Direction,
+        plant: &Plant,
+        window: &'w Window,
+        band: usize,
+    ) -> impl Iterator<Item = Block<'w>> {
+        // Rows of delays along uneven samples are as wide as those of the whole window need.
+        let is_one = direction.support_s.is_none() || self.observations.period_s.is_none() && plant.delay_s.is_some();
+        let most = if is_one { window.count } else { self.block_samples.max(BLOCK_BANDS * band) };
+        (0..window.count).step_by(most.max(1)).map(move |first| {
+            let (count, lead) = (most.min(window.count - first), band.min(window.first + first));
+            Block { window, first, count, lead }
+        })
+    }
+
+    /// Whether a direction acts where the samples of a block are.
+    fn reaches(&self, direction: &Direction, plant: &Plant, block: &Block<'_>) -> bool {
         let samples = block.samples(plant.consumed(self.observations.period_s.is_some()));
         let time_s = &self.observations.stretches[self.pieces[block.window.piece].stretch].time_s;
-        time_s[samples.start] <= support_s[1] && time_s[samples.end - 1] >= support_s[0]
+        let [from_s, to_s] = [time_s[samples.start], time_s[samples.end - 1]];
+        direction.support_s.is_none_or(|[first_s, last_s]| from_s <= last_s && to_s >= first_s)
+    }
+
+    /// The disagreement of a block with its derivative.
+    fn move_block(
+        &self,
+        direction: &Direction,
+        plant: &Plant,
+        block: &Block<'_>,
+        disagreement: &mut Disagreement<Number>,
+    ) {
+        let period_s = self.observations.period_s;
+        let samples = block.samples(plant.consumed(period_s.is_some()));
+        let cut = self.observations.stretches[self.pieces[block.window.piece].stretch].cut(samples);
+        disagreement.inverse.invert_moved(plant, cut, period_s, plant.moved(direction.functions));
+        disagreement.compare(plant, self.observations.step_s());
+    }
+
+    /// What brings noise into the disagreement of a block by a derivative.
+    fn moved_sources<'d>(
+        &'d self,
+        plant: &Plant,
+        block: &Block<'_>,
+        disagreement: &'d Disagreement<Number>,
+    ) -> Vec<Source<'d, Number>> {
+        let samples = block.samples(plant.consumed(self.observations.period_s.is_some()));
+        let variances = &self.variances[self.pieces[block.window.piece].stretch];
+        let mut sources = disagreement.sources(variances, samples.start);
+        sources.retain(|source| !source.rows.is_constant());
+        sources
     }
 
     /// The derivatives of a block, after those before it.
     fn derive(
         &self,
+        direction: &Direction,
         plant: &Plant,
-        chains: [bool; 2],
         block: &Block<'_>,
         factor: &Factor,
         disagreement: &mut Disagreement<Number>,
         moved: &mut Moved,
     ) {
         let Moved { factor: of_factor, values, largest } = moved;
-        let Block { window, first, count, lead } = *block;
-        let stretch = self.pieces[window.piece].stretch;
-        let (period_s, step_s) = (self.observations.period_s, self.observations.step_s());
-        let samples = block.samples(plant.consumed(period_s.is_some()));
-        let cut = self.observations.stretches[stretch].cut(samples.clone());
-        disagreement.inverse.invert_moved(plant, cut, period_s, chains);
-        disagreement.compare(plant, step_s);
+        let Block { count, lead, .. } = *block;
+        self.move_block(direction, plant, block, disagreement);
+        let sources = self.moved_sources(plant, block, disagreement);
         values.extend(disagreement.values[lead..].iter().map(|v| v.eps));
         let from = values.len() - count - lead;
         let values = &mut values[from..];
-        let mut sources = disagreement.sources(&self.variances[stretch], samples.start);
-        sources.retain(|source| !source.rows.is_constant());
-        let at = window.lead + first - lead;
         if sources.is_empty() && of_factor.passes(count) {
-            factor.whiten(values, at, lead);
+            factor.whiten(values, block.from_row(), lead);
         } else {
-            let residual = &self.residual[window.from + first - lead..window.from + first + count];
-            of_factor.whiten(factor, at, &sources, residual, values, lead);
+            of_factor.whiten(factor, block.from_row(), &sources, &self.residual[block.values()], values, lead);
         }
         *largest = values[lead..].iter().fold(*largest, |most, v| most.max(v.abs()));
     }

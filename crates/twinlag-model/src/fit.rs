@@ -247,7 +247,7 @@ impl Model {
             let moved = |by: f64| {
                 let mut at = theta.to_vec();
                 at[i] = (at[i] + by).clamp(variable.lower, variable.upper);
-                (at[i] - theta[i], cost.normal_equations(&at, None, None).slope)
+                (at[i] - theta[i], cost.slope(&at))
             };
             let ((up, above), (down, below)) = (moved(step), moved(-step));
             above.iter().zip(&below).map(|(above, below)| (above - below) / (up - down)).collect()

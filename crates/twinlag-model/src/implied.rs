@@ -207,7 +207,7 @@ impl Plant {
         let variances =
             [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
         let mut factor = Factor::empty();
-        factor.compute(&disagreement.sources(&variances, 0), residual.len(), None);
+        factor.compute(&disagreement.sources(&variances, 0), residual.len(), None, None);
         factor.whiten(&mut residual, 0, 0);
         let start = before + first_sample(stretch, time_s[0], step_s);
         let samples = start..start + residual.len();

@@ -200,25 +200,59 @@ impl Weighting {
         }
     }
 
-    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, block by block, so
-    /// that the sums stay where they are fast.
+    /// What each of `values` adds to the products of filtered values with `weights`, one for each of them: the filter
+    /// transposed.
+    pub(crate) fn transposed(&self, weights: &[f64]) -> Vec<f64> {
+        let n = weights.len();
+        let of_smooth: Vec<f64> = if self.prediction.is_empty() {
+            weights.to_vec()
+        } else {
+            let begin = self.prediction.len() - 1;
+            let lags = |k: usize| begin.saturating_sub(k)..self.prediction.len().min(n - k);
+            (0..n).map(|k| lags(k).map(|lag| self.prediction[lag] * weights[k + lag]).sum()).collect()
+        };
+        if self.taps.is_empty() {
+            return of_smooth;
+        }
+        let half = self.half();
+        // Nothing is filtered where the filter reaches past an end, and both ends take part in what is.
+        let inside = half..n.saturating_sub(half).max(half);
+        let mut wide = vec![0.0; n + 2 * half];
+        wide[half + inside.start.min(n)..half + inside.end.min(n)]
+            .copy_from_slice(&of_smooth[inside.start.min(n)..inside.end.min(n)]);
+        let mut out = vec![0.0; wide.len()];
+        self.smooth_inside(&wide, &mut out);
+        out[half..half + n].to_vec()
+    }
+
+    /// The filter of zero phase where it reaches past no end: both sides of a pair of taps at once, for as many values side by
+    /// side as registers hold sums.
     fn smooth_inside(&self, values: &[f64], out: &mut [f64]) {
-        const BLOCK: usize = 512;
+        const LANES: usize = 16;
         let half = self.half();
         let count = (values.len() + 1).saturating_sub(self.taps.len());
-        for from in (0..count).step_by(BLOCK) {
-            let n = BLOCK.min(count - from);
-            let sums = &mut out[from + half..from + half + n];
-            let middle = &values[from + half..from + half + n];
-            sums.iter_mut().zip(middle).for_each(|(sum, v)| *sum = self.taps[half] * v);
-            for lag in 1..=half {
-                let tap = self.taps[half + lag];
-                let (before, after) = (&values[from + half - lag..][..n], &values[from + half + lag..][..n]);
-                for ((sum, a), b) in sums.iter_mut().zip(before).zip(after) {
-                    *sum += tap * (a + b);
-                }
+        let whole = count - count % LANES;
+        for from in (0..whole).step_by(LANES) {
+            let around = &values[from..][..2 * half + LANES];
+            out[from + half..][..LANES].copy_from_slice(&self.sums::<LANES>(around));
+        }
+        for from in whole..count {
+            out[from + half] = self.sums::<1>(&values[from..][..=2 * half])[0];
+        }
+    }
+
+    /// `N` filtered values of those `around` them.
+    fn sums<const N: usize>(&self, around: &[f64]) -> [f64; N] {
+        let half = self.half();
+        let of = |from: usize| -> &[f64; N] { around[from..].first_chunk().expect("as many as the filter reaches") };
+        let mut sums = of(half).map(|v| self.taps[half] * v);
+        for (lag, tap) in self.taps[half..].iter().enumerate().skip(1) {
+            let (before, after) = (of(half - lag), of(half + lag));
+            for ((sum, a), b) in sums.iter_mut().zip(before).zip(after) {
+                *sum += tap * (a + b);
             }
         }
+        sums
     }
 }
 
@@ -237,4 +271,29 @@ fn spectrum(observations: &Observations, channel: usize) -> Vec<f64> {
         }
     }
     sum.iter().map(|s| s / count.max(1.0)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `(F v)ᵀ w` is `vᵀ (Fᵀ w)`. Both are sums of some 200 values times 50 taps of size one: rounding leaves 1e4 · 1.1e-16.
+    #[test]
+    fn the_transposed_filter_has_the_products_of_the_filter() {
+        let value = |k: usize| ((k * k * 7 + k) as f64 * 2.399).sin();
+        let taps: Vec<f64> = (0..49_usize).map(|j| 1.0 / (1.0 + j.abs_diff(24) as f64)).collect();
+        let prediction = vec![1.0, -0.6, 0.2];
+        for (taps, prediction) in
+            [(vec![], vec![]), (taps.clone(), vec![]), (vec![], prediction.clone()), (taps, prediction)]
+        {
+            let weighting = Weighting { taps, prediction };
+            for n in [1, 2, 30, 49, 50, 200] {
+                let values: Vec<f64> = (0..n).map(value).collect();
+                let weights: Vec<f64> = (0..n).map(|k| value(k + 1000)).collect();
+                let (want, got) = (weighting.apply(&values), weighting.transposed(&weights));
+                let (want, got) = (dense::dot(&want, &weights), dense::dot(&got, &values));
+                assert!((got - want).abs() < 1.1e-12, "{n} values: {got}, and {want}");
+            }
+        }
+    }
 }

@@ -96,11 +96,13 @@ pub(crate) struct Factor {
     same: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
+    /// Whether it begins a stretch and no masked reading enters it: then nothing but `same` decides its rows.
+    is_plain: bool,
 }
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0 }
+        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0, is_plain: false }
     }
 
     /// Values before one that it is correlated with.
@@ -111,7 +113,14 @@ impl Factor {
     /// Becomes the factor of the covariance of `count` values, in its own memory.
     ///
     /// - `before`: that of the window before, where the first of the values are a lead
-    pub(crate) fn compute(&mut self, sources: &[Source<'_, f64>], count: usize, before: Option<&Self>) {
+    /// - `like`: that of another stretch, whose rows may be the same
+    pub(crate) fn compute(
+        &mut self,
+        sources: &[Source<'_, f64>],
+        count: usize,
+        before: Option<&Self>,
+        like: Option<&Self>,
+    ) {
         self.band = sources.iter().map(|s| s.rows.width).max().unwrap_or(1) - 1;
         let (band, stride) = (self.band, self.band + 1);
         let settles = sources.iter().all(|s| s.rows.is_same()) && count > band;
@@ -121,6 +130,12 @@ impl Factor {
         }
         self.rows.clear();
         self.kept.clear();
+        self.is_plain =
+            before.is_none() && settles && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count;
+        let is_alike = |like: &&Self| like.is_plain && like.len() >= count && like.same == self.same;
+        if let Some(like) = like.filter(is_alike).filter(|_| self.is_plain) {
+            return self.begin_as(like, count);
+        }
         let mut agreeing = 0;
         if !settles {
             self.rows.reserve_exact(count * stride);
@@ -164,6 +179,19 @@ impl Factor {
         self.agreeing = agreeing;
     }
 
+    /// Whether it begins a stretch and no masked reading enters it.
+    pub(crate) fn is_plain(&self) -> bool {
+        self.is_plain
+    }
+
+    /// Becomes the first `count` rows of another.
+    fn begin_as(&mut self, like: &Self, count: usize) {
+        self.kept.extend_from_slice(&like.kept[..count]);
+        let rows = like.kept[count - 1] as usize + 1;
+        self.rows.extend_from_slice(&like.rows[..rows * (self.band + 1)]);
+        self.agreeing = if count == like.len() { like.agreeing } else { 0 };
+    }
+
     /// Keeps no more than the next window begins with, if the rows have not settled: there are as many of them as of values.
     pub(crate) fn shorten(&mut self) {
         // A window no longer than the band is its own end.
@@ -204,11 +232,11 @@ impl Factor {
 
     /// `L⁻¹ u` in place.
     ///
-    /// - `at`: the row that belongs to the first value
+    /// - `from_row`: the row that belongs to the first value
     /// - `lead`: so many values are whitened already
-    pub(crate) fn whiten(&self, u: &mut [f64], at: usize, lead: usize) {
+    pub(crate) fn whiten(&self, u: &mut [f64], from_row: usize, lead: usize) {
         for k in lead..u.len() {
-            let row = self.row(at + k);
+            let row = self.row(from_row + k);
             let reach = self.band.min(k);
             let (before, rest) = u.split_at_mut(k);
             rest[0] = (rest[0] - backwards(&row[1..=reach], &before[k - reach..])) / row[0];
@@ -217,7 +245,12 @@ impl Factor {
 
     /// `L⁻ᵀ r` in place: of a whitened residual `V⁻¹ u`.
     pub(crate) fn unwhiten_transposed(&self, r: &mut [f64]) {
-        for k in (0..r.len()).rev() {
+        self.unwhiten_transposed_from(r, 0);
+    }
+
+    /// As [`Self::unwhiten_transposed`] of the values after a lead, from which it takes off what they have in common.
+    pub(crate) fn unwhiten_transposed_from(&self, r: &mut [f64], lead: usize) {
+        for k in (lead..r.len()).rev() {
             let row = self.row(k);
             let (before, rest) = r.split_at_mut(k);
             let w = rest[0] / row[0];
@@ -229,14 +262,104 @@ impl Factor {
     }
 }
 
-/// The derivative of a factor: its last rows, value `k` of the stretch in place `k mod stride`.
+/// How an energy depends on the disagreement `u` and on its covariance `V`: derivatives by each, with `r = L⁻¹ u` and `q` that
+/// by `r`. That by `u` is `w = L⁻ᵀ q`, that by `L` is `−w rᵀ`, and what follows for `V = L Lᵀ` is the factorisation gone
+/// through backwards (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm").
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Adjoint {
+    /// By each value of the disagreement.
+    pub(crate) by_value: Vec<f64>,
+    /// By each entry of its covariance, lags `0..=band` of each row; and by those of `L`, where no row after it has been gone
+    /// through.
+    by_covariance: Vec<f64>,
+}
+
+impl Adjoint {
+    /// - `gradient`: `q` of all values
+    pub(crate) fn begin(gradient: Vec<f64>, band: usize) -> Self {
+        let by_covariance = vec![0.0; gradient.len() * (band + 1)];
+        Self { by_value: gradient, by_covariance }
+    }
+
+    /// Goes through the rows of a window, the last one first, after the windows that follow it.
+    ///
+    /// - `residual`: `r` of all values
+    /// - `all`: values of the window, its lead among them
+    pub(crate) fn go_back(&mut self, factor: &Factor, residual: &[f64], all: std::ops::Range<usize>, lead: usize) {
+        let (stride, first) = (factor.band + 1, all.start);
+        factor.unwhiten_transposed_from(&mut self.by_value[all.clone()], lead);
+        let by = &mut self.by_covariance[first * stride..all.end * stride];
+        let residual = &residual[all];
+        for k in (lead..residual.len()).rev() {
+            let reach = factor.band.min(k);
+            let w = self.by_value[first + k];
+            let (before, rest) = by.split_at_mut(k * stride);
+            let own = &mut rest[..=reach];
+            own.iter_mut().zip(residual[..=k].iter().rev()).for_each(|(by, r)| *by -= w * r);
+            let l = &factor.row(k)[..=reach];
+            own[0] *= 0.5 / l[0];
+            let of_diagonal = 2.0 * own[0];
+            own[1..].iter_mut().zip(&l[1..]).for_each(|(by, l)| *by -= of_diagonal * l);
+            for lag in 1..=reach {
+                let other = factor.row(k - lag);
+                let by_other = &mut before[(k - lag) * stride..][..stride];
+                own[lag] /= other[0];
+                let by_entry = own[lag];
+                by_other[0] -= by_entry * l[lag];
+                for older in lag + 1..=reach {
+                    own[older] -= by_entry * other[older - lag];
+                    by_other[older - lag] -= by_entry * l[older];
+                }
+            }
+        }
+    }
+
+    /// How fast the energy changes with the covariance of some values.
+    ///
+    /// - `band`: that of the factor
+    /// - `sources`: what makes the covariance, with derivatives; a source whose rows have none may be left out
+    pub(crate) fn slope(
+        &self,
+        band: usize,
+        sources: &[Source<'_, Number>],
+        all: std::ops::Range<usize>,
+        lead: usize,
+    ) -> f64 {
+        let count = all.len();
+        let by = &self.by_covariance[all.start * (band + 1)..all.end * (band + 1)];
+        let rows = by.chunks_exact(band + 1).enumerate().skip(lead);
+        let is_same = sources.iter().all(|source| source.rows.is_same());
+        if is_same && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count {
+            let mut sums = vec![0.0; band + 1];
+            rows.for_each(|(_, row)| sums.iter_mut().zip(row).for_each(|(sum, by)| *sum += by));
+            return sums.iter().enumerate().map(|(lag, by)| by * derivative_of_same(sources, lag)).sum();
+        }
+        let of_row = |(k, row): (usize, &[f64])| -> f64 {
+            let entries = row.iter().enumerate().take(k + 1);
+            entries.map(|(lag, by)| by * derivative_of_covariance(sources, k, lag)).sum()
+        };
+        rows.map(of_row).sum()
+    }
+}
+
+/// The derivative of a factor, row after row.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FactorDerivative {
-    recent: Vec<f64>,
-    row: Vec<f64>,
+    now: Last,
     same: Vec<f64>,
     /// Values of the stretch up to the end of the last window.
     end: usize,
+    /// The first window of an earlier stretch.
+    first: Remembered,
+}
+
+/// The last rows of the derivative of a factor.
+#[derive(Clone, Debug, Default)]
+struct Last {
+    /// A ring: after the row in place `at` comes the next one.
+    recent: Vec<f64>,
+    at: usize,
+    row: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
     /// Whether the last row stands for those that follow.
@@ -245,22 +368,51 @@ pub(crate) struct FactorDerivative {
     largest: f64,
 }
 
+/// The first window of a stretch that no masked reading enters: covariances decide its rows.
+#[derive(Clone, Debug, Default)]
+struct Remembered {
+    /// Entries of a row of the covariance, and of its derivative.
+    same: [Vec<f64>; 2],
+    /// Rows up to the one that stands for those that follow, or to the end of the window.
+    rows: Vec<f64>,
+    /// Values of the window.
+    count: usize,
+    /// The last rows at its end.
+    after: Last,
+}
+
+impl Remembered {
+    fn begin(&mut self, same: [&Vec<f64>; 2]) {
+        self.same.iter_mut().zip(same).for_each(|(own, same)| own.clone_from(same));
+        self.rows.clear();
+        self.count = 0;
+    }
+
+    /// Whether these are the rows of a window of `count` values.
+    fn is_of(&self, same: [&Vec<f64>; 2], count: usize) -> bool {
+        self.count >= count && self.same[0] == *same[0] && self.same[1] == *same[1]
+    }
+}
+
 impl FactorDerivative {
     /// Begins a stretch whose factor has bands of `band`.
     pub(crate) fn begin(&mut self, band: usize) {
         let stride = band + 1;
-        self.recent.clear();
-        self.recent.resize(stride * stride, 0.0);
-        self.row.clear();
-        self.row.resize(stride, 0.0);
-        (self.end, self.agreeing, self.is_kept, self.largest) = (0, 0, false, 0.0);
+        let Last { recent, at, row, agreeing, is_kept, largest } = &mut self.now;
+        *at = 0;
+        recent.clear();
+        recent.resize(stride * stride, 0.0);
+        row.clear();
+        row.resize(stride, 0.0);
+        (self.end, *agreeing, *is_kept, *largest) = (0, 0, false, 0.0);
     }
 
     /// Goes past `count` values where no source has derivatives, if there is nothing left of those before; whether there is not.
     pub(crate) fn passes(&mut self, count: usize) -> bool {
-        let stride = self.row.len();
-        let rows = if self.is_kept { &self.row } else { &self.recent };
-        let is_still = rows.iter().all(|d| d.abs() <= DERIVATIVE_ROUNDING * self.largest);
+        let Last { recent, row, is_kept, largest, .. } = &self.now;
+        let stride = row.len();
+        let rows = if *is_kept { row } else { recent };
+        let is_still = rows.iter().all(|d| d.abs() <= DERIVATIVE_ROUNDING * largest);
         if is_still {
             let end = self.end + count;
             self.begin(stride - 1);
@@ -277,81 +429,115 @@ impl FactorDerivative {
     /// - `residual`: `r`
     /// - `values`: the derivative of `u`, and then of `r`
     /// - `lead`: so many values are whitened already
-    /// - `at`: the row of `factor` that belongs to the first value
+    /// - `from_row`: the row of `factor` that belongs to the first value
     pub(crate) fn whiten(
         &mut self,
         factor: &Factor,
-        at: usize,
+        from_row: usize,
         sources: &[Source<'_, Number>],
         residual: &[f64],
         values: &mut [f64],
         lead: usize,
     ) {
-        let (band, stride) = (factor.band, factor.band + 1);
+        let stride = factor.band + 1;
         let settles = !factor.same.is_empty();
         self.same.clear();
         if settles {
             self.same.extend((0..stride).map(|lag| derivative_of_same(sources, lag)));
         }
         let first = self.end - lead;
-        for k in lead..values.len() {
-            let reach = band.min(k);
-            let of_factor = factor.row(at + k);
-            // Where the factor has settled, its derivative does soon after.
-            let is_settled = factor.is_settled(at + k);
-            if !(is_settled && self.agreeing >= SETTLED_ROWS) {
-                if self.is_kept {
-                    // All rows in reach were the one that was kept.
-                    self.recent.chunks_exact_mut(stride).for_each(|row| row.copy_from_slice(&self.row));
-                }
-                let is_plain = settles && (is_settled || !is_masked_around(sources, k, band));
-                self.next_row(factor, at, sources, k, first, is_plain);
-                let largest = self.row.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-                self.largest = self.largest.max(largest);
-                let before = &self.recent[(first + k + stride - 1) % stride * stride..][..stride];
-                let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest;
-                let has_settled = is_settled && self.row.iter().zip(before).all(agrees);
-                self.agreeing = if has_settled { self.agreeing + 1 } else { 0 };
-                self.recent[(first + k) % stride * stride..][..stride].copy_from_slice(&self.row);
+        let begins = factor.is_plain && self.end == 0;
+        if begins && self.first.is_of([&factor.same, &self.same], values.len()) {
+            self.end = values.len();
+            let Remembered { rows, after, count, .. } = &self.first;
+            let last = rows.len() / stride - 1;
+            for k in 0..values.len() {
+                let row = &rows[k.min(last) * stride..][..stride];
+                whiten_next(factor.row(from_row + k), row, residual, values, k);
             }
-            self.is_kept = is_settled && self.agreeing >= SETTLED_ROWS;
-            let (before, rest) = values.split_at_mut(k);
-            let from_factor = backwards(&self.row[..=reach], &residual[k - reach..=k]);
-            let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
-            rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
+            if values.len() == *count {
+                self.now.clone_from(after);
+            }
+            return;
+        }
+        if begins {
+            self.first.begin([&factor.same, &self.same]);
+        }
+        for k in lead..values.len() {
+            let is_new = self.advance(factor, from_row, sources, k);
+            if begins && is_new {
+                self.first.rows.extend_from_slice(&self.now.row);
+            }
+            whiten_next(factor.row(from_row + k), &self.now.row, residual, values, k);
         }
         self.end = first + values.len();
-    }
-
-    /// Row `k` of `dL`, of a window with `first` values before it.
-    fn next_row(
-        &mut self,
-        factor: &Factor,
-        at: usize,
-        sources: &[Source<'_, Number>],
-        k: usize,
-        first: usize,
-        is_plain: bool,
-    ) {
-        let stride = factor.band + 1;
-        let reach = factor.band.min(k);
-        let l = factor.row(at + k);
-        for lag in (0..=reach).rev() {
-            let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
-            if lag == 0 {
-                let products = l[1..=reach].iter().zip(&self.row[1..=reach]).map(|(l, dl)| l * dl);
-                entry -= 2.0 * products.sum::<f64>();
-                self.row[0] = 0.5 * entry / l[0];
-                continue;
-            }
-            let other = factor.row(at + k - lag);
-            let d_other = &self.recent[(first + k - lag) % stride * stride..][..stride];
-            for older in lag + 1..=reach {
-                entry -= self.row[older] * other[older - lag] + l[older] * d_other[older - lag];
-            }
-            self.row[lag] = (entry - l[lag] * d_other[0]) / other[0];
+        if begins {
+            self.first.count = values.len();
+            self.first.after.clone_from(&self.now);
         }
     }
+
+    /// Goes to row `k` of `dL`; whether it had to be computed.
+    fn advance(&mut self, factor: &Factor, from_row: usize, sources: &[Source<'_, Number>], k: usize) -> bool {
+        let (band, stride) = (factor.band, factor.band + 1);
+        // Where the factor has settled, its derivative does soon after.
+        let is_settled = factor.is_settled(from_row + k);
+        let is_new = !(is_settled && self.now.agreeing >= SETTLED_ROWS);
+        if is_new {
+            if self.now.is_kept {
+                // All rows in reach were the one that was kept.
+                let Last { recent, row, .. } = &mut self.now;
+                recent.chunks_exact_mut(stride).for_each(|recent| recent.copy_from_slice(row));
+            }
+            let is_plain = !factor.same.is_empty() && (is_settled || !is_masked_around(sources, k, band));
+            self.next_row(factor, from_row, sources, k, is_plain);
+            let Last { recent, at, row, agreeing, largest, .. } = &mut self.now;
+            let larger = |most: f64, d: &f64| if d.abs() > most { d.abs() } else { most };
+            let largest_here = row.iter().fold(0.0, larger);
+            *largest = larger(*largest, &largest_here);
+            let before = &recent[*at * stride..][..stride];
+            let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= DERIVATIVE_ROUNDING * largest_here;
+            let has_settled = is_settled && row.iter().zip(before).all(agrees);
+            *agreeing = if has_settled { *agreeing + 1 } else { 0 };
+            *at = if *at == band { 0 } else { *at + 1 };
+            recent[*at * stride..][..stride].copy_from_slice(row);
+        }
+        self.now.is_kept = is_settled && self.now.agreeing >= SETTLED_ROWS;
+        is_new
+    }
+
+    /// Row `k` of `dL`, after the one in place `at`.
+    fn next_row(&mut self, factor: &Factor, from_row: usize, sources: &[Source<'_, Number>], k: usize, is_plain: bool) {
+        let stride = factor.band + 1;
+        let reach = factor.band.min(k);
+        let l = &factor.row(from_row + k)[..=reach];
+        let Last { recent, at, row, .. } = &mut self.now;
+        for lag in (1..=reach).rev() {
+            let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
+            let other = &factor.row(from_row + k - lag)[..=reach - lag];
+            // The row before is in place `at`.
+            let place = if *at + 1 >= lag { *at + 1 - lag } else { *at + 1 + stride - lag };
+            let d_other = &recent[place * stride..][..=reach - lag];
+            let of_row = row[lag + 1..=reach].iter().zip(&l[lag + 1..]);
+            for ((dl, l), (other, d_other)) in of_row.zip(other[1..].iter().zip(&d_other[1..])) {
+                entry -= dl * other + l * d_other;
+            }
+            row[lag] = (entry - l[lag] * d_other[0]) / other[0];
+        }
+        let mut entry = if is_plain { self.same[0] } else { derivative_of_covariance(sources, k, 0) };
+        let products = l[1..].iter().zip(&row[1..]).map(|(l, dl)| l * dl);
+        entry -= 2.0 * products.sum::<f64>();
+        row[0] = 0.5 * entry / l[0];
+    }
+}
+
+/// Value `k` of `L dr = du − dL r`, in place of that of `du`.
+fn whiten_next(of_factor: &[f64], of_derivative: &[f64], residual: &[f64], values: &mut [f64], k: usize) {
+    let reach = k.min(of_factor.len() - 1);
+    let (before, rest) = values.split_at_mut(k);
+    let from_factor = backwards(&of_derivative[..=reach], &residual[k - reach..=k]);
+    let from_before = backwards(&of_factor[1..=reach], &before[k - reach..]);
+    rest[0] = (rest[0] - from_factor - from_before) / of_factor[0];
 }
 
 /// `Σ weights[i] values[n − 1 − i]`, the last value last: where it has only just been computed, all others are added up before.
@@ -399,7 +585,7 @@ fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, p
         }
         let products = now.iter().zip(&then[lag..]).map(|(a, b)| product(*a, *b));
         let first = source.reading(k);
-        sum += if variance.has_masked_in(first..first + now.len()) {
+        sum += if !variance.masked.is_empty() && variance.has_masked_in(first..first + now.len()) {
             products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
         } else {
             variance.plain * products.sum::<f64>()
@@ -442,7 +628,7 @@ mod tests {
     fn two_lags(tau_s: [f64; 2], is_masked: bool) -> (Vec<f64>, Factor) {
         let chains = tau_s.map(through_lag);
         let mut factor = Factor::empty();
-        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len(), None);
+        factor.compute(&sources(&chains, &variances(is_masked)), chains[0].len(), None, None);
         let u = chains[0].value.iter().zip(&chains[1].value).map(|(a, b)| *a - *b).collect();
         (u, factor)
     }

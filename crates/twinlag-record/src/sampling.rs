@@ -19,7 +19,8 @@ pub enum SamplingKind {
     /// Every step is the period, within a hundredth of it or the grid that stamps are printed on.
     Uniform,
     /// Stamps lie on a grid that is coarse beside the period, and steps differ by one unit of it,
-    /// as 3 s and 4 s with stamps of 1 s: the samples are taken as evenly spaced.
+    /// as 3 s and 4 s with stamps of 1 s, or every stamp is at most a unit from the rounded one and the unit is short beside
+    /// the period: the samples are taken as evenly spaced.
     Rounded,
     /// Steps differ: each is used as stamped.
     Irregular,
@@ -52,6 +53,13 @@ const MAX_DIGITS: i32 = 15;
 const SINGLE_DIGITS: i32 = 7;
 /// Departure, in periods, below which stamps count as even.
 const EXACT_PERIODS: f64 = 0.01;
+/// Part of its unit by which a stamp may differ from the instant that it was rounded from, and a hundredth more, as of grids;
+/// with the unit either way by which a clock is off that is read just before or after its last digit changes.
+const ROUNDED_UNITS: f64 = 0.51;
+const OFF_BY_ONE_UNITS: f64 = 1.51;
+/// Unit of a clock whose stamps may be off by one, in periods, at most: if the samples jitter and not the clock, what is made
+/// of them is off by 0.9 units rms, a sixtieth of what a reading changes by from sample to sample. Chosen.
+const MAX_OFF_BY_ONE_PERIODS: f64 = 0.02;
 
 impl Sampling {
     /// The step beyond which two rows do not belong together: 1.5 periods and the rounding of two
@@ -118,8 +126,11 @@ pub(crate) fn judge(time_s: &[f64], clock: Option<Clock>, choice: SamplingChoice
     let is_rounded = grid.is_some_and(|unit| high - low <= 1.01 * unit && is_steady(time_s, limit, period, unit))
         || (!(is_whole && is_uniform)
             && format.is_some_and(|(clock, format)| {
-                is_even_but_for_digits(time_s, &format.units(time_s, clock), limit, period)
-            }));
+                is_even_but_for_digits(time_s, &format.units(time_s, clock), ROUNDED_UNITS, limit, period)
+            }))
+        || grid.filter(|unit| is_whole && !is_uniform && *unit <= MAX_OFF_BY_ONE_PERIODS * period).is_some_and(
+            |unit| is_even_but_for_digits(time_s, &vec![unit; time_s.len()], OFF_BY_ONE_UNITS, limit, period),
+        );
     let kind = match choice {
         SamplingChoice::Uniform => SamplingKind::Uniform,
         SamplingChoice::Auto if is_whole && is_uniform => SamplingKind::Uniform,
@@ -169,11 +180,14 @@ fn is_steady(time_s: &[f64], limit_s: f64, period_s: f64, unit_s: f64) -> bool {
 /// latest ones, is convex in `P`: bisection by its slope finds a place where it is not positive, or
 /// that there is none.
 ///
+/// - `digits_s`: the unit of the last digit of each stamp, s
+/// - `most_units`: by how many of these a stamp may be off
+///
 /// The chance that a clock that jitters passes: of `n` stamps in `r` runs that jitter evenly within
 /// `±J`, each must lie in a window of `q`, which `n − r − 1` independent ones do with a probability of
 /// `(q/2J)^(n − r − 1)`: for `J = q` and 100 rows in one run 3e-30. Jitter that is much smaller than the
 /// last digit is not in the stamps, which are then as even as they can be.
-fn is_even_but_for_digits(time_s: &[f64], digits_s: &[f64], limit_s: f64, period_s: f64) -> bool {
+fn is_even_but_for_digits(time_s: &[f64], digits_s: &[f64], most_units: f64, limit_s: f64, period_s: f64) -> bool {
     // A row that is missing must show: two periods less the rounding of both stamps are more than
     // the limit of 1.5 periods and one rounding.
     if digits_s.iter().any(|q| *q > 0.25 * period_s) {
@@ -187,8 +201,7 @@ fn is_even_but_for_digits(time_s: &[f64], digits_s: &[f64], limit_s: f64, period
             for row in run.clone() {
                 let k = (row - run.start) as f64;
                 let start = (time_s[row] - time_s[run.start] - k * period_s) - k * correction_s;
-                // As of grids: a stamp may miss its place by a hundredth of the unit.
-                let half = 0.51 * digits_s[row];
+                let half = most_units * digits_s[row];
                 if start - half > latest.0 {
                     latest = (start - half, k);
                 }
@@ -396,6 +409,22 @@ mod tests {
         assert!((got.period_s - 1.0 / 24.0).abs() < 5e-11, "got {}, want {}", got.period_s, 1.0 / 24.0);
         assert!(got.largest_departure_s < 6e-6, "got {}, want half a unit, 5e-6", got.largest_departure_s);
         assert!((got.stamp_resolution_s.unwrap() - 1e-5).abs() < 1e-12);
+    }
+
+    /// A clock with a unit of a hundredth of the period that is off by one either way leaves departures of 1.5 units, 1.5e-5 s,
+    /// at most, and the slope of n points 0.87 units (of one either way and rounding) times √12 n^-3/2: ten of these are
+    /// 1.1e-10 s. Off by three it jitters. Failed: steps differ by 2 %, and each was used as stamped.
+    #[test]
+    fn stamps_that_are_off_by_one_in_their_last_digit_are_even() {
+        let stamps = |most: i32| -> Vec<f64> {
+            let off = |k: i32| (k * 7919 % 104_729) % (2 * most + 1) - most;
+            (0..20_000).map(|k| f64::from((f64::from(k) * 100.37).round() as i32 + off(k)) * 1e-5).collect()
+        };
+        let got = auto(&stamps(1));
+        assert_eq!(got.kind, SamplingKind::Rounded);
+        assert!((got.period_s - 1.0037e-3).abs() < 1.1e-10, "got {}, want 1.0037e-3", got.period_s);
+        assert!(got.largest_departure_s < 1.5e-5, "{}", got.largest_departure_s);
+        assert_eq!(auto(&stamps(3)).kind, SamplingKind::Irregular);
     }
 
     /// Seven significant digits leave milliseconds after 1000 s, which are more than a hundredth of the period. The slope has
