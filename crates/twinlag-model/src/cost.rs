@@ -14,7 +14,7 @@ use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::plant::Plant;
-use crate::selection::{Selection, Sieve};
+use crate::selection::{Samples, Selection, Sieve};
 use crate::weighting::Weighting;
 
 /// Residuals, over all columns, from which on columns are computed side by side: below, threads cost more than they save
@@ -121,6 +121,7 @@ impl<'a> ResidualCost<'a> {
         memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
         let Memory { evaluator, residual, ends, sieve, .. } = memory;
         residual.clear();
+        residual.reserve_exact(evaluator.residual.len().min(self.selection.counted()) + theta.len());
         ends.clear();
         for (index, window) in evaluator.windows().iter().enumerate() {
             let values = &evaluator.residual[window.residuals()];
@@ -184,7 +185,11 @@ impl<'a> ResidualCost<'a> {
     /// Residual and derivatives at a point; columns of the parameters before `first` are left empty.
     pub(crate) fn linearised(&self, theta: &[f64], first: usize) -> Linearised {
         let mut memory = self.memory.borrow_mut();
-        let mut columns = vec![Vec::new(); theta.len()];
+        self.evaluate(theta, &mut memory);
+        // No more memory than it takes: of a long record the columns are most of all that there is.
+        let is_computed = |i: usize| i >= first && !self.is_held(i);
+        let length = |i: usize| if is_computed(i) { memory.residual.len() } else { 0 };
+        let mut columns: Vec<Vec<f64>> = (0..theta.len()).map(|i| Vec::with_capacity(length(i))).collect();
         self.walk(theta, first, &mut memory, |block| {
             columns.iter_mut().zip(block.columns()).for_each(|(all, column)| all.extend_from_slice(column));
         });
@@ -206,7 +211,7 @@ impl<'a> ResidualCost<'a> {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
         let pieces = &memory.evaluator.pieces;
-        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter().copied());
+        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter());
         let agrees = |beside: &Beside<'_>| beside.agrees_with(&memory.residual) && has_samples(beside.without);
         let known = beside.filter(agrees).map(|beside| beside.without);
         let mut sums = Sums::of(theta.len(), known, filter);
@@ -238,7 +243,7 @@ impl Cost for ResidualCost<'_> {
 #[non_exhaustive]
 pub struct Linearised {
     /// Samples of the residuals; prior knowledge comes after them in both of the others.
-    pub samples: Vec<usize>,
+    pub samples: Samples,
     /// Residuals that count, filtered.
     pub residual: Vec<f64>,
     /// One column for each parameter.
