@@ -155,8 +155,15 @@ pub fn track(
 
 /// Both time constants at `time_s`, and the standard errors of their logarithms.
 fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
-    let parts: Vec<[[Vec<f64>; 2]; 2]> = time_s.par_chunks(SAMPLES_AT_ONCE).map(|part| part_along(fit, part)).collect();
-    [0, 1].map(|what| [0, 1].map(|i| parts.iter().flat_map(|part| part[what][i].iter().copied()).collect()))
+    let mut out: [[Vec<f64>; 2]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| vec![0.0; time_s.len()]));
+    let [[tau_1, tau_2], [error_1, error_2]] = &mut out;
+    let chunks = |all| <[f64]>::par_chunks_mut(all, SAMPLES_AT_ONCE);
+    let numbers = chunks(tau_1).zip(chunks(tau_2)).zip(chunks(error_1).zip(chunks(error_2)));
+    time_s.par_chunks(SAMPLES_AT_ONCE).zip(numbers).for_each(|(part, ((tau_1, tau_2), (error_1, error_2)))| {
+        let all = part_along(fit, part).into_iter().flatten();
+        all.zip([tau_1, tau_2, error_1, error_2]).for_each(|(from, to)| to.copy_from_slice(&from));
+    });
+    out
 }
 
 /// [`along`] at some instants: what each parameter moves there takes as much memory as there are parameters.
