@@ -151,6 +151,12 @@ mod tests {
         let after = linearised(samples(50), vec![wave(60, 0.53), wave(60, 1.1), wave(60, 0.7)], wave(60, 1.3));
         let scan = Scan::of(&before, &after, 30..60, f64::INFINITY).expect("samples within");
         assert_eq!(scan.energies.len(), 29, "one of 30 is lacking");
+        let limit =
+            0.5 * (scan.energies.iter().map(|(_, energy)| energy).fold(0.0, |a: f64, b| a.max(*b)) - scan.best.1);
+        let near = Scan::of(&before, &after, 30..60, limit).expect("samples within");
+        let is_near = |(_, energy): &&(usize, f64)| energy - scan.best.1 < limit;
+        assert_eq!(near.energies, scan.energies.iter().filter(is_near).copied().collect::<Vec<(usize, f64)>>());
+        assert!(near.energies.len() < 29 && near.best == scan.best);
         let want = |step: usize| stacked(&before, &after, step);
         for (sample, energy) in &scan.energies {
             assert!((energy - want(*sample).0).abs() < 1e-12, "{sample}: {energy}, want {}", want(*sample).0);
