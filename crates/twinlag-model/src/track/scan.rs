@@ -38,7 +38,8 @@ impl Scan {
         common().for_each(|(_, _, j)| add(&mut sums, &row_after(j), 1.0));
         // What is known beforehand comes after the samples.
         (before.samples.len()..before.residual.len()).for_each(|i| add(&mut sums, &row_before(i), 1.0));
-        let (mut energies, mut best): (Vec<(usize, f64)>, Option<(usize, f64, Vec<Vec<f64>>)>) = (Vec::new(), None);
+        let mut energies: Vec<(usize, f64)> = Vec::new();
+        let mut best: Option<(usize, f64, Vec<Vec<f64>>)> = None;
         for (sample, i, j) in common() {
             if within.contains(&sample) {
                 let energy = least_energy(&sums);
