@@ -14,7 +14,7 @@ use crate::model::Model;
 use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
-use crate::selection::{Selection, Sieve};
+use crate::selection::{Samples, Selection, Sieve};
 use crate::weighting::Weighting;
 
 /// Residuals, over all columns, from which on columns are computed side by side: below, threads cost more than they save
@@ -122,6 +122,7 @@ impl<'a> ResidualCost<'a> {
         memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
         let Memory { evaluator, residual, ends, sieve, .. } = memory;
         residual.clear();
+        residual.reserve_exact(evaluator.residual.len().min(self.selection.counted()) + theta.len());
         ends.clear();
         for (index, window) in evaluator.windows().iter().enumerate() {
             let values = &evaluator.residual[window.residuals()];
@@ -246,7 +247,10 @@ impl<'a> ResidualCost<'a> {
     /// Residual and derivatives at a point; columns of the parameters before `first` are left empty.
     pub(crate) fn linearised(&self, theta: &[f64], first: usize) -> Linearised {
         let mut memory = self.memory.borrow_mut();
-        let mut columns = vec![Vec::new(); theta.len()];
+        self.evaluate(theta, &mut memory);
+        // No more memory than it takes: of a long record the columns are most of all that there is.
+        let length = |i: usize| if i >= first { memory.residual.len() } else { 0 };
+        let mut columns: Vec<Vec<f64>> = (0..theta.len()).map(|i| Vec::with_capacity(length(i))).collect();
         let directions = self.directions(theta, first);
         self.walk(theta, (&directions, first), &mut memory, |block| {
             let end = block.range.end;
@@ -283,7 +287,7 @@ impl<'a> ResidualCost<'a> {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
         let pieces = &memory.evaluator.pieces;
-        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter().copied());
+        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter());
         let agrees = |beside: &Beside<'_>| beside.agrees_with(&memory.residual) && has_samples(beside.without);
         let known = beside.filter(agrees).map(|beside| beside.without);
         let first = known.map_or(0, |known| known.columns.len());
@@ -317,7 +321,7 @@ impl Cost for ResidualCost<'_> {
 #[non_exhaustive]
 pub struct Linearised {
     /// Samples of the residuals; prior knowledge comes after them in both of the others.
-    pub samples: Vec<usize>,
+    pub samples: Samples,
     /// Residuals that count, filtered.
     pub residual: Vec<f64>,
     /// One column for each parameter.

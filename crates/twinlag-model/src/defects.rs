@@ -265,3 +265,21 @@ fn gas_line_ratio(evaluation: &Evaluation, omega: f64) -> f64 {
     };
     amplitude(&evaluation.disagreement_k) / amplitude(&evaluation.gas_c)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A long series gets zeros after it, no more than a thirty-second of it, and a short one none.
+    #[test]
+    fn a_long_series_is_padded_to_a_fast_length() {
+        for samples in [600, MAX_TRANSFORMED_AS_IT_IS] {
+            assert_eq!(padded_length(samples), samples);
+        }
+        for samples in [MAX_TRANSFORMED_AS_IT_IS + 1, 1_999_924, 19_999_870] {
+            let padded = padded_length(samples);
+            assert!((samples..=samples + samples / 32).contains(&padded), "{samples}: {padded}");
+            assert_eq!(fast_length(padded), padded);
+        }
+    }
+}

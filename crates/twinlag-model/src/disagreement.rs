@@ -313,6 +313,7 @@ impl<'a> Evaluator<'a> {
         let is_even = self.observations.period_s.is_some();
         self.pieces.clear();
         self.residual.clear();
+        self.residual.reserve_exact(self.observations.samples());
         self.used = 0;
         let mut before = 0;
         for (index, stretch) in self.observations.stretches.iter().enumerate() {

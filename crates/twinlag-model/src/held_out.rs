@@ -28,8 +28,9 @@ pub fn held_out_energy(
         rows.for_each(|k| sums.add(&lin, k));
         sums
     };
-    let of_samples =
-        |is_of: &dyn Fn(usize) -> bool| sums(&mut (0..lin.samples.len()).filter(|&k| is_of(lin.samples[k])));
+    let of_samples = |is_of: &dyn Fn(usize) -> bool| {
+        sums(&mut lin.samples.iter().enumerate().filter(|(_, sample)| is_of(*sample)).map(|(k, _)| k))
+    };
     // What is known beforehand is in no fold.
     let whole = NormalEquations::of(&lin, lin.residual.len());
     let (mut energy, mut count) = (0.0, 0);

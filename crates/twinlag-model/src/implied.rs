@@ -255,3 +255,50 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effect::{Identifier, candidates};
+    use crate::model::Model;
+    use crate::observations::Stretch;
+    use crate::prepare::Prepared;
+    use crate::settings::Settings;
+
+    /// Both ways to evaluate a record whiten the same residual at the same samples, stretch by stretch; the mean and the difference
+    /// of the inferred inputs are those of the parts, in a model with noise of another colour too, whose differences come later.
+    #[test]
+    fn what_is_evaluated_is_made_of_its_parts() {
+        let stretch = |from: usize, samples: usize| {
+            let time_s: Vec<f64> = (from..from + samples).map(|k| k as f64).collect();
+            let reading_c = [2.0, 5.0].map(|late| time_s.iter().map(|t| 300.0 + (0.2 * (t - late)).sin()).collect());
+            Stretch::new(time_s, reading_c)
+        };
+        let observations = Observations::new(vec![stretch(0, 90), stretch(100, 70)], Some(1.0)).expect("a record");
+        let context = Prepared::new(&observations, &Settings::default()).expect("a record").context;
+        let coloured = candidates(&[Identifier::COLOURED_NOISE], &context).remove(0);
+        let start = coloured.starts().remove(0);
+        let two_lags = Model::new(&[], [0.1, 0.1]);
+        for (model, theta) in [
+            (two_lags.clone(), vec![2.0, 5.0]),
+            (two_lags.with(coloured), [2.0, 5.0].into_iter().chain(start).collect()),
+        ] {
+            let (evaluation, details) = (model.evaluate(&theta, &observations), model.details(&theta, &observations));
+            assert_eq!(evaluation.residual, details.residual);
+            assert_eq!(evaluation.samples, details.samples);
+            assert_eq!(evaluation.sample().count(), evaluation.residual.len());
+            assert_eq!(evaluation.stretches().collect::<Vec<_>>(), details.stretches().collect::<Vec<_>>());
+            let instants: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+            for (sample, time_s) in details.sample().zip(&details.time_s) {
+                assert!((instants[sample] - time_s).abs() <= 0.5, "sample {sample} at {time_s} s");
+            }
+            for (part, places) in details.parts.iter().zip(details.stretches()) {
+                let [one, two] = part.inferred.each_ref().map(|inferred| &inferred.value[part.skipped..]);
+                for (k, place) in places.enumerate() {
+                    assert_eq!(evaluation.gas_c[place], 0.5 * (one[k] + two[k]));
+                    assert_eq!(evaluation.disagreement_k[place], one[k] - two[k]);
+                }
+            }
+        }
+    }
+}

@@ -1,12 +1,14 @@
 //! What each residual of a fit does to its numbers.
 
+use std::ops::Range;
+
 use twinlag_cross_relation::PartScatter;
 
 use crate::cost::Linearised;
 use crate::dense;
 use crate::fit::Fitted;
 use crate::observations::Observations;
-use crate::selection::Selection;
+use crate::selection::{Samples, Selection};
 
 /// A fit, linearised where it ended.
 pub(crate) struct Influence<'a> {
@@ -42,12 +44,12 @@ impl<'a> Influence<'a> {
         for (column, weight) in columns.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0) {
             influence.iter_mut().zip(column).for_each(|(d, x)| *d += weight * x);
         }
-        let breaks = (1..n).filter(|k| samples[*k] != samples[*k - 1] + 1);
-        let ends: Vec<usize> = std::iter::once(0).chain(breaks).chain([n]).collect();
-        PartScatter::of(&runs(residual, &ends), &runs(&influence, &ends), variance.max(0.0).sqrt())
+        PartScatter::of(&runs(residual, samples), &runs(&influence, samples), variance.max(0.0).sqrt())
     }
 }
 
-fn runs<'a>(values: &'a [f64], ends: &[usize]) -> Vec<&'a [f64]> {
-    ends.windows(2).map(|w| &values[w[0]..w[1]]).collect()
+/// The values of each run of `samples`, which come first.
+fn runs<'a>(mut values: &'a [f64], samples: &Samples) -> Vec<&'a [f64]> {
+    let next = |run: &Range<usize>| values.split_off(..run.len()).expect("a value for each sample");
+    samples.runs().iter().map(next).collect()
 }

@@ -63,7 +63,7 @@ pub use observations::{Observations, Stretch, evenly_spread};
 pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
 pub use policy::Policy;
 pub use prepare::Prepared;
-pub use selection::Selection;
+pub use selection::{Samples, Selection};
 pub use settings::{Settings, Watch, report};
 pub use spectrum::{Bands, fit_noise, white_deviance};
 pub use spline::Spline;

@@ -1,5 +1,7 @@
 //! Which residuals count, and which of their frequencies.
 
+use std::ops::Range;
+
 use crate::disagreement::Piece;
 use crate::weighting::Weighting;
 
@@ -33,6 +35,60 @@ impl Selection {
     fn pick(&self, filtered: &[f64], first: usize, out: &mut Vec<f64>) {
         let counts = self.counts.get(first..).unwrap_or(&[]);
         out.extend(filtered.iter().zip(counts).filter(|(_, counts)| **counts).map(|(r, _)| *r));
+    }
+}
+
+/// Rising numbers as ranges of neighbours.
+pub(crate) fn ranges(numbers: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+    let mut out: Vec<Range<usize>> = Vec::new();
+    for number in numbers {
+        match out.last_mut() {
+            Some(last) if last.end == number => last.end += 1,
+            _ => out.push(number..number + 1),
+        }
+    }
+    out
+}
+
+/// Samples in rising order, in runs of neighbours.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Samples(Vec<Range<usize>>);
+
+impl Samples {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.0.iter().map(Range::len).sum()
+    }
+
+    /// Whether there is not one.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The runs.
+    pub fn runs(&self) -> &[Range<usize>] {
+        &self.0
+    }
+
+    /// All of them, in order.
+    pub fn iter(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.0.iter().cloned().flatten()
+    }
+
+    /// Those from place `first` on.
+    pub(crate) fn iter_from(&self, mut first: usize) -> impl Iterator<Item = usize> + '_ {
+        self.0.iter().flat_map(move |run| {
+            let skipped = first.min(run.len());
+            first -= skipped;
+            run.start + skipped..run.end
+        })
+    }
+}
+
+impl FromIterator<usize> for Samples {
+    /// - `samples`: in rising order
+    fn from_iter<I: IntoIterator<Item = usize>>(samples: I) -> Self {
+        Self(ranges(samples.into_iter()))
     }
 }
 
@@ -100,6 +156,18 @@ impl Sieve {
 mod tests {
     use super::*;
     use crate::observations::{Observations, Stretch};
+
+    #[test]
+    fn neighbours_make_a_range() {
+        assert_eq!(ranges([3, 4, 5, 9, 11, 12].into_iter()), [3..6, 9..10, 11..13]);
+        assert_eq!(ranges(std::iter::empty()), []);
+        let all = [3, 4, 5, 9, 11, 12];
+        let samples: Samples = all.into_iter().collect();
+        assert_eq!((samples.len(), samples.iter().collect::<Vec<usize>>()), (6, all.to_vec()));
+        for first in 0..=6 {
+            assert_eq!(samples.iter_from(first).collect::<Vec<usize>>(), all[first..], "from place {first}");
+        }
+    }
 
     /// Values that are filtered in windows are those that are filtered at once: the sums are the same ones.
     #[test]

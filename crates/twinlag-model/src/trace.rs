@@ -7,7 +7,7 @@ use crate::fit::Fitted;
 use crate::implied::Details;
 use crate::observations::Observations;
 use crate::policy::Policy;
-use crate::selection::Selection;
+use crate::selection::{Selection, ranges};
 use crate::spectrum::Bands;
 
 /// Points of a line that is kept whole: no screen has as many, and a twentieth of them is enlarged to its width.
@@ -140,18 +140,6 @@ fn worst(time_s: &[f64], residual: &[f64]) -> Option<ResidualPart> {
     parts.max_by(|a, b| a.mean_square.total_cmp(&b.mean_square))
 }
 
-/// Rising numbers as ranges of neighbours.
-fn ranges(numbers: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for number in numbers {
-        match out.last_mut() {
-            Some(last) if last.end == number => last.end += 1,
-            _ => out.push(number..number + 1),
-        }
-    }
-    out
-}
-
 /// Root mean square of what the gas temperature differs from the reading of the faster sensor, where that is there, K.
 ///
 /// - `sample`: the sample of each gas temperature, rising
@@ -212,11 +200,5 @@ mod tests {
         assert_eq!(gaps, [70_500.0]);
         let short = Line::thinned(&time_s[..900], value[..900].to_vec(), std::iter::once(0..900));
         assert_eq!((&short.time_s[..], &short.value[..]), (&time_s[..900], &value[..900]));
-    }
-
-    #[test]
-    fn neighbours_make_a_range() {
-        assert_eq!(ranges([3, 4, 5, 9, 11, 12].into_iter()), [3..6, 9..10, 11..13]);
-        assert_eq!(ranges(std::iter::empty()), []);
     }
 }

@@ -155,8 +155,15 @@ pub fn track(
 
 /// Both time constants at `time_s`, and the standard errors of their logarithms.
 fn along(fit: &ModelFit, time_s: &[f64]) -> [[Vec<f64>; 2]; 2] {
-    let parts: Vec<[[Vec<f64>; 2]; 2]> = time_s.par_chunks(SAMPLES_AT_ONCE).map(|part| part_along(fit, part)).collect();
-    [0, 1].map(|what| [0, 1].map(|i| parts.iter().flat_map(|part| part[what][i].iter().copied()).collect()))
+    let mut out: [[Vec<f64>; 2]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| vec![0.0; time_s.len()]));
+    let [[tau_1, tau_2], [error_1, error_2]] = &mut out;
+    let chunks = |all| <[f64]>::par_chunks_mut(all, SAMPLES_AT_ONCE);
+    let numbers = chunks(tau_1).zip(chunks(tau_2)).zip(chunks(error_1).zip(chunks(error_2)));
+    time_s.par_chunks(SAMPLES_AT_ONCE).zip(numbers).for_each(|(part, ((tau_1, tau_2), (error_1, error_2)))| {
+        let all = part_along(fit, part).into_iter().flatten();
+        all.zip([tau_1, tau_2, error_1, error_2]).for_each(|(from, to)| to.copy_from_slice(&from));
+    });
+    out
 }
 
 /// [`along`] at some instants: what each parameter moves there takes as much memory as there are parameters.
@@ -207,6 +214,11 @@ impl Tracker<'_> {
         model.fit(&theta, &self.prepared.observations, self.selection, effort)
     }
 
+    /// The instant of a step before a sample, s: between two samples, where it is, there is nothing to see.
+    fn instant_s(&self, sample: usize) -> f64 {
+        0.5 * (self.time_s[sample.max(1) - 1] + self.time_s[sample])
+    }
+
     /// Whether a spline of `size` coefficients is found as [`Local`] finds it.
     fn is_local(&self, constant: &Fitted, ends_s: [f64; 2], size: usize) -> bool {
         local::is_close(&constant.model, &constant.theta, &self.prepared.observations, self.selection, ends_s, size)
@@ -227,7 +239,7 @@ impl Tracker<'_> {
         let (mut theta, mut change, mut sample) = (constant.theta.clone(), 0.0, usize::MAX);
         for round in 0..STEP_ROUNDS {
             report(watch, "steps", round, STEP_ROUNDS)?;
-            let Some(scan) = self.scan(constant, &theta, change, within.clone()) else { return Ok(None) };
+            let Some(scan) = self.scan(constant, &theta, change, within.clone(), 0.0) else { return Ok(None) };
             let (likeliest, _, by) = &scan.best;
             let largest = change + by[theta.len()];
             for (theta, by) in theta.iter_mut().zip(by) {
@@ -240,21 +252,21 @@ impl Tracker<'_> {
             }
         }
         let from = Fitted { theta, ..constant.clone() };
-        // Between two samples, where it is, there is nothing to see.
-        let instants_s: Vec<f64> = (0..time_s.len()).map(|k| 0.5 * (time_s[k.max(1) - 1] + time_s[k])).collect();
-        let fit = |sample: usize, effort| self.fit(&from, varying::step(instants_s[sample]), &[change], effort);
+        let fit = |sample: usize, effort| self.fit(&from, varying::step(self.instant_s(sample)), &[change], effort);
         let looked = fit(sample, Effort::Look);
-        let near = Near::of(self, &looked, sample, &instants_s);
+        let near = Near::of(self, &looked, sample);
         let at = near.likeliest(sample, &within);
         let fitted = fit(at, Effort::Finish);
         let limit = INSTANT_95 * fitted.mean_energy().max(1.0);
         let n = constant.theta.len();
-        let Some(scan) = self.scan(constant, &fitted.theta[..n], fitted.theta[n], within) else { return Ok(None) };
+        let Some(scan) = self.scan(constant, &fitted.theta[..n], fitted.theta[n], within, limit) else {
+            return Ok(None);
+        };
         let half_s = 0.5 * self.prepared.context.step_s;
         let [low, high] = near.interval(at, &scan, limit);
         let point = ChangePoint {
-            at_s: instants_s[at],
-            interval_95_s: [instants_s[low] - half_s, instants_s[high] + half_s],
+            at_s: self.instant_s(at),
+            interval_95_s: [self.instant_s(low) - half_s, self.instant_s(high) + half_s],
             factor: 1.0 + fitted.theta[n],
             evidence: score(constant, 0.0) - score(&fitted, 0.0),
         };
@@ -262,13 +274,15 @@ impl Tracker<'_> {
     }
 
     /// How likely a step is at each sample `within`, linearised at these parameters and this change.
-    fn scan(&self, constant: &Fitted, theta: &[f64], change: f64, within: Range<usize>) -> Option<Scan> {
+    ///
+    /// - `limit`: energies that exceed the least by so much are not kept
+    fn scan(&self, constant: &Fitted, theta: &[f64], change: f64, within: Range<usize>, limit: f64) -> Option<Scan> {
         let (observations, selection) = (&self.prepared.observations, self.selection);
         let before = constant.model.linearised(theta, observations, selection);
         // Time constants are others all along.
         let changed = constant.model.with(varying::step(f64::NEG_INFINITY));
         let after: Vec<f64> = theta.iter().copied().chain([change]).collect();
-        Scan::of(&before, &changed.linearised(&after, observations, selection), within)
+        Scan::of(&before, &changed.linearised(&after, observations, selection), within, limit)
     }
 
     /// - `curve`: the spline of the fit, where its columns are those of [`Local`]

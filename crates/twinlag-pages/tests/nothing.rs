@@ -144,7 +144,7 @@ fn a_report_on_nothing_has_every_section_and_no_nan() {
     let nowhere = core();
     let mut gaps = nowhere.clone();
     for fit in [&mut gaps.base, &mut gaps.last] {
-        (fit.trace.time_s, fit.trace.gas_c) = (record.time_s.clone(), vec![f64::NAN; 200]);
+        (fit.trace.gas_c.time_s, fit.trace.gas_c.value) = (record.time_s.clone(), vec![f64::NAN; 200]);
     }
     for verdict in
         [Verdict::Adequate, Verdict::Explained, Verdict::PartlyExplained, Verdict::Unexplained, Verdict::Refused]

@@ -29,7 +29,7 @@ impl RowOfSample {
         for (sample, row) in rows.enumerate().filter_map(|(sample, row)| Some((sample, row?))) {
             match runs.last_mut() {
                 Some([first, first_row, count]) if [*first + *count, *first_row + *count] == [sample, row] => {
-                    *count += 1
+                    *count += 1;
                 }
                 _ => runs.push([sample, row, 1]),
             }

@@ -274,8 +274,8 @@ impl Local<'_> {
         let mut places: Vec<usize> = (0..width).collect();
         places[width - 1] = dimension - 1;
         let mut pieces = vec![usize::MAX; count];
-        for i in samples {
-            let time_s = self.time_s[columns.lin.samples[i]];
+        for (i, sample) in samples.clone().zip(columns.lin.samples.iter_from(samples.start)) {
+            let time_s = self.time_s[sample];
             for (a, value) in row[..others].iter_mut().enumerate() {
                 *value = columns.lin.columns[a][i];
             }
@@ -400,7 +400,7 @@ pub(super) fn is_close(
     let [level, line, exact] = [0, 1, 2].map(|k| &lin.columns[theta.len() + k]);
     let (mut off, mut all) = (0.0, 0.0);
     for (i, sample) in lin.samples.iter().enumerate() {
-        let (t, b) = (time_s[*sample], bump(time_s[*sample]));
+        let (t, b) = (time_s[sample], bump(time_s[sample]));
         off += (exact[i] - b.re * level[i] - b.eps * (line[i] - (t - middle_s) * level[i])).powi(2);
         all += exact[i] * exact[i];
     }

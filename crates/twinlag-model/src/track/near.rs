@@ -25,7 +25,6 @@ const SIDE_SAMPLES: usize = 8;
 pub(super) struct Near<'a> {
     tracker: &'a Tracker<'a>,
     fitted: &'a Fitted,
-    instants_s: &'a [f64],
     centre: usize,
     reach: usize,
     /// A piece around it, of a long record.
@@ -34,21 +33,20 @@ pub(super) struct Near<'a> {
 
 impl<'a> Near<'a> {
     /// - `fitted`: with a step at sample `centre`
-    /// - `instants_s`: of a step before each sample
-    pub(super) fn of(tracker: &'a Tracker<'a>, fitted: &'a Fitted, centre: usize, instants_s: &'a [f64]) -> Self {
+    pub(super) fn of(tracker: &'a Tracker<'a>, fitted: &'a Fitted, centre: usize) -> Self {
         let observations = &tracker.prepared.observations;
         let tau_s = fitted.theta[0].max(fitted.theta[1]);
-        let lags = (REACH_LAGS * tau_s / tracker.prepared.context.step_s).min(instants_s.len() as f64);
+        let lags = (REACH_LAGS * tau_s / tracker.prepared.context.step_s).min(tracker.time_s.len() as f64);
         let reach = (lags.ceil() as usize).max(MIN_REACH_SAMPLES);
-        let piece = (instants_s.len() > LONG_REACHES * reach)
+        let piece = (tracker.time_s.len() > LONG_REACHES * reach)
             .then(|| piece(observations, tracker.selection, centre, 3 * reach));
-        Self { tracker, fitted, instants_s, centre, reach, piece: piece.flatten() }
+        Self { tracker, fitted, centre, reach, piece: piece.flatten() }
     }
 
     /// The energy of a step at `sample`, but for what is the same at all of them.
     fn energy(&self, sample: usize) -> f64 {
         let constant = self.fitted.model.without(self.fitted.model.effects.len() - 1);
-        let changed = constant.with(varying::step(self.instants_s[sample]));
+        let changed = constant.with(varying::step(self.tracker.instant_s(sample)));
         if let Some((observations, selection)) = &self.piece {
             return changed.energy(&self.fitted.theta, observations, selection);
         }
@@ -94,7 +92,7 @@ impl<'a> Near<'a> {
             at(inside).unwrap_or(best)
         };
         let before = end(&|by| best.checked_sub(by));
-        let after = end(&|by| Some(best + by).filter(|sample| *sample < self.instants_s.len()));
+        let after = end(&|by| Some(best + by).filter(|sample| *sample < self.tracker.time_s.len()));
         [low.min(before), high.max(after)]
     }
 
@@ -155,9 +153,9 @@ mod tests {
     #[test]
     fn a_piece_has_the_differences_of_the_whole_record() {
         let fixture = fixture();
-        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let tracker = fixture.tracker();
         let fitted = looked(&tracker, &fixture.constant, 803);
-        let near = Near::of(&tracker, &fitted, 803, &instants_s);
+        let near = Near::of(&tracker, &fitted, 803);
         assert!(near.piece.is_some() && near.is_near(803 + near.reach) && !near.is_near(803 + 3 * near.reach));
         let least = (near.energy(801), whole(&tracker, &fitted, 801));
         for sample in (803 - near.reach..803 + near.reach).step_by(3) {
@@ -170,9 +168,9 @@ mod tests {
     #[test]
     fn the_likeliest_sample_has_the_least_energy_of_the_whole_record() {
         let fixture = fixture();
-        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let tracker = fixture.tracker();
         let fitted = looked(&tracker, &fixture.constant, 807);
-        let near = Near::of(&tracker, &fitted, 807, &instants_s);
+        let near = Near::of(&tracker, &fitted, 807);
         let got = near.likeliest(807, &(100..1700));
         let around = 807 - near.reach..807 + near.reach;
         let want = around.min_by(|a, b| whole(&tracker, &fitted, *a).total_cmp(&whole(&tracker, &fitted, *b)));
@@ -189,9 +187,9 @@ mod tests {
     #[test]
     fn the_interval_ends_where_the_energy_passes_the_limit() {
         let fixture = fixture();
-        let (tracker, instants_s) = (fixture.tracker(), instants_s());
+        let tracker = fixture.tracker();
         let fitted = looked(&tracker, &fixture.constant, 801);
-        let near = Near::of(&tracker, &fitted, 801, &instants_s);
+        let near = Near::of(&tracker, &fitted, 801);
         let best = near.likeliest(801, &(100..1700));
         let none_far = Scan { energies: Vec::new(), best: (best, 0.0, Vec::new()) };
         for limit in [7.35, 40.0, 400.0] {

@@ -9,13 +9,14 @@ use std::ops::Range;
 
 use crate::cost::Linearised;
 use crate::dense;
+use crate::selection::Samples;
 
 /// A pivot that is less than this share of what it was is rounding.
 const PIVOT_SHARE: f64 = 1e-12;
 
 /// The least energy of a step at each sample.
 pub(super) struct Scan {
-    /// A sample from which on the time constants are others, and the least energy with it.
+    /// A sample from which on the time constants are others, and the least energy with it: those within a limit of the least.
     pub(super) energies: Vec<(usize, f64)>,
     /// The likeliest sample, the energy there, and by how much the parameters change, the step's last.
     pub(super) best: (usize, f64, Vec<f64>),
@@ -26,22 +27,25 @@ impl Scan {
     ///
     /// - `before`: linearised with the time constants before the step, without the step's parameter
     /// - `after`: with those after it, and the step's parameter last
-    pub(super) fn of(before: &Linearised, after: &Linearised, within: Range<usize>) -> Option<Self> {
+    /// - `limit`: energies that exceed the least by so much are not kept
+    pub(super) fn of(before: &Linearised, after: &Linearised, within: Range<usize>, limit: f64) -> Option<Self> {
         let p = after.columns.len();
         let row_after = |j: usize| after.columns.iter().map(|c| c[j]).chain([after.residual[j]]).collect::<Vec<f64>>();
         let row_before =
             |i: usize| before.columns.iter().map(|c| c[i]).chain([0.0, before.residual[i]]).collect::<Vec<f64>>();
-        let common = common(&before.samples, &after.samples);
+        let common = || common(&before.samples, &after.samples);
         let mut sums = vec![vec![0.0; p + 1]; p + 1];
-        common.iter().for_each(|(_, j)| add(&mut sums, &row_after(*j), 1.0));
+        common().for_each(|(_, _, j)| add(&mut sums, &row_after(j), 1.0));
         // What is known beforehand comes after the samples.
         (before.samples.len()..before.residual.len()).for_each(|i| add(&mut sums, &row_before(i), 1.0));
-        let (mut energies, mut best) = (Vec::new(), None);
-        for (i, j) in common {
-            let sample = before.samples[i];
+        let mut energies: Vec<(usize, f64)> = Vec::new();
+        let mut best: Option<(usize, f64, Vec<Vec<f64>>)> = None;
+        for (sample, i, j) in common() {
             if within.contains(&sample) {
                 let energy = least_energy(&sums);
-                energies.push((sample, energy));
+                if best.as_ref().is_none_or(|(_, least, _)| energy - least < limit) {
+                    energies.push((sample, energy));
+                }
                 if best.as_ref().is_none_or(|(_, least, _)| energy < *least) {
                     best = Some((sample, energy, sums.clone()));
                 }
@@ -50,20 +54,21 @@ impl Scan {
             add(&mut sums, &row_after(j), -1.0);
         }
         let (sample, energy, sums) = best?;
+        energies.retain(|(_, of_sample)| of_sample - energy < limit);
         let products: Vec<Vec<f64>> = sums[..p].iter().map(|row| row[..p].to_vec()).collect();
         let change = dense::times(&dense::inverse(&products)?, &sums[p][..p]).into_iter().map(|x| -x).collect();
         Some(Self { energies, best: (sample, energy, change) })
     }
 }
 
-/// Places of the samples that both have.
-fn common(a: &[usize], b: &[usize]) -> Vec<(usize, usize)> {
-    let mut j = 0;
-    let place = |(i, sample): (usize, &usize)| {
-        j += b[j..].iter().take_while(|other| *other < sample).count();
-        (b.get(j) == Some(sample)).then_some((i, j))
-    };
-    a.iter().enumerate().filter_map(place).collect()
+/// The samples that both have, with their places.
+fn common(a: &Samples, b: &Samples) -> impl Iterator<Item = (usize, usize, usize)> {
+    let mut others = b.iter().enumerate().peekable();
+    a.iter().enumerate().filter_map(move |(i, sample)| {
+        while others.next_if(|(_, other)| *other < sample).is_some() {}
+        let (j, _) = others.peek().filter(|(_, other)| *other == sample)?;
+        Some((sample, i, *j))
+    })
 }
 
 /// Adds `times` the products of a row with itself to the lower half.
@@ -106,14 +111,16 @@ mod tests {
 
     /// Rows of samples, of the residual, and of what is known of the two parameters beforehand.
     fn linearised(samples: Vec<usize>, columns: Vec<Vec<f64>>, residual: Vec<f64>) -> Linearised {
-        Linearised { samples, residual, columns }
+        Linearised { samples: samples.into_iter().collect(), residual, columns }
     }
 
     /// The least sum of squares of rows that are stacked as the step has them, `r'r − r'J (J'J)⁻¹ J'r`, with where it is.
     fn stacked(before: &Linearised, after: &Linearised, step: usize) -> (f64, Vec<f64>) {
         let mut rows: Vec<(Vec<f64>, f64)> = Vec::new();
-        for (i, sample) in before.samples.iter().enumerate().filter(|(_, sample)| after.samples.contains(sample)) {
-            if *sample < step {
+        for (i, sample) in
+            before.samples.iter().enumerate().filter(|(_, sample)| after.samples.iter().any(|s| s == *sample))
+        {
+            if sample < step {
                 rows.push((vec![before.columns[0][i], before.columns[1][i], 0.0], before.residual[i]));
             } else {
                 let j = after.samples.iter().position(|s| s == sample).expect("it has this one");
@@ -143,8 +150,14 @@ mod tests {
         let columns = vec![with_known(wave(60, 0.37), 0.9), with_known(wave(60, 0.91), -0.4)];
         let before = linearised(samples(20), columns, with_known(wave(60, 1.7), 0.3));
         let after = linearised(samples(50), vec![wave(60, 0.53), wave(60, 1.1), wave(60, 0.7)], wave(60, 1.3));
-        let scan = Scan::of(&before, &after, 30..60).expect("samples within");
+        let scan = Scan::of(&before, &after, 30..60, f64::INFINITY).expect("samples within");
         assert_eq!(scan.energies.len(), 29, "one of 30 is lacking");
+        let limit =
+            0.5 * (scan.energies.iter().map(|(_, energy)| energy).fold(0.0, |a: f64, b| a.max(*b)) - scan.best.1);
+        let near = Scan::of(&before, &after, 30..60, limit).expect("samples within");
+        let is_near = |(_, energy): &&(usize, f64)| energy - scan.best.1 < limit;
+        assert_eq!(near.energies, scan.energies.iter().filter(is_near).copied().collect::<Vec<(usize, f64)>>());
+        assert!(near.energies.len() < 29 && near.best == scan.best);
         let want = |step: usize| stacked(&before, &after, step);
         for (sample, energy) in &scan.energies {
             assert!((energy - want(*sample).0).abs() < 1e-12, "{sample}: {energy}, want {}", want(*sample).0);
@@ -163,7 +176,7 @@ mod tests {
     fn a_small_step_has_the_energy_of_its_fit() {
         let fixture = Fixture::of(1800, |t| if t < 900.0 { 1.0 } else { 1.08 });
         let (tracker, constant) = (fixture.tracker(), &fixture.constant);
-        let scan = tracker.scan(constant, &constant.theta, 0.0, 600..1200).expect("samples within");
+        let scan = tracker.scan(constant, &constant.theta, 0.0, 600..1200, f64::INFINITY).expect("samples within");
         let taken_off = |energy: f64| constant.chi2 - energy;
         assert!(taken_off(scan.best.1) > 100.0, "the step is seen: {}", taken_off(scan.best.1));
         for (sample, energy) in scan.energies.iter().step_by(97) {
