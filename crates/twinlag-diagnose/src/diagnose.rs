@@ -37,7 +37,10 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     let can_learn = tones != Some(SINGLE);
     let mut state = match pieces(observations) {
         Some(pieces) => {
-            let mut part = State::new(Prepared::new(&pieces, settings)?, settings, watch);
+            let mut of_pieces = Prepared::new(&pieces, settings)?;
+            // What is neutral on average is so over all of the record.
+            (of_pieces.context.mean_c, of_pieces.context.moments) = (prepared.context.mean_c, prepared.context.moments);
+            let mut part = State::new(of_pieces, settings, watch);
             search(&mut part, settings, can_learn)?;
             let faster = if can_learn { faster(observations, &part, settings, watch)? } else { None };
             match faster {
