@@ -230,7 +230,6 @@ fn closed_loop(rows: usize, only: Option<&str>) -> Result<()> {
         if only.is_some() {
             println!("{}", serde_json::to_string_pretty(&answer.moves)?);
             println!("{:?}: {}", answer.verdict, answer.remarks.join("; "));
-            println!("{}", serde_json::to_string(&answer.last)?);
         }
         if seconds > slowest.0 {
             slowest = (seconds, kind.name());

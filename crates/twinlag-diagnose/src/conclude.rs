@@ -39,7 +39,8 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut remarks = remarks_of(&state.moves);
     let all = state.prepared.observations.samples();
     remarks.extend(state.faster.as_ref().map(Faster::remark));
-    remarks.extend(state.searched_samples.map(|samples| Remark::SearchedInPieces { samples, all }));
+    let is_screened = state.is_screened;
+    remarks.extend(state.searched_samples.map(|samples| Remark::SearchedInPieces { samples, all, is_screened }));
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
     let mut found = found(&state, &with_effects, &last);
@@ -114,6 +115,12 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         moves: state.moves,
         policy: policy.clone(),
     })
+}
+
+/// Whether a search has left more than noise in its record.
+pub(crate) fn leaves_more_than_noise(state: &State<'_>, settings: &Settings) -> bool {
+    let fitted = to_the_end(&state.current, state);
+    what_is_left(&summary(&fitted, state, &settings.policy), &settings.policy).is_some()
 }
 
 /// A fit of the search, of the whole record.

@@ -3,7 +3,7 @@
 
 use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unresolved, report};
 
-use crate::conclude::conclude;
+use crate::conclude::{conclude, leaves_more_than_noise};
 use crate::diagnosis::Diagnosis;
 use crate::excitation::{SINGLE, tones};
 use crate::faster::faster;
@@ -46,7 +46,13 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
             match faster {
                 Some((stretch, faster)) => {
                     let mut state = State::carried(stretch, prepared, settings, watch);
-                    state.faster = Some(faster);
+                    (state.faster, state.is_screened) = (Some(faster), false);
+                    return conclude(state, settings, tones);
+                }
+                None if leaves_more_than_noise(&part, settings) => {
+                    // No effect explains it, and what stands out in more samples is but a part of that.
+                    let mut state = State::carried(part, prepared, settings, watch);
+                    state.is_screened = false;
                     return conclude(state, settings, tones);
                 }
                 None => State::carried(part, prepared, settings, watch),

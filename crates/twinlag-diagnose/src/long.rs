@@ -144,7 +144,10 @@ mod tests {
         let answer = diagnose(&observations, &settings, &watch).expect("a diagnosis");
         let named: Vec<Identifier> = answer.effects.iter().map(|e| e.effect).collect();
         assert_eq!(named, [Identifier::SECOND_ORDER]);
-        assert_eq!(answer.remarks, [Remark::SearchedInPieces { samples: SEARCHED_SAMPLES, all: SAMPLES }]);
+        assert_eq!(
+            answer.remarks,
+            [Remark::SearchedInPieces { samples: SEARCHED_SAMPLES, all: SAMPLES, is_screened: true }]
+        );
         let of_pieces = diagnose(&pieces(&observations).expect("long"), &settings, &watch).expect("a diagnosis");
         for ((whole, part), tau_s) in
             answer.last.time_constants.iter().zip(&of_pieces.last.time_constants).zip([0.012, 0.060])

@@ -154,6 +154,8 @@ pub(crate) struct State<'a> {
     pub(crate) far: Vec<Candidate>,
     /// Samples of the pieces that were searched first, of a long record.
     pub(crate) searched_samples: Option<usize>,
+    /// Whether all of a long record is searched as well.
+    pub(crate) is_screened: bool,
     /// Effects with such time constants that these pieces do not exclude.
     pub(crate) far_in_pieces: Option<Vec<Candidate>>,
     /// A change of the time constants that is too fast for a model of the whole record.
@@ -180,6 +182,7 @@ impl<'a> State<'a> {
             moves: Vec::new(),
             far: Vec::new(),
             searched_samples: None,
+            is_screened: true,
             far_in_pieces: None,
             faster: None,
         }

@@ -75,6 +75,9 @@ pub enum Remark {
         samples: usize,
         /// Samples of the record.
         all: usize,
+        /// Whether what may still be missing was screened against all of them: not so where the pieces left more than noise.
+        #[serde(default = "yes")]
+        is_screened: bool,
     },
     /// Something is missing, and intervals do not know how far it moves the numbers.
     BiasUnknown {
@@ -120,6 +123,10 @@ impl Remark {
             Self::SearchedInPieces { .. } => 11,
         }
     }
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// A number with as many decimals as `size` has with three digits.
@@ -190,11 +197,18 @@ impl fmt::Display for Remark {
                 to_digits_of(to_s - from_s, to_s - from_s),
                 to_digits_of(to_s - from_s, *from_s)
             ),
-            Self::SearchedInPieces { samples, all } => write!(
-                f,
-                "effects were searched for in {samples} of {all} samples, spread over the record; what was found was fitted to all \
-                 of it, and what else may be missing was screened against all of it"
-            ),
+            Self::SearchedInPieces { samples, all, is_screened } => {
+                let then = if *is_screened {
+                    "what else may be missing was screened against all of it"
+                } else {
+                    "since these samples show more than any effect explains, nothing else was searched for in the others"
+                };
+                write!(
+                    f,
+                    "effects were searched for in {samples} of {all} samples, spread over the record; what was found was fitted \
+                     to all of it, and {then}"
+                )
+            }
             Self::Needless { effect } => write!(
                 f,
                 "{effect} was added first and later removed, because other effects explain the record without it: there is no \
@@ -225,7 +239,7 @@ mod tests {
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown { is_one_known: false },
             Remark::FasterThanTheWhole { effect: Identifier::VARYING_TIME_CONSTANT, ends_s: [480.0, 504.6] },
-            Remark::SearchedInPieces { samples: 24_576, all: 1_000_000 },
+            Remark::SearchedInPieces { samples: 24_576, all: 1_000_000, is_screened: true },
         ];
         let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();
         assert_eq!(importance.len(), all.len(), "no two remarks have one place");
