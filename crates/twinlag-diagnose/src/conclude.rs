@@ -52,6 +52,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let is_refused = tones == Some(SINGLE);
     remarks.extend(is_refused.then_some(Remark::SingleTone));
     remarks.extend(drop_coherent_noise(&mut found, &last, policy));
+    if state.faster.is_some() {
+        // The model lacks what looks like noise of the gas.
+        found.retain(|(_, found)| !found.effect.is_noise());
+    }
     let has_noise = with_effects.model.noise().is_some();
     let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.faster.is_none();
     let excess = excess(&last, has_noise).filter(is_bounded);
