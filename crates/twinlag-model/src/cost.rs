@@ -499,7 +499,7 @@ mod tests {
     /// most. The bound is that of the product of their lengths.
     #[test]
     fn the_slope_is_that_of_the_columns() {
-        for (kind, is_cut) in [(Kind::Even, false), (Kind::Uneven, false), (Kind::Even, true)] {
+        for (kind, is_cut) in [(Kind::Even, false), (Kind::Uneven, false), (Kind::Even, true), (Kind::Uneven, true)] {
             let observations = if is_cut { in_stretches(&record(kind)) } else { record(kind) };
             let (context, selection) = (context(&observations), selection(&observations));
             for effect in effects(&context) {

@@ -14,19 +14,22 @@ use crate::plant::Plant;
 /// Puts an effect into a model, with the derivative by one part of it.
 pub type Install = Arc<dyn Fn(&mut Plant) + Send + Sync>;
 
+/// Parts by their places among several, with their weights in a sum.
+pub(crate) type Weights = Vec<(usize, f64)>;
+
 /// One part of an effect, and where it acts.
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct Part {
-    /// Instants between which it acts, s.
-    pub support_s: [f64; 2],
+    /// Instants between which it acts, s, beyond which its derivative is zero; `None` of one that acts everywhere.
+    pub support_s: Option<[f64; 2]>,
     /// Puts the effect into the model, with values as they are and the derivative by this part.
     pub install: Install,
 }
 
 impl Part {
-    /// A part that acts between two instants, s.
-    pub fn new(support_s: [f64; 2], install: Install) -> Self {
+    /// - `support_s`: instants between which it acts, s, beyond which its derivative is zero; `None` of one that acts everywhere
+    pub fn new(support_s: Option<[f64; 2]>, install: Install) -> Self {
         Self { support_s, install }
     }
 }
@@ -70,7 +73,7 @@ pub(crate) struct Directions {
     pub(crate) all: Vec<Direction>,
     /// Of which of them the derivative by each parameter consists, with their weights; `None` where each parameter is the direction
     /// in its place.
-    pub(crate) of_parameters: Option<Vec<Vec<(usize, f64)>>>,
+    pub(crate) of_parameters: Option<Vec<Weights>>,
 }
 
 impl Directions {
@@ -143,7 +146,7 @@ impl Model {
             }
         }
         let functions = self.sensors_of_functions(self.range(effect).start);
-        Direction { plant: Some(plant), functions, support_s: Some(part.support_s) }
+        Direction { plant: Some(plant), functions, support_s: part.support_s }
     }
 }
 

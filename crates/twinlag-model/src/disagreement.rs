@@ -23,8 +23,8 @@ const MASKED_NOISE_SWINGS: f64 = 20.0;
 const MIN_DISAGREEMENTS: usize = 4;
 /// Samples of a window: what a derivative of one works on, some twenty numbers for each sample, is a megabyte. Chosen.
 const WINDOW_SAMPLES: usize = 8192;
-/// Values of a block, of which a part of a direction is computed or not, and the bands that it has at least: what a block computes
-/// beside its own values, for the operators and the lead, is some bands. Chosen.
+/// Values of a block, and the bands that it has at least: what acts in a part of a record is computed block by block, or left out. What
+/// a block takes beside its own values, for the operators and the lead, is some bands. Chosen.
 const BLOCK_SAMPLES: usize = 512;
 const BLOCK_BANDS: usize = 4;
 /// Samples of a record up to which all factors are kept for derivatives: of longer ones those that have not settled are computed
@@ -217,7 +217,7 @@ impl Block<'_> {
     }
 
     /// The row of the window's factor that belongs to its first value.
-    fn from_row(&self) -> usize {
+    fn first_row(&self) -> usize {
         self.window.lead + self.first - self.lead
     }
 }
@@ -353,7 +353,7 @@ impl<'a> Evaluator<'a> {
             piece.first_sample += first_sample(stretch, first_s, observations.step_s());
         }
         let sources = plain.sources(&variances[piece.stretch], first_reading);
-        let like = earlier.iter().map(|window| &window.factor).find(|factor| factor.is_plain());
+        let like = earlier.iter().map(|window| &window.factor).find(|factor| factor.is_stationary());
         window.factor.compute(&sources, lead + count, before, like);
         if !is_kept && let Some(last) = earlier.last_mut() {
             last.factor.shorten();
@@ -441,7 +441,8 @@ impl<'a> Evaluator<'a> {
 
     /// From half the gradient of an energy by the whitened residual, to that by the disagreement and its covariance.
     pub(crate) fn adjoint(&self, plant: &Plant, gradient: Vec<f64>, again: &mut Again) -> Adjoint {
-        let mut out = Adjoint::begin(gradient, self.windows().first().map_or(0, |window| window.factor.band()));
+        let widest = self.windows().iter().map(|window| window.factor.band()).max();
+        let mut out = Adjoint::begin(gradient, widest.unwrap_or(0));
         for index in (0..self.used).rev() {
             let Window { from, count, lead, .. } = self.windows[index];
             out.go_back(self.factor(plant, index, again), &self.residual, from - lead..from + count, lead);
@@ -521,9 +522,9 @@ impl<'a> Evaluator<'a> {
         let from = values.len() - count - lead;
         let values = &mut values[from..];
         if sources.is_empty() && of_factor.passes(count) {
-            factor.whiten(values, block.from_row(), lead);
+            factor.whiten(values, block.first_row(), lead);
         } else {
-            of_factor.whiten(factor, block.from_row(), &sources, &self.residual[block.values()], values, lead);
+            of_factor.whiten(factor, block.first_row(), &sources, &self.residual[block.values()], values, lead);
         }
         *largest = values[lead..].iter().fold(*largest, |most, v| most.max(v.abs()));
     }

@@ -2,6 +2,7 @@
 
 use num_dual::DualNum;
 
+use crate::directions::Weights;
 use crate::number::Number;
 
 /// Points of the midpoint rule by which the mean is taken off, for each coefficient: exact for cubics to some parts in
@@ -72,9 +73,12 @@ impl Spline {
     }
 }
 
-/// Splines with the values of one and a derivative that acts in a part of the record each, and of which of them its derivatives by
-/// the free coefficients consist, with their weights: by each B-spline, and by the mean.
-pub(crate) fn parts(from_s: f64, to_s: f64, free: &[f64]) -> (Vec<(Spline, [f64; 2])>, Vec<Vec<(usize, f64)>>) {
+/// A spline with its derivative by one of its parts, and the instants between which that acts, s; `None` where it acts everywhere.
+pub(crate) type LocalSpline = (Spline, Option<[f64; 2]>);
+
+/// The spline with its derivative by each B-spline, and by the mean; and for each free coefficient the weights by which its derivative
+/// is a sum of these.
+pub(crate) fn parts(from_s: f64, to_s: f64, free: &[f64]) -> (Vec<LocalSpline>, Vec<Weights>) {
     let numbers: Vec<Number> = free.iter().copied().map(Number::from).collect();
     let spline = Spline::new(from_s, to_s, &numbers);
     let count = spline.coefficients.len();
@@ -85,11 +89,11 @@ pub(crate) fn parts(from_s: f64, to_s: f64, free: &[f64]) -> (Vec<(Spline, [f64;
         out.coefficients[l] = out.coefficients[l].derivative();
         let first_s = if l <= 3 { f64::NEG_INFINITY } else { at_s(l - 3) };
         let last_s = if l + 1 >= intervals { f64::INFINITY } else { at_s(l + 1) };
-        (out, [first_s, last_s])
+        (out, Some([first_s, last_s]))
     };
     let mut level = spline.clone();
     level.mean.eps = -1.0;
-    let parts = (0..count).map(bump).chain([(level, [f64::NEG_INFINITY, f64::INFINITY])]).collect();
+    let parts = (0..count).map(bump).chain([(level, None)]).collect();
     let of_free = |i: usize| {
         let mut moved = numbers.clone();
         moved[i] = moved[i].derivative();

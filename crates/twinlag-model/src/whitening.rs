@@ -96,13 +96,14 @@ pub(crate) struct Factor {
     same: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
-    /// Whether it begins a stretch and no masked reading enters it: then nothing but `same` decides its rows.
-    is_plain: bool,
+    /// Whether all of its rows follow from `same` alone: it begins a stretch, its rows of weights are the same, and no masked reading
+    /// enters it.
+    is_stationary: bool,
 }
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0, is_plain: false }
+        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0, is_stationary: false }
     }
 
     /// Values before one that it is correlated with.
@@ -130,10 +131,10 @@ impl Factor {
         }
         self.rows.clear();
         self.kept.clear();
-        self.is_plain =
+        self.is_stationary =
             before.is_none() && settles && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count;
-        let is_alike = |like: &&Self| like.is_plain && like.len() >= count && like.same == self.same;
-        if let Some(like) = like.filter(is_alike).filter(|_| self.is_plain) {
+        let is_alike = |like: &&Self| like.is_stationary && like.len() >= count && like.same == self.same;
+        if let Some(like) = like.filter(is_alike).filter(|_| self.is_stationary) {
             return self.begin_as(like, count);
         }
         let mut agreeing = 0;
@@ -179,9 +180,9 @@ impl Factor {
         self.agreeing = agreeing;
     }
 
-    /// Whether it begins a stretch and no masked reading enters it.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.is_plain
+    /// Whether all of its rows follow from one of the covariance.
+    pub(crate) fn is_stationary(&self) -> bool {
+        self.is_stationary
     }
 
     /// Becomes the first `count` rows of another.
@@ -232,11 +233,11 @@ impl Factor {
 
     /// `L⁻¹ u` in place.
     ///
-    /// - `from_row`: the row that belongs to the first value
+    /// - `first_row`: the row that belongs to the first value
     /// - `lead`: so many values are whitened already
-    pub(crate) fn whiten(&self, u: &mut [f64], from_row: usize, lead: usize) {
+    pub(crate) fn whiten(&self, u: &mut [f64], first_row: usize, lead: usize) {
         for k in lead..u.len() {
-            let row = self.row(from_row + k);
+            let row = self.row(first_row + k);
             let reach = self.band.min(k);
             let (before, rest) = u.split_at_mut(k);
             rest[0] = (rest[0] - backwards(&row[1..=reach], &before[k - reach..])) / row[0];
@@ -264,7 +265,7 @@ impl Factor {
 
 /// How an energy depends on the disagreement `u` and on its covariance `V`: derivatives by each, with `r = L⁻¹ u` and `q` that
 /// by `r`. That by `u` is `w = L⁻ᵀ q`, that by `L` is `−w rᵀ`, and what follows for `V = L Lᵀ` is the factorisation gone
-/// through backwards (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm").
+/// through backwards (reverse mode; Smith 1995, "Differentiation of the Cholesky algorithm"). No reading is masked.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Adjoint {
     /// By each value of the disagreement.
@@ -272,13 +273,17 @@ pub(crate) struct Adjoint {
     /// By each entry of its covariance, lags `0..=band` of each row; and by those of `L`, where no row after it has been gone
     /// through.
     by_covariance: Vec<f64>,
+    /// Entries from row to row: as many as the widest of the factors has.
+    stride: usize,
 }
 
 impl Adjoint {
     /// - `gradient`: `q` of all values
+    /// - `band`: the widest of the factors
     pub(crate) fn begin(gradient: Vec<f64>, band: usize) -> Self {
-        let by_covariance = vec![0.0; gradient.len() * (band + 1)];
-        Self { by_value: gradient, by_covariance }
+        let stride = band + 1;
+        let by_covariance = vec![0.0; gradient.len() * stride];
+        Self { by_value: gradient, by_covariance, stride }
     }
 
     /// Goes through the rows of a window, the last one first, after the windows that follow it.
@@ -286,7 +291,7 @@ impl Adjoint {
     /// - `residual`: `r` of all values
     /// - `all`: values of the window, its lead among them
     pub(crate) fn go_back(&mut self, factor: &Factor, residual: &[f64], all: std::ops::Range<usize>, lead: usize) {
-        let (stride, first) = (factor.band + 1, all.start);
+        let (stride, first) = (self.stride, all.start);
         factor.unwhiten_transposed_from(&mut self.by_value[all.clone()], lead);
         let by = &mut self.by_covariance[first * stride..all.end * stride];
         let residual = &residual[all];
@@ -325,11 +330,9 @@ impl Adjoint {
         all: std::ops::Range<usize>,
         lead: usize,
     ) -> f64 {
-        let count = all.len();
-        let by = &self.by_covariance[all.start * (band + 1)..all.end * (band + 1)];
-        let rows = by.chunks_exact(band + 1).enumerate().skip(lead);
-        let is_same = sources.iter().all(|source| source.rows.is_same());
-        if is_same && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count {
+        let by = &self.by_covariance[all.start * self.stride..all.end * self.stride];
+        let rows = by.chunks_exact(self.stride).map(|row| &row[..=band]).enumerate().skip(lead);
+        if sources.iter().all(|source| source.rows.is_same()) {
             let mut sums = vec![0.0; band + 1];
             rows.for_each(|(_, row)| sums.iter_mut().zip(row).for_each(|(sum, by)| *sum += by));
             return sums.iter().enumerate().map(|(lag, by)| by * derivative_of_same(sources, lag)).sum();
@@ -390,7 +393,7 @@ impl Remembered {
 
     /// Whether these are the rows of a window of `count` values.
     fn is_of(&self, same: [&Vec<f64>; 2], count: usize) -> bool {
-        self.count >= count && self.same[0] == *same[0] && self.same[1] == *same[1]
+        self.count == count && self.same[0] == *same[0] && self.same[1] == *same[1]
     }
 }
 
@@ -429,11 +432,11 @@ impl FactorDerivative {
     /// - `residual`: `r`
     /// - `values`: the derivative of `u`, and then of `r`
     /// - `lead`: so many values are whitened already
-    /// - `from_row`: the row of `factor` that belongs to the first value
+    /// - `first_row`: the row of `factor` that belongs to the first value
     pub(crate) fn whiten(
         &mut self,
         factor: &Factor,
-        from_row: usize,
+        first_row: usize,
         sources: &[Source<'_, Number>],
         residual: &[f64],
         values: &mut [f64],
@@ -446,29 +449,27 @@ impl FactorDerivative {
             self.same.extend((0..stride).map(|lag| derivative_of_same(sources, lag)));
         }
         let first = self.end - lead;
-        let begins = factor.is_plain && self.end == 0;
+        let begins = factor.is_stationary && self.end == 0;
         if begins && self.first.is_of([&factor.same, &self.same], values.len()) {
             self.end = values.len();
-            let Remembered { rows, after, count, .. } = &self.first;
+            let Remembered { rows, after, .. } = &self.first;
             let last = rows.len() / stride - 1;
             for k in 0..values.len() {
                 let row = &rows[k.min(last) * stride..][..stride];
-                whiten_next(factor.row(from_row + k), row, residual, values, k);
+                whiten_next(factor.row(first_row + k), row, residual, values, k);
             }
-            if values.len() == *count {
-                self.now.clone_from(after);
-            }
+            self.now.clone_from(after);
             return;
         }
         if begins {
             self.first.begin([&factor.same, &self.same]);
         }
         for k in lead..values.len() {
-            let is_new = self.advance(factor, from_row, sources, k);
+            let is_new = self.advance(factor, first_row, sources, k);
             if begins && is_new {
                 self.first.rows.extend_from_slice(&self.now.row);
             }
-            whiten_next(factor.row(from_row + k), &self.now.row, residual, values, k);
+            whiten_next(factor.row(first_row + k), &self.now.row, residual, values, k);
         }
         self.end = first + values.len();
         if begins {
@@ -478,10 +479,10 @@ impl FactorDerivative {
     }
 
     /// Goes to row `k` of `dL`; whether it had to be computed.
-    fn advance(&mut self, factor: &Factor, from_row: usize, sources: &[Source<'_, Number>], k: usize) -> bool {
+    fn advance(&mut self, factor: &Factor, first_row: usize, sources: &[Source<'_, Number>], k: usize) -> bool {
         let (band, stride) = (factor.band, factor.band + 1);
         // Where the factor has settled, its derivative does soon after.
-        let is_settled = factor.is_settled(from_row + k);
+        let is_settled = factor.is_settled(first_row + k);
         let is_new = !(is_settled && self.now.agreeing >= SETTLED_ROWS);
         if is_new {
             if self.now.is_kept {
@@ -490,7 +491,7 @@ impl FactorDerivative {
                 recent.chunks_exact_mut(stride).for_each(|recent| recent.copy_from_slice(row));
             }
             let is_plain = !factor.same.is_empty() && (is_settled || !is_masked_around(sources, k, band));
-            self.next_row(factor, from_row, sources, k, is_plain);
+            self.next_row(factor, first_row, sources, k, is_plain);
             let Last { recent, at, row, agreeing, largest, .. } = &mut self.now;
             let larger = |most: f64, d: &f64| if d.abs() > most { d.abs() } else { most };
             let largest_here = row.iter().fold(0.0, larger);
@@ -507,14 +508,21 @@ impl FactorDerivative {
     }
 
     /// Row `k` of `dL`, after the one in place `at`.
-    fn next_row(&mut self, factor: &Factor, from_row: usize, sources: &[Source<'_, Number>], k: usize, is_plain: bool) {
+    fn next_row(
+        &mut self,
+        factor: &Factor,
+        first_row: usize,
+        sources: &[Source<'_, Number>],
+        k: usize,
+        is_plain: bool,
+    ) {
         let stride = factor.band + 1;
         let reach = factor.band.min(k);
-        let l = &factor.row(from_row + k)[..=reach];
+        let l = &factor.row(first_row + k)[..=reach];
         let Last { recent, at, row, .. } = &mut self.now;
         for lag in (1..=reach).rev() {
             let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
-            let other = &factor.row(from_row + k - lag)[..=reach - lag];
+            let other = &factor.row(first_row + k - lag)[..=reach - lag];
             // The row before is in place `at`.
             let place = if *at + 1 >= lag { *at + 1 - lag } else { *at + 1 + stride - lag };
             let d_other = &recent[place * stride..][..=reach - lag];

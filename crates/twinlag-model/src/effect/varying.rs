@@ -14,7 +14,7 @@ use crate::error::ModelError;
 use crate::flow::Flow;
 use crate::number::{Number, TimeFunction};
 use crate::plant::Plant;
-use crate::spline::{Spline, on_knots, parts};
+use crate::spline::{LocalSpline, Spline, on_knots, parts};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
     .in_words(
@@ -163,7 +163,7 @@ impl Effect for Varying {
         let (Of::Time { ends_s, .. } | Of::Ratio { ends_s }) = self.of else { return None };
         let (splines, of_parameters) = parts(ends_s[0], ends_s[1], values);
         let of_ratio = matches!(self.of, Of::Ratio { .. });
-        let part = |(spline, support_s): (Spline, [f64; 2])| {
+        let part = |(spline, support_s): LocalSpline| {
             let change = function(spline);
             Part::new(support_s, Arc::new(move |plant| install(change.clone(), of_ratio, plant)))
         };
