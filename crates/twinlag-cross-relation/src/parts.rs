@@ -88,8 +88,8 @@ fn term(r: f64, d: f64) -> [f64; 2] {
     [d * r, d * d]
 }
 
-/// A run, or pieces of a long one: their transforms together are as orthogonal as that of the whole, which would take thirty times
-/// its memory.
+/// A run, or pieces of a long one: their transforms together are as orthogonal as that of the whole, which would take thirty
+/// times its memory.
 fn pieces(run: &[f64]) -> impl Iterator<Item = &[f64]> {
     run.chunks(if run.len() <= MAX_WHOLE_RESIDUALS { run.len().max(1) } else { PIECE_RESIDUALS })
 }
@@ -104,7 +104,8 @@ fn spectrum(r: &[f64], d: &[f64]) -> Vec<[f64; 2]> {
 #[derive(Clone)]
 struct ByFrequency<'a> {
     pieces: &'a [Vec<[f64; 2]>],
-    /// The next term of each piece: its frequency, as bits, which order positive numbers as they are, the piece, and its place there.
+    /// The next term of each piece: its frequency, as bits, which order positive numbers as they are, the piece, and its place
+    /// there.
     next: BinaryHeap<Reverse<(u64, usize, usize)>>,
 }
 
@@ -222,8 +223,8 @@ mod tests {
         assert!(scatter.along.p_value > 1e-3, "{scatter:?}");
     }
 
-    /// Of pieces of several lengths all terms come once, in the order of their frequencies, those of a frequency in the order of
-    /// the pieces: what a stable sort of them all gives.
+    /// Of pieces of several lengths all terms come once, in the order of their frequencies, those of a frequency in the order
+    /// of the pieces: what a stable sort of them all gives.
     #[test]
     fn terms_come_in_the_order_of_their_frequencies() {
         let pieces: Vec<Vec<[f64; 2]>> = [3, 7, 0, 7, 1]
@@ -239,7 +240,8 @@ mod tests {
 
     /// A run longer than is transformed at once keeps its sums, since the transforms of pieces are as orthogonal as that of the
     /// whole: their difference is rounding, 1e-9 of the number of terms at most. What goes one way with slow and the
-    /// other with fast frequencies is seen in pieces too: each size of 0.02 has a standard error of `1/√3e5`, a ninth of it.
+    /// other with fast frequencies is seen in pieces too: each size of 0.02 has a standard error of `1/√6e5`, a fifteenth of
+    /// it.
     #[test]
     fn a_long_run_is_cut_into_pieces() {
         let n = MAX_WHOLE_RESIDUALS + 75_713;

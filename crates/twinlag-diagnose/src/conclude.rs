@@ -8,14 +8,14 @@ use twinlag_model::{
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::excitation::SINGLE;
-use crate::faster::Faster;
 use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
 use crate::if_known::{IfKnown, if_known};
 use crate::judge::{Circumstances, Judgements};
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
-use crate::moves::{Move, State, Taken};
-use crate::naming::{Tie, judge_effect, name, of_defect, of_faster, widen};
+use crate::moves::{Move, Searched, State, Taken};
+use crate::naming::{Tie, judge_effect, name, of_defect, of_rapid, widen};
+use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 
 /// Most samples of a changing mean that stands for a filter where no spectrum says which
@@ -38,9 +38,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let mut base = if is_base { last.clone() } else { base_fit(&state, unmasked.as_ref(), policy) };
     let mut remarks = remarks_of(&state.moves);
     let all = state.prepared.observations.samples();
-    remarks.extend(state.faster.as_ref().map(Faster::remark));
-    let is_screened = state.is_screened;
-    remarks.extend(state.searched_samples.map(|samples| Remark::SearchedInPieces { samples, all, is_screened }));
+    remarks.extend(state.rapid.as_ref().map(RapidVariation::remark));
+    if let Searched::Pieces { samples, is_screened } = state.searched {
+        remarks.push(Remark::SearchedInPieces { samples, all, is_screened });
+    }
     let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
     remarks.extend(remark);
     let mut found = found(&state, &with_effects, &last);
@@ -52,12 +53,12 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let is_refused = tones == Some(SINGLE);
     remarks.extend(is_refused.then_some(Remark::SingleTone));
     remarks.extend(drop_coherent_noise(&mut found, &last, policy));
-    if state.faster.is_some() {
+    if state.rapid.is_some() {
         // The model lacks what looks like noise of the gas.
         found.retain(|(_, found)| !found.effect.is_noise());
     }
     let has_noise = with_effects.model.noise().is_some();
-    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.faster.is_none();
+    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.rapid.is_none();
     let excess = excess(&last, has_noise).filter(is_bounded);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
     let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
@@ -181,13 +182,13 @@ fn remarks_of(moves: &[Move]) -> Vec<Remark> {
 /// Defects and effects, each with its place in the model `last`, if it is in there.
 fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
     let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, fit)));
-    let faster = state.faster.iter().map(|faster| (None, of_faster(faster)));
+    let rapid = state.rapid.iter().map(|variation| (None, of_rapid(variation)));
     let named = state.taken.iter().enumerate();
-    defects.chain(faster).chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
+    defects.chain(rapid).chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
 }
 
-/// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what the fit
-/// is weighted by all the same.
+/// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what
+/// the fit is weighted by all the same.
 fn drop_coherent_noise(found: &mut Vec<(Option<usize>, Found)>, last: &ModelFit, policy: &Policy) -> Option<Remark> {
     let is_coherent = last.tests.iter().any(|t| {
         t.test == TestName::Coherence && t.p_value < policy.rejection_p_value() && t.statistic > policy.noise_coherence
@@ -272,7 +273,7 @@ fn basis(
 /// - `left`: what is left over, where that is more than intervals can cover
 fn verdict(state: &State<'_>, is_nothing_found: bool, left: Option<&Unexplained>, policy: &Policy) -> Verdict {
     match (is_nothing_found, left) {
-        _ if state.faster.is_some() => Verdict::PartlyExplained,
+        _ if state.rapid.is_some() => Verdict::PartlyExplained,
         (true, None) => Verdict::Adequate,
         (true, Some(_)) => Verdict::Unexplained,
         (false, None) if effects(state) <= policy.most_distinguished_effects => Verdict::Explained,

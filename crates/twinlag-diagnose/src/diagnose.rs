@@ -6,9 +6,9 @@ use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unre
 use crate::conclude::{conclude, leaves_more_than_noise};
 use crate::diagnosis::Diagnosis;
 use crate::excitation::{SINGLE, tones};
-use crate::faster::faster;
 use crate::long::pieces;
-use crate::moves::{Proposal, State};
+use crate::moves::{Proposal, Searched, State};
+use crate::rapid::rapid_variation;
 
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
 ///
@@ -37,26 +37,23 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     let can_learn = tones != Some(SINGLE);
     let mut state = match pieces(observations) {
         Some(pieces) => {
-            let mut of_pieces = Prepared::new(&pieces, settings)?;
-            // What is neutral on average is so over all of the record.
-            (of_pieces.context.mean_c, of_pieces.context.moments) = (prepared.context.mean_c, prepared.context.moments);
-            let mut part = State::new(of_pieces, settings, watch);
+            let mut part = State::new(prepared.of_excerpt(&pieces, settings)?, settings, watch);
             search(&mut part, settings, can_learn)?;
-            let faster = if can_learn { faster(observations, &part, settings, watch)? } else { None };
-            match faster {
-                Some((stretch, faster)) => {
-                    let mut state = State::carried(stretch, prepared, settings, watch);
-                    (state.faster, state.is_screened) = (Some(faster), false);
-                    return conclude(state, settings, tones);
-                }
-                None if leaves_more_than_noise(&part, settings) => {
-                    // No effect explains it, and what stands out in more samples is but a part of that.
-                    let mut state = State::carried(part, prepared, settings, watch);
-                    state.is_screened = false;
-                    return conclude(state, settings, tones);
-                }
-                None => State::carried(part, prepared, settings, watch),
+            let rapid = if can_learn { rapid_variation(&prepared, &part, settings, watch)? } else { None };
+            if let Some((stretch, variation)) = rapid {
+                let mut state = State::carried(stretch, prepared, settings, watch);
+                (state.rapid, state.searched) = (Some(variation), Searched::Stretch);
+                return conclude(state, settings, tones);
             }
+            let is_screened = !leaves_more_than_noise(&part, settings);
+            let samples = part.prepared.observations.samples();
+            let mut state = State::carried(part, prepared, settings, watch);
+            state.searched = Searched::Pieces { samples, is_screened };
+            if !is_screened {
+                // No effect explains it, and what stands out in more samples is but a part of that.
+                return conclude(state, settings, tones);
+            }
+            state
         }
         None => State::new(prepared, settings, watch),
     };

@@ -51,13 +51,9 @@ pub struct Found {
     pub seen: Option<String>,
     /// Readings of the channel that are left out of the fit, in order.
     pub masked: Vec<Masked>,
-}
-
-impl Found {
-    /// Whether the model has it: not so an effect that a stretch of the record shows, and that is in no number of the whole.
-    pub fn is_in_the_model(&self) -> bool {
-        self.evidence.is_none() || !self.parameters.is_empty()
-    }
+    /// Whether the model accounts for it: not so for one that a stretch of the record shows, and that no number of the whole
+    /// holds.
+    pub is_in_the_model: bool,
 }
 
 /// Neighbouring readings of one channel that are left out of the fit.

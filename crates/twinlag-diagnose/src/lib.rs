@@ -41,7 +41,6 @@ mod diagnose;
 mod diagnosis;
 mod evidence;
 mod excitation;
-mod faster;
 mod grade;
 mod hidden;
 mod if_known;
@@ -52,6 +51,7 @@ mod long;
 mod moves;
 mod naming;
 mod rank;
+mod rapid;
 mod remark;
 mod size;
 

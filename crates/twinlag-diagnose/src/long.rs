@@ -64,7 +64,6 @@ impl<'a> State<'a> {
         }
         out.taken = part.taken.into_iter().map(|taken| out.taken_in_whole(taken)).collect();
         out.moves = part.moves;
-        out.searched_samples = Some(part.prepared.observations.samples());
         let is_open = |far: &Candidate| far.white_gain > -EXCLUDED_DEVIANCE && is_elsewhere(&far.fitted, &part.current);
         out.far_in_pieces = Some(part.far.into_iter().filter(is_open).collect());
         out

@@ -7,8 +7,8 @@ use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::evidence::Evidence;
-use crate::faster::Faster;
 use crate::rank::{LookAlike, successor, worth};
+use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 
 /// A change of the model, and why it was made.
@@ -139,6 +139,17 @@ fn identifiers(candidates: &[Candidate]) -> Vec<Identifier> {
     candidates.iter().map(|c| c.effect.identifier()).collect()
 }
 
+/// Which samples of a record were searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Searched {
+    /// All of them.
+    All,
+    /// Pieces first, of so many samples; and then all of them, or none of the others where the pieces left more than noise.
+    Pieces { samples: usize, is_screened: bool },
+    /// A stretch, since the time constants change too fast for all of it.
+    Stretch,
+}
+
 /// How far the loop has come.
 pub(crate) struct State<'a> {
     pub(crate) prepared: Prepared,
@@ -152,14 +163,11 @@ pub(crate) struct State<'a> {
     pub(crate) moves: Vec<Move>,
     /// Effects with time constants far from those that there are, of which none was accepted.
     pub(crate) far: Vec<Candidate>,
-    /// Samples of the pieces that were searched first, of a long record.
-    pub(crate) searched_samples: Option<usize>,
-    /// Whether all of a long record is searched as well.
-    pub(crate) is_screened: bool,
+    pub(crate) searched: Searched,
     /// Effects with such time constants that these pieces do not exclude.
     pub(crate) far_in_pieces: Option<Vec<Candidate>>,
     /// A change of the time constants that is too fast for a model of the whole record.
-    pub(crate) faster: Option<Faster>,
+    pub(crate) rapid: Option<RapidVariation>,
 }
 
 impl<'a> State<'a> {
@@ -181,10 +189,9 @@ impl<'a> State<'a> {
             taken: Vec::new(),
             moves: Vec::new(),
             far: Vec::new(),
-            searched_samples: None,
-            is_screened: true,
+            searched: Searched::All,
             far_in_pieces: None,
-            faster: None,
+            rapid: None,
         }
     }
 

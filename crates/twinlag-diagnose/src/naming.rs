@@ -11,10 +11,10 @@ use twinlag_optimise::{End, Scale};
 use crate::candidates::is_inside_bounds;
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
-use crate::faster::Faster;
 use crate::grade::{Judgement, Number, Reason};
 use crate::judge::Circumstances;
 use crate::moves::Taken;
+use crate::rapid::RapidVariation;
 use crate::remark::{Remark, to_digits_of};
 
 /// Relative change of an end of an interval that is worth a remark.
@@ -48,6 +48,7 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
         alternatives,
         seen: None,
         masked: Vec::new(),
+        is_in_the_model: true,
     }
 }
 
@@ -103,8 +104,8 @@ fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Op
 }
 
 /// A change that is too fast for a model of the whole record, without numbers: its own are those of a stretch.
-pub(crate) fn of_faster(faster: &Faster) -> Found {
-    let Faster { taken, ends_s: [from_s, to_s], seen_in, looked_in } = faster;
+pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
+    let RapidVariation { taken, ends_s: [from_s, to_s], seen_in, looked_in } = variation;
     let effect = &taken.candidate.effect;
     let [from, to] = [from_s, to_s].map(|t| to_digits_of(to_s - from_s, *t));
     let seen = format!(
@@ -121,6 +122,7 @@ pub(crate) fn of_faster(faster: &Faster) -> Found {
         alternatives: Vec::new(),
         seen: Some(seen),
         masked: Vec::new(),
+        is_in_the_model: false,
     }
 }
 
@@ -140,6 +142,7 @@ pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -
         alternatives: Vec::new(),
         seen: Some(seen),
         masked: Masked::runs(&defect.masked, &prepared.observations),
+        is_in_the_model: true,
     }
 }
 

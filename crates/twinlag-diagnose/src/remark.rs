@@ -63,7 +63,7 @@ pub enum Remark {
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
     /// Something changes faster than a model of the whole record can follow.
-    FasterThanTheWhole {
+    VariesTooFast {
         /// The effect.
         effect: Identifier,
         /// Ends of the stretch that showed it, s.
@@ -113,7 +113,7 @@ impl Remark {
             Self::Contradicted { .. } => 1,
             Self::LagAlone => 2,
             Self::BiasUnknown { .. } => 3,
-            Self::FasterThanTheWhole { .. } => 4,
+            Self::VariesTooFast { .. } => 4,
             Self::ModelErrorAsNoise => 5,
             Self::Widened { .. } => 6,
             Self::NoiseLowered => 7,
@@ -190,7 +190,7 @@ impl fmt::Display for Remark {
                 "{effect} was first placed in the other channel, but explains more in this one: if the rig says otherwise, \
                  believe the rig"
             ),
-            Self::FasterThanTheWhole { effect, ends_s: [from_s, to_s] } => write!(
+            Self::VariesTooFast { effect, ends_s: [from_s, to_s] } => write!(
                 f,
                 "{effect} goes up and down too often along this record for a model of all of it. Cut the record into parts of about \
                  {} s, as the one from {} s on in which it was found, and diagnose these",
@@ -238,7 +238,7 @@ mod tests {
             Remark::Contradicted { what: "T1 = 0.8 s".into(), instead: "T1 = 0.4 s".into(), deviations: 9.7 },
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown { is_one_known: false },
-            Remark::FasterThanTheWhole { effect: Identifier::VARYING_TIME_CONSTANT, ends_s: [480.0, 504.6] },
+            Remark::VariesTooFast { effect: Identifier::VARYING_TIME_CONSTANT, ends_s: [480.0, 504.6] },
             Remark::SearchedInPieces { samples: 24_576, all: 1_000_000, is_screened: true },
         ];
         let importance: BTreeSet<u8> = all.iter().map(Remark::importance).collect();

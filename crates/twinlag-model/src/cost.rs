@@ -70,8 +70,8 @@ pub(crate) struct Block<'a> {
 }
 
 impl<'a> Block<'a> {
-    /// A column for each direction, and of what is known beforehand one for each parameter; empty where none is computed, and where
-    /// all of it is zero.
+    /// A column for each direction, and of what is known beforehand one for each parameter; empty where none is computed, and
+    /// where all of it is zero.
     pub(crate) fn columns(&self) -> impl Iterator<Item = &'a [f64]> {
         self.columns.iter().map(|column| &column.picked[..])
     }
@@ -139,8 +139,8 @@ impl<'a> ResidualCost<'a> {
         Directions::of(self.model, theta, first, |i| self.is_held(i), self.observations)
     }
 
-    /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which derivatives
-    /// are those with respect to the parameters from `first` on that are not held.
+    /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which
+    /// derivatives are those with respect to the parameters from `first` on that are not held.
     fn walk(
         &self,
         theta: &[f64],
@@ -458,9 +458,10 @@ mod tests {
         }
     }
 
-    /// Residuals and derivatives of a record that is whitened in windows, or derived in blocks, are those of the whole, to rounding. Readings of 400 K are
-    /// rounded to 5e-14 K, 1e-12 of the noise of 0.05 K, and a whitened value adds up some tens: 3e-11. A derivative of the factor
-    /// counts as settled at 1e-13, and some hundred rows follow each other: 1e-11. The bound is twice their sum, 1e-10 of the largest.
+    /// Residuals and derivatives of a record that is whitened in windows, or derived in blocks, are those of the whole, to
+    /// rounding. Readings of 400 K are rounded to 5e-14 K, 1e-12 of the noise of 0.05 K, and a whitened value adds up some
+    /// tens: 3e-11. A derivative of the factor counts as settled at 1e-13, and some hundred rows follow each other: 1e-11. The
+    /// bound is twice their sum, 1e-10 of the largest.
     #[test]
     fn windows_give_what_the_whole_gives() {
         for (kind, is_cut) in [(Kind::Even, false), (Kind::Masked, false), (Kind::Even, true)] {

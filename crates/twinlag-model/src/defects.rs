@@ -17,8 +17,8 @@ use crate::policy::Policy;
 /// Bins beside a line that it is held against: beyond the window's main lobe.
 const BESIDE: [f64; 8] = [-10.0, -8.0, -6.0, -4.0, 4.0, 6.0, 8.0, 10.0];
 
-/// Values up to which a series is transformed as long as it is. The transform of a large prime factor takes six times the memory of
-/// others, and of a long series that is more than the record.
+/// Values up to which a series is transformed as long as it is. The transform of a large prime factor takes six times the
+/// memory of others, and of a long series that is more than the record.
 pub(crate) const MAX_TRANSFORMED_AS_IT_IS: usize = 1 << 19;
 
 /// Noise of the channels: as third differences show it, or as a model leaves it over.
@@ -194,7 +194,8 @@ fn tone(values: impl Iterator<Item = (usize, f64)>, omega: f64) -> Complex64 {
     sum
 }
 
-/// Lines that stick out of the residual of `fitted`: frequencies in Hz, strongest first, each far beyond what its neighbours are.
+/// Lines that stick out of the residual of `fitted`: frequencies in Hz, strongest first, each far beyond what its neighbours
+/// are.
 pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize) -> bool, policy: &Policy) -> Vec<f64> {
     let Some(period_s) = observations.period_s else { return Vec::new() };
     let Evaluation { residual, samples, .. } = fitted.model.evaluate(&fitted.theta, observations);
@@ -250,8 +251,8 @@ pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize)
     out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
 }
 
-/// Values to transform of a record with so many, zeros after them counted: of a long one no more than a thirty-second more, so that no
-/// large prime factor takes several times the memory.
+/// Values to transform of a record with so many, zeros after them counted: of a long one no more than a thirty-second more, so
+/// that no large prime factor takes several times the memory.
 fn padded_length(samples: usize) -> usize {
     if samples <= MAX_TRANSFORMED_AS_IT_IS { samples } else { fast_length(samples + samples / 32) }
 }

@@ -1,7 +1,8 @@
 //! Directions in which the derivatives of a residual are computed.
 //!
-//! A direction is a parameter, or, where a parameter changes a function along the whole record, one of the parts that reach over
-//! some of it: the derivative with respect to the parameter is a sum of these, and each costs no more than what it reaches.
+//! A direction is a parameter, or, where a parameter changes a function along the whole record, one of the parts that reach
+//! over some of it: the derivative with respect to the parameter is a sum of these, and each costs no more than what it
+//! reaches.
 
 use std::fmt;
 use std::sync::Arc;
@@ -71,14 +72,14 @@ pub(crate) struct Direction {
 /// The directions of a model at a point.
 pub(crate) struct Directions {
     pub(crate) all: Vec<Direction>,
-    /// Of which of them the derivative by each parameter consists, with their weights; `None` where each parameter is the direction
-    /// in its place.
+    /// Of which of them the derivative by each parameter consists, with their weights; `None` where each parameter is the
+    /// direction in its place.
     pub(crate) of_parameters: Option<Vec<Weights>>,
 }
 
 impl Directions {
-    /// Those of the parameters from `first` on that are not held. The parameters before `first`, and those that are held, have a
-    /// direction without a derivative each.
+    /// Those of the parameters from `first` on that are not held. The parameters before `first`, and those that are held, have
+    /// a direction without a derivative each.
     pub(crate) fn of(
         model: &Model,
         theta: &[f64],

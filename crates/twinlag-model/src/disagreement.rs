@@ -23,8 +23,8 @@ const MASKED_NOISE_SWINGS: f64 = 20.0;
 const MIN_DISAGREEMENTS: usize = 4;
 /// Samples of a window: what a derivative of one works on, some twenty numbers for each sample, is a megabyte. Chosen.
 const WINDOW_SAMPLES: usize = 8192;
-/// Values of a block, and the bands that it has at least: what acts in a part of a record is computed block by block, or left out. What
-/// a block takes beside its own values, for the operators and the lead, is some bands. Chosen.
+/// Values of a block, and the bands that it has at least: what acts in a part of a record is computed block by block, or left
+/// out. What a block takes beside its own values, for the operators and the lead, is some bands. Chosen.
 const BLOCK_SAMPLES: usize = 512;
 const BLOCK_BANDS: usize = 4;
 /// Samples of a record up to which all factors are kept for derivatives: of longer ones those that have not settled are computed

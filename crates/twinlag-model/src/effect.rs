@@ -76,8 +76,8 @@ pub trait Effect: Send + Sync {
     /// Puts the effect into the model. Derivatives of the cost come from the arithmetic with `values`.
     fn install(&self, values: &[Number], plant: &mut Plant);
 
-    /// Parts by which derivatives are computed in place of those by each parameter: of an effect whose parameters change a function
-    /// along the record, and that is quicker to compute where each part acts. By default there are none.
+    /// Parts by which derivatives are computed in place of those by each parameter: of an effect whose parameters change a
+    /// function along the record, and that is quicker to compute where each part acts. By default there are none.
     fn parts(&self, _values: &[f64]) -> Option<Parts> {
         None
     }

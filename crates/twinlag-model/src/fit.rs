@@ -290,9 +290,9 @@ mod tests {
     /// Half of what the tones are together.
     const LOUD_K: f64 = 2.0;
 
-    /// Of a record of twice as many samples as are taken whole, second derivatives are those of all samples: what noise adds to the
-    /// products is off by the inverse root of the pieces' samples, one part in 128, and it is a part of them. The bound on each is
-    /// three times that of the root of the diagonal. That part is large enough to be seen: a tenth of them and more.
+    /// Of a record of twice as many samples as are taken whole, second derivatives are those of all samples: what noise adds to
+    /// the products is off by the inverse root of the pieces' samples, one part in 128, and it is a part of them. The bound on
+    /// each is three times that of the root of the diagonal. That part is large enough to be seen: a tenth of them and more.
     #[test]
     fn second_derivatives_by_pieces_are_those_of_the_whole() {
         let observations = observations(2 * MAX_CURVED_SAMPLES, LOUD_K, |_| 1.0);

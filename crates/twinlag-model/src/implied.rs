@@ -265,8 +265,9 @@ mod tests {
     use crate::prepare::Prepared;
     use crate::settings::Settings;
 
-    /// Both ways to evaluate a record whiten the same residual at the same samples, stretch by stretch; the mean and the difference
-    /// of the inferred inputs are those of the parts, in a model with noise of another colour too, whose differences come later.
+    /// Both ways to evaluate a record whiten the same residual at the same samples, stretch by stretch; the mean and the
+    /// difference of the inferred inputs are those of the parts, in a model with noise of another colour too, whose differences
+    /// come later.
     #[test]
     fn what_is_evaluated_is_made_of_its_parts() {
         let stretch = |from: usize, samples: usize| {

@@ -175,9 +175,9 @@ policy! {
     /// Energy beside that of the noise, as a share of it, up to which a record counts as explained, and intervals cover that
     /// all of it goes with the number: half of what the test of the energy of 20 000 samples can see, `4 √(2/20 000)`.
     explained_excess_share: f64 = 0.02,
-    /// Coherence of the residual with the gas from which on what was taken for noise is model error: what the test of it sees in
-    /// 20 000 samples, 0.076 where the gas stands out at ten frequencies and 0.087 at sixty. Longer records show less, as that the noise
-    /// of both sensors is not quite of first order.
+    /// Coherence of the residual with the gas from which on what was taken for noise is model error: what the test of it sees
+    /// in 20 000 samples, which is 0.076 where the gas stands out at ten frequencies and 0.087 at sixty: chosen between them.
+    /// Longer records show smaller coherence, for example of a noise that is not quite of first order.
     noise_coherence: f64 = 0.08,
 
     /// How many standard errors the energy must lie below that of the assumed levels before they are

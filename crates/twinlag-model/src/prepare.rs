@@ -88,6 +88,17 @@ impl Prepared {
         })
     }
 
+    /// Pieces of this record, as [`Observations::excerpt`] takes them: effects that add nothing on average do so over all of
+    /// it.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn of_excerpt(&self, excerpt: &Observations, settings: &Settings) -> Result<Self, ModelError> {
+        let mut out = Self::new(excerpt, settings)?;
+        (out.context.mean_c, out.context.moments) = (self.context.mean_c, self.context.moments);
+        Ok(out)
+    }
+
     /// The two-lag model, isolated wrong readings, which show once there is one, masked.
     pub fn base(&mut self, settings: &Settings) -> Fitted {
         self.base_by(settings, |model, observations, searched| {

@@ -245,7 +245,7 @@ fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }
-    // The last hundredth of a long one is left out for that.
+    // Of a long one less than a fiftieth is left out, so that its length is quick to transform.
     let count = if run.len() > MAX_TRANSFORMED_AS_IT_IS { fast_length(run.len()) } else { run.len() };
     let run = &run[..count];
     let spectrum = Forward::once(count).transform(run);

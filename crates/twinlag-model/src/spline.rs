@@ -73,11 +73,12 @@ impl Spline {
     }
 }
 
-/// A spline with its derivative by one of its parts, and the instants between which that acts, s; `None` where it acts everywhere.
+/// A spline with its derivative by one of its parts, and the instants between which that acts, s; `None` where it acts
+/// everywhere.
 pub(crate) type LocalSpline = (Spline, Option<[f64; 2]>);
 
-/// The spline with its derivative by each B-spline, and by the mean; and for each free coefficient the weights by which its derivative
-/// is a sum of these.
+/// The spline with its derivative by each B-spline, and by the mean; and for each free coefficient the weights by which its
+/// derivative is a sum of these.
 pub(crate) fn parts(from_s: f64, to_s: f64, free: &[f64]) -> (Vec<LocalSpline>, Vec<Weights>) {
     let numbers: Vec<Number> = free.iter().copied().map(Number::from).collect();
     let spline = Spline::new(from_s, to_s, &numbers);

@@ -28,8 +28,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// All values, or of more than 65 536 the smallest and the largest of as many neighbours as leave so many; a stretch begins with
-    /// NaN then, but for the first.
+    /// All values, or of more than 65 536 the smallest and the largest of as many neighbours as leave so many; a stretch begins
+    /// with NaN then, but for the first.
     ///
     /// - `stretches`: their places among the values
     fn thinned(time_s: &[f64], value: Vec<f64>, stretches: impl Iterator<Item = Range<usize>>) -> Self {
@@ -87,8 +87,8 @@ impl ResidualPart {
 pub struct Trace {
     /// Whitened residual; of a long record its smallest and largest values.
     pub residual: Line,
-    /// Estimated gas temperature, °C: both inferred inputs together, without the frequencies in which there is only noise. Of a long
-    /// record its smallest and largest values.
+    /// Estimated gas temperature, °C: both inferred inputs together, without the frequencies in which there is only noise. Of a
+    /// long record its smallest and largest values.
     pub gas_c: Line,
     /// The residual in hundredths of the record, equal but for the last.
     pub parts: Vec<ResidualPart>,

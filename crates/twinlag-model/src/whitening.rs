@@ -96,8 +96,8 @@ pub(crate) struct Factor {
     same: Vec<f64>,
     /// Rows in a row that agreed at the end.
     agreeing: usize,
-    /// Whether all of its rows follow from `same` alone: it begins a stretch, its rows of weights are the same, and no masked reading
-    /// enters it.
+    /// Whether all of its rows follow from `same` alone: it begins a stretch, its rows of weights are the same, and no masked
+    /// reading enters it.
     is_stationary: bool,
 }
 

@@ -186,8 +186,8 @@ mod tests {
         }
     }
 
-    /// What the look showed is not so further on: a byte that no text has, another encoding than that of a letter before, with the
-    /// place where it is. Letters that come first decide.
+    /// What the look showed is not so further on: a byte that no text has, another encoding than that of a letter before, with
+    /// the place where it is. Letters that come first decide.
     #[test]
     fn what_differs_from_the_look_is_refused_with_its_place() {
         let line = "1,20.5,21\n";

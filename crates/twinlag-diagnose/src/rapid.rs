@@ -1,12 +1,10 @@
 //! Time constants that change faster along a long record than a smooth change over all of it can follow.
 //!
-//! A smooth change has some twenty coefficients, however long the record is: what swings a hundred times along it is beyond them,
+//! A smooth change has nineteen coefficients at most, however long the record is: what swings a hundred times along it is beyond them,
 //! and looks like noise of the gas in pieces that lie far apart. Consecutive samples, as many as a search takes in, show it. Where
 //! they do, it is named with what was seen; no number of the whole record can hold it.
 
-use twinlag_model::{
-    Effort, Fitted, ModelError, Observations, Prepared, Settings, Shared, Watch, candidates, evenly_spread,
-};
+use twinlag_model::{Effort, Fitted, ModelError, Prepared, Settings, Shared, Watch, candidates, evenly_spread};
 
 use crate::diagnose::search;
 use crate::long::{EXCLUDED_DEVIANCE, SEARCHED_SAMPLES};
@@ -14,11 +12,11 @@ use crate::moves::{State, Taken};
 use crate::rank::worth;
 use crate::remark::Remark;
 
-/// Stretches of consecutive samples, spread evenly over the record: the middle one is searched, the others confirm.
+/// Stretches of consecutive samples, spread evenly over the record: the middle one is searched, and one of the others has to confirm.
 const STRETCHES: usize = 3;
 
 /// Such a change.
-pub(crate) struct Faster {
+pub(crate) struct RapidVariation {
     pub(crate) taken: Taken,
     /// Ends of the stretch that was searched, s.
     pub(crate) ends_s: [f64; 2],
@@ -27,23 +25,24 @@ pub(crate) struct Faster {
     pub(crate) looked_in: usize,
 }
 
-impl Faster {
+impl RapidVariation {
     pub(crate) fn remark(&self) -> Remark {
-        Remark::FasterThanTheWhole { effect: self.taken.candidate.effect.identifier(), ends_s: self.ends_s }
+        Remark::VariesTooFast { effect: self.taken.candidate.effect.identifier(), ends_s: self.ends_s }
     }
 }
 
 /// What a stretch of a long record shows where its pieces left something to noise or to nothing; `None` where it shows no change of
 /// the time constants, or explains no more than what the pieces showed.
-pub(crate) fn faster<'a>(
-    observations: &Observations,
+pub(crate) fn rapid_variation<'a>(
+    whole: &Prepared,
     pieces: &State<'_>,
     settings: &'a Settings,
     watch: Watch<'a>,
-) -> Result<Option<(State<'a>, Faster)>, ModelError> {
+) -> Result<Option<(State<'a>, RapidVariation)>, ModelError> {
     if !pieces.has_noise() && pieces.current.mean_energy() < settings.policy.incomplete_energy {
         return Ok(None);
     }
+    let observations = &whole.observations;
     let starts: Vec<usize> = evenly_spread(observations.samples(), STRETCHES, SEARCHED_SAMPLES).collect();
     let stretch = |place: usize| {
         let out = observations.excerpt(std::iter::once(starts[place]), SEARCHED_SAMPLES);
@@ -51,7 +50,7 @@ pub(crate) fn faster<'a>(
     };
     // Where the record has a gap there is none.
     let Some(middle) = stretch(STRETCHES / 2) else { return Ok(None) };
-    let mut state = State::new(Prepared::new(&middle, settings)?, settings, watch);
+    let mut state = State::new(whole.of_excerpt(&middle, settings)?, settings, watch);
     search(&mut state, settings, true)?;
     let Some(index) = state.taken.iter().position(|taken| is_change_along_the_record(&taken.candidate.effect)) else {
         return Ok(None);
@@ -63,13 +62,16 @@ pub(crate) fn faster<'a>(
     }
     let (mut seen_in, mut looked_in) = (1, 1);
     for other in (0..STRETCHES).filter(|place| *place != STRETCHES / 2).filter_map(stretch) {
-        let prepared = Prepared::new(&other, settings)?;
+        let prepared = whole.of_excerpt(&other, settings)?;
         looked_in += 1;
         seen_in += usize::from(shows(&state, index, &prepared, settings));
     }
+    if seen_in == 1 && looked_in > 1 {
+        return Ok(None);
+    }
     let ends_s = middle.ends_s();
     let taken = state.take_out(index);
-    Ok(Some((state, Faster { taken, ends_s, seen_in, looked_in })))
+    Ok(Some((state, RapidVariation { taken, ends_s, seen_in, looked_in })))
 }
 
 fn is_change_along_the_record(effect: &Shared) -> bool {
@@ -114,7 +116,7 @@ mod tests {
     use std::f64::consts::TAU;
     use std::ops::ControlFlow;
 
-    use twinlag_model::{Identifier, Stretch};
+    use twinlag_model::{Identifier, Observations, Stretch};
     use twinlag_signal::{Flow, FlowSine, Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
 
     use super::*;
@@ -149,13 +151,14 @@ mod tests {
         let named: Vec<Identifier> = answer.effects.iter().map(|e| e.effect).collect();
         assert_eq!(named, [Identifier::VARYING_TIME_CONSTANT]);
         let found = &answer.effects[0];
-        assert!(found.parameters.is_empty() && !found.is_in_the_model());
+        assert!(found.parameters.is_empty() && !found.is_in_the_model);
         assert!(found.seen.as_ref().is_some_and(|seen| seen.contains("3 of 3")), "{:?}", found.seen);
         let cut = SEARCHED_SAMPLES as f64 * SAMPLE_PERIOD_S;
         assert!(answer.remarks.iter().any(|remark| matches!(
             remark,
-            Remark::FasterThanTheWhole { ends_s: [from_s, to_s], .. } if (to_s - from_s - cut).abs() < 2.0 * SAMPLE_PERIOD_S
+            Remark::VariesTooFast { ends_s: [from_s, to_s], .. } if (to_s - from_s - cut).abs() < 2.0 * SAMPLE_PERIOD_S
         )));
+        assert!(!answer.remarks.iter().any(|remark| matches!(remark, Remark::SearchedInPieces { .. })));
         assert!(answer.judgements.time_constants.iter().all(|j| j.grade == crate::grade::Grade::NoGo));
     }
 }
