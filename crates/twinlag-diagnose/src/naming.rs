@@ -109,8 +109,8 @@ pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
     let effect = &taken.candidate.effect;
     let [from, to] = [from_s, to_s].map(|t| to_digits_of(to_s - from_s, *t));
     let seen = format!(
-        "seen between {from} and {to} s, and in {seen_in} of {looked_in} such stretches; it is faster than a model of the whole \
-         record can follow, and in none of its numbers"
+        "seen between {from} and {to} s, and in {seen_in} of {looked_in} stretches of the record; it is faster than a model of \
+         the whole record can follow, and in none of its numbers"
     );
     Found {
         effect: effect.identifier(),

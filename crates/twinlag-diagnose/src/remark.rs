@@ -192,7 +192,7 @@ impl fmt::Display for Remark {
             ),
             Self::VariesTooFast { effect, ends_s: [from_s, to_s] } => write!(
                 f,
-                "{effect} goes up and down too often along this record for a model of all of it. Cut the record into parts of about \
+                "{effect} goes up and down too often along this record for a model of all of it. Cut the record into parts no longer than \
                  {} s, as the one from {} s on in which it was found, and diagnose these",
                 to_digits_of(to_s - from_s, to_s - from_s),
                 to_digits_of(to_s - from_s, *from_s)

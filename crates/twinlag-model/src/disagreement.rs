@@ -157,6 +157,11 @@ impl Window {
         self.from..self.from + self.count
     }
 
+    /// Values before one that it is correlated with.
+    pub(crate) fn band(&self) -> usize {
+        self.factor.band()
+    }
+
     /// Its disagreement, into `plain`; the first of its samples in the stretch.
     fn disagree(
         &self,
@@ -441,7 +446,7 @@ impl<'a> Evaluator<'a> {
 
     /// From half the gradient of an energy by the whitened residual, to that by the disagreement and its covariance.
     pub(crate) fn adjoint(&self, plant: &Plant, gradient: Vec<f64>, again: &mut Again) -> Adjoint {
-        let widest = self.windows().iter().map(|window| window.factor.band()).max();
+        let widest = self.windows().iter().map(Window::band).max();
         let mut out = Adjoint::begin(gradient, widest.unwrap_or(0));
         for index in (0..self.used).rev() {
             let Window { from, count, lead, .. } = self.windows[index];

@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn parts_are_whole_lines_and_make_up_the_text() {
-        let text: String = (0..50).map(|k| format!("{k},{},21.5\n", 20 + k % 3)).collect();
+        let text = (0..50).map(|k| format!("{k},{},21.5\n", 20 + k % 3)).collect::<Vec<_>>().concat();
         for (text, is_open) in [(text.clone(), false), (text + "50,20,2", true)] {
             for (look_bytes, part_bytes) in [(40, 1), (40, 3), (100, 64), (13, 500)] {
                 let (first, rest, open) = parts(text.as_bytes(), look_bytes, part_bytes).expect("plain text");
