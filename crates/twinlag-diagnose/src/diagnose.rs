@@ -43,21 +43,21 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
             if let Some((stretch, variation)) = rapid {
                 let mut state = State::carried(stretch, prepared, settings, watch);
                 (state.rapid, state.searched) = (Some(variation), Searched::Stretch);
-                return conclude(state, settings, tones);
+                state
+            } else {
+                // What no effect explains in the pieces none does in the whole: what stands out there is but a part of it.
+                let is_screened = !leaves_more_than_noise(&part, settings);
+                let samples = part.prepared.observations.samples();
+                let mut state = State::carried(part, prepared, settings, watch);
+                state.searched = Searched::Pieces { samples, is_screened };
+                state
             }
-            let is_screened = !leaves_more_than_noise(&part, settings);
-            let samples = part.prepared.observations.samples();
-            let mut state = State::carried(part, prepared, settings, watch);
-            state.searched = Searched::Pieces { samples, is_screened };
-            if !is_screened {
-                // No effect explains it, and what stands out in more samples is but a part of that.
-                return conclude(state, settings, tones);
-            }
-            state
         }
         None => State::new(prepared, settings, watch),
     };
-    search(&mut state, settings, can_learn)?;
+    if matches!(state.searched, Searched::All | Searched::Pieces { is_screened: true, .. }) {
+        search(&mut state, settings, can_learn)?;
+    }
     conclude(state, settings, tones)
 }
 

@@ -1,8 +1,8 @@
 //! Time constants that change faster along a long record than a smooth change over all of it can follow.
 //!
-//! A smooth change has nineteen coefficients at most, however long the record is: what swings a hundred times along it is beyond them,
-//! and looks like noise of the gas in pieces that lie far apart. Consecutive samples, as many as a search takes in, show it. Where
-//! they do, it is named with what was seen; no number of the whole record can hold it.
+//! A smooth change has nineteen coefficients at most, however long the record is: what swings a hundred times along it is
+//! beyond them, and looks like noise of the gas in pieces that lie far apart. Consecutive samples, as many as a search takes
+//! in, show it. Where they do, it is named with what was seen; no number of the whole record can hold it.
 
 use twinlag_model::{
     Effort, Fitted, ModelError, Observations, Prepared, Settings, Shared, Watch, candidates, evenly_spread,
@@ -15,7 +15,8 @@ use crate::moves::{State, Taken};
 use crate::rank::worth;
 use crate::remark::Remark;
 
-/// Stretches of consecutive samples, spread evenly over the record: the middle one is searched, and one of the others has to confirm.
+/// Stretches of consecutive samples, spread evenly over the record: the middle one is searched, and one of the others has to
+/// confirm.
 const STRETCHES: usize = 3;
 /// Times that the stretch is halved where it is not explained: what swings too often in one shows in a shorter one. Chosen: the
 /// shortest has 3072 samples.
@@ -37,8 +38,8 @@ impl RapidVariation {
     }
 }
 
-/// What a stretch of a long record shows where its pieces left something to noise or to nothing; `None` where it shows no change of
-/// the time constants, or explains no more than what the pieces showed.
+/// What a stretch of a long record shows where its pieces left something to noise or to nothing; `None` where it shows no
+/// change of the time constants, or explains no more than what the pieces showed.
 pub(crate) fn rapid_variation<'a>(
     whole: &Prepared,
     pieces: &State<'_>,
@@ -48,7 +49,7 @@ pub(crate) fn rapid_variation<'a>(
     if !pieces.has_noise() && pieces.current.mean_energy() < settings.policy.incomplete_energy {
         return Ok(None);
     }
-    let observations = &whole.observations;
+    let observations = &whole.raw.0;
     let starts: Vec<usize> = evenly_spread(observations.samples(), STRETCHES, SEARCHED_SAMPLES).collect();
     let stretch = |place: usize| {
         let out = observations.excerpt(std::iter::once(starts[place]), SEARCHED_SAMPLES);
@@ -61,7 +62,8 @@ pub(crate) fn rapid_variation<'a>(
     let Some(index) = change_along_the_record(&state) else { return Ok(None) };
     let of_pieces = without_noise(&pieces.current, &state.prepared);
     let of_stretch = without_noise(&state.current, &state.prepared);
-    if deviance(&of_pieces, &of_stretch) < EXCLUDED_DEVIANCE {
+    let added = of_stretch.theta.len() as f64 - of_pieces.theta.len() as f64;
+    if gain(&of_pieces, &of_stretch) < added * of_stretch.count.ln() + EXCLUDED_DEVIANCE {
         return Ok(None);
     }
     let (mut seen_in, mut looked_in) = (1, 1);
@@ -115,11 +117,9 @@ fn is_change_along_the_record(effect: &Shared) -> bool {
     effect.about().changes_time_constants && effect.is_of_the_record()
 }
 
-/// Deviance that the second of two fits to the same samples saves, parameters counted.
-fn deviance(one: &Fitted, other: &Fitted) -> f64 {
-    let parameters = |fitted: &Fitted| fitted.theta.len() as f64;
+/// Deviance that the second of two fits to the same samples saves.
+fn gain(one: &Fitted, other: &Fitted) -> f64 {
     other.count * (one.mean_energy() / other.mean_energy()).ln()
-        - (parameters(other) - parameters(one)) * other.count.ln()
 }
 
 /// A model without its noise, which explains whatever is left over, fitted to a record.
@@ -144,8 +144,7 @@ fn shows(state: &State<'_>, index: usize, prepared: &Prepared, settings: &Settin
     let model = without.model.with(change.clone());
     let theta = [&without.theta[..], &change.starts()[0]].concat();
     let with = model.fit(&theta, &prepared.observations, &prepared.searched, Effort::Compare);
-    let gain = with.count * (without.mean_energy() / with.mean_energy()).ln();
-    gain > worth(change.parameters().len(), with.count, &settings.policy)
+    gain(&without, &with) > worth(change.parameters().len(), with.count, &settings.policy)
 }
 
 #[cfg(test)]

@@ -55,8 +55,6 @@ struct Column {
     sieve: Sieve,
     /// Derivatives of the residuals that count.
     picked: Vec<f64>,
-    /// Half the derivative of the energy, where that alone is asked for.
-    slope: f64,
 }
 
 /// Residuals that count, some after the others, with their derivatives.
@@ -66,14 +64,23 @@ pub(crate) struct Block<'a> {
     pub(crate) range: Range<usize>,
     /// Whether this is what is known beforehand, the last block.
     pub(crate) is_prior: bool,
-    columns: &'a [Column],
-}
-
-impl<'a> Block<'a> {
     /// A column for each direction, and of what is known beforehand one for each parameter; empty where none is computed, and
     /// where all of it is zero.
-    pub(crate) fn columns(&self) -> impl Iterator<Item = &'a [f64]> {
-        self.columns.iter().map(|column| &column.picked[..])
+    pub(crate) columns: Vec<&'a [f64]>,
+}
+
+/// Computes what belongs to each direction in a window of so many residuals.
+fn each_direction<T: Send>(
+    items: &mut [T],
+    directions: &Directions,
+    residuals: usize,
+    compute: impl Fn((&mut T, &Direction)) + Sync + Send,
+) {
+    let count = directions.all.iter().filter(|direction| direction.plant.is_some()).count();
+    if count > 1 && count * residuals >= MIN_PARALLEL_VALUES {
+        items.par_iter_mut().zip(&directions.all).for_each(compute);
+    } else {
+        items.iter_mut().zip(&directions.all).for_each(compute);
     }
 }
 
@@ -134,31 +141,25 @@ impl<'a> ResidualCost<'a> {
         memory.at.extend_from_slice(theta);
     }
 
-    /// The directions of the parameters from `first` on.
+    /// The directions of the parameters from `first` on that are not held.
     fn directions(&self, theta: &[f64], first: usize) -> Directions {
         Directions::of(self.model, theta, first, |i| self.is_held(i), self.observations)
     }
 
     /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which
-    /// derivatives are those with respect to the parameters from `first` on that are not held.
-    fn walk(
-        &self,
-        theta: &[f64],
-        (directions, first): (&Directions, usize),
-        memory: &mut Memory<'_>,
-        mut visit: impl FnMut(Block<'_>),
-    ) {
+    /// derivatives are those with respect to the parameters.
+    fn walk(&self, theta: &[f64], directions: &Directions, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
         self.evaluate(theta, memory);
         let Memory { evaluator, residual, ends, columns, spare, again, .. } = memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
         let still = self.model.plant_of(&constants(theta), self.observations);
-        columns.resize_with(directions.all.len(), Column::default);
-        let count = directions.all.iter().filter(|direction| direction.plant.is_some()).count();
+        columns.resize_with(columns.len().max(directions.all.len()), Column::default);
+        let columns = &mut columns[..directions.all.len()];
         let mut done = 0;
         for (index, window) in evaluator.windows().iter().enumerate() {
             let factor = evaluator.factor(&still, index, again);
             let compute = |(column, direction): (&mut Column, &Direction)| {
-                let Column { moved, sieve, picked, .. } = column;
+                let Column { moved, sieve, picked } = column;
                 picked.clear();
                 if direction.plant.is_none() {
                     return;
@@ -171,26 +172,22 @@ impl<'a> ResidualCost<'a> {
                 }
                 spare.lock().expect("no thread panics").push(disagreement);
             };
-            if count > 1 && count * window.residuals().len() >= MIN_PARALLEL_VALUES {
-                columns.par_iter_mut().zip(&directions.all).for_each(compute);
-            } else {
-                columns.iter_mut().zip(&directions.all).for_each(compute);
-            }
+            each_direction(columns, directions, window.residuals().len(), compute);
             let range = std::mem::replace(&mut done, ends[index])..ends[index];
+            let columns = columns.iter().map(|column| &column.picked[..]).collect();
             visit(Block { residual: &residual[range.clone()], range, is_prior: false, columns });
         }
-        columns.resize_with(theta.len(), Column::default);
-        for (i, column) in columns.iter_mut().enumerate() {
-            column.picked.clear();
-            if i >= first && !self.is_held(i) {
-                column.picked.extend(self.model.knowledge(&moved(theta, i)).map(|k| k.eps));
-            }
-        }
+        let known = |i: usize| -> Vec<f64> {
+            let is_computed = i >= directions.first && !self.is_held(i);
+            if is_computed { self.model.knowledge(&moved(theta, i)).map(|k| k.eps).collect() } else { Vec::new() }
+        };
+        let known: Vec<Vec<f64>> = (0..theta.len()).map(known).collect();
+        let columns = known.iter().map(Vec::as_slice).collect();
         visit(Block { residual: &residual[done..], range: done..residual.len(), is_prior: true, columns });
     }
 
-    /// Half the first derivatives of the energy, `Jᵀr`, without the columns of `J`: what it gains by the disagreement and by
-    /// its covariance is the same for all parameters. Variances of masked readings are so large that this would lose digits to
+    /// Half the first derivatives of the energy, `Jᵀr`, without the columns of `J`: its derivatives by the disagreement and by the
+    /// covariance are computed once for all parameters. Variances of masked readings are so large that this would lose digits to
     /// them.
     pub(crate) fn slope(&self, theta: &[f64]) -> Vec<f64> {
         let is_masked = |stretch: &Arc<Stretch>| stretch.masked.iter().flatten().any(|is_masked| *is_masked);
@@ -199,28 +196,22 @@ impl<'a> ResidualCost<'a> {
         }
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        let Memory { evaluator, residual, columns, spare, again, .. } = &mut *memory;
+        let Memory { evaluator, residual, spare, again, .. } = &mut *memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
         let still = self.model.plant_of(&constants(theta), self.observations);
         let adjoint = evaluator.adjoint(&still, self.gradient(evaluator, residual), again);
         let directions = self.directions(theta, 0);
-        columns.clear();
-        columns.resize_with(directions.all.len(), Column::default);
-        let count = directions.all.iter().filter(|direction| direction.plant.is_some()).count();
+        let mut slopes = vec![0.0; directions.all.len()];
         for (index, window) in evaluator.windows().iter().enumerate() {
             let factor = evaluator.factor(&still, index, again);
-            let compute = |(column, direction): (&mut Column, &Direction)| {
+            let compute = |(slope, direction): (&mut f64, &Direction)| {
                 let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
-                column.slope += evaluator.slope(direction, index, factor, &mut disagreement, &adjoint);
+                *slope += evaluator.slope(direction, index, factor, &mut disagreement, &adjoint);
                 spare.lock().expect("no thread panics").push(disagreement);
             };
-            if count > 1 && count * window.residuals().len() >= MIN_PARALLEL_VALUES {
-                columns.par_iter_mut().zip(&directions.all).for_each(compute);
-            } else {
-                columns.iter_mut().zip(&directions.all).for_each(compute);
-            }
+            each_direction(&mut slopes, &directions, window.residuals().len(), compute);
         }
-        let mut slope = directions.along_parameters(columns.iter().map(|column| column.slope).collect());
+        let mut slope = directions.along_parameters(slopes);
         for (i, slope) in slope.iter_mut().enumerate().filter(|(i, _)| !self.is_held(*i)) {
             *slope += self.model.knowledge(&moved(theta, i)).map(|known| known.re * known.eps).sum::<f64>();
         }
@@ -252,9 +243,8 @@ impl<'a> ResidualCost<'a> {
         let length = |i: usize| if i >= first { memory.residual.len() } else { 0 };
         let mut columns: Vec<Vec<f64>> = (0..theta.len()).map(|i| Vec::with_capacity(length(i))).collect();
         let directions = self.directions(theta, first);
-        self.walk(theta, (&directions, first), &mut memory, |block| {
-            let end = block.range.end;
-            let of_directions: Vec<&[f64]> = block.columns().collect();
+        self.walk(theta, &directions, &mut memory, |block| {
+            let (end, of_directions) = (block.range.end, &block.columns);
             for (i, all) in columns.iter_mut().enumerate().skip(first) {
                 match directions.of_parameters.as_ref().filter(|_| !block.is_prior) {
                     None => all.extend_from_slice(of_directions[i]),
@@ -293,7 +283,7 @@ impl<'a> ResidualCost<'a> {
         let first = known.map_or(0, |known| known.columns.len());
         let directions = self.directions(theta, first);
         let mut sums = Sums::of(&directions, known, filter);
-        self.walk(theta, (&directions, first), &mut memory, |block| sums.add(&block));
+        self.walk(theta, &directions, &mut memory, |block| sums.add(&block));
         sums.normal_equations()
     }
 }

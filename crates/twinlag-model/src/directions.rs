@@ -71,6 +71,8 @@ pub(crate) struct Direction {
 
 /// The directions of a model at a point.
 pub(crate) struct Directions {
+    /// The first parameter that has one with a derivative.
+    pub(crate) first: usize,
     pub(crate) all: Vec<Direction>,
     /// Of which of them the derivative by each parameter consists, with their weights; `None` where each parameter is the
     /// direction in its place.
@@ -87,33 +89,31 @@ impl Directions {
         is_held: impl Fn(usize) -> bool,
         observations: &Observations,
     ) -> Self {
-        let mut out = Self { all: Vec::new(), of_parameters: None };
-        let mut of_parameters = Vec::with_capacity(theta.len());
+        let (mut all, mut of_parameters, mut has_parts) = (Vec::new(), Vec::with_capacity(theta.len()), false);
         let ranges = (0..2).map(|i| (None, i..i + 1));
         let ranges = ranges.chain((0..model.effects.len()).map(|index| (Some(index), model.range(index))));
         for (effect, range) in ranges {
             let is_whole = range.start >= first && !range.clone().any(&is_held);
             let parts = effect.filter(|_| is_whole).and_then(|e| model.effects[e].parts(&theta[range.clone()]));
             if let (Some(effect), Some(Parts { parts, of_parameters: of_own })) = (effect, parts) {
-                let from = out.all.len();
-                out.all.extend(parts.iter().map(|part| model.direction(theta, effect, part, observations)));
+                let from = all.len();
+                all.extend(parts.iter().map(|part| model.direction(theta, effect, part, observations)));
                 of_parameters
                     .extend(of_own.into_iter().map(|own| own.into_iter().map(|(k, w)| (from + k, w)).collect()));
-                out.of_parameters = Some(Vec::new());
+                has_parts = true;
                 continue;
             }
             for i in range {
                 let is_computed = i >= first && !is_held(i);
-                of_parameters.push(vec![(out.all.len(), 1.0)]);
-                out.all.push(Direction {
+                of_parameters.push(vec![(all.len(), 1.0)]);
+                all.push(Direction {
                     plant: is_computed.then(|| model.plant_of(&moved(theta, i), observations)),
                     functions: model.sensors_of_functions(i),
                     support_s: None,
                 });
             }
         }
-        out.of_parameters = out.of_parameters.map(|_| of_parameters);
-        out
+        Self { first, all, of_parameters: has_parts.then_some(of_parameters) }
     }
 
     /// `Wᵀ s`: derivatives by the parameters from those in all directions.

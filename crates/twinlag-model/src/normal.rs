@@ -115,7 +115,7 @@ impl<'a> Sums<'a> {
             let end = block.range.end.min(column.len());
             &column[block.range.start.min(end)..end]
         });
-        let columns: Vec<&[f64]> = of_known.chain(block.columns().skip(known.len())).collect();
+        let columns: Vec<&[f64]> = of_known.chain(block.columns.iter().copied().skip(known.len())).collect();
         out.energy += dense::dot(block.residual, block.residual);
         out.count += block.residual.len();
         out.slope.iter_mut().zip(&columns).for_each(|(slope, column)| *slope += dense::dot(column, block.residual));
