@@ -129,6 +129,9 @@ not go (with --strict also where a number is conditional), 2 wrong usage, 3 the 
 pub(crate) struct Diagnose {
     #[command(flatten)]
     pub(crate) input: Input,
+    /// More records of the same rig: one model for all of them, each record left out in turn to see what the model is worth on it.
+    #[arg(value_name = "MORE")]
+    pub(crate) more: Vec<PathBuf>,
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,

@@ -1,5 +1,7 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
+use std::path::{Path, PathBuf};
+
 use twinlag::diagnosis::{Grade, Verdict};
 use twinlag::record::Record;
 use twinlag::{DiagnoseOptions, Diagnosis, Status};
@@ -17,15 +19,23 @@ use crate::progress::Progress;
 pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     let outputs = [("--report", &command.report), ("--save", &command.save)];
     let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
-    output::check(&command.input.file, &outputs, command.force)?;
+    let files = files(command)?;
+    files.iter().try_for_each(|file| output::check(file, &outputs, command.force))?;
     let options = DiagnoseOptions {
         characterise: command.input.method.options()?,
         without: command.without.clone(),
         ..DiagnoseOptions::default()
     };
-    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
-    print::notes(&record, console);
-    let answer = diagnose(&record, &options, console)?;
+    let mut records = Vec::new();
+    for file in &files {
+        let record = read_watched(file, &command.input.columns.selection(), console)?;
+        print::notes(&record, console);
+        records.push(record);
+    }
+    let (record, answer) = match &records[..] {
+        [record] => (record.clone(), diagnose(record, &options, console)?),
+        records => (twinlag::joined(records)?, diagnose_records(records, &options, console)?),
+    };
     if let Some(path) = &command.save {
         output::model(path, &answer.model())?;
     }
@@ -34,6 +44,33 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     }
     print::diagnosis(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
+}
+
+/// The records, each named once.
+fn files(command: &Diagnose) -> Result<Vec<&Path>, Failure> {
+    let files: Vec<&Path> = std::iter::once(&command.input.file).chain(&command.more).map(PathBuf::as_path).collect();
+    let is_seen = |(place, file): &(usize, &&Path)| {
+        let same = |other: &Path| {
+            other == **file || other.canonicalize().is_ok_and(|one| file.canonicalize().is_ok_and(|two| one == two))
+        };
+        files[..*place].iter().any(|other| same(other))
+    };
+    match files.iter().enumerate().find(is_seen) {
+        Some((_, file)) => Err(Failure::Usage(format!(
+            "{} is named twice: a record that is counted twice is not left out when it is left out once",
+            file.display()
+        ))),
+        None => Ok(files),
+    }
+}
+
+fn diagnose_records(records: &[Record], options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
+    let samples: usize = records.iter().map(Record::len).sum();
+    let progress = Progress::start(console, format!("diagnosing {samples} samples of {} records", records.len()));
+    let watch = |task: &str, done, total| progress.watch(task, done, total);
+    let all: Vec<&str> = records.iter().map(|record| record.source.as_str()).collect();
+    let answer = twinlag::diagnose_records_watched(records, options, &watch);
+    answer.map_err(|error| Failure::in_file(error, &all.join(", ")))
 }
 
 pub(crate) fn diagnose(record: &Record, options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {

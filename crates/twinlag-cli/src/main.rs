@@ -21,6 +21,7 @@ mod live;
 mod output;
 mod print;
 mod progress;
+mod records;
 mod settings;
 mod simulate;
 mod study;

@@ -17,6 +17,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades::{graded, reasons};
 use crate::if_known;
+use crate::records;
 use crate::settings::usage;
 
 /// Prints exactly one JSON object on standard output.
@@ -316,6 +317,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     lines.extend(reasons(asked(&answer.last).chain(of_effects(&answer.effects)), "  "));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
+    lines.extend(records::lines(answer));
     lines.extend(answer.if_known.iter().flat_map(if_known::lines));
     lines.push(String::new());
     if let Some(left) = &answer.unexplained {
@@ -533,7 +535,7 @@ fn noise_source(from: NoiseSource) -> &'static str {
     }
 }
 
-fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
+pub(crate) fn interval(value: f64, low: f64, high: f64, unit: &str) -> String {
     let decimals = decimals_of([low, high]);
     format!("{value:.decimals$}{unit}  [{low:.decimals$}, {high:.decimals$}] (95 %)")
 }

@@ -88,8 +88,14 @@ fn is_confirmed(candidate: &Candidate, without: &Fitted, observations: &Observat
     before.zip(after).is_none_or(|(before, after)| 2.0 * (after - before) > least)
 }
 
-/// Logarithm of the likelihood of the readings, up to what is the same for all models of a record.
+/// Logarithm of the likelihood of the readings, up to what is the same for all models of a record; of several records that of
+/// all of them, each with a gas of its own.
 fn log_likelihood(fitted: &Fitted, observations: &Observations) -> Option<f64> {
+    let members = observations.members();
+    members.iter().map(|member| of_one_record(fitted, &observations.of_member(member.number))).sum()
+}
+
+fn of_one_record(fitted: &Fitted, observations: &Observations) -> Option<f64> {
     let (readings, rig) = Extended::new(fitted, observations).rig(&fitted.theta).ok()?;
     let prior = learn_quickly(&readings, &rig).ok()?.prior;
     let gas = reconstruct(&readings, &rig, &prior, Form::Filter).ok()?;

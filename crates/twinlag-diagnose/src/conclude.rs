@@ -1,12 +1,11 @@
 //! From the last state of the loop to the answer.
 
 use twinlag_cross_relation::TestName;
-use twinlag_model::{
-    Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, Weighting, summarise,
-};
+use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, summarise};
 
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
+use crate::errors::Squares;
 use crate::excitation::SINGLE;
 use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
 use crate::if_known::{IfKnown, if_known};
@@ -17,10 +16,6 @@ use crate::moves::{Move, Searched, State, Taken};
 use crate::naming::{Tie, judge_effect, name, of_defect, of_rapid, widen};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
-
-/// Most samples of a changing mean that stands for a filter where no spectrum says which
-/// frequencies are noise.
-const MOST_SMOOTHED_SAMPLES: f64 = 50.0;
 
 /// The answer, its numbers fitted once more to the whole record.
 ///
@@ -129,7 +124,7 @@ pub(crate) fn leaves_more_than_noise(state: &State<'_>, settings: &Settings) -> 
 }
 
 /// A fit of the search, of the whole record.
-fn to_the_end(fitted: &Fitted, state: &State<'_>) -> Fitted {
+pub(crate) fn to_the_end(fitted: &Fitted, state: &State<'_>) -> Fitted {
     let (observations, everything) = (&state.prepared.observations, &state.prepared.everything);
     fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
 }
@@ -289,21 +284,7 @@ fn errors(state: &State<'_>, unmasked: Option<&Fitted>, fits: [&ModelFit; 2]) ->
     let [base, last] = fits;
     let prepared = &state.prepared;
     let rms = |fitted: &Fitted, observations: &Observations| {
-        let evaluation = fitted.model.evaluate(&fitted.theta, observations);
-        // Without the frequencies in which there is only noise, which each factor of the inverse
-        // makes larger.
-        let filter = Weighting::of_disagreement(observations, fitted.model.noise_std_k());
-        // Where no spectrum says which these are, changes within the faster time constant are left
-        // out.
-        let faster_s = fitted.theta[0].min(fitted.theta[1]);
-        let half = (faster_s / observations.step_s()).clamp(1.0, MOST_SMOOTHED_SAMPLES) as usize;
-        let smoothed = |stretch| filter.smooth_or_mean(&evaluation.disagreement_k[stretch], half);
-        let apart: Vec<f64> = evaluation.stretches().flat_map(smoothed).collect();
-        [&evaluation.residual, &apart].map(|values| {
-            let pairs = values.iter().zip(evaluation.sample()).filter(|(_, s)| prepared.judges(*s));
-            let (sum, count) = pairs.fold((0.0, 0.0_f64), |(sum, n), (v, _)| (sum + v * v, n + 1.0));
-            (sum / count.max(1.0)).sqrt()
-        })
+        Squares::of(fitted, observations, |sample| prepared.judges(sample)).roots()
     };
     let [r0, k0] = match unmasked {
         Some(unmasked) => rms(unmasked, &prepared.raw.0),

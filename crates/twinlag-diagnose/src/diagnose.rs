@@ -31,6 +31,16 @@ use crate::rapid::rapid_variation;
 /// [`ModelError`] for a record that is too short, or in which a channel never changes, for a
 /// policy that means nothing, and for a run that `watch` cancels.
 pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'_>) -> Result<Diagnosis, ModelError> {
+    let (state, tones) = searched(observations, settings, watch)?;
+    conclude(state, settings, tones)
+}
+
+/// The loop at its end, and how many separate tones the gas has, where it has few.
+pub(crate) fn searched<'a>(
+    observations: &Observations,
+    settings: &'a Settings,
+    watch: Watch<'a>,
+) -> Result<(State<'a>, Option<usize>), ModelError> {
     let prepared = Prepared::new(observations, settings)?;
     report(watch, "two lags", 0, 1)?;
     let tones = tones(observations, &settings.policy);
@@ -39,7 +49,12 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
         Some(pieces) => {
             let mut part = State::new(prepared.of_excerpt(&pieces, settings)?, settings, watch);
             search(&mut part, settings, can_learn)?;
-            let rapid = if can_learn { rapid_variation(&prepared, &part, settings, watch)? } else { None };
+            // A stretch is one of a record.
+            let rapid = if can_learn && !observations.is_joined() {
+                rapid_variation(&prepared, &part, settings, watch)?
+            } else {
+                None
+            };
             if let Some((stretch, variation)) = rapid {
                 let mut state = State::carried(stretch, prepared, settings, watch);
                 (state.rapid, state.searched) = (Some(variation), Searched::Stretch);
@@ -58,7 +73,7 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     if matches!(state.searched, Searched::All | Searched::Pieces { is_screened: true, .. }) {
         search(&mut state, settings, can_learn)?;
     }
-    conclude(state, settings, tones)
+    Ok((state, tones))
 }
 
 /// Moves on as long as there is a move.
@@ -163,7 +178,7 @@ mod tests {
                     let place = at(&taken, before, before_channel);
                     taken[place] = (effect, channel, Vec::new());
                 }
-                Move::Remove { effect, channel, .. } => {
+                Move::Remove { effect, channel, .. } | Move::Withdraw { effect, channel, .. } => {
                     let place = at(&taken, effect, channel);
                     taken.remove(place);
                 }

@@ -51,6 +51,8 @@ pub struct Found {
     pub seen: Option<String>,
     /// Readings of the channel that are left out of the fit, in order.
     pub masked: Vec<Masked>,
+    /// Whether each of several records has numbers of its own for it, and the rig has none.
+    pub is_of_each_record: bool,
     /// Whether the model accounts for it: not so for one that a stretch of the record shows, and that no number of the whole
     /// holds.
     pub is_in_the_model: bool,

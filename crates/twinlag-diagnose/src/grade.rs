@@ -10,7 +10,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{PartScatter, Z_975};
-use twinlag_model::{Identifier, ModelFit, Policy};
+use twinlag_model::{BetweenRecords, Identifier, ModelFit, Policy};
 
 use crate::diagnosis::Verdict;
 
@@ -73,6 +73,13 @@ pub enum Reason {
     PartsDisagree {
         /// Their scatter over that which noise makes.
         ratio: f64,
+    },
+    /// Records of one rig give different values of a number that they share, and the interval covers what they differ.
+    RecordsDisagree {
+        /// Their scatter over that which noise makes.
+        ratio: f64,
+        /// Whether the interval says anything still.
+        is_known: bool,
     },
     /// Other effects explain the record as well, and with them the number is another.
     Cause {
@@ -188,7 +195,8 @@ impl Reason {
             | Self::LeftBehind { .. }
             | Self::OnBound
             | Self::SingleTone
-            | Self::RatioChanges { .. } => Grade::NoGo,
+            | Self::RatioChanges { .. }
+            | Self::RecordsDisagree { is_known: false, .. } => Grade::NoGo,
             Self::Follows { grade, .. } | Self::Fault { grade, .. } | Self::Contradicted { grade, .. } => *grade,
             _ => Grade::Conditional,
         }
@@ -253,6 +261,15 @@ impl fmt::Display for Reason {
                 f,
                 "right if the record is typical: its parts give values that differ {ratio:.1} times as much as noise explains, \
                  which the interval covers"
+            ),
+            Self::RecordsDisagree { ratio, is_known: true } => write!(
+                f,
+                "right if these records are typical: they give values that differ {ratio:.1} times as much as noise explains, \
+                 which the interval covers"
+            ),
+            Self::RecordsDisagree { ratio, .. } => write!(
+                f,
+                "the records give values that differ {ratio:.1} times as much as noise explains, so that they have none in common"
             ),
             Self::Cause { effect } => {
                 write!(f, "right if the cause is {effect}: others explain the record as well and give another number")
@@ -455,8 +472,30 @@ pub struct Number {
     pub interval_95: Option<[f64; 2]>,
     /// How far it moves between parts of the record.
     pub scatter: Option<PartScatter>,
+    /// How far it moves between records that share it, where it does by more than noise explains.
+    pub between: Option<RecordScatter>,
     /// Whether it is positive by nature, so that its interval is a factor either way.
     pub is_positive: bool,
+}
+
+/// How far a number moves between records of one rig that share it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RecordScatter {
+    /// The 95 % interval of the mean over such records.
+    pub interval_95: [f64; 2],
+    /// Root mean square of what the records' values differ, over their standard errors.
+    pub ratio: f64,
+    /// Probability of at least as large a scatter if the model is right.
+    pub p_value: f64,
+}
+
+impl RecordScatter {
+    /// That of what records say of a number; `None` where noise explains what they differ.
+    pub fn of(between: Option<&BetweenRecords>) -> Option<Self> {
+        let BetweenRecords { interval_95, ratio, p_value, .. } = *between.filter(|between| between.scatters())?;
+        Some(Self { interval_95, ratio, p_value })
+    }
 }
 
 impl Number {
@@ -478,6 +517,14 @@ impl Number {
         let interval = self.widened(interval, factor);
         if factor > 1.0 && self.is_vague(interval, policy) {
             reasons.push(Reason::LeftOver);
+        }
+        let Some(RecordScatter { interval_95: between, ratio, p_value }) = self.between else {
+            return (Judgement::of(&reasons), Some(interval));
+        };
+        let interval = [interval[0].min(between[0]), interval[1].max(between[1])];
+        let is_known = !self.is_vague(interval, policy);
+        if p_value < policy.records_rejection_probability || !is_known {
+            reasons.push(Reason::RecordsDisagree { ratio, is_known });
         }
         (Judgement::of(&reasons), Some(interval))
     }
@@ -558,7 +605,7 @@ mod tests {
     use super::*;
 
     fn number(value: f64, interval: [f64; 2], is_positive: bool) -> Number {
-        Number { value, interval_95: Some(interval), scatter: None, is_positive }
+        Number { value, interval_95: Some(interval), scatter: None, between: None, is_positive }
     }
 
     /// Whether reasons come together, one after the other, or with what something else rests on.
@@ -605,6 +652,23 @@ mod tests {
     fn the_quietest_quarter_counts_degrees_of_freedom() {
         assert_eq!(quietest_quarter(&[[1.0, 3.0, 60.0], [2.0, 0.5, 10.0], [3.0, 0.8, 30.0]]), 0.8);
         assert_eq!(quietest_quarter(&[]), 0.0);
+    }
+
+    /// An interval holds what records differ, whichever way; the condition comes where chance does not explain it, and what they
+    /// leave without a sign is not given.
+    #[test]
+    fn intervals_cover_what_records_differ() {
+        let (policy, basis) = (Policy::default(), Basis::default());
+        let judged = |interval_95, p_value| {
+            let between = Some(RecordScatter { interval_95, ratio: 2.5, p_value });
+            let (judgement, interval) =
+                Number { between, ..number(2.0, [1.8, 2.2], false) }.judged(Vec::new(), &basis, &policy);
+            (judgement.grade, interval.expect("it had one"))
+        };
+        assert_eq!(judged([1.9, 2.1], 0.2), (Grade::Go, [1.8, 2.2]));
+        assert_eq!(judged([1.0, 2.1], 0.2), (Grade::Go, [1.0, 2.2]));
+        assert_eq!(judged([1.0, 2.1], 1e-6), (Grade::Conditional, [1.0, 2.2]));
+        assert_eq!(judged([-1.0, 3.0], 0.2), (Grade::NoGo, [-1.0, 3.0]));
     }
 
     /// A number whose sign or size is lost in a wider interval is not given.

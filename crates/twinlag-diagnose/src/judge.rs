@@ -3,7 +3,7 @@
 use twinlag_model::{Identifier, KnownTimeConstant, ModelFit, Policy, TimeConstant};
 use twinlag_optimise::End;
 
-use crate::grade::{Basis, Judgement, Number, Reason};
+use crate::grade::{Basis, Judgement, Number, Reason, RecordScatter};
 
 /// Grades of the numbers that every fit has.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -79,17 +79,26 @@ impl<'a> Circumstances<'a> {
             if is_held {
                 return Judgement::given();
             }
-            self.judged(&mut fit.time_constants[i], true, i, &basis)
+            let between = RecordScatter::of(fit.between.as_ref().and_then(|between| between.parameters[i].as_ref()));
+            self.judged(&mut fit.time_constants[i], between, i, &basis)
         });
         let is_on_bound = matches!(&fit.fit.end, End::OnBound(which) if which.iter().any(|i| *i < 2));
         if is_on_bound && !self.is_total_delay {
             fit.difference = TimeConstant::default();
         }
-        let difference = self.judged(&mut fit.difference, false, 2, &basis);
+        let between = fit.between.as_ref().filter(|_| !self.is_total_delay);
+        let between = RecordScatter::of(between.and_then(|between| between.difference.as_ref()));
+        let difference = self.judged(&mut fit.difference, between, 2, &basis);
         Judgements { time_constants, difference }
     }
 
-    fn judged(&self, number: &mut TimeConstant, is_positive: bool, index: usize, basis: &Basis) -> Judgement {
+    fn judged(
+        &self,
+        number: &mut TimeConstant,
+        between: Option<RecordScatter>,
+        index: usize,
+        basis: &Basis,
+    ) -> Judgement {
         let Some(value) = number.value_s else { return Judgement::of(&[Reason::NotDetermined]) };
         let most_s = self.policy.longest_given_share * self.span_s;
         let cause = self.causes[index].map(|effect| Reason::Cause { effect });
@@ -100,7 +109,11 @@ impl<'a> Circumstances<'a> {
         }
         let TimeConstant { interval_95_s, scatter, .. } = *number;
         let (judgement, interval) =
-            Number { value, interval_95: interval_95_s, scatter, is_positive }.judged(own, basis, self.policy);
+            Number { value, interval_95: interval_95_s, scatter, between, is_positive: index < 2 }.judged(
+                own,
+                basis,
+                self.policy,
+            );
         number.interval_95_s = interval;
         judgement
     }

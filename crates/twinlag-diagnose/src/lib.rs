@@ -39,11 +39,13 @@ mod conclude;
 mod contradiction;
 mod diagnose;
 mod diagnosis;
+mod errors;
 mod evidence;
 mod excitation;
 mod grade;
 mod hidden;
 mod if_known;
+mod joint;
 mod judge;
 mod left_over;
 mod limits;
@@ -54,18 +56,21 @@ mod rank;
 mod rapid;
 mod remark;
 mod size;
+mod transfer;
 
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;
 pub use excitation::{is_single_tone, is_single_tone_in};
-pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, excess};
+pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
 pub use hidden::{pieces_of_long, unseen};
 pub use if_known::{Held, HeldEffect, IfKnown};
+pub use joint::{Disagreement, JointDiagnosis, OfRecord, OwnNumber, diagnose_records};
 pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
 pub use moves::Move;
 pub use remark::Remark;
+pub use transfer::{LeftOut, Seated, Transfer};
 pub use twinlag_model::{
     About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, Line, ModelError,
     ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track, Value,

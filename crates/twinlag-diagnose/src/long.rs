@@ -5,6 +5,8 @@
 //! from there: every effect that is still missing is screened against all residuals, and what stands out is fitted to all. Effects
 //! with quite other time constants, each of which costs a fit, are fitted to the whole where the pieces do not exclude them.
 
+use std::ops::Range;
+
 use twinlag_model::{Effort, Fitted, ModelError, Observations, Prepared, Settings, Shared, Watch, evenly_spread};
 
 use crate::candidates::{Candidate, Search};
@@ -33,9 +35,21 @@ pub(crate) fn pieces(observations: &Observations) -> Option<Observations> {
     if !is_long(observations) {
         return None;
     }
-    let starts = evenly_spread(observations.samples(), PIECES, PIECE_SAMPLES);
+    let members = observations.members();
+    let of_each = (PIECES / members.len()).max(1);
+    let starts = members.iter().flat_map(|member| starts_in(member.samples.clone(), of_each));
     let pieces = observations.excerpt(starts, PIECE_SAMPLES);
     (!is_long(&pieces)).then_some(pieces)
+}
+
+/// First samples of so many pieces of a record; of one in its middle, and of none where it is shorter.
+fn starts_in(samples: Range<usize>, pieces: usize) -> Vec<usize> {
+    let Range { start, end } = samples;
+    match pieces {
+        _ if end - start < PIECE_SAMPLES => Vec::new(),
+        1 => vec![start + (end - start - PIECE_SAMPLES) / 2],
+        _ => evenly_spread(end - start, pieces, PIECE_SAMPLES).map(|first| start + first).collect(),
+    }
 }
 
 impl<'a> State<'a> {

@@ -68,6 +68,15 @@ pub enum Move {
         /// over without it.
         loss: Option<f64>,
     },
+    /// An effect was taken out since it does not help on records that had no part in finding it.
+    Withdraw {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// Deviance that it saves there, not above 0.
+        gain: f64,
+    },
     /// Noise levels were lowered to what is left over.
     LowerNoise {
         /// Energy of the residual per residual beforehand.
@@ -87,6 +96,7 @@ impl Move {
             Self::Exchange { before, effect, .. } if before == effect => Some(Remark::OtherChannel { effect: *effect }),
             Self::Exchange { before, effect, .. } => Some(Remark::Replaced { before: *before, after: *effect }),
             Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
+            Self::Withdraw { effect, .. } => Some(Remark::DoesNotTransfer { effect: *effect }),
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
             Self::Add { .. } | Self::Extend { .. } | Self::Keep { .. } | Self::Reweigh { .. } => None,
         }
@@ -320,6 +330,16 @@ impl<'a> State<'a> {
         let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
         let is_explained = !search.needs_noise(&without, &self.taken[index].candidate);
         is_explained.then(|| self.removal(index, without, None))
+    }
+
+    /// Takes out effect `index`, which gains no deviance on records that were left out.
+    pub(crate) fn withdrawal(&self, index: usize, gain: f64) -> Proposal {
+        let (model, theta) = self.current.without(index);
+        let search = self.search();
+        let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
+        let effect = &self.taken[index].candidate.effect;
+        let entry = Move::Withdraw { effect: effect.identifier(), channel: effect.channel(), gain };
+        Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
     fn removal(&self, index: usize, without: Fitted, loss: Option<f64>) -> Proposal {

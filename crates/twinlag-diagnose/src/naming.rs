@@ -4,14 +4,15 @@ use std::ops::Range;
 
 use twinlag_cross_relation::{Z_975, log_normal_interval_95};
 use twinlag_model::{
-    Defect, Derived, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Value, covariance,
+    Defect, Derived, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Shared, Value, covariance,
 };
 use twinlag_optimise::{End, Scale};
 
 use crate::candidates::is_inside_bounds;
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
-use crate::grade::{Judgement, Number, Reason};
+use crate::grade::{Judgement, Number, Reason, RecordScatter};
+use crate::joint::OwnNumber;
 use crate::judge::Circumstances;
 use crate::moves::Taken;
 use crate::rapid::RapidVariation;
@@ -25,14 +26,35 @@ const DECISIVE: f64 = 0.5;
 /// that bends within ten of them is straight over it.
 const DERIVATIVE_STEP_SE: f64 = 0.1;
 
-/// Effect `index` of the model `last` with its numbers, whose uncertainty is that of `fit`.
+/// Numbers of an effect whose values are in `range`, and those that follow from them, whose uncertainty is that of `fit`.
+fn numbers(effect: &Shared, range: Range<usize>, last: &Fitted, fit: &ModelFit) -> Vec<Value> {
+    let covariance = fit.covariance.as_ref().filter(|_| !effect.is_noise());
+    let pairs = effect.parameters().iter().zip(range.clone());
+    let mut out: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
+    out.extend(effect.derived().into_iter().map(|d| derived(&d, &last.theta, range.clone(), covariance)));
+    out
+}
+
+/// Numbers of the model `last` that belong to one of several records, whose uncertainty is that of `fit`.
+pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<OwnNumber> {
+    let of_effect = |index: usize| {
+        let effect = &last.model.effects[index];
+        let own = effect.in_record(record).map(|(own, places)| {
+            let first = last.model.range(index).start;
+            numbers(&own, first + places.start..first + places.end, last, fit)
+        });
+        let seat = (effect.identifier(), effect.channel());
+        own.unwrap_or_default().into_iter().map(move |number| OwnNumber { effect: seat, number })
+    };
+    (0..last.model.effects.len()).flat_map(of_effect).collect()
+}
+
+/// Effect `index` of the model `last` with its numbers, whose uncertainty is that of `fit`; without those that belong to one of
+/// several records.
 pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -> Found {
     let effect = &taken.candidate.effect;
-    let covariance = fit.covariance.as_ref().filter(|_| !effect.is_noise());
-    let range = last.model.range(index);
-    let pairs = effect.parameters().iter().zip(range.clone());
-    let mut parameters: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
-    parameters.extend(effect.derived().into_iter().map(|d| derived(&d, &last.theta, range.clone(), covariance)));
+    let is_of_records = effect.record_of(0).is_some();
+    let parameters = if is_of_records { Vec::new() } else { numbers(effect, last.model.range(index), last, fit) };
     let mut alternatives: Vec<Identifier> = taken.ties.iter().map(|t| t.effect.identifier()).collect();
     let is_of_either = alternatives.contains(&effect.identifier());
     alternatives.retain(|other| *other != effect.identifier());
@@ -46,8 +68,9 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
         parameters,
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
-        seen: None,
+        seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
         masked: Vec::new(),
+        is_of_each_record: is_of_records,
         is_in_the_model: true,
     }
 }
@@ -122,6 +145,7 @@ pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
         alternatives: Vec::new(),
         seen: Some(seen),
         masked: Vec::new(),
+        is_of_each_record: false,
         is_in_the_model: false,
     }
 }
@@ -142,6 +166,7 @@ pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -
         alternatives: Vec::new(),
         seen: Some(seen),
         masked: Masked::runs(&defect.masked, &prepared.observations),
+        is_of_each_record: false,
         is_in_the_model: true,
     }
 }
@@ -184,7 +209,9 @@ pub(crate) fn judge_effect(
             continue;
         }
         let scatter = scatter.get(index).copied().flatten();
-        let number = Number { value: value.value, interval_95: value.interval_95, scatter, is_positive };
+        let between = fit.between.as_ref().filter(|_| index < parameters.len());
+        let between = RecordScatter::of(between.and_then(|between| between.parameters[range.start + index].as_ref()));
+        let number = Number { value: value.value, interval_95: value.interval_95, scatter, between, is_positive };
         let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
         let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
         let hidden = if index < parameters.len() { hidden(index) } else { (0..parameters.len()).find_map(hidden) };

@@ -60,6 +60,11 @@ pub enum Remark {
         /// By how many standard deviations both differ.
         deviations: f64,
     },
+    /// An effect was taken out since it does not help on records that had no part in finding it.
+    DoesNotTransfer {
+        /// The effect.
+        effect: Identifier,
+    },
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
     /// Something changes faster than a model of the whole record can follow.
@@ -120,7 +125,8 @@ impl Remark {
             Self::Replaced { .. } => 8,
             Self::OtherChannel { .. } => 9,
             Self::Needless { .. } => 10,
-            Self::SearchedInPieces { .. } => 11,
+            Self::DoesNotTransfer { .. } => 11,
+            Self::SearchedInPieces { .. } => 12,
         }
     }
 }
@@ -209,6 +215,11 @@ impl fmt::Display for Remark {
                      to all of it, and {then}"
                 )
             }
+            Self::DoesNotTransfer { effect } => write!(
+                f,
+                "{effect} explained a part of these records and was removed, because it does not help on a record that had no part in \
+                 finding it: it stands in for something that changes from record to record"
+            ),
             Self::Needless { effect } => write!(
                 f,
                 "{effect} was added first and later removed, because other effects explain the record without it: there is no \
@@ -231,6 +242,7 @@ mod tests {
             Remark::Replaced { before, after },
             Remark::OtherChannel { effect: before },
             Remark::Needless { effect: before },
+            Remark::DoesNotTransfer { effect: before },
             Remark::NoiseLowered,
             Remark::Widened { effects: vec![before, after] },
             Remark::LagAlone,

@@ -44,9 +44,14 @@ pub(crate) struct Piece {
     pub(crate) first_sample: usize,
 }
 
-/// Variance of each reading of a channel, K²: boundless, to all purposes, where it is masked.
-pub(crate) fn reading_variance(noise_std_k: f64, masked: &[bool], swing_k: f64) -> Variance {
-    Variance::masked(noise_std_k * noise_std_k, (MASKED_NOISE_SWINGS * swing_k).powi(2), masked)
+/// Variance of each reading of both channels of a stretch, K²: boundless, to all purposes, where it is masked.
+///
+/// - `noise_std_k`: white noise of the channels in all stretches, K
+pub(crate) fn reading_variances(noise_std_k: [f64; 2], stretch: &Stretch, swing_k: f64) -> [Variance; 2] {
+    [0, 1].map(|i| {
+        let std_k = noise_std_k[i] * stretch.noise_factor[i];
+        Variance::masked(std_k * std_k, (MASKED_NOISE_SWINGS * swing_k).powi(2), &stretch.masked[i])
+    })
 }
 
 /// The disagreement of one stretch, ready to be whitened, in memory that is used again.
@@ -280,8 +285,7 @@ pub(crate) struct Evaluator<'a> {
 impl<'a> Evaluator<'a> {
     /// - `noise_std_k`: white noise of the channels, which all plants have
     pub(crate) fn new(observations: &'a Observations, noise_std_k: [f64; 2]) -> Self {
-        let of_stretch =
-            |s: &Arc<Stretch>| [0, 1].map(|i| reading_variance(noise_std_k[i], &s.masked[i], observations.swing_k()));
+        let of_stretch = |s: &Arc<Stretch>| reading_variances(noise_std_k, s, observations.swing_k());
         Self {
             observations,
             variances: observations.stretches.iter().map(of_stretch).collect(),

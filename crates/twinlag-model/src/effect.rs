@@ -25,8 +25,10 @@ mod about;
 mod context;
 mod identifier;
 mod known;
+mod of_members;
 mod parameter;
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use twinlag_optimise::Scale;
@@ -111,9 +113,20 @@ pub trait Effect: Send + Sync {
     }
 
     /// Whether parameters belong to a record and not to the rig: the phase of a line, a function of time. They are
-    /// fitted again where the effect is known from another record.
+    /// fitted again where the effect is known from another record, and of several records each has its own. Such an effect
+    /// installs functions of time and offsets, nothing else.
     fn is_of_the_record(&self) -> bool {
         false
+    }
+
+    /// The record, from 0, that one of [`Self::parameters`] belongs to, in a model of several; `None` where all share it.
+    fn record_of(&self, _parameter: usize) -> Option<usize> {
+        None
+    }
+
+    /// The effect as one record has it, and the places of its values, in a model of several where each has its own.
+    fn in_record(&self, _number: usize) -> Option<(Shared, Range<usize>)> {
+        None
     }
 
     /// Prior knowledge of the parameters: functions of `values` that have zero mean and unit variance beforehand.
@@ -158,9 +171,23 @@ pub trait Effect: Send + Sync {
 /// An effect that several models share.
 pub type Shared = Arc<dyn Effect>;
 
-/// Every candidate of `effects`. Defects of the data have none: they are dealt with before.
+/// Every candidate of `effects`. Defects of the data have none: they are dealt with before. Of several records, those that belong
+/// to a record have parameters of their own in each.
 pub fn candidates(effects: &[Identifier], context: &Context) -> Vec<Shared> {
-    effects.iter().flat_map(|e| (e.about().candidates)(context)).collect()
+    effects.iter().flat_map(|e| candidates_of(*e, context)).collect()
+}
+
+fn candidates_of(effect: Identifier, context: &Context) -> Vec<Shared> {
+    let make = effect.about().candidates;
+    let all = make(context);
+    if context.members.len() < 2 || !all.iter().any(|candidate| candidate.is_of_the_record()) {
+        return all;
+    }
+    let of_member: Vec<_> = context.each_member().map(|(member, own)| (member, make(&own))).collect();
+    let in_each = |candidate: Shared| {
+        if candidate.is_of_the_record() { of_members::in_each(&candidate, &of_member) } else { Some(candidate) }
+    };
+    all.into_iter().filter_map(in_each).collect()
 }
 
 /// That effects of other crates among `effects` have names of their own and return what [`Effect`] promises. Those of

@@ -19,6 +19,8 @@ pub enum ModelError {
          time constants alone (`characterise`)"
     )]
     InShreds { samples: usize, needed: usize },
+    #[error("a joint model needs two records of one rig or more, got {records}")]
+    TooFewRecords { records: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,
     #[error("expected a positive flow at every sample, as many as there are readings")]

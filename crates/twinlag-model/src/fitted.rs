@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{PartScatter, ResidualTest};
 use twinlag_optimise::Fit;
 
+use crate::between::Between;
 use crate::effect::Identifier;
 use crate::extended::Extended;
 use crate::trace::Trace;
@@ -65,6 +66,8 @@ pub struct ModelFit {
     pub covariance: Option<Vec<Vec<f64>>>,
     /// How far each parameter moves between parts of the record, in the order of the covariance.
     pub scatter: Vec<Option<PartScatter>>,
+    /// What several records say of the numbers that they share; `None` of one record.
+    pub between: Option<Between>,
     /// The model itself, for a compensation; `None` in a fit that was put together for its picture.
     pub extended: Option<Extended>,
 }

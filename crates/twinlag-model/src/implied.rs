@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::chain::Chain;
-use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variance};
+use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variances};
 use crate::inverse::Inverse;
 use crate::observations::Observations;
 use crate::plant::Plant;
@@ -204,8 +204,7 @@ impl Plant {
         let chains = std::mem::replace(&mut disagreement.inverse, Inverse::empty()).chains;
         let time_s = chains[0].times_s()[..residual.len()].to_vec();
         let inferred = undifferenced.unwrap_or(chains).map(|Chain { value, rows, .. }| Inferred { value, rows });
-        let variances =
-            [0, 1].map(|i| reading_variance(self.noise_std_k[i], &stretch.masked[i], observations.swing_k()));
+        let variances = reading_variances(self.noise_std_k, stretch, observations.swing_k());
         let mut factor = Factor::empty();
         factor.compute(&disagreement.sources(&variances, 0), residual.len(), None, None);
         factor.whiten(&mut residual, 0, 0);

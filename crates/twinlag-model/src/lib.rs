@@ -1,6 +1,7 @@
 //! Two first-order sensors with any further physical effects: the inverse of the whole rig with its
 //! noise, and its fit.
 
+mod between;
 mod blocks;
 mod chain;
 mod correlation;
@@ -20,6 +21,7 @@ mod implied;
 mod influence;
 mod inverse;
 mod known;
+mod member_noise;
 mod model;
 mod normal;
 mod number;
@@ -28,6 +30,7 @@ mod plant;
 mod policy;
 mod prepare;
 mod range_end;
+mod records;
 mod residual;
 mod rows;
 mod selection;
@@ -40,6 +43,7 @@ mod track;
 mod weighting;
 mod whitening;
 
+pub use between::{Between, BetweenRecords, Contradicted, OwnValue};
 pub use cost::Linearised;
 pub use defects::{ChannelNoise, levels, line_channel, lines};
 pub use directions::{Install, Part, Parts};
@@ -63,6 +67,7 @@ pub use observations::{Observations, Stretch, evenly_spread};
 pub use plant::{Extra, Place, Plant, Reading, Sensor, SlowPath, ZERO_CELSIUS_K};
 pub use policy::Policy;
 pub use prepare::Prepared;
+pub use records::{Member, OneRecord};
 pub use selection::{Samples, Selection};
 pub use settings::{Settings, Watch, report};
 pub use spectrum::{Bands, fit_noise, white_deviance};

@@ -184,6 +184,24 @@ impl Model {
         self.effects.iter().flat_map(|e| e.parameters())
     }
 
+    /// The record, from 0, that a parameter belongs to, in a model of several; `None` where all share it.
+    pub fn record_of(&self, parameter: usize) -> Option<usize> {
+        let index = (0..self.effects.len()).find(|index| self.range(*index).contains(&parameter))?;
+        self.effects[index].record_of(parameter - self.range(index).start)
+    }
+
+    /// Parameters that belong to records which `observations` are not of.
+    fn of_other_records(&self, observations: &Observations) -> Vec<usize> {
+        let of_records: Vec<(usize, usize)> =
+            (2..self.parameter_count()).filter_map(|i| Some((i, self.record_of(i)?))).collect();
+        if of_records.is_empty() {
+            return Vec::new();
+        }
+        let members = observations.members();
+        let is_there = |record: usize| members.iter().any(|member| member.number == record);
+        of_records.into_iter().filter(|(_, record)| !is_there(*record)).map(|(i, _)| i).collect()
+    }
+
     /// Prior knowledge of the effects' parameters: functions that have zero mean and unit variance beforehand.
     pub(crate) fn prior(&self, theta: &[Number]) -> Vec<Number> {
         self.effects.iter().enumerate().flat_map(|(index, e)| e.prior(&theta[self.range(index)])).collect()
@@ -290,6 +308,9 @@ impl Model {
         };
         let mut out = vec![tau(0), tau(1)];
         out.extend(self.parameters().map(|p| p.variable.clone()));
+        for i in self.of_other_records(observations) {
+            out[i] = out[i].clone().held_at(theta[i]);
+        }
         for (index, effect) in self.effects.iter().enumerate() {
             if effect.is_noise() || (self.is_frozen && !effect.is_of_the_record()) {
                 for i in self.range(index) {

@@ -36,13 +36,17 @@ pub struct Stretch {
     pub masked: [Vec<bool>; 2],
     /// Flow velocity or density, in any unit.
     flow: Option<Vec<f64>>,
+    /// The record that it is of, from 0, where several are joined.
+    pub(crate) member: usize,
+    /// Noise of each channel here over that of all stretches.
+    pub(crate) noise_factor: [f64; 2],
 }
 
 impl Stretch {
     /// A stretch of which every sample counts.
     pub fn new(time_s: Vec<f64>, reading_c: [Vec<f64>; 2]) -> Self {
         let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
-        Self { time_s, reading_c, masked, flow: None }
+        Self { time_s, reading_c, masked, flow: None, member: 0, noise_factor: [1.0; 2] }
     }
 
     /// This stretch, with the marked readings of either channel ignored. They are missing readings,
@@ -56,6 +60,17 @@ impl Stretch {
     #[must_use]
     pub fn with_flow(self, flow: Vec<f64>) -> Self {
         Self { flow: Some(flow), ..self }
+    }
+
+    /// This stretch as one of a record among others, `later_s` seconds later.
+    pub(crate) fn as_member(&self, member: usize, later_s: f64) -> Self {
+        let time_s = self.time_s.iter().map(|t| t + later_s).collect();
+        Self { time_s, member, ..self.clone() }
+    }
+
+    /// First and last instant, s.
+    pub(crate) fn ends_s(&self) -> [f64; 2] {
+        [self.time_s[0], self.time_s[self.len() - 1]]
     }
 
     /// The mean of the first readings, °C.
@@ -164,10 +179,9 @@ impl Observations {
         [first, last]
     }
 
-    /// Time from the first to the last sample, s.
+    /// Time from the first to the last sample, s; of several records that of the longest.
     pub fn span_s(&self) -> f64 {
-        let [first_s, last_s] = self.ends_s();
-        last_s - first_s
+        self.members().iter().map(|member| member.ends_s[1] - member.ends_s[0]).fold(0.0, f64::max)
     }
 
     /// Mean time from sample to sample, s.
@@ -232,11 +246,18 @@ impl Observations {
                         reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
                         masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
                         flow: None,
+                        member: stretch.member,
+                        noise_factor: stretch.noise_factor,
                     }));
                 }
                 break;
             }
         }
-        if stretches.is_empty() { self.clone() } else { Self { stretches, flow: self.flow.clone(), ..*self } }
+        if stretches.is_empty() { self.clone() } else { self.with_stretches(stretches) }
+    }
+
+    /// Other stretches of the record.
+    pub(crate) fn with_stretches(&self, stretches: Vec<Arc<Stretch>>) -> Self {
+        Self { stretches, flow: self.flow.clone(), ..*self }
     }
 }

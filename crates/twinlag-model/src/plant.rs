@@ -157,27 +157,18 @@ pub struct Plant {
     pub extra: Vec<Extra>,
     /// How many samples a delay may reach.
     pub(crate) reach: usize,
-    /// The middle of the record, s.
-    pub(crate) middle_s: f64,
 }
 
 impl Plant {
     /// Two first-order lags.
     pub(crate) fn new(observations: &Observations, tau_s: [Number; 2], noise_std_k: [f64; 2]) -> Self {
-        let [first_s, last_s] = observations.ends_s();
         Self {
             sensors: tau_s.map(Sensor::first_order),
             noise_std_k,
             delay_s: None,
             extra: Vec::new(),
             reach: reach(observations),
-            middle_s: 0.5 * (first_s + last_s),
         }
-    }
-
-    /// The middle of the record, s.
-    pub fn middle_s(&self) -> f64 {
-        self.middle_s
     }
 
     /// Values of a stretch that have no disagreement: each operator takes some at the ends.

@@ -159,6 +159,9 @@ policy! {
     /// Probability that parts of a record seem to disagree on a number of a right model: of the three that are asked most, in
     /// three records of a thousand.
     parts_rejection_probability: f64 = 1e-3,
+    /// Probability that records of one rig seem to differ, in their noise or in a number that they share, of a right model: as of
+    /// parts of a record.
+    records_rejection_probability: f64 = 1e-3,
     /// Probability that a record has an effect that the search has not named: chosen, one in four, of which each kind of effect
     /// that has a size has an equal share, and its places, forms and starts share that.
     prior_effect_probability: f64 = 0.25,

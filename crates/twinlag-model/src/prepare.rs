@@ -6,6 +6,7 @@ use crate::effect::{self, Context, Identifier};
 use crate::error::ModelError;
 use crate::fit::{Effort, Fitted};
 use crate::fitted::Defect;
+use crate::member_noise;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::reach;
@@ -69,6 +70,9 @@ impl Prepared {
         if let Some(std_k) = settings.noise_std_k {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];
+        } else if observations.is_joined() {
+            let factors = member_noise::factors(&observations, &levels, &policy);
+            observations = observations.with_noise_factors(&factors);
         }
         let raw = (observations.clone(), levels);
         let found = data_defects(&mut observations, &levels, settings);
@@ -96,6 +100,9 @@ impl Prepared {
     pub fn of_excerpt(&self, excerpt: &Observations, settings: &Settings) -> Result<Self, ModelError> {
         let mut out = Self::new(excerpt, settings)?;
         (out.context.mean_c, out.context.moments) = (self.context.mean_c, self.context.moments);
+        if self.observations.is_joined() {
+            out.context.members.clone_from(&self.context.members);
+        }
         Ok(out)
     }
 
@@ -352,6 +359,7 @@ fn context(observations: &Observations, levels: &ChannelNoise) -> Context {
     let step_s = observations.step_s();
     Context {
         ends_s: observations.ends_s(),
+        members: observations.members(),
         step_s,
         is_even: observations.period_s.is_some(),
         samples: observations.samples(),

@@ -20,6 +20,11 @@ impl Selection {
         self.counts.get(sample).copied().unwrap_or(false)
     }
 
+    /// The selection of successive samples, counted from the first of them.
+    pub(crate) fn of_samples(&self, samples: Range<usize>) -> Self {
+        Self { counts: self.counts[samples].to_vec(), weighting: self.weighting.clone() }
+    }
+
     /// How many samples count.
     pub(crate) fn counted(&self) -> usize {
         self.counts.iter().filter(|counts| **counts).count()

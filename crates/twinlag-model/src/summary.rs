@@ -2,6 +2,7 @@
 
 use twinlag_cross_relation::{CHI2_95, ResidualTest, Z_975, log_normal_interval_95, residual_tests};
 
+use crate::between::between;
 use crate::correlation::{autocorrelation, filtered};
 use crate::cost::Linearised;
 use crate::defects::ChannelNoise;
@@ -115,6 +116,7 @@ pub fn summarise(
     let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
     // What it holds is as long as the record.
     drop(influence);
+    let between = between(fitted, observations, selection);
     ModelFit {
         time_constants,
         difference,
@@ -127,6 +129,7 @@ pub fn summarise(
         is_weighted_by_residual: rejects,
         covariance,
         scatter,
+        between,
         extended: Some(Extended::new(fitted, observations)),
         trace,
     }

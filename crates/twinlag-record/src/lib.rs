@@ -45,6 +45,7 @@ mod error;
 mod fill;
 mod from_columns;
 mod grid;
+mod joined;
 mod layout;
 mod names;
 mod note;

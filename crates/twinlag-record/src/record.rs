@@ -226,6 +226,11 @@ impl Record {
         Ok(self)
     }
 
+    /// This record without the lines of its rows: they are those of no single file.
+    pub(crate) fn without_lines(self) -> Self {
+        Self { lines: None, ..self }
+    }
+
     /// Makes a record of vectors, checked in the same way as a file.
     ///
     /// ```

@@ -6,6 +6,7 @@ mod diagnosis;
 mod fitted;
 mod found_in;
 mod model;
+mod records;
 mod track;
 
 pub use crate::bands::GasFault;
@@ -17,6 +18,7 @@ pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit};
 pub use found_in::FoundIn;
 pub use model::{Model, ModelEffect, ModelNumber};
+pub use records::{DisagreementAnswer, EffectInPlace, RecordAnswer, RecordNumber, TransferAnswer};
 pub use track::{Along, Ratio, Track};
 
 pub(crate) use characterisation::is_on_bound_of_time_constant;

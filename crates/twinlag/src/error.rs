@@ -48,6 +48,11 @@ pub enum Error {
     )]
     ModelChannels { model: [String; 2], record: [String; 2] },
     #[error(
+        "{file}: expected the sensors of the first record, {} and {}, in this order, got {} and {}. Records of one rig have the \
+         same two sensors: choose their columns", expected[0], expected[1], found[0], found[1]
+    )]
+    OtherChannels { file: String, expected: [String; 2], found: [String; 2] },
+    #[error(
         "quiet segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
          {needed} samples or more in unbroken stretches there"
     )]
@@ -95,7 +100,7 @@ impl Error {
             Self::QuietSegment { .. } => vec![Setting::QuietSegment],
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
             Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
-            Self::ModelChannels { .. } => vec![Setting::Channels],
+            Self::ModelChannels { .. } | Self::OtherChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],
             Self::LiveStart { .. } => vec![Setting::Live, Setting::Known],

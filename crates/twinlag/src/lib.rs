@@ -83,9 +83,10 @@ mod verbs;
 mod watch;
 
 pub use answers::{
-    Along, Characterisation, Compensation, Diagnosis, Difference, EffectNumber, ErrorBeforeAfter, Estimated, FoundIn,
-    FreeParameters, GasFault, IntervalMethod, MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit,
-    Quality, Ratio, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track,
+    Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
+    ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasFault, IntervalMethod, MadeBy, Model, ModelEffect,
+    ModelNumber, NamedEffect, NamedLimit, Quality, Ratio, RecordAnswer, RecordNumber, RecordSummary, Residual,
+    SecondLag, SensorEstimate, Status, Track, TransferAnswer,
 };
 pub use error::Error;
 pub use options::Options;
@@ -93,8 +94,8 @@ pub use reference::AgainstReference;
 pub use setting::Setting;
 pub use verbs::{
     CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
-    characterise_watched, characterise_with, compensate, compensate_watched, diagnose, diagnose_watched, readings,
-    track, track_watched,
+    characterise_watched, characterise_with, compensate, compensate_watched, diagnose, diagnose_records,
+    diagnose_records_watched, diagnose_watched, joined, readings, track, track_watched,
 };
 pub use watch::Watch;
 

@@ -3,6 +3,7 @@
 mod characterise;
 mod compensate;
 mod diagnose;
+mod diagnose_records;
 mod live;
 mod track;
 mod with_model;
@@ -12,6 +13,7 @@ use twinlag_diagnose::Judgement;
 pub use characterise::{characterise, characterise_watched, readings};
 pub use compensate::{CompensateOptions, compensate, compensate_watched};
 pub use diagnose::{DiagnoseOptions, diagnose, diagnose_watched};
+pub use diagnose_records::{diagnose_records, diagnose_records_watched, joined};
 pub use live::{Live, LiveAnswer, LiveOptions};
 pub use track::{TrackOptions, track, track_watched};
 pub use with_model::characterise_with;

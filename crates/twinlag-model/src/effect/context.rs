@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use crate::flow::Flow;
+use crate::records::Member;
 
 /// What is known of a record, and of the model so far, when effects are looked for.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Context {
-    /// Ends of the record, s.
+    /// Ends of the record, s; of several those of all of them together.
     pub ends_s: [f64; 2],
+    /// The records, one or several.
+    pub members: Vec<Member>,
     /// Mean time from sample to sample, s.
     pub step_s: f64,
     /// Whether samples are evenly spaced.
@@ -47,8 +50,21 @@ impl Context {
         (TYPICAL_SWING_SHARE * self.swing_k).max(self.noise_std_k[channel]).max(LEAST_TYPICAL_K)
     }
 
-    /// Time from the first to the last sample, s.
+    /// Time from the first to the last sample, s; of several records that of the longest.
     pub fn span_s(&self) -> f64 {
-        self.ends_s[1] - self.ends_s[0]
+        self.members.iter().map(|member| member.ends_s[1] - member.ends_s[0]).fold(0.0, f64::max)
+    }
+
+    /// Halfway between the ends of the record, s.
+    pub fn middle_s(&self) -> f64 {
+        0.5 * (self.ends_s[0] + self.ends_s[1])
+    }
+
+    /// What is known of each of several records by itself.
+    pub(crate) fn each_member(&self) -> impl Iterator<Item = (Member, Self)> + '_ {
+        self.members.iter().map(|member| {
+            let (ends_s, samples) = (member.ends_s, member.samples.len());
+            (member.clone(), Self { ends_s, samples, members: vec![member.clone()], ..self.clone() })
+        })
     }
 }

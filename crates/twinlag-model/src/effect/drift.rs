@@ -22,6 +22,7 @@ pub(crate) static ABOUT: About = About::new("drift", 12, candidates)
 struct Drift {
     seat: Seat,
     offset_k: f64,
+    middle_s: f64,
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
@@ -34,10 +35,10 @@ fn candidates(context: &Context) -> Vec<Shared> {
     );
     let offset = Parameter::new("offset", "K", Variable::linear("offset", typical_k, -widest, widest))
         .determining(Freedom::Offset);
-    let offset_k = context.mean_c[1] - context.mean_c[0];
+    let (offset_k, middle_s) = (context.mean_c[1] - context.mean_c[0], context.middle_s());
     let make = |parameters| {
         let seat = Seat::new(Identifier::DRIFT, Some(1), parameters);
-        Arc::new(Drift { seat, offset_k }) as Shared
+        Arc::new(Drift { seat, offset_k, middle_s }) as Shared
     };
     vec![make(vec![rate.clone()]), make(vec![rate, offset])]
 }
@@ -52,11 +53,15 @@ impl Effect for Drift {
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {
-        let (k_per_s, middle_s) = (values[0], plant.middle_s());
+        let (k_per_s, middle_s) = (values[0], self.middle_s);
         let reading = &mut plant.sensors[1].reading;
         reading.disturbances.push(Arc::new(move |time_s| k_per_s * (time_s - middle_s)));
         if let Some(offset_k) = values.get(1) {
             reading.offset_k += *offset_k;
         }
+    }
+
+    fn is_of_the_record(&self) -> bool {
+        true
     }
 }

@@ -6,7 +6,7 @@ use twinlag_diagnose::{
     Move, Policy, Unexplained, Verdict,
 };
 
-use crate::answers::{Characterisation, FoundIn, Model, ModelEffect};
+use crate::answers::{Characterisation, FoundIn, Model, ModelEffect, RecordAnswer, TransferAnswer};
 
 /// A number of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -132,6 +132,12 @@ pub struct Diagnosis {
     /// given and only noise is left over, or where one was known.
     #[serde(default)]
     pub if_known: Option<IfKnown<String>>,
+    /// What each of several records of a rig has for itself; none of a single record.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub records: Vec<RecordAnswer>,
+    /// Errors of records that had no part in finding the model; `None` of a single record.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<TransferAnswer>,
     /// What to know before using the numbers.
     pub remarks: Vec<String>,
     /// Effects that were not considered, as asked.

@@ -136,7 +136,7 @@ impl Model {
             effects: core
                 .effects
                 .iter()
-                .filter(|found| found.is_in_the_model)
+                .filter(|found| found.is_in_the_model && !found.is_of_each_record)
                 .map(|found| ModelEffect::found(found, &of_last.channels))
                 .collect(),
             verdict: Some(core.verdict),

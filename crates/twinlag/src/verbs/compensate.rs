@@ -1,7 +1,7 @@
 //! The gas temperature of a record with its standard deviation.
 
 use twinlag_compensate::{Form, bandwidth_hz};
-use twinlag_diagnose::{Grade, Judgement, ModelFit, Reason, Trace, Verdict};
+use twinlag_diagnose::{Grade, Judgement, Masked, ModelFit, Reason, Trace, Verdict};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
@@ -204,7 +204,8 @@ impl Modelled {
             });
         }
         let Diagnosed { rows, core } = Diagnosed::of(record, &options.diagnose, watch)?;
-        let effects = named(record, &core, &rows, options.diagnose.characterise.best_effort);
+        let place = |masked: &mut Masked| rows.place(masked, record);
+        let effects = named(record, &core, place, options.diagnose.characterise.best_effort);
         let last = with_effects(record, &options.diagnose, &core, &effects);
         Ok(Self {
             model: Model::found(&core, &last, None),

@@ -2,7 +2,8 @@
 
 use twinlag_cross_relation::Parameter;
 use twinlag_diagnose::{
-    Diagnosis as Core, Identifier, Judgements, ModelFit, Policy, Remark, Settings, Verdict, diagnose as close_the_loop,
+    Diagnosis as Core, Identifier, Judgements, Masked, ModelFit, Policy, Remark, Settings, Verdict,
+    diagnose as close_the_loop,
 };
 use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
@@ -70,12 +71,24 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
         budget: core.error,
         reference_rmse_k: reference.and_then(|reference| reference.before_and_after(&core)),
     };
+    Ok(answer(record, options, core, error, |masked| rows.place(masked, record)))
+}
+
+/// The answer with the names of channels and files.
+///
+/// - `place`: puts rows of the file in the place of samples
+pub(crate) fn answer(
+    record: &Record,
+    options: &DiagnoseOptions,
+    core: Core,
+    error: ErrorBeforeAfter,
+    place: impl FnMut(&mut Masked),
+) -> Diagnosis {
     let mut remarks: Vec<String> = core.remarks.iter().map(ToString::to_string).collect();
     remarks.extend(remark_on_reference(&error));
     remarks.extend(remark_on_options(&options.characterise));
-    let best_effort = options.characterise.best_effort;
-    let named = named(record, &core, &rows, best_effort);
-    Ok(Diagnosis {
+    let named = named(record, &core, place, options.characterise.best_effort);
+    Diagnosis {
         schema: Diagnosis::SCHEMA.into(),
         base: base(record, options, &core),
         verdict: core.verdict,
@@ -87,6 +100,8 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
         not_testable: core.not_testable.clone(),
         limits: core.limits.iter().map(|l| l.named(&record.channels)).collect(),
         if_known: core.if_known.as_ref().map(|values| values.named(&record.channels)),
+        records: Vec::new(),
+        transfer: None,
         remarks,
         without: options.without.clone(),
         found_in: Some(FoundIn::of(record)),
@@ -94,7 +109,7 @@ pub fn diagnose_watched(record: &Record, options: &DiagnoseOptions, watch: Watch
         moves: core.moves.clone(),
         policy: core.policy.clone(),
         core: Some(Box::new(core)),
-    })
+    }
 }
 
 /// What the loop says of a record, and the rows that it is of.
@@ -107,13 +122,17 @@ impl Diagnosed {
     pub(crate) fn of(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Self, Error> {
         options.characterise.check()?;
         let rows = Rows::of(record)?;
-        let settings = Settings {
-            effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
-            policy: options.policy.clone(),
-            ..settings_of(&options.characterise)
-        };
-        let core = close_the_loop(&rows.observations, &settings, watch)?;
+        let core = close_the_loop(&rows.observations, &settings(options), watch)?;
         Ok(Self { rows, core })
+    }
+}
+
+/// What the loop may assume.
+pub(crate) fn settings(options: &DiagnoseOptions) -> Settings {
+    Settings {
+        effects: Identifier::ALL.into_iter().filter(|e| !options.without.contains(e)).collect(),
+        policy: options.policy.clone(),
+        ..settings_of(&options.characterise)
     }
 }
 
@@ -137,11 +156,18 @@ fn base(record: &Record, options: &DiagnoseOptions, core: &Core) -> Characterisa
     out
 }
 
-/// The effects with the names of their channels and the rows of their masked readings.
-pub(crate) fn named(record: &Record, core: &Core, rows: &Rows, best_effort: bool) -> Vec<NamedEffect> {
+/// The effects with the names of their channels.
+///
+/// - `place`: puts rows of the file in the place of samples
+pub(crate) fn named(
+    record: &Record,
+    core: &Core,
+    place: impl FnMut(&mut Masked),
+    best_effort: bool,
+) -> Vec<NamedEffect> {
     let of = |found| NamedEffect::of(found, &record.channels, best_effort);
     let mut effects: Vec<NamedEffect> = core.effects.iter().map(of).collect();
-    effects.iter_mut().flat_map(|effect| &mut effect.masked).for_each(|masked| rows.place(masked, record));
+    effects.iter_mut().flat_map(|effect| &mut effect.masked).for_each(place);
     effects
 }
 

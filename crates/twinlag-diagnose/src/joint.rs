@@ -1,0 +1,146 @@
+//! Several records of one rig: one model, and what each record says of it.
+
+use twinlag_model::{Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Settings, Value, Watch};
+
+use crate::conclude::{conclude, to_the_end};
+use crate::diagnose::searched;
+use crate::diagnosis::{Diagnosis, Verdict};
+use crate::moves::State;
+use crate::naming::own_numbers;
+use crate::transfer::{LeftOut, Seated, Transfer, transfer, withdraw_what_does_not_transfer};
+
+/// A number that belongs to a record.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OwnNumber {
+    /// The effect that it is of.
+    pub effect: Seated,
+    /// The number.
+    pub number: Value,
+}
+
+/// A number that all records share and one contradicts.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Disagreement {
+    /// The effect that it is of; `None` of a time constant.
+    pub effect: Option<Seated>,
+    /// Its name: `T1`, `T2`, or a parameter of the effect.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What the record says, and the others.
+    pub values: Contradicted,
+}
+
+/// One of several records beside the others.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OfRecord {
+    /// Its samples.
+    pub samples: usize,
+    /// Its errors under the model of the others.
+    pub left_out: LeftOut,
+    /// Noise of its channels, K.
+    pub noise_std_k: [f64; 2],
+    /// Numbers of its own; none where more than noise is left over.
+    pub own: Vec<OwnNumber>,
+    /// Shared numbers on which it contradicts all others together. None in a record that agrees.
+    pub disagreements: Vec<Disagreement>,
+}
+
+/// The result of a diagnosis of several records.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct JointDiagnosis {
+    /// The diagnosis of all of them together.
+    pub diagnosis: Diagnosis,
+    /// Each record, in the order in which they came.
+    pub records: Vec<OfRecord>,
+    /// Errors on records that had no part in finding the model.
+    pub transfer: Transfer,
+}
+
+/// Finds what two first-order lags leave over in several records of one rig, and which effects account for it in all of them.
+///
+/// What belongs to the rig is one number for all records; what belongs to a record (a drift, the phase of a line, a flow that
+/// changes, noise levels) each has for itself. An effect is named only if it lowers the error of records that had no part in
+/// fitting it, and an interval covers what the records differ.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use twinlag_diagnose::{Identifier, Observations, Settings, Stretch, diagnose_records};
+/// use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+///
+/// // Two records of one rig, whose second channel reads 1 K too hot.
+/// let record = |seed| -> Result<Observations, Box<dyn std::error::Error>> {
+///     let mut sensors = [0.03, 0.11].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+///     sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.1)));
+///     sensors[1].offset_k = 1.0;
+///     let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 8.0, corner_hz: 1.0, cutoff_hz: 100.0 }));
+///     let record = Rig::new(seed, Record::new(1000, 0.01), gas, sensors)?.simulate()?;
+///     let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+///     Ok(Observations::new(vec![stretch], Some(0.01))?)
+/// };
+/// let watch = |_: &str, _, _| ControlFlow::Continue(());
+/// let joint = diagnose_records(&[record(1)?, record(2)?], &Settings::default(), &watch)?;
+/// assert_eq!(joint.diagnosis.effects[0].effect, Identifier::CALIBRATION);
+/// assert!(joint.records.iter().all(|record| record.disagreements.is_empty()));
+/// let rms = joint.transfer.normalised_rms;
+/// assert!(rms.before > 1.5 && rms.after < 1.1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// As [`crate::diagnose()`]; [`ModelError::TooFewRecords`] for less than two records.
+pub fn diagnose_records(
+    records: &[Observations],
+    settings: &Settings,
+    watch: Watch<'_>,
+) -> Result<JointDiagnosis, ModelError> {
+    if records.len() < 2 {
+        return Err(ModelError::TooFewRecords { records: records.len() });
+    }
+    let (mut state, tones) = searched(&Observations::joined(records)?, settings, watch)?;
+    withdraw_what_does_not_transfer(&mut state, watch)?;
+    let transfer = transfer(&state, settings, watch)?;
+    let last = to_the_end(&state.current, &state);
+    let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
+    let diagnosis = conclude(state, settings, tones)?;
+    let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
+    let of = |record: usize| OfRecord {
+        samples: records[record].samples(),
+        left_out: transfer.records[record].clone(),
+        noise_std_k: noise_std_k[record],
+        own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
+        disagreements: disagreements(record, &last, diagnosis.last.between.as_ref(), settings),
+    };
+    let records = (0..records.len()).map(of).collect();
+    Ok(JointDiagnosis { records, transfer, diagnosis })
+}
+
+/// Noise of the channels of each record, K.
+fn records_noise_k(state: &State<'_>) -> Vec<[f64; 2]> {
+    let std_k = state.current.model.noise_std_k();
+    let of = |record: &OneRecord| record.noise_std_k(std_k);
+    state.prepared.each_record().iter().map(of).collect()
+}
+
+/// Shared numbers on which a record contradicts the others.
+fn disagreements(record: usize, last: &Fitted, between: Option<&Between>, settings: &Settings) -> Vec<Disagreement> {
+    let contradicted = between.map_or_else(Vec::new, |between| between.contradicted(&settings.policy));
+    let of = |(at, values): (usize, Contradicted)| {
+        let model = &last.model;
+        match (0..model.effects.len()).find(|index| model.range(*index).contains(&at)) {
+            None => Disagreement { effect: None, name: format!("T{}", at + 1), unit: "s", values },
+            Some(index) => {
+                let effect = &model.effects[index];
+                let parameter = &effect.parameters()[at - model.range(index).start];
+                let (name, unit) = (parameter.name.to_owned(), parameter.unit);
+                Disagreement { effect: Some((effect.identifier(), effect.channel())), name, unit, values }
+            }
+        }
+    };
+    contradicted.into_iter().filter(|(_, values)| values.own.record == record).map(of).collect()
+}

@@ -1,0 +1,111 @@
+//! Whether what is found on some records of a rig holds on one that had no part in finding it.
+//!
+//! Each record is left out in turn: the loop runs on the others, and its model is carried to the record that was left out, where
+//! nothing is fitted but what belongs to a record. An effect that does not lower the error there stands in for something else,
+//! however well it fits.
+
+use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
+
+use crate::conclude::to_the_end;
+use crate::diagnose::searched;
+use crate::diagnosis::BeforeAfter;
+use crate::errors::Squares;
+use crate::moves::State;
+
+/// An effect with its channel, 0 or 1; `None` where it is of both, or relative.
+pub type Seated = (Identifier, Option<usize>);
+
+/// Errors of a record that had no part in finding the model and its effects.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct LeftOut {
+    /// Root mean square of the whitened residual.
+    pub normalised_rms: BeforeAfter<f64>,
+    /// Root mean square of the difference between the two inferred gas temperatures, K.
+    pub input_difference_k: BeforeAfter<f64>,
+    /// Effects that were found on the other records.
+    pub found: Vec<Seated>,
+}
+
+/// Errors on records that were left out, one at a time.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Transfer {
+    /// Root mean square of the whitened residual, of all records.
+    pub normalised_rms: BeforeAfter<f64>,
+    /// Root mean square of the difference between the two inferred gas temperatures, of all records, K.
+    pub input_difference_k: BeforeAfter<f64>,
+    /// The same of each record.
+    pub records: Vec<LeftOut>,
+}
+
+/// What each record is when it is left out, with the model of the others.
+pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>) -> Result<Transfer, ModelError> {
+    let records = state.prepared.each_record();
+    let mut sums = [Squares::default(); 2];
+    let mut left_out = Vec::new();
+    for (done, record) in records.iter().enumerate() {
+        report(watch, "records left out", done, records.len())?;
+        let others = state.prepared.raw.0.without_member(record.member.number);
+        let (of_others, _) = searched(&others, settings, watch)?;
+        let of = |fitted: &Fitted| on(record, &with_levels_of(&to_the_end(fitted, &of_others), &state.current));
+        let squares = [of(&of_others.base)?, of(&of_others.current)?];
+        for (sum, squares) in sums.iter_mut().zip(squares) {
+            *sum = sum.and(squares);
+        }
+        let [normalised_rms, input_difference_k] = before_and_after(squares);
+        let found = of_others.current.model.effects.iter().map(|e| (e.identifier(), e.channel())).collect();
+        left_out.push(LeftOut { normalised_rms, input_difference_k, found });
+    }
+    let [normalised_rms, input_difference_k] = before_and_after(sums);
+    Ok(Transfer { normalised_rms, input_difference_k, records: left_out })
+}
+
+fn before_and_after([before, after]: [Squares; 2]) -> [BeforeAfter<f64>; 2] {
+    let ([r0, k0], [r1, k1]) = (before.roots(), after.roots());
+    [BeforeAfter { before: r0, after: r1 }, BeforeAfter { before: k0, after: k1 }]
+}
+
+/// A model under the noise levels of another: errors compare under the same ones alone.
+fn with_levels_of(fitted: &Fitted, other: &Fitted) -> Fitted {
+    Fitted { model: fitted.model.clone().with_noise(other.model.noise_std_k()), ..fitted.clone() }
+}
+
+/// Errors of a model of the others on a record.
+fn on(record: &OneRecord, fitted: &Fitted) -> Result<Squares, ModelError> {
+    let carried = record.carried(fitted)?;
+    Ok(Squares::of(&carried, &record.observations, |sample| record.everything.holds(sample)))
+}
+
+/// Takes out effects that do not help on records which had no part in fitting them, the worst first.
+pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watch<'_>) -> Result<(), ModelError> {
+    while let Some((index, gain)) = least_gain(state, watch)?.filter(|(_, gain)| *gain <= 0.0) {
+        let withdrawal = state.withdrawal(index, gain);
+        state.apply(withdrawal);
+    }
+    Ok(())
+}
+
+/// The effect, noise aside, that saves the least deviance on records which had no part in fitting it, and this deviance.
+fn least_gain(state: &State<'_>, watch: Watch<'_>) -> Result<Option<(usize, f64)>, ModelError> {
+    let current = &state.current;
+    let effects: Vec<usize> =
+        (0..current.model.effects.len()).filter(|index| !current.model.effects[*index].is_noise()).collect();
+    if effects.is_empty() {
+        return Ok(None);
+    }
+    let mut gains = vec![0.0; effects.len()];
+    let records = state.prepared.each_record();
+    for (done, record) in records.iter().enumerate() {
+        report(watch, "effects on records left out", done, records.len())?;
+        let (others, selection) = state.prepared.without_record(record);
+        let of_others =
+            |model: &Model, theta: &[f64]| on(record, &model.fit(theta, &others, &selection, Effort::Compare));
+        let with = of_others(&current.model, &current.theta)?;
+        for (gain, index) in gains.iter_mut().zip(&effects) {
+            let (model, theta) = current.without(*index);
+            *gain += with.gain(of_others(&model, &theta)?);
+        }
+    }
+    Ok(effects.into_iter().zip(gains).min_by(|a, b| a.1.total_cmp(&b.1)))
+}

@@ -1,0 +1,286 @@
+//! What several records of one rig say of the numbers that they share.
+//!
+//! Each record has an estimate of its own beside the joint one: a Newton step of its own energy from the joint fit. If the model
+//! were the whole truth, these would scatter by their standard errors. Where they scatter by more, something that changes from
+//! record to record is missing in the model, and a shared number is a mean over records that were drawn from many: its
+//! uncertainty is that of a random effect, whose variance between records is that of Paule and Mandel (1982), with the standard
+//! error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a number has a large standard
+//! error, and so little weight.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use crate::dense;
+use crate::fit::Fitted;
+use crate::observations::Observations;
+use crate::policy::Policy;
+use crate::selection::Selection;
+use crate::summary::covariance;
+
+/// Halvings of the interval in which the variance between records lies: to a relative 1e-15.
+const HALVINGS: usize = 60;
+/// Fewest records of which one can be said to contradict the others.
+const FEWEST_TO_CONTRADICT: usize = 3;
+
+/// An estimate from one record alone, beside what all share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OwnValue {
+    /// The record, from 0.
+    pub record: usize,
+    /// The estimate.
+    pub value: f64,
+    /// Its standard error in that record.
+    pub standard_error: f64,
+}
+
+/// What records say of a number that they share.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct BetweenRecords {
+    /// The estimates of the records that determine it.
+    pub own: Vec<OwnValue>,
+    /// Their weighted mean.
+    pub mean: f64,
+    /// Standard deviation of the number between records, beside their standard errors.
+    pub standard_deviation: f64,
+    /// Standard error of the mean.
+    pub standard_error: f64,
+    /// Its 95 % interval.
+    pub interval_95: [f64; 2],
+    /// Root mean square of what the estimates differ from their mean, over their standard errors: 1 if the model is right.
+    pub ratio: f64,
+    /// Probability of at least as large a scatter if the model is right.
+    pub p_value: f64,
+}
+
+/// A record that contradicts the others on a number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Contradicted {
+    /// What the record says.
+    pub own: OwnValue,
+    /// What the others say.
+    pub others: f64,
+    /// The standard error of that, with what they differ from each other.
+    pub others_error: f64,
+    /// Probability of at least as large a difference by chance, if records differ as the others do.
+    pub p_value: f64,
+}
+
+impl BetweenRecords {
+    /// From the estimates of each record; `None` of fewer than two.
+    ///
+    /// ```
+    /// use twinlag_model::BetweenRecords;
+    ///
+    /// // Four records whose values differ by ten times their standard errors.
+    /// let between = BetweenRecords::of(&[(0, 1.0, 0.1), (1, 2.0, 0.1), (2, 3.0, 0.1), (3, 2.0, 0.1)]).expect("four");
+    /// assert!((between.mean - 2.0).abs() < 1e-9);
+    /// // The sample variance, 2/3, less that of a standard error.
+    /// assert!((between.standard_deviation.powi(2) - (2.0 / 3.0 - 0.01)).abs() < 1e-6);
+    /// assert!(between.p_value < 1e-9 && between.ratio > 8.0);
+    /// assert!(BetweenRecords::of(&[(0, 1.0, 0.1)]).is_none());
+    /// ```
+    pub fn of(values: &[(usize, f64, f64)]) -> Option<Self> {
+        let own: Vec<OwnValue> = values
+            .iter()
+            .filter(|(_, value, error)| value.is_finite() && error.is_finite() && *error > 0.0)
+            .map(|(record, value, standard_error)| OwnValue {
+                record: *record,
+                value: *value,
+                standard_error: *standard_error,
+            })
+            .collect();
+        if own.len() < 2 {
+            return None;
+        }
+        let dof = (own.len() - 1) as f64;
+        let (_, at_rest) = scatter(&own, 0.0);
+        let variance = variance_between(&own, dof);
+        let (mean, statistic) = scatter(&own, variance);
+        let weight: f64 = own.iter().map(|own| (own.standard_error.powi(2) + variance).recip()).sum();
+        let standard_error = ((statistic / dof).max(1.0) / weight).sqrt();
+        let half = quantile_975(dof) * standard_error;
+        Some(Self {
+            mean,
+            standard_deviation: variance.sqrt(),
+            standard_error,
+            interval_95: [mean - half, mean + half],
+            ratio: (at_rest / dof).sqrt(),
+            p_value: ChiSquared::new(dof).map_or(1.0, |chi2| chi2.sf(at_rest)),
+            own,
+        })
+    }
+
+    /// Whether the records scatter by more than their standard errors.
+    pub fn scatters(&self) -> bool {
+        self.standard_deviation > 0.0
+    }
+
+    /// Records that contradict all the others together, by chance once in `1/probability` numbers.
+    pub fn contradicted(&self, probability: f64) -> Vec<Contradicted> {
+        let records = self.own.len();
+        if records < FEWEST_TO_CONTRADICT {
+            return Vec::new();
+        }
+        let of = |place: usize| {
+            let own = self.own[place];
+            let others: Vec<(usize, f64, f64)> = self
+                .own
+                .iter()
+                .filter(|other| other.record != own.record)
+                .map(|other| (other.record, other.value, other.standard_error))
+                .collect();
+            let others = Self::of(&others)?;
+            let spread = others.standard_error.hypot(others.standard_deviation);
+            let deviations = (own.value - others.mean).abs() / own.standard_error.hypot(spread);
+            let student = StudentsT::new(0.0, 1.0, (records - 2) as f64).ok()?;
+            let p_value = 2.0 * student.sf(deviations);
+            let is_far = p_value * (records as f64) < probability;
+            is_far.then_some(Contradicted { own, others: others.mean, others_error: others.standard_error, p_value })
+        };
+        (0..records).filter_map(of).collect()
+    }
+}
+
+/// Weighted mean of the estimates under a variance between records, and the sum of squares about it in units of their variances.
+fn scatter(own: &[OwnValue], variance: f64) -> (f64, f64) {
+    let weights: Vec<f64> = own.iter().map(|own| (own.standard_error.powi(2) + variance).recip()).collect();
+    let mean = own.iter().zip(&weights).map(|(own, w)| w * own.value).sum::<f64>() / weights.iter().sum::<f64>();
+    (mean, own.iter().zip(&weights).map(|(own, w)| w * (own.value - mean).powi(2)).sum())
+}
+
+/// The variance between records at which the sum of squares is its expectation; 0 where it is less without any.
+fn variance_between(own: &[OwnValue], dof: f64) -> f64 {
+    if scatter(own, 0.0).1 <= dof {
+        return 0.0;
+    }
+    let values = own.iter().map(|own| own.value);
+    let range = values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min);
+    // With this variance no value is further off than one unit.
+    let (mut low, mut high) = (0.0, range * range);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if scatter(own, middle).1 > dof { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Quantile 0.975 of Student's distribution.
+fn quantile_975(dof: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |student| student.inverse_cdf(0.975))
+}
+
+/// What records say of the shared numbers of a fit.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Between {
+    /// Of each parameter, in the order of the covariance; `None` of one that belongs to a record, is held, or that fewer than two
+    /// records determine.
+    pub parameters: Vec<Option<BetweenRecords>>,
+    /// Of the difference of the time constants.
+    pub difference: Option<BetweenRecords>,
+}
+
+/// What records say of the shared numbers of `fitted`; `None` of one record.
+pub(crate) fn between(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Option<Between> {
+    let members = observations.members();
+    if members.len() < 2 {
+        return None;
+    }
+    let steps: Vec<(usize, Step)> = members
+        .iter()
+        .filter_map(|member| {
+            let own = observations.of_member(member.number);
+            Some((member.number, Step::of(fitted, &own, &selection.of_samples(member.samples.clone()))?))
+        })
+        .collect();
+    let of = |sum: &[(usize, f64)]| {
+        let values: Vec<(usize, f64, f64)> = steps
+            .iter()
+            .map(|(record, step)| {
+                let value = sum.iter().map(|(i, s)| s * (fitted.theta[*i] - step.step[*i])).sum();
+                let pairs = sum.iter().flat_map(|a| sum.iter().map(move |b| (a, b)));
+                let variance: f64 = pairs.map(|((i, s), (j, t))| s * t * step.covariance[*i][*j]).sum();
+                (*record, value, variance.max(0.0).sqrt())
+            })
+            .collect();
+        BetweenRecords::of(&values)
+    };
+    let is_shared = |i: usize| fitted.model.record_of(i).is_none() && !is_of_noise(fitted, i);
+    let parameters = (0..fitted.theta.len()).map(|i| if is_shared(i) { of(&[(i, 1.0)]) } else { None }).collect();
+    Some(Between { parameters, difference: of(&[(0, -1.0), (1, 1.0)]) })
+}
+
+fn is_of_noise(fitted: &Fitted, parameter: usize) -> bool {
+    let model = &fitted.model;
+    (0..model.effects.len()).any(|index| model.effects[index].is_noise() && model.range(index).contains(&parameter))
+}
+
+/// How far the minimum of a record's own energy is from a joint fit.
+struct Step {
+    /// To be subtracted.
+    step: Vec<f64>,
+    covariance: Vec<Vec<f64>>,
+}
+
+impl Step {
+    fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Option<Self> {
+        let Fitted { model, theta, .. } = fitted;
+        let normal = model.normal_equations(theta, observations, selection, None);
+        let step = dense::times(&model.curvature(theta, observations, selection, &normal)?, &normal.slope);
+        let covariance = covariance(fitted, observations, selection, false)?;
+        Some(Self { step, covariance })
+    }
+}
+
+/// Shared numbers that a record contradicts, each with its place among the parameters; the difference has none.
+impl Between {
+    /// Records that contradict the others, with the parameter.
+    pub fn contradicted(&self, policy: &Policy) -> Vec<(usize, Contradicted)> {
+        let numbers = self.parameters.iter().filter(|between| between.is_some()).count().max(1);
+        let probability = policy.records_rejection_probability / numbers as f64;
+        let of = |(at, between): (usize, &Option<BetweenRecords>)| {
+            let contradicted = between.as_ref().map_or_else(Vec::new, |between| between.contradicted(probability));
+            contradicted.into_iter().map(move |one| (at, one))
+        };
+        self.parameters.iter().enumerate().flat_map(of).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values that scatter less than their errors have the interval of their weighted mean, with Student's quantile.
+    #[test]
+    fn records_that_agree_have_no_variance_between_them() {
+        let between = BetweenRecords::of(&[(0, 1.00, 0.1), (1, 1.05, 0.1), (2, 0.95, 0.1)]).expect("three records");
+        assert_eq!(between.standard_deviation, 0.0);
+        assert!((between.mean - 1.0).abs() < 1e-12 && between.p_value > 0.5);
+        // 0.1/√3, and 4.302653 for two degrees of freedom, to the digits given.
+        assert!((between.interval_95[1] - 1.0 - 4.302_653 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-6);
+    }
+
+    /// A record that determines nothing changes nothing: its weight is one in 10⁸.
+    #[test]
+    fn a_record_that_says_nothing_has_no_weight() {
+        let three = [(0, 1.0, 0.1), (1, 2.0, 0.1), (2, 1.5, 0.1)];
+        let four = [&three[..], &[(3, 700.0, 1e4)]].concat();
+        let [with, without] = [&four[..], &three[..]].map(|v| BetweenRecords::of(v).expect("several"));
+        assert!((with.mean - without.mean).abs() < 1e-4, "{} {}", with.mean, without.mean);
+        assert_eq!(BetweenRecords::of(&[(0, 1.0, 0.1), (1, f64::NAN, 0.1), (2, 1.0, 0.0)]), None);
+    }
+
+    /// Of five records one is off by fifty standard errors: it contradicts the others, and none of these does.
+    #[test]
+    fn the_record_that_contradicts_is_named() {
+        let values = [(0, 1.0, 0.1), (1, 1.1, 0.1), (2, 0.9, 0.1), (3, 6.0, 0.1), (4, 1.05, 0.1)];
+        let between = BetweenRecords::of(&values).expect("five records");
+        let contradicted = between.contradicted(1e-3);
+        assert_eq!(contradicted.iter().map(|one| one.own.record).collect::<Vec<_>>(), [3]);
+        assert!((contradicted[0].others - 1.0125).abs() < 1e-9);
+        // Of two records nobody can say which is wrong.
+        assert!(BetweenRecords::of(&values[2..4]).expect("two records").contradicted(1e-3).is_empty());
+    }
+}

@@ -1,0 +1,244 @@
+//! Several records of one rig, one after the other, as one.
+//!
+//! What belongs to the rig is then fitted to all of them, and what belongs to a record, to that record alone. Each record is
+//! moved along the axis of time, so that no two overlap, and a function of time is one of a record.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::effect::{Context, KnownEffect, Shared};
+use crate::error::ModelError;
+use crate::fit::{Effort, Fitted};
+use crate::model::Model;
+use crate::observations::{Observations, Stretch};
+use crate::prepare::Prepared;
+use crate::selection::Selection;
+
+/// Time between two records, as a share of the longest one: enough to see the gap in a picture. Nothing else depends on it.
+const GAP_SHARE: f64 = 0.02;
+/// Relative difference of two sample periods that are one.
+const SAME_PERIOD: f64 = 1e-6;
+
+/// One record of several of a rig.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Member {
+    /// Its number, from 0.
+    pub number: usize,
+    /// Its samples, counted through all stretches.
+    pub samples: Range<usize>,
+    /// Its first and last instant, s, as the joined records have them.
+    pub ends_s: [f64; 2],
+}
+
+impl Observations {
+    /// Several records of one rig as one: each keeps its stretches, which are moved in time so that the records come one after
+    /// the other.
+    ///
+    /// ```
+    /// use twinlag_model::{ModelError, Observations, Stretch};
+    ///
+    /// let record = |from_s: f64| {
+    ///     let time_s: Vec<f64> = (0..100).map(|k| from_s + 0.5 * f64::from(k)).collect();
+    ///     let reading_c = [1.0, 3.0].map(|k| time_s.iter().map(|t| 20.0 + k * t.sin()).collect());
+    ///     Observations::new(vec![Stretch::new(time_s, reading_c)], Some(0.5))
+    /// };
+    /// let joined = Observations::joined(&[record(0.0)?, record(7.0)?])?;
+    /// let members = joined.members();
+    /// assert_eq!((members.len(), joined.samples()), (2, 200));
+    /// assert_eq!(members[1].samples, 100..200);
+    /// assert!(members[1].ends_s[0] > members[0].ends_s[1]);
+    /// assert_eq!(joined.of_member(1).samples(), 100);
+    /// # Ok::<(), ModelError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`]: [`ModelError::TooShort`] for no record.
+    pub fn joined(records: &[Self]) -> Result<Self, ModelError> {
+        let gap_s = GAP_SHARE * records.iter().map(Self::span_s).fold(0.0, f64::max);
+        let mut stretches = Vec::new();
+        let mut free_from_s = None;
+        for (number, record) in records.iter().enumerate() {
+            let [first_s, last_s] = record.ends_s();
+            let later_s = free_from_s.map_or(0.0, |free_s: f64| free_s - first_s);
+            stretches.extend(record.stretches.iter().map(|stretch| stretch.as_member(number, later_s)));
+            free_from_s = Some(last_s + later_s + gap_s);
+        }
+        let period_s = records.first().and_then(|record| record.period_s);
+        let is_same = |other: Option<f64>| match (period_s, other) {
+            (Some(one), Some(other)) => (one - other).abs() <= SAME_PERIOD * one,
+            _ => false,
+        };
+        Self::new(stretches, period_s.filter(|_| records.iter().all(|record| is_same(record.period_s))))
+    }
+
+    /// The records that these are, in order: one, unless they were joined.
+    pub fn members(&self) -> Vec<Member> {
+        let mut out: Vec<Member> = Vec::new();
+        let mut first = 0;
+        for stretch in &self.stretches {
+            let end = first + stretch.len();
+            let [first_s, last_s] = stretch.ends_s();
+            match out.last_mut() {
+                Some(member) if member.number == stretch.member => {
+                    (member.samples.end, member.ends_s[1]) = (end, last_s);
+                }
+                _ => out.push(Member { number: stretch.member, samples: first..end, ends_s: [first_s, last_s] }),
+            }
+            first = end;
+        }
+        out
+    }
+
+    /// Whether these are several records.
+    pub fn is_joined(&self) -> bool {
+        self.stretches.iter().any(|stretch| stretch.member != self.stretches[0].member)
+    }
+
+    /// One of the records, where it lies among the others.
+    #[must_use]
+    pub fn of_member(&self, number: usize) -> Self {
+        self.keeping(|stretch| stretch.member == number)
+    }
+
+    /// The records without one of them, where they lie.
+    #[must_use]
+    pub fn without_member(&self, number: usize) -> Self {
+        self.keeping(|stretch| stretch.member != number)
+    }
+
+    /// Some of the stretches, shared with these.
+    fn keeping(&self, is_kept: impl Fn(&Stretch) -> bool) -> Self {
+        let stretches = self.stretches.iter().filter(|stretch| is_kept(stretch)).cloned().collect();
+        self.with_stretches(stretches)
+    }
+
+    /// These with the noise of each record's channels over that of all, in the order of [`Self::members`].
+    #[must_use]
+    pub(crate) fn with_noise_factors(mut self, factors: &[[f64; 2]]) -> Self {
+        let members = self.members();
+        for stretch in &mut self.stretches {
+            let place = members.iter().position(|member| member.number == stretch.member);
+            let factor = place.and_then(|place| factors.get(place)).copied().unwrap_or([1.0; 2]);
+            if stretch.noise_factor != factor {
+                Arc::make_mut(stretch).noise_factor = factor;
+            }
+        }
+        self
+    }
+}
+
+/// One of several records that were prepared together.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct OneRecord {
+    /// Which of them it is.
+    pub member: Member,
+    /// The record, where it lies among the others.
+    pub observations: Observations,
+    /// Its residuals that count.
+    pub everything: Selection,
+    context: Context,
+}
+
+impl Prepared {
+    /// Each of several records.
+    pub fn each_record(&self) -> Vec<OneRecord> {
+        let of = |(member, context): (Member, Context)| OneRecord {
+            observations: self.observations.of_member(member.number),
+            everything: self.everything.of_samples(member.samples.clone()),
+            member,
+            context,
+        };
+        self.context.each_member().map(of).collect()
+    }
+
+    /// All of several records but one, and what fits of them count.
+    pub fn without_record(&self, record: &OneRecord) -> (Observations, Selection) {
+        let mut others = self.everything.clone();
+        others.counts.drain(record.member.samples.clone());
+        (self.observations.without_member(record.member.number), others)
+    }
+}
+
+impl OneRecord {
+    /// Noise of its channels, K, where that of all records together is `std_k`.
+    pub fn noise_std_k(&self, std_k: [f64; 2]) -> [f64; 2] {
+        let factor = self.observations.stretches[0].noise_factor;
+        [0, 1].map(|i| std_k[i] * factor[i])
+    }
+
+    /// A model of other records on this one: what belongs to the rig stays as it is, and what belongs to a record is fitted.
+    ///
+    /// # Errors
+    /// [`ModelError`] where an effect that belongs to a record cannot be made for this one.
+    pub fn carried(&self, fitted: &Fitted) -> Result<Fitted, ModelError> {
+        let Fitted { model, theta, .. } = fitted;
+        let mut own = Model::new(&[], model.noise_std_k());
+        own.is_frozen = true;
+        let mut values = theta[..2].to_vec();
+        for (index, effect) in model.effects.iter().enumerate() {
+            let given = &theta[model.range(index)];
+            if effect.is_of_the_record() {
+                let effect = self.made_for_it(effect, given)?;
+                values.extend(effect.starts().into_iter().next().unwrap_or_default());
+                own = own.with(effect);
+            } else {
+                values.extend_from_slice(given);
+                own = own.with(effect.clone());
+            }
+        }
+        let own = own.holding(0, theta[0]).holding(1, theta[1]);
+        let has_own = own.effects.iter().any(|effect| effect.is_of_the_record());
+        if has_own {
+            return Ok(own.fit(&values, &self.observations, &self.everything, Effort::Compare));
+        }
+        Ok(Fitted { model: own, theta: values, ..fitted.clone() })
+    }
+
+    /// An effect that belongs to a record in the form that others have it.
+    fn made_for_it(&self, effect: &Shared, given: &[f64]) -> Result<Shared, ModelError> {
+        let of_another = effect.record_of(0).and_then(|number| effect.in_record(number));
+        let (form, places) = of_another.unwrap_or_else(|| (effect.clone(), 0..given.len()));
+        let parameters =
+            form.parameters().iter().zip(&given[places]).map(|(p, value)| (p.name.into(), *value)).collect();
+        let known = KnownEffect { effect: form.identifier(), channel: form.channel(), parameters };
+        let made = (known.effect.about().restore)(&known, &self.context)?;
+        made.ok_or_else(|| ModelError::Model { effect: known.effect.name() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(samples: u32, period_s: f64, from_s: f64) -> Observations {
+        let time_s: Vec<f64> = (0..samples).map(|k| from_s + period_s * f64::from(k)).collect();
+        let reading_c = [1.0, 3.0].map(|k| time_s.iter().map(|t| 20.0 + k * t.sin()).collect());
+        Observations::new(vec![Stretch::new(time_s, reading_c)], Some(period_s)).expect("a record")
+    }
+
+    /// Records that overlap in time come one after the other, whatever their own clocks said.
+    #[test]
+    fn records_follow_each_other() {
+        let joined = Observations::joined(&[record(90, 0.5, 1e6), record(80, 0.5, 0.0), record(70, 0.5, 1e6)]);
+        let joined = joined.expect("three records");
+        let members = joined.members();
+        assert_eq!(members.iter().map(|m| m.samples.clone()).collect::<Vec<_>>(), [0..90, 90..170, 170..240]);
+        assert!(members.windows(2).all(|two| two[0].ends_s[1] < two[1].ends_s[0]), "{members:?}");
+        assert_eq!(joined.period_s, Some(0.5));
+        assert!(joined.is_joined() && !joined.of_member(2).is_joined());
+        let others = joined.without_member(1);
+        assert_eq!(others.members().iter().map(|m| m.number).collect::<Vec<_>>(), [0, 2]);
+        assert_eq!(others.members()[1].ends_s, members[2].ends_s);
+        // As long as the longest of them, not as all of them together.
+        assert_eq!(joined.span_s(), 44.5);
+    }
+
+    /// Records with different sample periods are as one whose samples are not evenly spaced.
+    #[test]
+    fn different_periods_are_uneven_steps() {
+        let joined = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.25, 0.0)]).expect("two records");
+        assert_eq!(joined.period_s, None);
+    }
+}

@@ -1,0 +1,160 @@
+//! What a diagnosis of several records says of each of them.
+
+use serde::{Deserialize, Serialize};
+use twinlag_diagnose::{BeforeAfter, Disagreement, Identifier, LeftOut, Masked, Seated, Transfer};
+
+/// Errors of records that had no part in finding the model: each is left out in turn, the loop runs on the others, and its model
+/// is carried to the one that was left out, where nothing is fitted but what belongs to a record.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct TransferAnswer {
+    /// Root mean square of the whitened residual.
+    pub normalised_rms: BeforeAfter<f64>,
+    /// Root mean square of the difference between the two inferred gas temperatures, K.
+    #[serde(rename = "input_difference_K")]
+    pub input_difference_k: BeforeAfter<f64>,
+}
+
+impl TransferAnswer {
+    pub(crate) fn of(transfer: &Transfer) -> Self {
+        Self { normalised_rms: transfer.normalised_rms, input_difference_k: transfer.input_difference_k }
+    }
+
+    fn of_one(left_out: &LeftOut) -> Self {
+        Self { normalised_rms: left_out.normalised_rms, input_difference_k: left_out.input_difference_k }
+    }
+}
+
+/// An effect in its channel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct EffectInPlace {
+    /// The effect.
+    pub effect: Identifier,
+    /// Its channel; `None` where it is of both, or relative.
+    pub channel: Option<String>,
+}
+
+impl EffectInPlace {
+    fn of((effect, channel): Seated, channels: &[String; 2]) -> Self {
+        Self { effect, channel: channel.map(|i| channels[i].clone()) }
+    }
+}
+
+/// A number that belongs to one record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct RecordNumber {
+    /// The effect that it is of.
+    #[serde(flatten)]
+    pub of: EffectInPlace,
+    /// Its name.
+    pub name: String,
+    /// The number.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: Option<f64>,
+    /// Its 95 % interval.
+    pub interval_95: Option<[f64; 2]>,
+    /// Its unit.
+    pub unit: String,
+}
+
+/// A number that all records share, and that this one contradicts.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct DisagreementAnswer {
+    /// The effect that it is of; `None` of a time constant.
+    pub of: Option<EffectInPlace>,
+    /// Its name: that of the channel, or of a parameter of the effect.
+    pub name: String,
+    /// What this record says by itself, the rest of the model at its best.
+    pub value: f64,
+    /// The standard error of that.
+    pub standard_error: f64,
+    /// What the other records say together.
+    pub others: f64,
+    /// The standard error of that.
+    pub others_standard_error: f64,
+    /// Unit of these.
+    pub unit: String,
+    /// Probability of at least as large a difference by chance, if it differs from the others as these do from each other.
+    pub p_value: f64,
+}
+
+impl DisagreementAnswer {
+    fn of(found: &Disagreement, channels: &[String; 2]) -> Self {
+        let Disagreement { effect, name, unit, values, .. } = found;
+        let name = match (effect, name.as_str()) {
+            (None, "T1") => channels[0].clone(),
+            (None, _) => channels[1].clone(),
+            (Some(_), name) => name.to_owned(),
+        };
+        Self {
+            of: effect.map(|effect| EffectInPlace::of(effect, channels)),
+            name,
+            value: values.own.value,
+            standard_error: values.own.standard_error,
+            others: values.others,
+            others_standard_error: values.others_error,
+            unit: (*unit).to_owned(),
+            p_value: values.p_value,
+        }
+    }
+}
+
+/// One of several records of a rig beside the others.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct RecordAnswer {
+    /// File or name.
+    pub source: String,
+    /// Samples.
+    pub samples: usize,
+    /// Its errors under the model of the others.
+    pub transfer: TransferAnswer,
+    /// Effects that were found on the others.
+    pub found_on_others: Vec<EffectInPlace>,
+    /// Noise of its channels, K.
+    #[serde(rename = "noise_std_K")]
+    pub noise_std_k: [f64; 2],
+    /// Numbers of its own; none where more than noise is left over.
+    pub own: Vec<RecordNumber>,
+    /// Whether it contradicts the others on no number.
+    pub agrees: bool,
+    /// Shared numbers on which it contradicts all others together.
+    pub disagreements: Vec<DisagreementAnswer>,
+    /// Readings that are left out of the fit, by their lines in its file.
+    pub masked: Vec<Masked>,
+}
+
+impl RecordAnswer {
+    pub(crate) fn of(
+        found: &twinlag_diagnose::OfRecord,
+        source: &str,
+        channels: &[String; 2],
+        masked: Vec<Masked>,
+    ) -> Self {
+        let number = |own: &twinlag_diagnose::OwnNumber| RecordNumber {
+            of: EffectInPlace::of(own.effect, channels),
+            name: own.number.name.clone(),
+            value: own.number.value,
+            standard_error: own.number.standard_error,
+            interval_95: own.number.interval_95,
+            unit: own.number.unit.clone(),
+        };
+        let disagreements: Vec<DisagreementAnswer> =
+            found.disagreements.iter().map(|one| DisagreementAnswer::of(one, channels)).collect();
+        Self {
+            source: source.to_owned(),
+            samples: found.samples,
+            transfer: TransferAnswer::of_one(&found.left_out),
+            found_on_others: found.left_out.found.iter().map(|e| EffectInPlace::of(*e, channels)).collect(),
+            noise_std_k: found.noise_std_k,
+            own: found.own.iter().map(number).collect(),
+            agrees: disagreements.is_empty(),
+            disagreements,
+            masked,
+        }
+    }
+}
