@@ -123,7 +123,7 @@ fn gain(one: &Fitted, other: &Fitted) -> f64 {
 }
 
 /// A model without its noise, which explains whatever is left over, fitted to a record.
-fn without_noise(fitted: &Fitted, prepared: &Prepared) -> Fitted {
+pub(crate) fn without_noise(fitted: &Fitted, prepared: &Prepared) -> Fitted {
     let (mut model, mut theta) = (fitted.model.clone(), fitted.theta.clone());
     while let Some(noise) = model.noise() {
         theta.drain(model.range(noise));

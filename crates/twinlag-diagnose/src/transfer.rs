@@ -2,7 +2,7 @@
 //!
 //! Each record is left out in turn: the loop runs on the others, and its model is carried to the record that was left out, where
 //! nothing is fitted but what belongs to a record. An effect that does not lower the error there stands in for something else,
-//! however well it fits.
+//! however well it fits. What was found as noise is no part of the model here: it lowers no error, it is taken for granted.
 
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
 
@@ -11,6 +11,7 @@ use crate::diagnose::searched;
 use crate::diagnosis::BeforeAfter;
 use crate::errors::Squares;
 use crate::moves::State;
+use crate::rapid::without_noise;
 
 /// An effect with its channel, 0 or 1; `None` where it is of both, or relative.
 pub type Seated = (Identifier, Option<usize>);
@@ -35,7 +36,7 @@ pub struct Transfer {
     pub normalised_rms: BeforeAfter<f64>,
     /// Root mean square of the difference between the two inferred gas temperatures, of all records, K.
     pub input_difference_k: BeforeAfter<f64>,
-    /// The same of each record.
+    /// Errors of each record, in the order in which the records came.
     pub records: Vec<LeftOut>,
 }
 
@@ -48,7 +49,7 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
         report(watch, "records left out", done, records.len())?;
         let others = state.prepared.raw.0.without_member(record.member.number);
         let (of_others, _) = searched(&others, settings, watch)?;
-        let of = |fitted: &Fitted| on(record, &with_levels_of(&to_the_end(fitted, &of_others), &state.current));
+        let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
         let squares = [of(&of_others.base)?, of(&of_others.current)?];
         for (sum, squares) in sums.iter_mut().zip(squares) {
             *sum = sum.and(squares);
@@ -66,9 +67,11 @@ fn before_and_after([before, after]: [Squares; 2]) -> [BeforeAfter<f64>; 2] {
     [BeforeAfter { before: r0, after: r1 }, BeforeAfter { before: k0, after: k1 }]
 }
 
-/// A model under the noise levels of another: errors compare under the same ones alone.
-fn with_levels_of(fitted: &Fitted, other: &Fitted) -> Fitted {
-    Fitted { model: fitted.model.clone().with_noise(other.model.noise_std_k()), ..fitted.clone() }
+/// A model of the others without what was found as noise, under the levels of all records: errors compare under the same ones alone.
+fn bare(fitted: Fitted, of_others: &State<'_>, all: &State<'_>) -> Fitted {
+    let is_bare = fitted.model.noise().is_none();
+    let fitted = if is_bare { fitted } else { without_noise(&fitted, &of_others.prepared) };
+    Fitted { model: fitted.model.with_noise(all.prepared.levels.std_k), ..fitted }
 }
 
 /// Errors of a model of the others on a record.
@@ -88,9 +91,10 @@ pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watc
 
 /// The effect, noise aside, that saves the least deviance on records which had no part in fitting it, and this deviance.
 fn least_gain(state: &State<'_>, watch: Watch<'_>) -> Result<Option<(usize, f64)>, ModelError> {
-    let current = &state.current;
+    let current = without_noise(&state.current, &state.prepared);
+    // Their places among all of them.
     let effects: Vec<usize> =
-        (0..current.model.effects.len()).filter(|index| !current.model.effects[*index].is_noise()).collect();
+        (0..state.taken.len()).filter(|index| !state.current.model.effects[*index].is_noise()).collect();
     if effects.is_empty() {
         return Ok(None);
     }
@@ -102,8 +106,8 @@ fn least_gain(state: &State<'_>, watch: Watch<'_>) -> Result<Option<(usize, f64)
         let of_others =
             |model: &Model, theta: &[f64]| on(record, &model.fit(theta, &others, &selection, Effort::Compare));
         let with = of_others(&current.model, &current.theta)?;
-        for (gain, index) in gains.iter_mut().zip(&effects) {
-            let (model, theta) = current.without(*index);
+        for (index, gain) in gains.iter_mut().enumerate() {
+            let (model, theta) = current.without(index);
             *gain += with.gain(of_others(&model, &theta)?);
         }
     }
