@@ -1,5 +1,6 @@
 //! `twinlag diagnose FILE`: the closed loop.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use twinlag::diagnosis::{Grade, Verdict};
@@ -33,8 +34,8 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         records.push(record);
     }
     let (record, answer) = match &records[..] {
-        [record] => (record.clone(), diagnose(record, &options, console)?),
-        records => (twinlag::joined(records)?, diagnose_records(records, &options, console)?),
+        [record] => (Cow::Borrowed(record), diagnose(record, &options, console)?),
+        records => (Cow::Owned(twinlag::joined(records)?), diagnose_records(records, &options, console)?),
     };
     if let Some(path) = &command.save {
         output::model(path, &answer.model())?;

@@ -79,7 +79,7 @@ impl Masked {
             let end = first + stretch.time_s.len();
             let (here, after) = rest.split_at(rest.partition_point(|sample| *sample < end));
             for (place, sample) in here.iter().enumerate() {
-                let time_s = stretch.time_s[sample - first];
+                let time_s = stretch.time_s.at(sample - first);
                 match out.last_mut() {
                     Some(last) if place > 0 && last.rows[1] + 1 == *sample => {
                         (last.rows[1], last.time_s[1]) = (*sample, time_s);

@@ -72,9 +72,9 @@ pub use moves::Move;
 pub use remark::Remark;
 pub use transfer::{LeftOut, Seated, Transfer};
 pub use twinlag_model::{
-    About, Change, ChangePoint, Extended, Identifier, KnownEffect, KnownFit, KnownTimeConstant, Line, ModelError,
-    ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track, Value,
-    Watch, evenly_spread, fit_with, track,
+    About, Change, ChangePoint, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant, Line,
+    ModelError, ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track,
+    Value, Watch, evenly_spread, fit_with, track,
 };
 
 /// A diagnosis may go to any thread, and be read by several.

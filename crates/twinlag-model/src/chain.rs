@@ -91,7 +91,7 @@ impl<T: Real> Chain<T> {
     /// Begins again, with the readings of a channel as they are.
     pub(crate) fn begin(&mut self, cut: Cut<'_>, channel: usize, period_s: Option<f64>) {
         self.time_s.clear();
-        self.time_s.extend_from_slice(cut.time_s);
+        self.time_s.extend(cut.time_s.of(cut.first..cut.first + cut.reading_c[channel].len()));
         self.skipped = 0;
         self.value.clear();
         self.value.extend(cut.reading_c[channel].iter().map(|y| T::from(*y)));

@@ -65,7 +65,7 @@ pub(crate) fn readings(observations: &Observations) -> Option<Readings> {
             if k >= from + MIN_LEVEL_ROWS {
                 let steps = match observations.period_s {
                     Some(period_s) => Steps::Even(period_s),
-                    None => Steps::Uneven(s.time_s[from..k].windows(2).map(|t| t[1] - t[0]).collect()),
+                    None => Steps::Uneven((from + 1..k).map(|k| s.time_s.at(k) - s.time_s.at(k - 1)).collect()),
                 };
                 let cut = |i: usize| s.reading_c[i][from..k].to_vec();
                 segments.push(Segment::new(cut(0), cut(1), steps).ok()?);

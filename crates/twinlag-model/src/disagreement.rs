@@ -138,7 +138,7 @@ pub(crate) fn is_long_enough(stretch: &Stretch, plant: &Plant, is_even: bool) ->
 
 /// The sample of a stretch whose instant the first value of a disagreement has.
 pub(crate) fn first_sample(stretch: &Stretch, first_s: f64, step_s: f64) -> usize {
-    stretch.time_s.partition_point(|t| *t < first_s - SAME_INSTANT_STEPS * step_s)
+    stretch.time_s.first_not_before(first_s - SAME_INSTANT_STEPS * step_s)
 }
 
 /// Values of a stretch that are whitened at a time, and the factor for them. Up to so many samples a stretch is one window.
@@ -480,7 +480,7 @@ impl<'a> Evaluator<'a> {
     fn reaches(&self, direction: &Direction, plant: &Plant, block: &Block<'_>) -> bool {
         let samples = block.samples(plant.consumed(self.observations.period_s.is_some()));
         let time_s = &self.observations.stretches[self.pieces[block.window.piece].stretch].time_s;
-        let [from_s, to_s] = [time_s[samples.start], time_s[samples.end - 1]];
+        let [from_s, to_s] = [time_s.at(samples.start), time_s.at(samples.end - 1)];
         direction.support_s.is_none_or(|[first_s, last_s]| from_s <= last_s && to_s >= first_s)
     }
 

@@ -95,7 +95,7 @@ impl Extended {
             let [one, two] = plant.temperatures(stretch);
             temperature_c[0].extend(one);
             temperature_c[1].extend(two);
-            time_s.extend_from_slice(&stretch.time_s);
+            time_s.extend(stretch.time_s.iter());
             for (all, masked) in missing.iter_mut().zip(&stretch.masked) {
                 all.extend_from_slice(masked);
             }

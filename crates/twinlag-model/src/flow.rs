@@ -1,6 +1,7 @@
 //! A measured flow velocity or density along the record.
 
 use crate::error::ModelError;
+use crate::instants::Instants;
 
 /// Its logarithm over that of its geometric mean.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,14 +17,14 @@ impl Flow {
     ///
     /// # Errors
     /// [`ModelError::Flow`] for values that are not positive, or not as many as instants.
-    pub fn new(stretches: &[(&[f64], &[f64])]) -> Result<Self, ModelError> {
-        let is_sound = |(time_s, values): &(&[f64], &[f64])| {
+    pub fn new(stretches: &[(&Instants, &[f64])]) -> Result<Self, ModelError> {
+        let is_sound = |(time_s, values): &(&Instants, &[f64])| {
             time_s.len() == values.len() && values.iter().all(|v| v.is_finite() && *v > 0.0)
         };
         if !stretches.iter().all(is_sound) {
             return Err(ModelError::Flow);
         }
-        let time_s: Vec<f64> = stretches.iter().flat_map(|s| s.0.iter().copied()).collect();
+        let time_s: Vec<f64> = stretches.iter().flat_map(|s| s.0.iter()).collect();
         let logs: Vec<f64> = stretches.iter().flat_map(|s| s.1.iter().map(|v| v.ln())).collect();
         let mean = logs.iter().sum::<f64>() / logs.len().max(1) as f64;
         Ok(Self { time_s, log_ratio: logs.into_iter().map(|l| l - mean).collect() })

@@ -288,7 +288,7 @@ mod tests {
             assert_eq!(evaluation.samples, details.samples);
             assert_eq!(evaluation.sample().count(), evaluation.residual.len());
             assert_eq!(evaluation.stretches().collect::<Vec<_>>(), details.stretches().collect::<Vec<_>>());
-            let instants: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+            let instants: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter()).collect();
             for (sample, time_s) in details.sample().zip(&details.time_s) {
                 assert!((instants[sample] - time_s).abs() <= 0.5, "sample {sample} at {time_s} s");
             }

@@ -267,8 +267,8 @@ impl Model {
         for stretch in &mut out.stretches {
             let Stretch { time_s, reading_c, .. } = Arc::make_mut(stretch);
             for (readings, sensor) in reading_c.iter_mut().zip(&plant.sensors) {
-                for (y, t) in readings.iter_mut().zip(&*time_s) {
-                    *y -= sensor.reading.disturbance_at(*t).re;
+                for (y, t) in Arc::make_mut(readings).iter_mut().zip(time_s.iter()) {
+                    *y -= sensor.reading.disturbance_at(t).re;
                 }
             }
         }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::error::ModelError;
 use crate::flow::Flow;
+use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
 const MIN_STRETCH_SAMPLES: usize = 8;
@@ -29,9 +30,9 @@ pub fn evenly_spread(samples: usize, pieces: usize, length: usize) -> impl Itera
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
     /// Sample instants, s, rising.
-    pub time_s: Vec<f64>,
-    /// Readings of channels 1 and 2, °C.
-    pub reading_c: [Vec<f64>; 2],
+    pub time_s: Instants,
+    /// Readings of channels 1 and 2, °C, which whoever has them already shares.
+    pub reading_c: [Arc<Vec<f64>>; 2],
     /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
     pub masked: [Vec<bool>; 2],
     /// Flow velocity or density, in any unit.
@@ -45,6 +46,11 @@ pub struct Stretch {
 impl Stretch {
     /// A stretch of which every sample counts.
     pub fn new(time_s: Vec<f64>, reading_c: [Vec<f64>; 2]) -> Self {
+        Self::sharing(time_s.into(), reading_c.map(Arc::new))
+    }
+
+    /// A stretch of which every sample counts, with readings that others hold as well.
+    pub fn sharing(time_s: Instants, reading_c: [Arc<Vec<f64>>; 2]) -> Self {
         let masked = [vec![false; time_s.len()], vec![false; time_s.len()]];
         Self { time_s, reading_c, masked, flow: None, member: 0, noise_factor: [1.0; 2] }
     }
@@ -64,13 +70,12 @@ impl Stretch {
 
     /// This stretch as one of a record among others, `later_s` seconds later.
     pub(crate) fn as_member(&self, member: usize, later_s: f64) -> Self {
-        let time_s = self.time_s.iter().map(|t| t + later_s).collect();
-        Self { time_s, member, ..self.clone() }
+        Self { time_s: self.time_s.later(later_s), member, ..self.clone() }
     }
 
     /// First and last instant, s.
     pub(crate) fn ends_s(&self) -> [f64; 2] {
-        [self.time_s[0], self.time_s[self.len() - 1]]
+        [self.time_s.at(0), self.time_s.at(self.len() - 1)]
     }
 
     /// The mean of the first readings, °C.
@@ -85,7 +90,7 @@ impl Stretch {
     /// Some of its samples.
     pub(crate) fn cut(&self, samples: Range<usize>) -> Cut<'_> {
         let reading_c = [0, 1].map(|i| &self.reading_c[i][samples.clone()]);
-        Cut { time_s: &self.time_s[samples], reading_c }
+        Cut { time_s: &self.time_s, first: samples.start, reading_c }
     }
 
     /// All of its samples.
@@ -97,8 +102,10 @@ impl Stretch {
 /// Successive samples of a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cut<'a> {
-    /// Sample instants, s.
-    pub(crate) time_s: &'a [f64],
+    /// Instants of the stretch.
+    pub(crate) time_s: &'a Instants,
+    /// The sample of the stretch with which these begin.
+    pub(crate) first: usize,
     /// Readings of channels 1 and 2, °C.
     pub(crate) reading_c: [&'a [f64]; 2],
 }
@@ -148,12 +155,12 @@ impl Observations {
         if samples < MIN_RECORD_SAMPLES {
             return Err(ModelError::TooShort { samples, needed: MIN_RECORD_SAMPLES });
         }
-        let is_sound = |v: &Vec<f64>| v.iter().all(|x| x.is_finite());
-        if !stretches.iter().all(|s| is_sound(&s.time_s) && s.reading_c.iter().all(is_sound)) {
+        let is_sound = |v: &Arc<Vec<f64>>| v.iter().all(|x| x.is_finite());
+        if !stretches.iter().all(|s| s.time_s.are_finite() && s.reading_c.iter().all(is_sound)) {
             return Err(ModelError::NotFinite);
         }
-        let flows: Option<Vec<(&[f64], &[f64])>> =
-            stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s[..], &flow[..]))).collect();
+        let flows: Option<Vec<(&Instants, &[f64])>> =
+            stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s, &flow[..]))).collect();
         let flow = flows.map(|flows| Flow::new(&flows).map(Arc::new)).transpose()?;
         let stretches = stretches.into_iter().map(Arc::new).collect();
         let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
@@ -174,8 +181,8 @@ impl Observations {
 
     /// First and last instant, s.
     pub fn ends_s(&self) -> [f64; 2] {
-        let first = self.stretches.first().map_or(0.0, |s| s.time_s[0]);
-        let last = self.stretches.last().map_or(1.0, |s| s.time_s[s.len() - 1]);
+        let first = self.stretches.first().map_or(0.0, |s| s.ends_s()[0]);
+        let last = self.stretches.last().map_or(1.0, |s| s.ends_s()[1]);
         [first, last]
     }
 
@@ -190,7 +197,8 @@ impl Observations {
             let (sum, count) = self
                 .stretches
                 .iter()
-                .fold((0.0, 0), |(sum, count), s| (sum + s.time_s[s.len() - 1] - s.time_s[0], count + s.len() - 1));
+                .map(|s| (s.ends_s(), s.len() - 1))
+                .fold((0.0, 0), |(sum, count), ([from_s, to_s], steps)| (sum + to_s - from_s, count + steps));
             sum / count as f64
         })
     }
@@ -242,8 +250,8 @@ impl Observations {
                 if from + length <= n {
                     let cut = from..from + length;
                     stretches.push(Arc::new(Stretch {
-                        time_s: stretch.time_s[cut.clone()].to_vec(),
-                        reading_c: [0, 1].map(|i| stretch.reading_c[i][cut.clone()].to_vec()),
+                        time_s: stretch.time_s.cut(cut.clone()),
+                        reading_c: [0, 1].map(|i| Arc::new(stretch.reading_c[i][cut.clone()].to_vec())),
                         masked: [0, 1].map(|i| stretch.masked[i][cut.clone()].to_vec()),
                         flow: None,
                         member: stretch.member,

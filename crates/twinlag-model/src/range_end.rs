@@ -26,6 +26,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::defects::ChannelNoise;
+use crate::instants::Instants;
 use crate::observations::{Observations, Stretch};
 use crate::policy::Policy;
 
@@ -291,12 +292,12 @@ fn elsewhere(judge: &Judge<'_>, departures: &[Vec<f64>], lengths: &[usize], plac
 /// `(1 + τ_zero s)/(1 + τ_pole s)` of readings on straight lines between samples; exact for these.
 ///
 /// - `start_c`: what comes out at the first sample
-fn through(time_s: &[f64], y: &[f64], zero_s: f64, pole_s: f64, start_c: f64) -> Vec<f64> {
+fn through(time_s: &Instants, y: &[f64], zero_s: f64, pole_s: f64, start_c: f64) -> Vec<f64> {
     let direct = zero_s / pole_s;
     let mut lagged = if direct < 1.0 { (start_c - direct * y[0]) / (1.0 - direct) } else { y[0] };
     let mut out = vec![direct * y[0] + (1.0 - direct) * lagged];
     for k in 1..y.len() {
-        let step = (time_s[k] - time_s[k - 1]) / pole_s;
+        let step = (time_s.at(k) - time_s.at(k - 1)) / pole_s;
         let kept = (-step).exp();
         // The mean of the straight line as the lag weighs it.
         let late = -(-step).exp_m1() / step;

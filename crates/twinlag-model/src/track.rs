@@ -122,7 +122,7 @@ pub fn track(
     let has_delay = constant.model.parameters().any(|p| p.is_lateness);
     let selection = if has_delay { prepared.everything.clone() } else { prepared.without_delay() };
     let constant = constant.model.fit(&constant.theta, &prepared.observations, &selection, Effort::Finish);
-    let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+    let time_s: Vec<f64> = prepared.observations.stretches.iter().flat_map(|s| s.time_s.iter()).collect();
     let search = Tracker { prepared: &prepared, selection: &selection, time_s: &time_s };
     let mut best = (Change::Constant, constant.clone(), score(&constant, 0.0));
     let mut consider = |change: Change, fitted: Fitted, numbers: f64| {

@@ -7,6 +7,8 @@
 //! that the stamps count as irregular, the one that all steps are multiples of. Between the rows
 //! that are there, straight lines stand in for those that are not; they are no readings.
 
+use std::sync::Arc;
+
 use crate::record::Record;
 use crate::sampling::SamplingKind;
 
@@ -56,8 +58,8 @@ pub struct Stretch {
     /// stamped.
     pub time_s: Vec<f64>,
     /// Readings of both channels, °C; on a straight line between its neighbours where a sample is
-    /// missing.
-    pub reading_c: [Vec<f64>; 2],
+    /// missing. Shared with the record where it is all of that.
+    pub reading_c: [Arc<Vec<f64>>; 2],
     /// The flow, in the unit of its column, if the record has one; on straight lines where a sample
     /// is missing.
     pub flow: Option<Vec<f64>>,
@@ -85,7 +87,9 @@ impl Stretch {
             Some(period_s) => (0..rows.len()).map(|k| first_s + k as f64 * period_s).collect(),
             None => rows.iter().flatten().map(|&row| record.time_s[row]).collect(),
         };
-        let reading_c = [&record.t1_c, &record.t2_c].map(|values| bridged(&rows, values));
+        let is_all = rows.len() == record.len() && rows.iter().all(Option::is_some);
+        let reading = |values: &Arc<Vec<f64>>| if is_all { values.clone() } else { Arc::new(bridged(&rows, values)) };
+        let reading_c = [reading(&record.t1_c), reading(&record.t2_c)];
         let flow = record.flow.as_ref().map(|flow| bridged(&rows, flow));
         Self { rows, time_s, reading_c, flow }
     }
@@ -228,7 +232,7 @@ mod tests {
         assert_eq!(grid.stretches.len(), 1);
         let stretch = &grid.stretches[0];
         assert_eq!((stretch.len(), stretch.missing().iter().filter(|m| **m).count()), (60, 20));
-        for (k, (t, value)) in stretch.time_s.iter().zip(&stretch.reading_c[0]).enumerate() {
+        for (k, (t, value)) in stretch.time_s.iter().zip(stretch.reading_c[0].iter()).enumerate() {
             assert!((value - (20.0 + 0.5 * t)).abs() < 1e-13 * 50.0, "sample {k}: {value}");
         }
     }

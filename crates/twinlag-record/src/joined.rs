@@ -1,5 +1,7 @@
 //! Several records one after the other, for pictures and summaries of all of them.
 
+use std::sync::Arc;
+
 use crate::record::Record;
 
 impl Record {
@@ -33,8 +35,8 @@ impl Record {
             let rows = out.len();
             out.source = format!("{}, {}", out.source, record.source);
             out.time_s.extend(record.time_s.iter().map(|t| t + later_s));
-            out.t1_c.extend_from_slice(&record.t1_c);
-            out.t2_c.extend_from_slice(&record.t2_c);
+            Arc::make_mut(&mut out.t1_c).extend_from_slice(&record.t1_c);
+            Arc::make_mut(&mut out.t2_c).extend_from_slice(&record.t2_c);
             out.reference_c = both(out.reference_c, record.reference_c.as_deref());
             out.flow = both(out.flow, record.flow.as_deref());
             out.missing += record.missing;

@@ -6,6 +6,7 @@
 use std::io::{Read, Write};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
@@ -64,10 +65,10 @@ pub struct Record {
     pub channels: [String; 2],
     /// Strictly increasing, from 0, as stamped.
     pub time_s: Vec<f64>,
-    /// First sensor; NaN where missing.
-    pub t1_c: Vec<f64>,
-    /// Second sensor; NaN where missing.
-    pub t2_c: Vec<f64>,
+    /// First sensor; NaN where missing. What is made of the record may share it.
+    pub t1_c: Arc<Vec<f64>>,
+    /// Second sensor; NaN where missing. What is made of the record may share it.
+    pub t2_c: Arc<Vec<f64>>,
     /// A trusted temperature, if one was chosen; NaN where missing.
     pub reference_c: Option<Vec<f64>>,
     /// A flow velocity or density in the unit of its column, if one was chosen; positive in every
@@ -339,8 +340,8 @@ impl Record {
             source,
             channels: names,
             time_s,
-            t1_c,
-            t2_c,
+            t1_c: Arc::new(t1_c),
+            t2_c: Arc::new(t2_c),
             reference_c,
             flow: None,
             missing,

@@ -313,8 +313,8 @@ fn vectors_make_the_same_record_as_their_file() {
         source: "vectors".to_owned(),
         names: ["T1", "T2"].map(str::to_owned),
         time_s: want.time_s.clone(),
-        t1_c: want.t1_c.clone(),
-        t2_c: want.t2_c.clone(),
+        t1_c: want.t1_c.to_vec(),
+        t2_c: want.t2_c.to_vec(),
         reference_c: None,
     };
     let got = Record::from_channels(channels, SamplingChoice::Auto).unwrap();

@@ -1,6 +1,6 @@
 //! The rows of a record as the model of a rig takes them.
 
-use twinlag_diagnose::{KnownTimeConstant, Masked, Observations, Settings, Stretch};
+use twinlag_diagnose::{Instants, KnownTimeConstant, Masked, Observations, Settings, Stretch};
 use twinlag_record::{Grid, Record};
 
 use twinlag_cross_relation::Parameter;
@@ -75,15 +75,20 @@ pub(crate) fn observations(record: &Record) -> Result<Observations, Error> {
 }
 
 fn on(grid: Grid) -> Result<Observations, Error> {
+    let period_s = grid.period_s;
     let stretches = grid.stretches.into_iter().map(|stretch| {
         let missing = stretch.missing();
-        let out = Stretch::new(stretch.time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
+        let time_s = match (period_s, stretch.time_s.first()) {
+            (Some(period_s), Some(first_s)) => Instants::even(*first_s, period_s, stretch.time_s.len()),
+            _ => Instants::from(stretch.time_s),
+        };
+        let out = Stretch::sharing(time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
         match stretch.flow {
             Some(flow) => out.with_flow(flow),
             None => out,
         }
     });
-    Ok(Observations::new(stretches.collect(), grid.period_s)?)
+    Ok(Observations::new(stretches.collect(), period_s)?)
 }
 
 /// What the options say of noise and time constants beforehand, as settings of a diagnosis.

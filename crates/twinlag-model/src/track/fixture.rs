@@ -61,7 +61,7 @@ impl Fixture {
         let settings = Settings { noise_std_k: Some([NOISE_K; 2]), ..Settings::default() };
         let Known { prepared, fitted, .. } = Known::of(&observations, &settings, &[]).expect("a sound record");
         let selection = prepared.everything.clone();
-        let time_s = observations.stretches[0].time_s.clone();
+        let time_s = observations.stretches[0].time_s.iter().collect();
         Self { prepared, selection, time_s, constant: fitted }
     }
 

@@ -389,14 +389,14 @@ pub(super) fn is_close(
     let reach = (3.0 * knot_s / observations.step_s()) as usize;
     // The middle of the B-spline, which reaches over four intervals.
     let centre_s = ends_s[0] + (middle as f64 - 1.0) * knot_s;
-    let centre = observations.stretches.iter().flat_map(|s| &s.time_s).take_while(|t| **t < centre_s).count();
+    let centre = observations.stretches.iter().flat_map(|s| s.time_s.iter()).take_while(|t| *t < centre_s).count();
     let part = piece(observations, selection, centre.min(samples - 1), reach.min(samples));
     let (observations, selection) = part.as_ref().map_or((observations, selection), |(o, s)| (o, s));
     let middle_s = 0.5 * observations.ends_s().iter().sum::<f64>();
     let exact = Given::shared(Arc::new(move |time_s| bump(time_s).re), true, false);
     let at: Vec<f64> = theta.iter().copied().chain([0.0; 3]).collect();
     let lin = with_both(model, middle_s, false).with(exact).linearised(&at, observations, selection);
-    let time_s: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter().copied()).collect();
+    let time_s: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter()).collect();
     let [level, line, exact] = [0, 1, 2].map(|k| &lin.columns[theta.len() + k]);
     let (mut off, mut all) = (0.0, 0.0);
     for (i, sample) in lin.samples.iter().enumerate() {

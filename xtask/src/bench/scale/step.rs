@@ -187,7 +187,7 @@ fn filter(record: &Record) -> Result<()> {
     let terms = [Term::Rough { std_k: 8.0, corner_hz: 5.0 }];
     let stream = Stream::<STATES>::new(&rig, 300.0, &terms, record.sampling.period_s);
     let mut stream = stream.context("the states are enough")?;
-    for (t1_c, t2_c) in record.t1_c.iter().zip(&record.t2_c) {
+    for (t1_c, t2_c) in record.t1_c.iter().zip(record.t2_c.iter()) {
         black_box(stream.push([Some(*t1_c), Some(*t2_c)]));
     }
     Ok(())
