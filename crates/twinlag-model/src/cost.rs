@@ -328,6 +328,7 @@ mod tests {
     use super::*;
     use crate::disagreement::Window;
     use crate::effect::{Context, Identifier, Parameter, Shared, candidates, varying};
+    use crate::instants::Instants;
     use crate::prepare::Prepared;
     use crate::settings::Settings;
 
@@ -383,11 +384,11 @@ mod tests {
         let cut = |samples: Range<usize>| {
             let reading_c = [0, 1].map(|i| all.reading_c[i][samples.clone()].to_vec());
             let flow = samples.clone().map(|k| 5.0 + (0.05 * k as f64).sin()).collect();
-            Stretch::new(all.time_s[samples].to_vec(), reading_c).with_flow(flow)
+            Stretch::new(all.time_s.of(samples).collect(), reading_c).with_flow(flow)
         };
         let mut stretches = vec![cut(0..140), cut(142..163), cut(165..SAMPLES)];
         if observations.period_s.is_none() {
-            stretches[1].time_s = (142..163).map(f64::from).collect();
+            stretches[1].time_s = Instants::even(142.0, 1.0, 21);
         }
         Observations::new(stretches, observations.period_s).expect("a record of 233 samples")
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use twinlag_bias::{COARSE_STEP_NOISE_RATIO, estimate_noise};
 use twinlag_cross_relation::{Readings, Segment, Steps};
-use twinlag_transform::{Forward, fast_length, hann};
+use twinlag_transform::{doubled_power, fast_length, hann};
 
 use crate::fit::Fitted;
 use crate::implied::{Evaluation, Part, median};
@@ -199,12 +199,11 @@ fn tone(values: impl Iterator<Item = (usize, f64)>, omega: f64) -> Complex64 {
 pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize) -> bool, policy: &Policy) -> Vec<f64> {
     let Some(period_s) = observations.period_s else { return Vec::new() };
     let Evaluation { residual, samples, .. } = fitted.model.evaluate(&fitted.theta, observations);
-    // What does not count is zero; twice the length, so that no frequency is far from a bin.
+    // What does not count is zero.
     let Some(last) = samples.iter().filter(|samples| !samples.is_empty()).map(|samples| samples.end - 1).max() else {
         return Vec::new();
     };
-    let n = padded_length(2 * (last + 1));
-    let mut run = vec![0.0; n];
+    let mut run = vec![0.0; padded_length(last + 1)];
     let mut count = 0usize;
     for (r, sample) in residual.iter().zip(samples.into_iter().flatten()) {
         if holds(sample) {
@@ -216,11 +215,10 @@ pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize)
     if count < 64 {
         return Vec::new();
     }
-    let plan = Forward::once(n);
-    let mut spectrum = vec![Complex64::ZERO; plan.bins()];
-    plan.transform_into(&mut run, &mut spectrum, &mut Vec::new());
-    drop((plan, run));
-    let power: Vec<f64> = spectrum.into_iter().map(|x| x.norm_sqr() / count as f64).collect();
+    let mut power = doubled_power(&run);
+    power.iter_mut().for_each(|power| *power /= count as f64);
+    let n = 2 * run.len();
+    drop(run);
     let mut found: HashMap<usize, f64> = HashMap::new();
     for bin in 3..power.len().saturating_sub(1) {
         let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];
@@ -251,10 +249,11 @@ pub fn lines(fitted: &Fitted, observations: &Observations, holds: impl Fn(usize)
     out.into_iter().map(|(bin, _)| bin as f64 / (n as f64 * period_s)).collect()
 }
 
-/// Values to transform of a record with so many, zeros after them counted: of a long one no more than a thirty-second more, so
-/// that no large prime factor takes several times the memory.
+/// Values to transform of a record with so many, zeros after them counted, an even number: of a long one no more than a
+/// thirty-second more, so that no large prime factor takes several times the memory.
 fn padded_length(samples: usize) -> usize {
-    if samples <= MAX_TRANSFORMED_AS_IT_IS { samples } else { fast_length(samples + samples / 32) }
+    let pairs = samples.div_ceil(2);
+    2 * if samples <= MAX_TRANSFORMED_AS_IT_IS { pairs } else { fast_length(pairs + pairs / 32) }
 }
 
 /// Amplitude of a line at `omega` radians per sample in the difference of both inferred inputs, over that in their mean: 2 where
@@ -277,10 +276,11 @@ mod tests {
         for samples in [600, MAX_TRANSFORMED_AS_IT_IS] {
             assert_eq!(padded_length(samples), samples);
         }
+        assert_eq!(padded_length(601), 602);
         for samples in [MAX_TRANSFORMED_AS_IT_IS + 1, 1_999_924, 19_999_870] {
             let padded = padded_length(samples);
-            assert!((samples..=samples + samples / 32).contains(&padded), "{samples}: {padded}");
-            assert_eq!(fast_length(padded), padded);
+            assert!((samples..=samples + samples / 32 + 2).contains(&padded), "{samples}: {padded}");
+            assert_eq!((fast_length(padded), padded % 2), (padded, 0));
         }
     }
 }

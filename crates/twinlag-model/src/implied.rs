@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::instants::Instants;
 use crate::chain::Chain;
 use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variances};
 use crate::inverse::Inverse;
@@ -49,7 +50,7 @@ pub(crate) struct Details {
     /// Whitened residual.
     pub(crate) residual: Vec<f64>,
     /// Its instants, s.
-    pub(crate) time_s: Vec<f64>,
+    pub(crate) time_s: Instants,
     /// Whether it says anything: one for each masked reading does not.
     pub(crate) is_informed: Vec<bool>,
     /// Its samples, as [`Evaluation`] has them.
@@ -135,7 +136,7 @@ struct Whitened {
     rows: [Rows<f64>; 2],
     variances: [Variance; 2],
     residual: Vec<f64>,
-    time_s: Vec<f64>,
+    time_s: Instants,
     samples: Range<usize>,
     factor: Factor,
 }
@@ -173,7 +174,7 @@ impl Plant {
             let mut weighted = residual.clone();
             factor.unwhiten_transposed(&mut weighted);
             append(&mut out.residual, residual);
-            append(&mut out.time_s, time_s);
+            out.time_s.append(time_s);
             out.samples.push(samples);
             let skipped = self.extra.len();
             out.parts.push(Part { stretch, rows, variances, weighted, inferred, skipped, before });
@@ -202,14 +203,18 @@ impl Plant {
         let mut residual = std::mem::take(&mut disagreement.values);
         // What is as long as the record, and not needed any more, goes.
         let chains = std::mem::replace(&mut disagreement.inverse, Inverse::empty()).chains;
-        let time_s = chains[0].times_s()[..residual.len()].to_vec();
+        let first_s = chains[0].times_s()[0];
+        let first = first_sample(stretch, first_s, step_s);
+        let time_s = match observations.period_s {
+            Some(_) => stretch.time_s.cut(first..first + residual.len()),
+            None => chains[0].times_s()[..residual.len()].to_vec().into(),
+        };
         let inferred = undifferenced.unwrap_or(chains).map(|Chain { value, rows, .. }| Inferred { value, rows });
         let variances = reading_variances(self.noise_std_k, stretch, observations.swing_k());
         let mut factor = Factor::empty();
         factor.compute(&disagreement.sources(&variances, 0), residual.len(), None, None);
         factor.whiten(&mut residual, 0, 0);
-        let start = before + first_sample(stretch, time_s[0], step_s);
-        let samples = start..start + residual.len();
+        let samples = before + first..before + first + residual.len();
         Whitened { inferred, rows: disagreement.reading_rows, variances, residual, time_s, samples, factor }
     }
 
@@ -289,7 +294,7 @@ mod tests {
             assert_eq!(evaluation.sample().count(), evaluation.residual.len());
             assert_eq!(evaluation.stretches().collect::<Vec<_>>(), details.stretches().collect::<Vec<_>>());
             let instants: Vec<f64> = observations.stretches.iter().flat_map(|s| s.time_s.iter()).collect();
-            for (sample, time_s) in details.sample().zip(&details.time_s) {
+            for (sample, time_s) in details.sample().zip(details.time_s.iter()) {
                 assert!((instants[sample] - time_s).abs() <= 0.5, "sample {sample} at {time_s} s");
             }
             for (part, places) in details.parts.iter().zip(details.stretches()) {

@@ -24,6 +24,12 @@ enum Kind {
     Stamped(Vec<f64>),
 }
 
+impl Default for Instants {
+    fn default() -> Self {
+        Self::from(Vec::new())
+    }
+}
+
 impl From<Vec<f64>> for Instants {
     fn from(time_s: Vec<f64>) -> Self {
         Self(Kind::Stamped(time_s))
@@ -101,6 +107,15 @@ impl Instants {
                 Self(Kind::Even { origin_s: origin_s + by_s, step_s: *step_s, places: places.clone() })
             }
             Kind::Stamped(time_s) => Self(Kind::Stamped(time_s.iter().map(|t| t + by_s).collect())),
+        }
+    }
+
+    /// Puts others behind these.
+    pub(crate) fn append(&mut self, others: Self) {
+        if self.is_empty() {
+            *self = others;
+        } else {
+            *self = Self::from(self.iter().chain(others.iter()).collect::<Vec<f64>>());
         }
     }
 

@@ -4,6 +4,8 @@
 //! stands for the input is a reading with its estimated noise taken off, `ŷ = y − Σ Bᵀ V⁻¹ u`: the projection that makes it
 //! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
+use std::borrow::Cow;
+
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use twinlag_cross_relation::{ResidualTest, TestName};
 use twinlag_transform::{Complex64, Forward, Tapered, fast_length, hann};
@@ -24,9 +26,12 @@ const GAS_POWER_RATIO: f64 = 3.0;
 /// Parts of the record whose energies are compared.
 const ENERGY_PARTS: usize = 20;
 
-/// Residual and estimated input where they count, in unbroken runs.
+/// Residual and estimated input where they count and say anything, in unbroken runs.
 pub(crate) struct Pairs {
-    runs: Vec<(Vec<f64>, Vec<f64>)>,
+    /// Runs of the residual.
+    pub(crate) residual: Vec<Vec<f64>>,
+    /// Runs of the estimated input, as long as those of the residual.
+    input: Vec<Vec<f64>>,
     /// White noise of the reading that stands for the input, K.
     noise_std_k: f64,
 }
@@ -39,36 +44,42 @@ impl Pairs {
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel =
             usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
-        let mut cleaned = vec![f64::NAN; observations.samples()];
-        for part in &details.parts {
+        let (mut residual, mut input): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
+        let mut last = None;
+        for ((part, samples), places) in details.parts.iter().zip(&details.samples).zip(details.stretches()) {
             let stretch = &observations.stretches[part.stretch];
             let noise = part.noise_of(channel, stretch.len());
-            for (k, (y, n)) in stretch.reading_c[channel].iter().zip(noise).enumerate() {
-                cleaned[part.before + k] = y - n;
+            let reading_c = &stretch.reading_c[channel];
+            for (place, sample) in places.zip(samples.clone()).filter(|(_, sample)| selection.holds(*sample)) {
+                if last.replace(sample).is_none_or(|last| sample != last + 1) {
+                    for runs in [&mut residual, &mut input] {
+                        runs.push(Vec::with_capacity(samples.end - sample));
+                    }
+                }
+                // A masked reading takes one residual away; those around it are white all the same.
+                if details.is_informed[place] {
+                    let k = sample - part.before;
+                    residual.last_mut().expect("begun").push(details.residual[place]);
+                    input.last_mut().expect("begun").push(reading_c[k] - noise[k]);
+                }
             }
         }
-        let mut runs: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
-        let mut last = None;
-        for (k, sample) in details.sample().enumerate().filter(|(_, s)| selection.holds(*s)) {
-            if last.is_none_or(|l| sample != l + 1) {
-                runs.push((Vec::new(), Vec::new()));
-            }
-            last = Some(sample);
-            if details.is_informed[k] {
-                let run = runs.last_mut().expect("begun");
-                run.0.push(details.residual[k]);
-                run.1.push(cleaned[sample]);
-            }
+        for run in residual.iter_mut().chain(&mut input) {
+            run.shrink_to_fit();
         }
-        Self { runs, noise_std_k: plant.noise_std_k[channel] }
+        Self { residual, input, noise_std_k: plant.noise_std_k[channel] }
     }
 
-    fn residual(&self) -> impl Iterator<Item = f64> + '_ {
-        self.runs.iter().flat_map(|r| r.0.iter().copied())
+    fn runs(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        self.residual.iter().map(Vec::as_slice).zip(self.input.iter().map(Vec::as_slice))
     }
+}
 
-    fn input(&self) -> impl Iterator<Item = f64> + '_ {
-        self.runs.iter().flat_map(|r| r.1.iter().copied())
+/// All values of some runs, one after the other.
+fn joined(runs: &[Vec<f64>]) -> Cow<'_, [f64]> {
+    match runs {
+        [run] => Cow::Borrowed(run),
+        runs => Cow::Owned(runs.concat()),
     }
 }
 
@@ -106,7 +117,7 @@ pub(crate) fn estimated_gas(fitted: &Fitted, parts: Vec<Part>, observations: &Ob
 /// - `pairs`: of the fitted model
 /// - `is_coarse`: whether a converter is, whose rounding has no tails
 pub(crate) fn tests(fitted: &Fitted, pairs: &Pairs, observations: &Observations, is_coarse: bool) -> Vec<ResidualTest> {
-    let r: Vec<f64> = pairs.residual().collect();
+    let r = joined(&pairs.residual);
     if r.len() < 100 {
         return Vec::new();
     }
@@ -140,7 +151,7 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
     let mut cross = vec![Complex64::default(); bins];
     let (mut of_r, mut of_x) = (vec![0.0; bins], vec![0.0; bins]);
     let mut count = 0.0_f64;
-    for (r, x) in &pairs.runs {
+    for (r, x) in pairs.runs() {
         for (r, x) in tapered.halves(r).zip(tapered.halves(x)) {
             let transform = |v: &[f64]| {
                 // Both ends on a straight line: a slope would leak into every bin.
@@ -175,7 +186,7 @@ fn coherence(pairs: &Pairs) -> Option<ResidualTest> {
 /// The residual itself against the level of the input, in ten classes of equal size: a static error shows as a mean that differs.
 fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
     const CLASSES: usize = 10;
-    let x: Vec<f64> = pairs.input().collect();
+    let x = joined(&pairs.input);
     let mut order: Vec<u32> = (0..x.len() as u32).collect();
     order.sort_by(|&a, &b| x[a as usize].total_cmp(&x[b as usize]));
     drop(x);
@@ -198,21 +209,17 @@ fn level(pairs: &Pairs, r: &[f64]) -> Option<ResidualTest> {
 
 /// Correlation of the residual's energy with how fast the input changes.
 fn rate(pairs: &Pairs, r: &[f64]) -> ResidualTest {
-    let slope: Vec<f64> = pairs
-        .runs
-        .iter()
-        .flat_map(|(_, x)| (0..x.len()).map(|k| (x[(k + 4).min(x.len() - 1)] - x[k.saturating_sub(4)]).abs()))
-        .collect();
-    let energy: Vec<f64> = r.iter().map(|r| r * r).collect();
-    let z = correlation(&energy, &slope) * (r.len() as f64).sqrt();
+    let change_k = |x: &[f64], k: usize| (x[(k + 4).min(x.len() - 1)] - x[k.saturating_sub(4)]).abs();
+    let pace = pairs.input.iter().flat_map(|x| (0..x.len()).map(|k| change_k(x, k)));
+    let z = correlation(r.iter().map(|r| r * r), pace, r.len() as f64) * (r.len() as f64).sqrt();
     test(TestName::Rate, z, None, two_sided(z))
 }
 
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let n = a.len() as f64;
-    let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
+/// Correlation of `n` values with as many others.
+fn correlation(a: impl Iterator<Item = f64> + Clone, b: impl Iterator<Item = f64> + Clone, n: f64) -> f64 {
+    let (ma, mb) = (a.clone().sum::<f64>() / n, b.clone().sum::<f64>() / n);
     let (mut ab, mut aa, mut bb) = (0.0, 0.0, 0.0);
-    for (a, b) in a.iter().zip(b) {
+    for (a, b) in a.zip(b) {
         ab += (a - ma) * (b - mb);
         aa += (a - ma) * (a - ma);
         bb += (b - mb) * (b - mb);
@@ -241,7 +248,7 @@ fn time(r: &[f64]) -> ResidualTest {
 /// expectation it exceeds `x` times their mean with probability `(1 + x/m)^−m`.
 fn lines(pairs: &Pairs) -> Option<ResidualTest> {
     const NEIGHBOURS: usize = 30;
-    let run = pairs.runs.iter().map(|r| &r.0).max_by_key(|r| r.len())?;
+    let run = pairs.residual.iter().max_by_key(|r| r.len())?;
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }

@@ -9,7 +9,7 @@ use twinlag_transform::Forward;
 
 use crate::disagreement::Evaluator;
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
-use crate::implied::{Details, is_informed};
+use crate::implied::is_informed;
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::{Extra, Place, Plant};
@@ -319,12 +319,6 @@ pub fn fit_noise(
         likelihood: cost.likelihood(&x, Half::Both),
         held_out: cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even),
     }
-}
-
-/// Unbroken runs of the residuals that count and say anything.
-pub(crate) fn runs(details: &Details, holds: impl Fn(usize) -> bool) -> Vec<Vec<f64>> {
-    let pairs = details.residual.iter().copied().zip(details.is_informed.iter().copied());
-    runs_of(details.sample().zip(pairs), holds)
 }
 
 /// Runs of samples, each with its residual and whether this says anything.

@@ -16,7 +16,7 @@ use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::residual::Pairs;
 use crate::selection::Selection;
-use crate::spectrum::{Bands, runs};
+use crate::spectrum::Bands;
 use crate::trace::Trace;
 
 /// Whether a time constant is shorter than the samples resolve, or as long as the record. One that is known need not be
@@ -151,16 +151,15 @@ impl Left {
         policy: &Policy,
     ) -> Self {
         let details = fitted.model.details(&fitted.theta, observations);
-        let residual_runs = runs(&details, |s| selection.holds(s));
-        let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
-        let mut tests = residual_tests(&residual_runs, fitted.model.free_count(), level_std);
-        let count: usize = residual_runs.iter().map(Vec::len).sum();
-        let dof = count.saturating_sub(fitted.model.free_count()).max(1);
-        let chi2_per_dof = residual_runs.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
-        let bands = Bands::of(&residual_runs);
-        drop(residual_runs);
         let pairs = Pairs::of(fitted, &details, observations, selection);
+        // What is as long as the record goes as soon as it can.
+        let bands = Bands::of(&pairs.residual);
         let trace = Trace::of(fitted, details, &bands, observations, selection, policy);
+        let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
+        let mut tests = residual_tests(&pairs.residual, fitted.model.free_count(), level_std);
+        let count: usize = pairs.residual.iter().map(Vec::len).sum();
+        let dof = count.saturating_sub(fitted.model.free_count()).max(1);
+        let chi2_per_dof = pairs.residual.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
         let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
         tests.extend(crate::residual::tests(fitted, &pairs, observations, is_coarse));
         Self { tests, chi2_per_dof, trace }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::blocks;
 use crate::fit::Fitted;
 use crate::implied::Details;
+use crate::instants::Instants;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::{Selection, ranges};
@@ -32,24 +33,24 @@ impl Line {
     /// with NaN then, but for the first.
     ///
     /// - `stretches`: their places among the values
-    fn thinned(time_s: &[f64], value: Vec<f64>, stretches: impl Iterator<Item = Range<usize>>) -> Self {
+    fn thinned(time_s: &Instants, value: Vec<f64>, stretches: impl Iterator<Item = Range<usize>>) -> Self {
         if value.len() <= MAX_POINTS {
-            return Self { time_s: time_s.to_vec(), value };
+            return Self { time_s: time_s.iter().collect(), value };
         }
         let together = value.len().div_ceil(MAX_POINTS / 2);
         let mut out = Self::default();
         for Range { start, end } in stretches.filter(|stretch| !stretch.is_empty()) {
             if !out.value.is_empty() {
-                out.push(time_s[start], f64::NAN);
+                out.push(time_s.at(start), f64::NAN);
             }
             for first in (start..end).step_by(together) {
                 let neighbours = first..(first + together).min(end);
                 let by_value = |a: &usize, b: &usize| value[*a].total_cmp(&value[*b]);
                 let extremes = [neighbours.clone().min_by(by_value), neighbours.max_by(by_value)];
                 let [one, other] = extremes.map(|k| k.expect("a neighbour"));
-                out.push(time_s[one.min(other)], value[one.min(other)]);
+                out.push(time_s.at(one.min(other)), value[one.min(other)]);
                 if one != other {
-                    out.push(time_s[one.max(other)], value[one.max(other)]);
+                    out.push(time_s.at(one.max(other)), value[one.max(other)]);
                 }
             }
         }
@@ -75,8 +76,8 @@ pub struct ResidualPart {
 }
 
 impl ResidualPart {
-    fn of(time_s: &[f64], residual: &[f64], range: Range<usize>) -> Self {
-        let (ends_s, count) = ([time_s[range.start], time_s[range.end - 1]], range.len());
+    fn of(time_s: &Instants, residual: &[f64], range: Range<usize>) -> Self {
+        let (ends_s, count) = ([time_s.at(range.start), time_s.at(range.end - 1)], range.len());
         Self { ends_s, count, mean_square: residual[range].iter().map(|r| r * r).sum::<f64>() / count as f64 }
     }
 }
@@ -133,7 +134,7 @@ impl Trace {
 }
 
 /// The one of [`NAMED_PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
-fn worst(time_s: &[f64], residual: &[f64]) -> Option<ResidualPart> {
+fn worst(time_s: &Instants, residual: &[f64]) -> Option<ResidualPart> {
     let n = residual.len();
     let parts = (0..NAMED_PARTS).map(|i| i * n / NAMED_PARTS..(i + 1) * n / NAMED_PARTS);
     let parts = parts.filter(|part| !part.is_empty()).map(|part| ResidualPart::of(time_s, residual, part));
@@ -169,7 +170,7 @@ mod tests {
     fn the_worst_part_is_a_tenth() {
         let worst_of = |residual: Vec<f64>| {
             let time_s: Vec<f64> = (0..residual.len()).map(|k| k as f64).collect();
-            worst(&time_s, &residual).map(|part| (part.ends_s, part.count))
+            worst(&time_s.into(), &residual).map(|part| (part.ends_s, part.count))
         };
         let mut residual = vec![1.0; 1009];
         residual[1008] = 3.0;
@@ -185,7 +186,7 @@ mod tests {
         let n = 3 * MAX_POINTS + 17;
         let time_s: Vec<f64> = (0..n).map(|k| if k < 70_000 { k as f64 } else { k as f64 + 500.0 }).collect();
         let value: Vec<f64> = (0..n).map(|k| ((k * k * 7 + k) as f64 * 2.399).sin()).collect();
-        let line = Line::thinned(&time_s, value.clone(), [0..70_000, 70_000..n].into_iter());
+        let line = Line::thinned(&time_s.clone().into(), value.clone(), [0..70_000, 70_000..n].into_iter());
         assert!(line.value.len() <= MAX_POINTS + 2, "{}", line.value.len());
         assert!(line.time_s.is_sorted());
         let points: Vec<(u64, u64)> =
@@ -198,7 +199,7 @@ mod tests {
         }
         let gaps: Vec<f64> = line.time_s.iter().zip(&line.value).filter(|(_, v)| v.is_nan()).map(|(t, _)| *t).collect();
         assert_eq!(gaps, [70_500.0]);
-        let short = Line::thinned(&time_s[..900], value[..900].to_vec(), std::iter::once(0..900));
+        let short = Line::thinned(&time_s[..900].to_vec().into(), value[..900].to_vec(), std::iter::once(0..900));
         assert_eq!((&short.time_s[..], &short.value[..]), (&time_s[..900], &value[..900]));
     }
 }

@@ -17,12 +17,14 @@
 //! assert!((twelve_times[1] / 12.0 - 0.5).abs() < 1e-15);
 //! ```
 
+mod doubled;
 mod fourier;
 mod kept;
 mod length;
 mod sine;
 mod taper;
 
+pub use doubled::doubled_power;
 pub use fourier::{Forward, Inverse};
 pub use length::fast_length;
 pub use num_complex::Complex64;

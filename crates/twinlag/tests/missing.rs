@@ -29,7 +29,7 @@ fn without(record: &Record, is_missing: impl Fn(usize) -> bool) -> Record {
         names: record.channels.clone(),
         time_s: record.time_s.clone(),
         t1_c,
-        t2_c: record.t2_c.clone(),
+        t2_c: record.t2_c.to_vec(),
         reference_c: None,
     };
     Record::from_channels(channels, SamplingChoice::Auto).expect("a sound record")
@@ -74,8 +74,8 @@ fn even_stamps_taken_as_stamped_give_the_same() {
         source: "a rig".into(),
         names: whole.channels.clone(),
         time_s: whole.time_s.clone(),
-        t1_c: whole.t1_c.clone(),
-        t2_c: whole.t2_c.clone(),
+        t1_c: whole.t1_c.to_vec(),
+        t2_c: whole.t2_c.to_vec(),
         reference_c: None,
     };
     let as_stamped = Record::from_channels(channels, SamplingChoice::AsStamped).expect("a sound record");
