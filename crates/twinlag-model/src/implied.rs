@@ -3,11 +3,11 @@
 
 use std::ops::Range;
 
-use crate::instants::Instants;
 use crate::chain::Chain;
 use crate::disagreement::{Disagreement, first_sample, is_long_enough, reading_variances};
+use crate::instants::Instants;
 use crate::inverse::Inverse;
-use crate::observations::Observations;
+use crate::observations::{Observations, Stretch};
 use crate::plant::Plant;
 use crate::rows::Rows;
 use crate::whitening::{Factor, Variance};
@@ -170,7 +170,11 @@ impl Plant {
         let mut out = Details::default();
         self.each_whitened(observations, |stretch, before, whitened| {
             let Whitened { inferred, rows, variances, residual, time_s, samples, factor } = whitened;
-            out.is_informed.extend(is_informed(&(0..residual.len()).map(|k| factor.row(k)[0]).collect::<Vec<f64>>()));
+            if is_all_informed(&observations.stretches[stretch], observations.period_s.is_some()) {
+                out.is_informed.resize(out.is_informed.len() + residual.len(), true);
+            } else {
+                out.is_informed.extend(is_informed((0..residual.len()).map(|k| factor.row(k)[0]).collect()));
+            }
             let mut weighted = residual.clone();
             factor.unwhiten_transposed(&mut weighted);
             append(&mut out.residual, residual);
@@ -244,12 +248,17 @@ fn append(all: &mut Vec<f64>, values: Vec<f64>) {
     }
 }
 
+/// Whether every disagreement of a stretch says something: evenly spaced readings of which none is masked are as good as each other.
+pub(crate) fn is_all_informed(stretch: &Stretch, is_even: bool) -> bool {
+    is_even && !stretch.masked.iter().flatten().any(|is_masked| *is_masked)
+}
+
 /// Whether each of the disagreements of a stretch says anything.
 ///
 /// - `scales`: standard deviation of each, given those before it, K
-pub(crate) fn is_informed(scales: &[f64]) -> Vec<bool> {
-    let typical = median(scales.to_vec());
-    scales.iter().map(|scale| *scale < UNINFORMED_RATIO * typical).collect()
+pub(crate) fn is_informed(scales: Vec<f64>) -> Vec<bool> {
+    let typical = median(scales.clone());
+    scales.into_iter().map(|scale| scale < UNINFORMED_RATIO * typical).collect()
 }
 
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
@@ -265,7 +274,6 @@ mod tests {
     use super::*;
     use crate::effect::{Identifier, candidates};
     use crate::model::Model;
-    use crate::observations::Stretch;
     use crate::prepare::Prepared;
     use crate::settings::Settings;
 

@@ -9,7 +9,7 @@ use twinlag_transform::Forward;
 
 use crate::disagreement::Evaluator;
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
-use crate::implied::is_informed;
+use crate::implied::{is_all_informed, is_informed};
 use crate::model::Model;
 use crate::observations::Observations;
 use crate::plant::{Extra, Place, Plant};
@@ -349,13 +349,19 @@ impl Model {
     ) -> Vec<Vec<f64>> {
         let plant = self.plant(theta, observations);
         let mut evaluator = Evaluator::new(observations, plant.noise_std_k);
+        let is_even = observations.period_s.is_some();
+        let is_all = observations.stretches.iter().all(|stretch| is_all_informed(stretch, is_even));
         let mut scales = Vec::new();
-        evaluator.evaluate_with(&plant, |scale| scales.push(scale));
+        if is_all {
+            evaluator.evaluate(&plant);
+        } else {
+            evaluator.evaluate_with(&plant, |scale| scales.push(scale));
+        }
         let mut first = 0;
         let of_piece = evaluator.pieces.iter().flat_map(|piece| {
             let all = first..first + piece.count;
             first = all.end;
-            let informed = is_informed(&scales[all.clone()]);
+            let informed = if is_all { vec![true; piece.count] } else { is_informed(scales[all.clone()].to_vec()) };
             (piece.first_sample..).zip(evaluator.residual[all].iter().copied().zip(informed))
         });
         runs_of(of_piece, holds)

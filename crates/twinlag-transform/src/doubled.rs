@@ -33,7 +33,8 @@ pub fn doubled_power(values: &[f64]) -> Vec<f64> {
     let even = Forward::once(n).transform(values);
     power.iter_mut().step_by(2).zip(even).for_each(|(power, x)| *power = x.norm_sqr());
     let (first, second) = values.split_at(n / 2);
-    let turned = |(k, (a, b)): (usize, (&f64, &f64))| Complex64::new(*a, -b) * Complex64::cis(-PI * k as f64 / n as f64);
+    let turned =
+        |(k, (a, b)): (usize, (&f64, &f64))| Complex64::new(*a, -b) * Complex64::cis(-PI * k as f64 / n as f64);
     let mut odd: Vec<Complex64> = first.iter().zip(second).enumerate().map(turned).collect();
     FftPlanner::new().plan_fft_forward(n / 2).process(&mut odd);
     for (m, x) in odd.iter().enumerate() {
