@@ -134,6 +134,12 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
+    /// This effect where the time constants are others, s: of noise that has passed a sensor's lag. `None` of one that does not
+    /// depend on them.
+    fn beside(&self, _tau_s: [f64; 2]) -> Option<Shared> {
+        None
+    }
+
     /// Numbers that are reported beside the fitted ones.
     fn derived(&self) -> Vec<Derived> {
         Vec::new()

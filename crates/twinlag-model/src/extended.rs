@@ -107,8 +107,8 @@ impl Extended {
 }
 
 fn rig(plant: &Plant) -> Rig {
-    let extra = |place: Place| {
-        let found = plant.extra.iter().find(|e| e.place == place)?;
+    let extra = |is_there: &dyn Fn(Place) -> bool| {
+        let found = plant.extra.iter().find(|e| is_there(e.place))?;
         Some(Coloured { std_k: found.std_k, correlation_s: found.correlation_s })
     };
     let sensors = [0, 1].map(|i| {
@@ -119,10 +119,12 @@ fn rig(plant: &Plant) -> Rig {
             second_tau_s: sensor.second_tau_s.map(|tau_s| tau_s.re),
             slow: sensor.slow.map(|slow| SlowPath { share: slow.share.re, tau_s: slow.tau_s.re }),
             noise_std_k: plant.noise_std_k[i] / gain,
-            coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
+            coloured: extra(&|place| place == Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
         }
     });
-    Rig { sensors, delay_s: plant.delay_s.map_or(0.0, |delay_s| delay_s.re), clock: 0, mismatch: extra(Place::Gas) }
+    // Which of both gas temperatures is the gas's nobody knows: what they differ is shared.
+    let mismatch = extra(&|place| matches!(place, Place::Gas | Place::GasAt { .. }));
+    Rig { sensors, delay_s: plant.delay_s.map_or(0.0, |delay_s| delay_s.re), clock: 0, mismatch }
 }
 
 /// What each sensor does at each instant, where that changes.

@@ -67,6 +67,10 @@ impl Known {
         let mut prepared = Prepared::new(observations, settings)?;
         let mut model = Model::new(&settings.known, prepared.levels.std_k);
         model.is_frozen = true;
+        if effects.iter().any(|known| known.effect.about().follows_gas) {
+            let two_lags = model.fit_over_grid(&[], GRID_STARTS, &prepared.observations, &prepared.everything);
+            prepared.context.gas = two_lags.estimated_gas(&prepared.observations);
+        }
         let (mut rest, mut fitted_again) = (Vec::new(), Vec::new());
         for known in effects.iter().filter(|k| !k.effect.about().is_defect) {
             let effect = (known.effect.about().restore)(known, &prepared.context)?;

@@ -143,6 +143,11 @@ impl Weighting {
         gain * gain
     }
 
+    /// Whether there is a filter.
+    pub(crate) fn has_filter(&self) -> bool {
+        !self.taps.is_empty()
+    }
+
     /// Means over `half` values either way, fewer at the ends, where there is no filter.
     pub fn smooth_or_mean(&self, values: &[f64], half: usize) -> Vec<f64> {
         if !self.taps.is_empty() {

@@ -41,6 +41,8 @@ pub struct About {
     pub is_narrow: bool,
     /// Whether it makes the time constants change along the record.
     pub changes_time_constants: bool,
+    /// Whether it depends on the gas temperature, of which its candidates then need an estimate.
+    pub follows_gas: bool,
     /// Whether a filter can undo it sample by sample, as readings come.
     pub is_streamable: bool,
     /// Every form in which it may be added to a model of a record.
@@ -70,6 +72,7 @@ impl About {
             imitates_static: false,
             is_narrow: false,
             changes_time_constants: false,
+            follows_gas: false,
             is_streamable: false,
             candidates,
             restore: |known, context| Ok(described_by(known, (known.effect.about().candidates)(context))),
@@ -143,6 +146,13 @@ impl About {
     #[must_use]
     pub const fn changing_time_constants(mut self) -> Self {
         self.changes_time_constants = true;
+        self
+    }
+
+    /// It depends on the gas temperature.
+    #[must_use]
+    pub const fn following_gas(mut self) -> Self {
+        self.follows_gas = true;
         self
     }
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::flow::Flow;
+use crate::gas::Gas;
 use crate::records::Member;
 
 /// What is known of a record, and of the model so far, when effects are looked for.
@@ -35,6 +36,8 @@ pub struct Context {
     pub tau_s: [f64; 2],
     /// Flow, where it was measured and changes.
     pub flow: Option<Arc<Flow>>,
+    /// The gas temperature as the model so far has it, where it makes a difference.
+    pub gas: Option<Arc<Gas>>,
     /// Lines that stand out of the residual: frequency in Hz, and the channel that shows them, 0 or 1.
     pub lines: Vec<(f64, usize)>,
 }
