@@ -298,6 +298,10 @@ pub(crate) struct Columns {
     /// power of it.
     #[arg(long, value_name = "COL")]
     flow: Option<ColumnRef>,
+    /// The position of sensors that move, in m (or dbar of water): a depth, a height. `diagnose` tries time constants that go
+    /// with a power of their speed, and sensors that stand apart along the motion.
+    #[arg(long, value_name = "COL", conflicts_with = "flow")]
+    position: Option<ColumnRef>,
     /// Time from row to row, for files without a time column; a guessed time column is then
     /// ignored.
     #[arg(long, value_name = "SECONDS")]
@@ -332,6 +336,7 @@ impl Columns {
             t2: self.t2.clone(),
             reference: self.reference.clone(),
             flow: self.flow.clone(),
+            position: self.position.clone(),
             period_s: self.period,
             sampling: self.sampling,
         }

@@ -17,11 +17,11 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
         [name.to_owned(), digits(before, 4), digits(after, 4), found, agrees.to_owned()]
     };
     let of_record = |record: &RecordAnswer| {
-        let rms = record.transfer.normalised_rms;
+        let rms = record.error.held_out_normalised_rms;
         let agrees = if record.agrees { "yes" } else { "no" };
         row(&record.source, rms.before, rms.after, effects(&record.found_on_others), agrees)
     };
-    let rms = transfer.normalised_rms;
+    let rms = transfer.error.held_out_normalised_rms;
     let all = row("all", rms.before, rms.after, String::new(), "");
     let rows: Vec<[String; 5]> =
         [header].into_iter().chain(answer.records.iter().map(of_record)).chain([all]).collect();

@@ -7,7 +7,7 @@ use twinlag::record::Setting as ReaderSetting;
 pub(crate) fn options(setting: Setting) -> &'static [&'static str] {
     match setting {
         Setting::Channels => &["--t1", "--t2"],
-        Setting::Flow => &["--flow"],
+        Setting::Flow => &["--flow", "--position"],
         Setting::Sampling => &["--sampling"],
         Setting::Estimator => &["--estimator"],
         Setting::Hold => &["--hold"],
@@ -37,6 +37,7 @@ pub(crate) fn reader_option(setting: ReaderSetting) -> Option<&'static str> {
         ReaderSetting::T2 => "--t2",
         ReaderSetting::Reference => "--reference",
         ReaderSetting::Flow => "--flow",
+        ReaderSetting::Position => "--position",
         ReaderSetting::Period => "--period",
         _ => return None,
     })

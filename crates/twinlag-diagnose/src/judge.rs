@@ -99,7 +99,13 @@ impl<'a> Circumstances<'a> {
         index: usize,
         basis: &Basis,
     ) -> Judgement {
-        let Some(value) = number.value_s else { return Judgement::of(&[Reason::NotDetermined]) };
+        let Some(value) = number.value_s else {
+            // What was given and is wrong may be why.
+            let contradicted =
+                basis.reasons.iter().filter(|reason| matches!(reason, Reason::Contradicted { .. })).cloned();
+            let reasons: Vec<Reason> = contradicted.chain([Reason::NotDetermined]).collect();
+            return Judgement::of(&reasons);
+        };
         let most_s = self.policy.longest_given_share * self.span_s;
         let cause = self.causes[index].map(|effect| Reason::Cause { effect });
         let hidden = Reason::hidden(&self.hidden[index]);

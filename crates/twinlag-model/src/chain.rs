@@ -214,20 +214,33 @@ impl<T: Real> Chain<T> {
         self.rows.combine_each(count, length, taps);
     }
 
-    /// `S₀` at instants later by `delay_s`, within `reach` samples either way, which are cut off at both ends: the
-    /// spline's own values between the samples. On uneven samples other cubics stand in, and the reach is three.
-    pub(crate) fn advance(&mut self, delay_s: T, reach: usize) {
+    /// `S₀` at instants later by a delay, s, within `reach` samples either way, which are cut off at both ends: the spline's own
+    /// values between the samples. On uneven samples other cubics stand in, and the reach is three.
+    ///
+    /// - `delay_s`: of the instant of each value
+    /// - `ends_s`: the least and the largest delay; where they are the same, it is one
+    pub(crate) fn advance(&mut self, delay_s: impl Fn(f64) -> T, ends_s: [f64; 2], reach: usize) {
         let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
-        let shift = delay_s / period_s;
-        let whole = shift.value().floor().clamp(-(reach as f64), reach as f64 - 1.0);
-        let d = shift - whole;
-        // The cubic B-spline at the four samples around, and nothing at the fifth.
-        let taps = crate::spline::weights(d);
+        let whole = |shift: f64| shift.floor().clamp(-(reach as f64), reach as f64 - 1.0);
+        let [low, high] = ends_s.map(|end_s| whole(end_s / period_s));
         // Value k is of sample k + reach + 1; its first tap is one sample before that.
-        let first = (reach as f64 + whole) as usize;
+        let first = (reach as f64 + low) as usize;
         let count = self.len() - 2 * reach - DELAY_TAPS + 1;
+        let length = DELAY_TAPS + (high - low) as usize;
+        let is_one = ends_s[0] == ends_s[1];
+        let mut taps = std::mem::take(&mut self.memory.taps);
+        taps.clear();
+        taps.resize(if is_one { length } else { count * length }, T::from(0.0));
+        for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
+            let shift = delay_s(self.times_s()[k + reach + 1]) / period_s;
+            let whole = whole(shift.value()).clamp(low, high);
+            // The cubic B-spline at the four samples around, and nothing at the fifth.
+            let place = (whole - low) as usize;
+            taps[place..place + DELAY_TAPS].copy_from_slice(&crate::spline::weights(shift - whole)[..DELAY_TAPS]);
+        }
         for k in 0..count {
             let mut sum = T::from(0.0);
+            let taps = if is_one { &taps } else { &taps[k * length..(k + 1) * length] };
             for (tap, v) in taps.iter().zip(&self.value[first + k..]) {
                 sum += *tap * *v;
             }
@@ -235,20 +248,26 @@ impl<T: Real> Chain<T> {
         }
         self.value.truncate(count);
         self.rows.skip(first);
-        self.rows.combine_values(count, &taps);
+        if is_one {
+            self.rows.combine_values(count, &taps);
+        } else {
+            self.rows.combine_each(count, length, &taps);
+        }
+        self.memory.taps = taps;
         self.skipped += reach + 1;
     }
 
-    /// The values in the middle of each interval, later by `delay_s`: on cubics with the slopes of Catmull and Rom
+    /// The values in the middle of each interval, later by a delay: on cubics with the slopes of Catmull and Rom
     /// between the samples, so that they change smoothly with the delay.
-    fn advance_uneven(&mut self, delay_s: T) {
+    fn advance_uneven(&mut self, delay_s: impl Fn(f64) -> T) {
         let reach = UNEVEN_REACH;
         let span = 2 * reach + DELAY_TAPS;
         let count = self.len() - span + 1;
         let middle_s = |times_s: &[f64], k: usize| 0.5 * (times_s[k + reach + 1] + times_s[k + reach + 2]);
         // The interval that an instant lies in, counted from sample k.
         let interval = |times_s: &[f64], k: usize| {
-            let at_s = middle_s(times_s, k) + delay_s.value();
+            let middle_s = middle_s(times_s, k);
+            let at_s = middle_s + delay_s(middle_s).value();
             times_s[k..k + span].partition_point(|t| *t <= at_s).clamp(2, span - 2) - 1
         };
         let intervals = (0..count).map(|k| interval(&self.time_s, k));
@@ -261,7 +280,8 @@ impl<T: Real> Chain<T> {
         for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
             let j = interval(&self.time_s, k) - first;
             let window = &self.time_s[k + first..k + first + length];
-            let at = delay_s + middle_s(&self.time_s, k);
+            let middle_s = middle_s(&self.time_s, k);
+            let at = delay_s(middle_s) + middle_s;
             let step_s = window[j + 1] - window[j];
             let mut u = (at - window[j]) / step_s;
             if u.value() < 0.0 || u.value() > 1.0 {
@@ -344,7 +364,7 @@ mod tests {
         for (times, period_s) in [((0..60).map(f64::from).collect::<Vec<_>>(), Some(1.0)), (uneven, None)] {
             for delay_s in [-2.4, -1.0, 0.0, 0.3, 1.0, 2.49] {
                 let mut got = chain(|t| 3.0 - 0.5 * t, times.clone(), period_s);
-                got.advance(delay_s, 4);
+                got.advance(|_| delay_s, [delay_s; 2], 4);
                 for (v, t) in got.value.iter().zip(got.times_s()) {
                     let want = 3.0 - 0.5 * (t + delay_s);
                     assert!((v - want).abs() < 1e-12, "{period_s:?}, {delay_s} at {t}: got {v}, want {want}");
@@ -367,7 +387,7 @@ mod tests {
             chain.map(&bent);
             let tau_s: Vec<f64> = (0..28).map(|k| 2.0 + 0.1 * f64::from(k)).collect();
             chain.factor(Along::Each(&tau_s), Curves::default());
-            chain.advance(0.3, 2);
+            chain.advance(|t| 0.3 + 0.02 * t, [0.3, 0.9], 2);
             chain
         };
         let (still, moved) = (through(None), through(Some(14)));

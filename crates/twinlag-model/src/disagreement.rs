@@ -469,7 +469,7 @@ impl<'a> Evaluator<'a> {
         band: usize,
     ) -> impl Iterator<Item = Block<'w>> {
         // Rows of delays along uneven samples are as wide as those of the whole window need.
-        let is_one = direction.support_s.is_none() || self.observations.period_s.is_none() && plant.delay_s.is_some();
+        let is_one = direction.support_s.is_none() || self.observations.period_s.is_none() && plant.has_delay();
         let most = if is_one { window.count } else { self.block_samples.max(BLOCK_BANDS * band) };
         (0..window.count).step_by(most.max(1)).map(move |first| {
             let (count, lead) = (most.min(window.count - first), band.min(window.first + first));

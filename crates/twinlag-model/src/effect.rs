@@ -16,6 +16,7 @@ pub(crate) mod quantisation;
 pub(crate) mod radiation;
 pub(crate) mod saturation;
 pub(crate) mod second_order;
+pub(crate) mod separation;
 pub(crate) mod slow_mode;
 pub(crate) mod spikes;
 pub(crate) mod temperature_dependence;

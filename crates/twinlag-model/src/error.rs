@@ -27,8 +27,12 @@ pub enum ModelError {
     Flow,
     #[error("channel {channel} never changes, so it shows no dynamics")]
     Constant { channel: usize },
-    #[error("the model has time constants that depend on a measured flow: name its column")]
+    #[error("the model depends on a measured flow, or on the position of sensors that move: name its column")]
     NeedsFlow,
+    #[error(
+        "the sensors stand apart along the flow, by a delay that changes: no gas temperature is found from both of them"
+    )]
+    ChangingDelay,
     #[error(
         "the model has \"{effect}\" with parameters that it does not have here: was it made by another \
         version?"

@@ -85,9 +85,13 @@ impl Extended {
     /// own coloured noise.
     ///
     /// # Errors
-    /// [`ModelError::Compensate`] for parameters with which there is no rig.
+    /// [`ModelError::Compensate`] for parameters with which there is no rig; [`ModelError::ChangingDelay`] for sensors that stand
+    /// apart along the flow.
     pub fn rig(&self, parameters: &[f64]) -> Result<(Readings, Rig), ModelError> {
         let plant = self.model.plant(parameters, &self.observations);
+        if plant.separation.is_some() {
+            return Err(ModelError::ChangingDelay);
+        }
         let mut time_s = Vec::new();
         let mut temperature_c: [Vec<f64>; 2] = Default::default();
         let mut missing: [Vec<bool>; 2] = Default::default();

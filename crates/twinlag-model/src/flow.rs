@@ -1,13 +1,31 @@
-//! A measured flow velocity or density along the record.
+//! A measured flow velocity or density along the record, or the speed of sensors that move.
 
 use crate::error::ModelError;
 use crate::instants::Instants;
 
-/// Its logarithm over that of its geometric mean.
+/// Least speed of sensors that move, as a share of their root mean square speed. Where they turn they are at rest for a moment, and
+/// what then carries heat is not their speed: the water follows them, and rises by itself. Chosen.
+const MIN_SPEED_SHARE: f64 = 0.25;
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlowKind {
+    /// A velocity or a density, in any unit, positive throughout.
+    Flow,
+    /// The speed of sensors that move, m/s, with its sign.
+    Motion,
+}
+
+/// A flow along a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flow {
+    kind: FlowKind,
     time_s: Vec<f64>,
+    /// Logarithm of its size over that of its geometric mean.
     log_ratio: Vec<f64>,
+    /// Geometric mean over its values, with their sign.
+    inverse_ratio: Vec<f64>,
+    mean: f64,
 }
 
 impl Flow {
@@ -16,28 +34,59 @@ impl Flow {
     /// - `stretches`: instants, s, and values of each
     ///
     /// # Errors
-    /// [`ModelError::Flow`] for values that are not positive, or not as many as instants.
-    pub fn new(stretches: &[(&Instants, &[f64])]) -> Result<Self, ModelError> {
-        let is_sound = |(time_s, values): &(&Instants, &[f64])| {
-            time_s.len() == values.len() && values.iter().all(|v| v.is_finite() && *v > 0.0)
-        };
-        if !stretches.iter().all(is_sound) {
+    /// [`ModelError::Flow`] for values that are not finite, not as many as instants, or not positive where they are a flow.
+    pub fn new(kind: FlowKind, stretches: &[(&Instants, &[f64])]) -> Result<Self, ModelError> {
+        let is_possible = |v: &f64| v.is_finite() && (*v > 0.0 || kind == FlowKind::Motion);
+        if !stretches.iter().all(|(time_s, values)| time_s.len() == values.len() && values.iter().all(is_possible)) {
             return Err(ModelError::Flow);
         }
         let time_s: Vec<f64> = stretches.iter().flat_map(|s| s.0.iter()).collect();
-        let logs: Vec<f64> = stretches.iter().flat_map(|s| s.1.iter().map(|v| v.ln())).collect();
-        let mean = logs.iter().sum::<f64>() / logs.len().max(1) as f64;
-        Ok(Self { time_s, log_ratio: logs.into_iter().map(|l| l - mean).collect() })
+        let values: Vec<f64> = stretches.iter().flat_map(|s| s.1.iter().copied()).collect();
+        let count = values.len().max(1) as f64;
+        let least = match kind {
+            FlowKind::Flow => f64::MIN_POSITIVE,
+            FlowKind::Motion => MIN_SPEED_SHARE * (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
+        };
+        let sizes: Vec<f64> = values.iter().map(|v| v.abs().max(least).max(f64::MIN_POSITIVE)).collect();
+        let log_mean = sizes.iter().map(|size| size.ln()).sum::<f64>() / count;
+        let log_ratio: Vec<f64> = sizes.iter().map(|size| size.ln() - log_mean).collect();
+        let inverse_ratio = log_ratio.iter().zip(&values).map(|(l, v)| (-l).exp().copysign(*v)).collect();
+        Ok(Self { kind, time_s, log_ratio, inverse_ratio, mean: log_mean.exp() })
     }
 
-    /// `ln(v/v_mean)` at an instant, on straight lines between the samples.
+    /// What it is.
+    pub fn kind(&self) -> FlowKind {
+        self.kind
+    }
+
+    /// Its geometric mean, in its unit.
+    pub fn mean(&self) -> f64 {
+        self.mean
+    }
+
+    /// `ln(v/v_mean)` of its size at an instant, on straight lines between the samples.
     pub fn log_ratio_at(&self, time_s: f64) -> f64 {
+        self.at(&self.log_ratio, time_s)
+    }
+
+    /// `v_mean/v` with its sign at an instant, on straight lines between the samples.
+    pub fn inverse_ratio_at(&self, time_s: f64) -> f64 {
+        self.at(&self.inverse_ratio, time_s)
+    }
+
+    /// The least and the largest `v_mean/v`.
+    pub(crate) fn inverse_ratios(&self) -> [f64; 2] {
+        let bounds = [f64::INFINITY, f64::NEG_INFINITY];
+        self.inverse_ratio.iter().fold(bounds, |[least, largest], ratio| [least.min(*ratio), largest.max(*ratio)])
+    }
+
+    fn at(&self, values: &[f64], time_s: f64) -> f64 {
         let last = self.time_s.len() - 1;
         let after = self.time_s.partition_point(|t| *t <= time_s).clamp(1, last.max(1)).min(last);
         let before = after.saturating_sub(1);
         let step_s = self.time_s[after] - self.time_s[before];
         let share = if step_s > 0.0 { ((time_s - self.time_s[before]) / step_s).clamp(0.0, 1.0) } else { 0.0 };
-        self.log_ratio[before] + share * (self.log_ratio[after] - self.log_ratio[before])
+        values[before] + share * (values[after] - values[before])
     }
 
     /// Whether it changes by more than rounding.

@@ -50,13 +50,16 @@ impl<T: Real> Inverse<T> {
         if has_gas {
             gas.begin(cut, 0, period_s);
         }
-        if let Some(delay_s) = plant.delay_s {
-            let delays_s = [T::from(0.0), T::of(delay_s)];
-            for i in (0..2).filter(|i| has[*i]) {
-                chains[i].advance(delays_s[i], plant.reach);
+        if plant.has_delay() {
+            let at_once = |chain: &mut Chain<T>| chain.advance(|_| T::from(0.0), [0.0; 2], plant.reach);
+            if has[0] {
+                at_once(&mut chains[0]);
+            }
+            if has[1] {
+                chains[1].advance(|time_s| T::of(plant.delay_at(time_s)), plant.delays_s(), plant.reach);
             }
             if has_gas {
-                gas.advance(T::from(0.0), plant.reach);
+                at_once(gas);
             }
         }
         let mut pass = |gas_tau_s: T| {
@@ -153,7 +156,8 @@ impl Plant {
         let own = [0, 1].map(|i| {
             let sensor = &self.sensors[i];
             let numbers = [sensor.reading.gain, sensor.reading.offset_k, sensor.tau_s];
-            let later = if i == 1 { self.delay_s } else { None };
+            let apart = self.separation.as_ref().map(|separation| separation.delay_s);
+            let later = self.delay_s.into_iter().chain(apart).filter(|_| i == 1);
             functions[i] || numbers.into_iter().chain(sensor.second_tau_s).chain(later).any(moves)
         });
         // A slow path of one sensor is a factor of the other's chain as well.

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::error::ModelError;
-use crate::flow::Flow;
+use crate::flow::{Flow, FlowKind};
 use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
@@ -35,8 +35,8 @@ pub struct Stretch {
     pub reading_c: [Arc<Vec<f64>>; 2],
     /// Readings that say nothing (spikes, saturation): their noise counts as boundless.
     pub masked: [Vec<bool>; 2],
-    /// Flow velocity or density, in any unit.
-    flow: Option<Vec<f64>>,
+    /// Flow velocity or density, in any unit, or the speed of sensors that move, m/s.
+    flow: Option<(FlowKind, Vec<f64>)>,
     /// The record that it is of, from 0, where several are joined.
     pub(crate) member: usize,
     /// Noise of each channel here over that of all stretches.
@@ -65,7 +65,13 @@ impl Stretch {
     /// This stretch with a measured flow velocity or density at each sample, positive, in any unit.
     #[must_use]
     pub fn with_flow(self, flow: Vec<f64>) -> Self {
-        Self { flow: Some(flow), ..self }
+        Self { flow: Some((FlowKind::Flow, flow)), ..self }
+    }
+
+    /// This stretch with the speed at which the sensors move at each sample, m/s, negative where they move the other way.
+    #[must_use]
+    pub fn with_motion(self, speed_m_s: Vec<f64>) -> Self {
+        Self { flow: Some((FlowKind::Motion, speed_m_s)), ..self }
     }
 
     /// This stretch as one of a record among others, `later_s` seconds later.
@@ -159,9 +165,15 @@ impl Observations {
         if !stretches.iter().all(|s| s.time_s.are_finite() && s.reading_c.iter().all(is_sound)) {
             return Err(ModelError::NotFinite);
         }
-        let flows: Option<Vec<(&Instants, &[f64])>> =
-            stretches.iter().map(|s| s.flow.as_ref().map(|flow| (&s.time_s, &flow[..]))).collect();
-        let flow = flows.map(|flows| Flow::new(&flows).map(Arc::new)).transpose()?;
+        let kind = stretches.first().and_then(|s| s.flow.as_ref()).map(|(kind, _)| *kind);
+        let of = |s: &Stretch| s.flow.as_ref().filter(|(of_it, _)| Some(*of_it) == kind).map(|(_, flow)| flow.clone());
+        let flows: Option<Vec<Vec<f64>>> = stretches.iter().map(of).collect();
+        let flow = kind.zip(flows).map(|(kind, flows)| {
+            let of_stretches: Vec<(&Instants, &[f64])> =
+                stretches.iter().zip(&flows).map(|(s, flow)| (&s.time_s, &flow[..])).collect();
+            Flow::new(kind, &of_stretches).map(Arc::new)
+        });
+        let flow = flow.transpose()?;
         let stretches = stretches.into_iter().map(Arc::new).collect();
         let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
         out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);

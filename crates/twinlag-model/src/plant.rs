@@ -5,8 +5,10 @@
 //! together. [`crate::disagreement`] inverts it.
 
 use std::fmt;
+use std::sync::Arc;
 
 use crate::chain::{Chain, DELAY_TAPS, UNEVEN_REACH};
+use crate::flow::Flow;
 use crate::number::{Curve, Number, TimeFunction};
 use crate::observations::{Observations, Stretch};
 
@@ -174,6 +176,15 @@ impl Extra {
     }
 }
 
+/// Sensors that stand apart along a flow, or along their own motion: what one sees the other sees `L/v(t)` later.
+#[derive(Clone, Debug)]
+pub struct Separation {
+    /// How much later the second one is at the mean flow, s: the distance over it.
+    pub delay_s: Number,
+    /// The flow.
+    pub flow: Arc<Flow>,
+}
+
 /// The rig: two sensors, the delay between them, their noise.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -183,6 +194,8 @@ pub struct Plant {
     pub noise_std_k: [f64; 2],
     /// How much later channel 2 is than channel 1, s.
     pub delay_s: Option<Number>,
+    /// How much later it is beside that, where the sensors stand apart along a flow.
+    pub separation: Option<Separation>,
     /// Noise beside the white.
     pub extra: Vec<Extra>,
     /// How many samples a delay may reach.
@@ -196,9 +209,28 @@ impl Plant {
             sensors: tau_s.map(Sensor::first_order),
             noise_std_k,
             delay_s: None,
+            separation: None,
             extra: Vec::new(),
             reach: reach(observations),
         }
+    }
+
+    /// How much later channel 2 is at an instant, s.
+    pub(crate) fn delay_at(&self, time_s: f64) -> Number {
+        let apart = self.separation.as_ref().map(|apart| apart.delay_s * apart.flow.inverse_ratio_at(time_s));
+        self.delay_s.into_iter().chain(apart).sum()
+    }
+
+    /// The least and the largest delay along the record, s.
+    pub(crate) fn delays_s(&self) -> [f64; 2] {
+        let delay_s = self.delay_s.map_or(0.0, |delay_s| delay_s.re);
+        let ratios = self.separation.as_ref().map(|apart| apart.flow.inverse_ratios().map(|r| r * apart.delay_s.re));
+        ratios.map_or([delay_s; 2], |[a, b]| [delay_s + a.min(b), delay_s + a.max(b)])
+    }
+
+    /// Whether either channel is later than the other.
+    pub(crate) fn has_delay(&self) -> bool {
+        self.delay_s.is_some() || self.separation.is_some()
     }
 
     /// Values of a stretch that have no disagreement: each operator takes some at the ends.
@@ -206,7 +238,7 @@ impl Plant {
         let of_sensor = |s: &Sensor| usize::from(s.second_tau_s.is_some()) + usize::from(s.slow.is_some());
         let factors: usize = self.sensors.iter().map(of_sensor).sum();
         let (each, delay) = if is_even { (2, 2 * self.reach) } else { (1, 2 * UNEVEN_REACH) };
-        let delay = if self.delay_s.is_some() { delay + DELAY_TAPS - 1 } else { 0 };
+        let delay = if self.has_delay() { delay + DELAY_TAPS - 1 } else { 0 };
         each * (1 + factors) + delay + self.differences()
     }
 

@@ -23,6 +23,7 @@ pub(crate) struct Chosen {
     pub(crate) channels: [usize; 2],
     pub(crate) reference: Option<usize>,
     pub(crate) flow: Option<usize>,
+    pub(crate) position: Option<usize>,
 }
 
 impl Chosen {
@@ -33,7 +34,7 @@ impl Chosen {
             Some(TimeColumns::DateAndTime { date, time }) => vec![date, time],
             None => Vec::new(),
         };
-        time.into_iter().chain(self.channels).chain(self.reference).chain(self.flow).collect()
+        time.into_iter().chain(self.channels).chain(self.reference).chain(self.flow).chain(self.position).collect()
     }
 }
 
@@ -55,8 +56,8 @@ const LONGEST_NAMING_UNIT_S: f64 = 1.0;
 pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>) -> Result<Chosen, RecordError> {
     let find = |wanted: &Option<_>| wanted.as_ref().map(|wanted| table.find(wanted)).transpose();
     let (named_time, named) = (find(&selection.time)?, [find(&selection.t1)?, find(&selection.t2)?]);
-    let (reference, flow) = (find(&selection.reference)?, find(&selection.flow)?);
-    let taken: Vec<usize> = [named_time, named[0], named[1], reference, flow].into_iter().flatten().collect();
+    let (reference, flow, position) = (find(&selection.reference)?, find(&selection.flow)?, find(&selection.position)?);
+    let taken: Vec<usize> = [named_time, named[0], named[1], reference, flow, position].into_iter().flatten().collect();
     if let Some((_, &twice)) = taken.iter().enumerate().find(|(at, index)| taken[..*at].contains(index)) {
         return Err(RecordError::SameColumn { file: table.source().to_owned(), column: table.title(twice) });
     }
@@ -78,10 +79,10 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
     let channels = match named {
         [Some(t1), Some(t2)] => [t1, t2],
-        _ => guess_channels(table, named, time, [reference, flow], notes)?,
+        _ => guess_channels(table, named, time, [reference, flow, position], notes)?,
     };
     if selection.period_s.is_some() {
-        return Ok(Chosen { time: None, channels, reference, flow });
+        return Ok(Chosen { time: None, channels, reference, flow, position });
     }
     let Some(time) = time else {
         return Err(RecordError::NoTime { file: table.source().to_owned(), columns: table.listing() });
@@ -89,7 +90,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     if let Some(index) = guessed_time {
         notes.insert(0, Note::Guessed { role: "time", column: table.title(index) });
     }
-    Ok(Chosen { time: Some(time), channels, reference, flow })
+    Ok(Chosen { time: Some(time), channels, reference, flow, position })
 }
 
 fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
@@ -140,7 +141,7 @@ fn guess_channels(
     table: &Table,
     named: [Option<usize>; 2],
     time: Option<TimeColumns>,
-    [reference, flow]: [Option<usize>; 2],
+    apart: [Option<usize>; 3],
     notes: &mut Vec<Note>,
 ) -> Result<[usize; 2], RecordError> {
     let columns = table.columns();
@@ -150,13 +151,13 @@ fn guess_channels(
             Some(TimeColumns::DateAndTime { date, time }) => date == index || time == index,
             None => false,
         };
-        !of_time && reference != Some(index) && flow != Some(index) && !named.contains(&Some(index))
+        !of_time && !apart.contains(&Some(index)) && !named.contains(&Some(index))
     };
     let free: Vec<usize> = (0..columns.len()).filter(|&index| is_free(index)).collect();
     let candidates = candidates(columns, &free, &[Kind::Number]);
     let pair = clear_pair(columns, named, &candidates).or_else(|| only_pair(columns, named, &free, &[Kind::Number]));
     let Some(channels) = pair else {
-        return Err(unclear(table, named, reference, &free, &candidates));
+        return Err(unclear(table, named, apart[0], &free, &candidates));
     };
     for (role, (was, index)) in ["T1", "T2"].into_iter().zip(named.into_iter().zip(channels)) {
         if was.is_none() {

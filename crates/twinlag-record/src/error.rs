@@ -141,6 +141,15 @@ pub enum RecordError {
     BadFlow { file: String, at: Place, column: String, value: f64 },
     #[error("{file}: column {column}: expected a flow that changes, found {value} throughout; use no flow")]
     ConstantFlow { file: String, column: String, value: f64 },
+    #[error(
+        "{file}: {at}, column {column}: expected the position of the sensors in every row that is used, found none; use no position, \
+         or mend the column"
+    )]
+    BadPosition { file: String, at: Place, column: String },
+    #[error("{file}: column {column}: expected a position that changes, found the same throughout; use no position")]
+    ConstantPosition { file: String, column: String },
+    #[error("{file}: both a flow and a position are given, expected one of them: time constants go with one velocity")]
+    FlowAndPosition { file: String },
     #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example {first}", first = numbers[0])]
     AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
     #[error(
@@ -251,6 +260,8 @@ impl RecordError {
             | Self::AmbiguousName { .. }
             | Self::SameColumn { .. } => &Setting::COLUMNS,
             Self::BadFlow { .. } | Self::ConstantFlow { .. } => &[Setting::Flow],
+            Self::BadPosition { .. } | Self::ConstantPosition { .. } => &[Setting::Position],
+            Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
             Self::NotATimeUnit { .. } | Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],

@@ -63,6 +63,8 @@ pub struct Stretch {
     /// The flow, in the unit of its column, if the record has one; on straight lines where a sample
     /// is missing.
     pub flow: Option<Vec<f64>>,
+    /// The speed of sensors that move, m/s, if the record has it; on straight lines where a sample is missing.
+    pub speed_m_s: Option<Vec<f64>>,
 }
 
 impl Stretch {
@@ -91,7 +93,8 @@ impl Stretch {
         let reading = |values: &Arc<Vec<f64>>| if is_all { values.clone() } else { Arc::new(bridged(&rows, values)) };
         let reading_c = [reading(&record.t1_c), reading(&record.t2_c)];
         let flow = record.flow.as_ref().map(|flow| bridged(&rows, flow));
-        Self { rows, time_s, reading_c, flow }
+        let speed_m_s = record.speed_m_s.as_ref().map(|speed_m_s| bridged(&rows, speed_m_s));
+        Self { rows, time_s, reading_c, flow, speed_m_s }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::record::Record;
 
 impl Record {
     /// The rows of several records of the same sensors, one record after the other. Names and the spacing of the stamps are those
-    /// of the first; a reference or a flow is there where all have one.
+    /// of the first; a reference, a flow or a speed is there where all have one.
     ///
     /// - `records`: with how much later each is to be, s; one is later than the one before it
     ///
@@ -39,6 +39,7 @@ impl Record {
             Arc::make_mut(&mut out.t2_c).extend_from_slice(&record.t2_c);
             out.reference_c = both(out.reference_c, record.reference_c.as_deref());
             out.flow = both(out.flow, record.flow.as_deref());
+            out.speed_m_s = both(out.speed_m_s, record.speed_m_s.as_deref());
             out.missing += record.missing;
             out.segments.extend(record.segments.iter().map(|rows_of| rows_of.start + rows..rows_of.end + rows));
         }

@@ -47,6 +47,7 @@ mod from_columns;
 mod grid;
 mod joined;
 mod layout;
+mod motion;
 mod names;
 mod note;
 mod number;

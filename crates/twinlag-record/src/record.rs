@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
+use crate::motion;
 use crate::note::Note;
 use crate::row_lines::RowLines;
 use crate::sampling::{self, Clock, Sampling, SamplingKind};
@@ -74,6 +75,8 @@ pub struct Record {
     /// A flow velocity or density in the unit of its column, if one was chosen; positive in every
     /// row that is used.
     pub flow: Option<Vec<f64>>,
+    /// The speed of sensors that move, m/s, from a column of their position, if one was chosen; finite in every row that is used.
+    pub speed_m_s: Option<Vec<f64>>,
     /// Rows in which T1 or T2 is missing.
     pub missing: usize,
     /// How the stamps lie in time.
@@ -196,9 +199,39 @@ impl Record {
         let mut all = table.notes().to_vec();
         all.append(&mut notes);
         let record = Self::build(channels, selection.sampling, clock, all, &origin)?;
-        let Some(index) = chosen.flow else { return Ok(record) };
         let at = |row: usize| table.place_of(row);
-        record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at)
+        match (chosen.flow, chosen.position) {
+            (Some(_), Some(_)) => Err(RecordError::FlowAndPosition { file: record.source }),
+            (Some(index), None) => record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at),
+            (None, Some(index)) => record.moving(table.numbers(index)?, &table.title(index), at),
+            (None, None) => Ok(record),
+        }
+    }
+
+    /// This record of sensors that move, with their position in each row, m.
+    ///
+    /// # Errors
+    /// [`RecordError::LengthMismatch`], [`RecordError::BadPosition`], [`RecordError::ConstantPosition`].
+    pub fn with_position(self, position_m: &[f64]) -> Result<Self, RecordError> {
+        self.moving(position_m, "position", |row| Place::Sample(row + 1))
+    }
+
+    fn moving(mut self, position_m: &[f64], column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
+        let (file, expected) = (self.source.clone(), self.len());
+        if position_m.len() != expected {
+            let (name, like) = (column.to_owned(), "time_s".to_owned());
+            return Err(RecordError::LengthMismatch { file, name, found: position_m.len(), like, expected });
+        }
+        let mut used = self.segments.iter().cloned().flatten();
+        if let Some(row) = used.find(|&row| !position_m[row].is_finite()) {
+            return Err(RecordError::BadPosition { file, at: at(row), column: column.to_owned() });
+        }
+        let speed_m_s = motion::speed(&self.time_s, position_m);
+        if self.segments.iter().cloned().flatten().all(|row| speed_m_s[row] == 0.0) {
+            return Err(RecordError::ConstantPosition { file, column: column.to_owned() });
+        }
+        self.speed_m_s = Some(speed_m_s);
+        Ok(self)
     }
 
     /// This record with a flow velocity or density, in any unit, one value for each row.
@@ -344,6 +377,7 @@ impl Record {
             t2_c: Arc::new(t2_c),
             reference_c,
             flow: None,
+            speed_m_s: None,
             missing,
             sampling,
             segments,

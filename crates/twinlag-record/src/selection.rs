@@ -93,6 +93,8 @@ pub struct Selection {
     pub reference: Option<ColumnRef>,
     /// A flow velocity or density, in any unit, if there is one: time constants may go with it.
     pub flow: Option<ColumnRef>,
+    /// The position of sensors that move, m, if there is one: a depth or a height. Time constants may go with their speed.
+    pub position: Option<ColumnRef>,
     /// Time from one row to the next; then no time column is used.
     pub period_s: Option<f64>,
     /// How the stamps are to be understood.
@@ -115,13 +117,15 @@ pub enum Setting {
     Reference,
     /// [`Selection::flow`].
     Flow,
+    /// [`Selection::position`].
+    Position,
     /// [`Selection::period_s`].
     Period,
 }
 
 impl Setting {
     /// All that name a column.
-    pub const COLUMNS: [Self; 5] = [Self::Time, Self::T1, Self::T2, Self::Reference, Self::Flow];
+    pub const COLUMNS: [Self; 6] = [Self::Time, Self::T1, Self::T2, Self::Reference, Self::Flow, Self::Position];
 }
 
 #[cfg(test)]

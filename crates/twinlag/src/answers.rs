@@ -18,7 +18,9 @@ pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit};
 pub use found_in::FoundIn;
 pub use model::{Model, ModelEffect, ModelNumber};
-pub use records::{DisagreementAnswer, EffectInPlace, RecordAnswer, RecordNumber, TransferAnswer};
+pub use records::{
+    DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer, RecordNumber, TransferAnswer, TransferError,
+};
 pub use track::{Along, Ratio, Track};
 
 pub(crate) use characterisation::is_on_bound_of_time_constant;

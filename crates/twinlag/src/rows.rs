@@ -83,9 +83,10 @@ fn on(grid: Grid) -> Result<Observations, Error> {
             _ => Instants::from(stretch.time_s),
         };
         let out = Stretch::sharing(time_s, stretch.reading_c).with_missing([missing.clone(), missing]);
-        match stretch.flow {
-            Some(flow) => out.with_flow(flow),
-            None => out,
+        match (stretch.flow, stretch.speed_m_s) {
+            (Some(flow), _) => out.with_flow(flow),
+            (None, Some(speed_m_s)) => out.with_motion(speed_m_s),
+            (None, None) => out,
         }
     });
     Ok(Observations::new(stretches.collect(), period_s)?)

@@ -55,7 +55,7 @@ impl About {
     /// An effect of the mean, seen at all frequencies, that imitates none and excludes none.
     ///
     /// - `name`: as scripts use it, in kebab case
-    /// - `rank`: how often it occurs, 0 for the most frequent; effects of this library have 0 to 14
+    /// - `rank`: how often it occurs, 0 for the most frequent; effects of this library have 0 to 15
     pub const fn new(name: &'static str, rank: u8, candidates: fn(&Context) -> Vec<Shared>) -> Self {
         Self {
             name,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
 use super::{
     About, calibration, coloured_noise, crosstalk, delay, drift, input_mismatch, mains_pickup, quantisation, radiation,
-    saturation, second_order, slow_mode, spikes, temperature_dependence, varying,
+    saturation, second_order, separation, slow_mode, spikes, temperature_dependence, varying,
 };
 use crate::error::ModelError;
 
@@ -64,8 +64,11 @@ impl Identifier {
     /// Sensors that do not see the same gas.
     pub const INPUT_MISMATCH: Self = Self(&input_mismatch::ABOUT);
 
+    /// Sensors that stand apart along a flow or a motion.
+    pub const SEPARATION: Self = Self(&separation::ABOUT);
+
     /// Those of this library, the most frequent first.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::SATURATION,
         Self::QUANTISATION,
         Self::SPIKES,
@@ -81,6 +84,7 @@ impl Identifier {
         Self::DRIFT,
         Self::COLOURED_NOISE,
         Self::INPUT_MISMATCH,
+        Self::SEPARATION,
     ];
 
     /// The identifier of an effect, of this library or of another crate.
@@ -193,7 +197,7 @@ mod tests {
     #[test]
     fn the_most_frequent_come_first() {
         let ranks: Vec<u8> = Identifier::ALL.iter().map(|e| e.about().rank).collect();
-        assert_eq!(ranks, (0..15).collect::<Vec<u8>>());
+        assert_eq!(ranks, (0..16).collect::<Vec<u8>>());
     }
 
     #[test]

@@ -18,7 +18,8 @@ use crate::spline::{LocalSpline, Spline, on_knots, parts};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
     .in_words(
-        "both time constants change along the record by the same factor, as they do when the flow changes",
+        "time constants change along the record, as they do when the flow changes: both by the same factor, or with a \
+         measured flow that of one sensor alone",
         "log the flow velocity, or take records at steady flow",
         "which sensor causes a change of their ratio",
     )
@@ -45,6 +46,9 @@ const RATIO_NAMES: [&str; RATIO_SIZE] = ["ratio1", "ratio2", "ratio3", "ratio4"]
 /// Size of a change that matters, twice which is the longest step of a fit: a half, as doubling the flow makes it. With a
 /// tenth of that a fit ended after its forty iterations, short of the minimum.
 const TYPICAL_CHANGE: f64 = 0.5;
+
+/// Exponents of a flow that are possible.
+const EXPONENTS: [f64; 2] = [-3.0, 3.0];
 
 /// What `m` is a function of.
 enum Of {
@@ -106,10 +110,14 @@ pub(crate) fn ratio(ends_s: [f64; 2]) -> Shared {
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
-    let of_flow = context.flow.as_ref().map(|flow| {
-        let exponent = Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, -3.0, 3.0));
-        let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, None, vec![exponent]);
-        Arc::new(Varying { of: Of::Flow(flow.clone()), seat }) as Shared
+    // A sensor behind a pump, or inside a housing, has a flow of its own.
+    let of_flow = context.flow.iter().flat_map(|flow| {
+        [None, Some(0), Some(1)].map(|channel| {
+            let [lowest, highest] = EXPONENTS;
+            let exponent = Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, lowest, highest));
+            let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, channel, vec![exponent]);
+            Arc::new(Varying { of: Of::Flow(flow.clone()), seat }) as Shared
+        })
     });
     of_size(FIRST_SIZE, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
@@ -125,12 +133,10 @@ fn function(spline: Spline) -> TimeFunction {
     Arc::new(move |time_s| spline.at(time_s))
 }
 
-/// A relative change of both time constants, or of the second alone, which is one of their ratio.
-fn install(change: TimeFunction, of_ratio: bool, plant: &mut Plant) {
-    if !of_ratio {
-        plant.sensors[0].changes.push(change.clone());
-    }
-    plant.sensors[1].changes.push(change);
+/// A relative change of both time constants, or of that of one sensor.
+fn install(change: &TimeFunction, channel: Option<usize>, plant: &mut Plant) {
+    let sensors = plant.sensors.iter_mut().enumerate().filter(|(i, _)| channel.is_none_or(|channel| channel == *i));
+    sensors.for_each(|(_, sensor)| sensor.changes.push(change.clone()));
 }
 
 impl Effect for Varying {
@@ -156,16 +162,16 @@ impl Effect for Varying {
                 Arc::new(move |time_s| if time_s < at_s { Number::from(0.0) } else { change })
             }
         };
-        install(change, matches!(self.of, Of::Ratio { .. }), plant);
+        install(&change, self.seat.channel, plant);
     }
 
     fn parts(&self, values: &[f64]) -> Option<Parts> {
         let (Of::Time { ends_s, .. } | Of::Ratio { ends_s }) = self.of else { return None };
         let (splines, of_parameters) = parts(ends_s[0], ends_s[1], values);
-        let of_ratio = matches!(self.of, Of::Ratio { .. });
+        let channel = self.seat.channel;
         let part = |(spline, support_s): LocalSpline| {
             let change = function(spline);
-            Part::new(support_s, Arc::new(move |plant| install(change.clone(), of_ratio, plant)))
+            Part::new(support_s, Arc::new(move |plant| install(&change, channel, plant)))
         };
         Some(Parts::new(splines.into_iter().map(part).collect(), of_parameters))
     }

@@ -3,25 +3,56 @@
 use serde::{Deserialize, Serialize};
 use twinlag_diagnose::{BeforeAfter, Disagreement, Identifier, LeftOut, Masked, Seated, Transfer};
 
+/// What is left out in turn, so that what is found has no part in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum LeftOutUnit {
+    /// A record of several.
+    Record,
+}
+
+/// Errors on a record that had no part in finding the model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct TransferError {
+    /// Root mean square of the whitened residual.
+    pub held_out_normalised_rms: BeforeAfter<f64>,
+    /// Root mean square of the difference between the two inferred gas temperatures, K.
+    #[serde(rename = "held_out_input_difference_K")]
+    pub held_out_input_difference_k: BeforeAfter<f64>,
+}
+
 /// Errors of records that had no part in finding the model: each is left out in turn, the loop runs on the others, and its model
 /// is carried to the one that was left out, where nothing is fitted but what belongs to a record.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TransferAnswer {
-    /// Root mean square of the whitened residual.
-    pub normalised_rms: BeforeAfter<f64>,
-    /// Root mean square of the difference between the two inferred gas temperatures, K.
-    #[serde(rename = "input_difference_K")]
-    pub input_difference_k: BeforeAfter<f64>,
+    /// Errors of all of them.
+    #[serde(flatten)]
+    pub error: TransferError,
+    /// What was left out in turn.
+    pub left_out: LeftOutUnit,
+    /// How many of them.
+    pub count: usize,
 }
 
 impl TransferAnswer {
     pub(crate) fn of(transfer: &Transfer) -> Self {
-        Self { normalised_rms: transfer.normalised_rms, input_difference_k: transfer.input_difference_k }
+        let error = TransferError {
+            held_out_normalised_rms: transfer.normalised_rms,
+            held_out_input_difference_k: transfer.input_difference_k,
+        };
+        Self { error, left_out: LeftOutUnit::Record, count: transfer.records.len() }
     }
+}
 
-    fn of_one(left_out: &LeftOut) -> Self {
-        Self { normalised_rms: left_out.normalised_rms, input_difference_k: left_out.input_difference_k }
+impl TransferError {
+    fn of(left_out: &LeftOut) -> Self {
+        Self {
+            held_out_normalised_rms: left_out.normalised_rms,
+            held_out_input_difference_k: left_out.input_difference_k,
+        }
     }
 }
 
@@ -112,7 +143,7 @@ pub struct RecordAnswer {
     /// Samples.
     pub samples: usize,
     /// Its errors under the model of the others.
-    pub transfer: TransferAnswer,
+    pub error: TransferError,
     /// Effects that were found on the others.
     pub found_on_others: Vec<EffectInPlace>,
     /// Noise of its channels, K.
@@ -148,7 +179,7 @@ impl RecordAnswer {
         Self {
             source: source.to_owned(),
             samples: found.samples,
-            transfer: TransferAnswer::of_one(&found.left_out),
+            error: TransferError::of(&found.left_out),
             found_on_others: found.left_out.found.iter().map(|e| EffectInPlace::of(*e, channels)).collect(),
             noise_std_k: found.noise_std_k,
             own: found.own.iter().map(number).collect(),

@@ -105,7 +105,7 @@ pub(crate) fn answer(
         remarks,
         without: options.without.clone(),
         found_in: Some(FoundIn::of(record)),
-        has_flow: record.flow.is_some(),
+        has_flow: record.flow.is_some() || record.speed_m_s.is_some(),
         moves: core.moves.clone(),
         policy: core.policy.clone(),
         core: Some(Box::new(core)),

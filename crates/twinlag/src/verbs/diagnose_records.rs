@@ -22,7 +22,7 @@ use crate::watch::{UNWATCHED, Watch};
 /// # let tuesday = record.clone();
 /// let answer = twinlag::diagnose_records(&[record, tuesday], &DiagnoseOptions::default())?;
 /// assert_eq!(answer.records.len(), 2);
-/// let rms = answer.transfer.expect("of several records").normalised_rms;
+/// let rms = answer.transfer.expect("of several records").error.held_out_normalised_rms;
 /// assert!(rms.after < rms.before);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -23,7 +23,7 @@ impl Excerpt {
     /// Pieces of a long record without a break, all of which is searched for tones; `None` of any other.
     pub(super) fn of_long(record: &Record, options: &Options) -> Result<Option<Self>, Error> {
         let is_unbroken = record.segments.len() == 1 && record.segments[0].len() == record.len();
-        let is_whole = is_unbroken && record.flow.is_none();
+        let is_whole = is_unbroken && record.flow.is_none() && record.speed_m_s.is_none();
         let is_even = record.sampling.kind != SamplingKind::Irregular;
         let Some(pieces) = pieces_of_long(record.len()).filter(|_| is_whole && is_even) else { return Ok(None) };
         let period_s = record.sampling.period_s;

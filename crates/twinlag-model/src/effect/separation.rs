@@ -1,0 +1,82 @@
+//! Sensors that stand apart along a flow, or along their own motion: the second one sees the gas `L/v(t)` later, where the flow `v` is
+//! measured. Of sensors that move back and forth the sign of `v` changes, and which of them comes first.
+
+use std::sync::Arc;
+
+use twinlag_optimise::Variable;
+
+use crate::chain::UNEVEN_REACH;
+use crate::effect::parameter::inside;
+use crate::effect::{About, Context, Derived, Effect, Identifier, KnownEffect, Parameter, Seat, Shared, described_by};
+use crate::error::ModelError;
+use crate::flow::{Flow, FlowKind};
+use crate::number::Number;
+use crate::plant::{Plant, Separation};
+
+pub(crate) static ABOUT: About = About::new("separation", 15, candidates)
+    .in_words(
+        "the sensors stand apart along the flow, or along their own motion, so that one comes to a place later than the other: by \
+         their distance over the velocity",
+        "mount the junctions side by side across the flow",
+        "a distance across the flow",
+    )
+    .imitating(&["delay", "second-order", "varying-time-constant"])
+    .turning_phases()
+    .restored_by(restore);
+
+/// Usual delay at the mean flow, in sample periods. Chosen, as of a delay.
+const USUAL_PERIODS: f64 = 0.5;
+/// Delays from which a fit starts, in sample periods.
+const STARTS_PERIODS: [f64; 2] = [0.3, -0.3];
+
+struct Apart {
+    seat: Seat,
+    flow: Arc<Flow>,
+    step_s: f64,
+}
+
+fn candidates(context: &Context) -> Vec<Shared> {
+    let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 } * context.step_s;
+    let of = |flow: &Arc<Flow>| {
+        // At the slowest flow no longer than the model reaches.
+        let [least, largest] = flow.inverse_ratios();
+        let longest_s = longest / least.abs().max(largest.abs());
+        let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest_s, longest_s);
+        let delay = Parameter::new("delay_at_mean_flow", "s", variable);
+        let seat = Seat::new(Identifier::SEPARATION, Some(1), vec![delay]);
+        Arc::new(Apart { seat, flow: flow.clone(), step_s: context.step_s }) as Shared
+    };
+    context.flow.iter().map(of).collect()
+}
+
+fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
+    if context.flow.is_none() {
+        return Err(ModelError::NeedsFlow);
+    }
+    Ok(described_by(known, candidates(context)))
+}
+
+impl Effect for Apart {
+    fn seat(&self) -> &Seat {
+        &self.seat
+    }
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        STARTS_PERIODS.map(|steps| inside(&self.seat.parameters, &[steps * self.step_s])).to_vec()
+    }
+
+    fn install(&self, values: &[Number], plant: &mut Plant) {
+        plant.separation = Some(Separation { delay_s: values[0], flow: self.flow.clone() });
+    }
+
+    fn derived(&self) -> Vec<Derived> {
+        let mean = self.flow.mean();
+        match self.flow.kind() {
+            FlowKind::Flow => vec![Derived::constant("mean_flow", "its unit", mean)],
+            FlowKind::Motion => {
+                let distance = Derived { name: "distance", unit: "m", of: Box::new(move |values| values[0] * mean) };
+                vec![Derived::constant("mean_speed", "m/s", mean), distance]
+            }
+        }
+    }
+}
