@@ -595,6 +595,48 @@ mod tests {
         assert!(most_bands > 1, "stretches of uneven samples whose delays reach over more of them than others");
     }
 
+    /// Residuals that are filtered window by window twice give the sums of those that are kept: they are the same numbers.
+    #[test]
+    fn residuals_that_are_not_kept_give_the_same_sums() {
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
+            let observations = in_stretches(&record(kind));
+            let (context, selection) = (context(&observations), selection(&observations));
+            let two_lags = Model::new(&[], [0.05, 0.07]);
+            let without = two_lags.linearised(&TAU_S, &observations, &selection);
+            for effect in effects(&context) {
+                let model = two_lags.with(effect.clone());
+                let theta: Vec<f64> = TAU_S.into_iter().chain(effect.starts().remove(0)).collect();
+                let cost = || {
+                    let cost = ResidualCost::new(&model, &theta, &observations, &selection);
+                    let mut memory = cost.memory.borrow_mut();
+                    (memory.evaluator.window_samples, memory.evaluator.max_kept_samples) = (37, 37);
+                    drop(memory);
+                    cost
+                };
+                let (kept, passed) =
+                    (cost().normal_equations(&theta), cost().into_normal_equations(&theta, None, None));
+                let name = effect.identifier().name();
+                assert_eq!(passed, kept, "{kind:?}, {name}");
+                // A difference that any residual keeps within, and one that none does.
+                for (max_difference, is_beside) in [(1e9, true), (0.0, false)] {
+                    let beside = Beside { without: &without, max_difference };
+                    let got = cost().into_normal_equations(&theta, Some(beside), None);
+                    let has_samples = selection.samples(&cost().pieces_at(&theta)).eq(without.samples.iter());
+                    assert_eq!(got.is_beside, is_beside && has_samples, "{kind:?}, {name}, {max_difference}");
+                }
+            }
+        }
+    }
+
+    impl ResidualCost<'_> {
+        /// Pieces of the record at a point.
+        fn pieces_at(&self, theta: &[f64]) -> Vec<crate::disagreement::Piece> {
+            let mut memory = self.memory.borrow_mut();
+            self.evaluate(theta, &mut memory);
+            std::mem::take(&mut memory.evaluator.pieces)
+        }
+    }
+
     /// An effect whose parameters are those of its absence leaves the residual as it is, to rounding: of readings of
     /// 400 K over noise of 0.05 K each rounding leaves 9e-13, some ten of them three times that, and the largest of
     /// thousands four times that again, 1.1e-11. The bound is twice as much. Effects that add factors to both inverses are smoothed once more, and left out.
