@@ -293,11 +293,8 @@ mod tests {
         let watch = |_: &str, _, _| ControlFlow::Continue(());
         let mut observations = observations([0.5, 6.0]);
         let mut state = 11_u64;
-        for reading in observations
-            .stretches
-            .iter_mut()
-            .flat_map(|s| &mut Arc::make_mut(s).reading_c)
-            .flat_map(|c| Arc::make_mut(c))
+        for reading in
+            observations.stretches.iter_mut().flat_map(|s| &mut Arc::make_mut(s).reading_c).flat_map(Arc::make_mut)
         {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             *reading = 20.0 + (state >> 11) as f64 / (1_u64 << 53) as f64;

@@ -117,7 +117,7 @@ pub fn diagnose_records(
         disagreements: disagreements(record, &last, diagnosis.last.between.as_ref(), settings),
     };
     let records = (0..records.len()).map(of).collect();
-    Ok(JointDiagnosis { records, transfer, diagnosis })
+    Ok(JointDiagnosis { diagnosis, records, transfer })
 }
 
 /// Noise of the channels of each record, K.

@@ -36,9 +36,12 @@ struct Memory<'a> {
     evaluator: Evaluator<'a>,
     /// Parameters of the last evaluation.
     at: Vec<f64>,
-    /// Its residuals that count, and what is known beforehand.
+    /// Its residuals that count, where they are kept, and what is known beforehand.
     residual: Vec<f64>,
-    /// Where the residuals of each window end among these.
+    is_kept: bool,
+    /// Those of one window, where they are not.
+    passing: Vec<f64>,
+    /// Where the residuals of each window end among all.
     ends: Vec<usize>,
     sieve: Sieve,
     /// Derivatives, one column for each direction.
@@ -96,6 +99,8 @@ impl<'a> ResidualCost<'a> {
             evaluator: Evaluator::new(observations, model.noise_std_k()),
             at: Vec::new(),
             residual: Vec::new(),
+            is_kept: true,
+            passing: Vec::new(),
             ends: Vec::new(),
             sieve: Sieve::default(),
             columns: Vec::new(),
@@ -121,24 +126,50 @@ impl<'a> ResidualCost<'a> {
         if sum.is_finite() { sum } else { f64::INFINITY }
     }
 
+    /// Evaluates, and keeps the residuals that count.
     fn evaluate(&self, theta: &[f64], memory: &mut Memory<'_>) {
         if memory.at == theta {
             return;
         }
-        let numbers = constants(theta);
-        memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
+        let numbers = self.evaluate_plant(theta, memory);
         let Memory { evaluator, residual, ends, sieve, .. } = memory;
-        residual.clear();
         residual.reserve_exact(evaluator.residual.len().min(self.selection.counted()) + theta.len());
-        ends.clear();
         for (index, window) in evaluator.windows().iter().enumerate() {
             let values = &evaluator.residual[window.residuals()];
             sieve.pick(values, evaluator.span(index), self.selection, residual);
             ends.push(residual.len());
         }
         residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
+        memory.is_kept = true;
+    }
+
+    /// Evaluates, and visits the residuals that count, window after window, and what is known beforehand, with their places among
+    /// all; only the latter is kept.
+    fn pass(&self, theta: &[f64], memory: &mut Memory<'_>, mut visit: impl FnMut(Range<usize>, &[f64])) {
+        let numbers = self.evaluate_plant(theta, memory);
+        let Memory { evaluator, residual, passing, ends, sieve, .. } = memory;
+        let mut done = 0;
+        for (index, window) in evaluator.windows().iter().enumerate() {
+            passing.clear();
+            sieve.pick(&evaluator.residual[window.residuals()], evaluator.span(index), self.selection, passing);
+            let end = done + passing.len();
+            visit(std::mem::replace(&mut done, end)..end, passing);
+            ends.push(end);
+        }
+        residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
+        visit(done..done + residual.len(), residual);
+        memory.is_kept = false;
+    }
+
+    /// Evaluates the plant of these parameters, and returns them as numbers.
+    fn evaluate_plant(&self, theta: &[f64], memory: &mut Memory<'_>) -> Vec<Number> {
+        let numbers = constants(theta);
+        memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
+        memory.residual.clear();
+        memory.ends.clear();
         memory.at.clear();
         memory.at.extend_from_slice(theta);
+        numbers
     }
 
     /// The directions of the parameters from `first` on that are not held.
@@ -147,10 +178,9 @@ impl<'a> ResidualCost<'a> {
     }
 
     /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which
-    /// derivatives are those with respect to the parameters.
+    /// derivatives are those with respect to the parameters. At the point that was evaluated last.
     fn walk(&self, theta: &[f64], directions: &Directions, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
-        self.evaluate(theta, memory);
-        let Memory { evaluator, residual, ends, columns, spare, again, .. } = memory;
+        let Memory { evaluator, residual, is_kept, passing, ends, sieve, columns, spare, again, .. } = memory;
         let (evaluator, spare) = (&*evaluator, &*spare);
         let still = self.model.plant_of(&constants(theta), self.observations);
         columns.resize_with(columns.len().max(directions.all.len()), Column::default);
@@ -175,7 +205,14 @@ impl<'a> ResidualCost<'a> {
             each_direction(columns, directions, window.residuals().len(), compute);
             let range = std::mem::replace(&mut done, ends[index])..ends[index];
             let columns = columns.iter().map(|column| &column.picked[..]).collect();
-            visit(Block { residual: &residual[range.clone()], range, is_prior: false, columns });
+            let residual = if *is_kept {
+                &residual[range.clone()]
+            } else {
+                passing.clear();
+                sieve.pick(&evaluator.residual[window.residuals()], evaluator.span(index), self.selection, passing);
+                &passing[..]
+            };
+            visit(Block { residual, range, is_prior: false, columns });
         }
         let known = |i: usize| -> Vec<f64> {
             let is_computed = i >= directions.first && !self.is_held(i);
@@ -183,7 +220,8 @@ impl<'a> ResidualCost<'a> {
         };
         let known: Vec<Vec<f64>> = (0..theta.len()).map(known).collect();
         let columns = known.iter().map(Vec::as_slice).collect();
-        visit(Block { residual: &residual[done..], range: done..residual.len(), is_prior: true, columns });
+        let prior = &residual[if *is_kept { done } else { 0 }..];
+        visit(Block { residual: prior, range: done..done + prior.len(), is_prior: true, columns });
     }
 
     /// Half the first derivatives of the energy, `Jᵀr`, without the columns of `J`: its derivatives by the disagreement and by the
@@ -192,7 +230,7 @@ impl<'a> ResidualCost<'a> {
     pub(crate) fn slope(&self, theta: &[f64]) -> Vec<f64> {
         let is_masked = |stretch: &Arc<Stretch>| stretch.masked.iter().flatten().any(|is_masked| *is_masked);
         if self.observations.stretches.iter().any(is_masked) {
-            return self.normal_equations(theta, None, None).slope;
+            return self.normal_equations(theta).slope;
         }
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
@@ -264,26 +302,54 @@ impl<'a> ResidualCost<'a> {
         Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces).collect(), residual }
     }
 
-    /// The normal equations at a point.
+    /// The normal equations at a point, without what only [`Model::scored_normal_equations`] has.
+    pub(crate) fn normal_equations(&self, theta: &[f64]) -> NormalEquations {
+        let mut memory = self.memory.borrow_mut();
+        self.evaluate(theta, &mut memory);
+        self.summed(theta, &mut memory, None, None)
+    }
+
+    /// The normal equations at the one point that is of interest: residuals of a long record are filtered twice rather than kept.
     ///
     /// - `beside`: what is known of the columns, as [`Model::normal_equations`] has it
     /// - `filter`: that of the covariance of the slope, where that is of interest
-    pub(crate) fn normal_equations(
-        &self,
+    pub(crate) fn into_normal_equations(
+        self,
         theta: &[f64],
         beside: Option<Beside<'_>>,
         filter: Option<&Weighting>,
     ) -> NormalEquations {
         let mut memory = self.memory.borrow_mut();
-        self.evaluate(theta, &mut memory);
+        let mut agrees = true;
+        let mut compare = |range: Range<usize>, residual: &[f64]| {
+            agrees = agrees && beside.is_none_or(|beside| beside.agrees_with(residual, range.start));
+        };
+        if memory.evaluator.keeps_factors() {
+            self.evaluate(theta, &mut memory);
+            compare(0..memory.residual.len(), &memory.residual);
+        } else {
+            self.pass(theta, &mut memory, compare);
+        }
+        self.summed(theta, &mut memory, beside.filter(|_| agrees), filter)
+    }
+
+    /// Sums at the point that was evaluated last.
+    ///
+    /// - `beside`: a model of the same residuals, if they are of the same samples
+    fn summed(
+        &self,
+        theta: &[f64],
+        memory: &mut Memory<'_>,
+        beside: Option<Beside<'_>>,
+        filter: Option<&Weighting>,
+    ) -> NormalEquations {
         let pieces = &memory.evaluator.pieces;
         let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter());
-        let agrees = |beside: &Beside<'_>| beside.agrees_with(&memory.residual) && has_samples(beside.without);
-        let known = beside.filter(agrees).map(|beside| beside.without);
+        let known = beside.map(|beside| beside.without).filter(|without| has_samples(without));
         let first = known.map_or(0, |known| known.columns.len());
         let directions = self.directions(theta, first);
         let mut sums = Sums::of(&directions, known, filter);
-        self.walk(theta, &directions, &mut memory, |block| sums.add(&block));
+        self.walk(theta, &directions, memory, |block| sums.add(&block));
         sums.normal_equations()
     }
 }
@@ -296,7 +362,7 @@ impl Cost for ResidualCost<'_> {
     }
 
     fn derivatives(&self, theta: &[f64]) -> Option<Derivatives> {
-        let NormalEquations { energy, slope, products, .. } = self.normal_equations(theta, None, None);
+        let NormalEquations { energy, slope, products, .. } = self.normal_equations(theta);
         let twice = |row: Vec<f64>| row.into_iter().map(|x| 2.0 * x).collect();
         Some(Derivatives {
             value: energy,
@@ -514,8 +580,7 @@ mod tests {
                     memory.evaluator.window_samples = window_samples;
                     memory.evaluator.max_kept_samples = window_samples;
                     drop(memory);
-                    let NormalEquations { slope: want, products, energy, .. } =
-                        cost.normal_equations(&theta, None, None);
+                    let NormalEquations { slope: want, products, energy, .. } = cost.normal_equations(&theta);
                     let slope = cost.slope(&theta);
                     let of_window = |windows: &[Window]| windows.iter().map(Window::band).collect::<BTreeSet<usize>>();
                     most_bands = most_bands.max(of_window(cost.memory.borrow().evaluator.windows()).len());
@@ -528,6 +593,48 @@ mod tests {
             }
         }
         assert!(most_bands > 1, "stretches of uneven samples whose delays reach over more of them than others");
+    }
+
+    /// Residuals that are filtered window by window twice give the sums of those that are kept: they are the same numbers.
+    #[test]
+    fn residuals_that_are_not_kept_give_the_same_sums() {
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
+            let observations = in_stretches(&record(kind));
+            let (context, selection) = (context(&observations), selection(&observations));
+            let two_lags = Model::new(&[], [0.05, 0.07]);
+            let without = two_lags.linearised(&TAU_S, &observations, &selection);
+            for effect in effects(&context) {
+                let model = two_lags.with(effect.clone());
+                let theta: Vec<f64> = TAU_S.into_iter().chain(effect.starts().remove(0)).collect();
+                let cost = || {
+                    let cost = ResidualCost::new(&model, &theta, &observations, &selection);
+                    let mut memory = cost.memory.borrow_mut();
+                    (memory.evaluator.window_samples, memory.evaluator.max_kept_samples) = (37, 37);
+                    drop(memory);
+                    cost
+                };
+                let (kept, passed) =
+                    (cost().normal_equations(&theta), cost().into_normal_equations(&theta, None, None));
+                let name = effect.identifier().name();
+                assert_eq!(passed, kept, "{kind:?}, {name}");
+                // A difference that any residual keeps within, and one that none does.
+                for (max_difference, is_beside) in [(1e9, true), (0.0, false)] {
+                    let beside = Beside { without: &without, max_difference };
+                    let got = cost().into_normal_equations(&theta, Some(beside), None);
+                    let has_samples = selection.samples(&cost().pieces_at(&theta)).eq(without.samples.iter());
+                    assert_eq!(got.is_beside, is_beside && has_samples, "{kind:?}, {name}, {max_difference}");
+                }
+            }
+        }
+    }
+
+    impl ResidualCost<'_> {
+        /// Pieces of the record at a point.
+        fn pieces_at(&self, theta: &[f64]) -> Vec<crate::disagreement::Piece> {
+            let mut memory = self.memory.borrow_mut();
+            self.evaluate(theta, &mut memory);
+            std::mem::take(&mut memory.evaluator.pieces)
+        }
     }
 
     /// An effect whose parameters are those of its absence leaves the residual as it is, to rounding: of readings of

@@ -301,6 +301,11 @@ impl<'a> Evaluator<'a> {
         }
     }
 
+    /// Whether the factors of all windows are kept: those of a long record are computed again.
+    pub(crate) fn keeps_factors(&self) -> bool {
+        self.observations.samples() <= self.max_kept_samples
+    }
+
     /// Windows of the last evaluation.
     pub(crate) fn windows(&self) -> &[Window] {
         &self.windows[..self.used]
@@ -344,7 +349,7 @@ impl<'a> Evaluator<'a> {
 
     /// The residual of the next window of the last piece.
     fn evaluate_window(&mut self, plant: &Plant, first: usize, count: usize) {
-        let is_kept = self.observations.samples() <= self.max_kept_samples;
+        let is_kept = self.keeps_factors();
         let Self { observations, variances, plain, windows, used, pieces, residual, .. } = self;
         if windows.len() == *used {
             windows.push(Window { piece: 0, first: 0, from: 0, count: 0, lead: 0, factor: Factor::empty() });

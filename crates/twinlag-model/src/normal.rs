@@ -81,8 +81,11 @@ pub struct Beside<'a> {
 }
 
 impl Beside<'_> {
-    pub(crate) fn agrees_with(&self, residual: &[f64]) -> bool {
-        let mut pairs = residual.iter().zip(&self.without.residual);
+    /// Whether residuals differ by no more than they may.
+    ///
+    /// - `first`: place of the first of them among all
+    pub(crate) fn agrees_with(&self, residual: &[f64], first: usize) -> bool {
+        let mut pairs = residual.iter().zip(self.without.residual.get(first..).unwrap_or(&[]));
         self.max_difference.is_infinite() || pairs.all(|(a, b)| (a - b).abs() < self.max_difference)
     }
 }
@@ -186,7 +189,7 @@ impl Model {
         selection: &Selection,
         beside: Option<Beside<'_>>,
     ) -> NormalEquations {
-        ResidualCost::new(self, theta, observations, selection).normal_equations(theta, beside, None)
+        ResidualCost::new(self, theta, observations, selection).into_normal_equations(theta, beside, None)
     }
 
     /// The normal equations at a point, with [`NormalEquations::slope_covariance`]; else as [`Model::normal_equations`].
@@ -198,6 +201,6 @@ impl Model {
         beside: Option<Beside<'_>>,
     ) -> NormalEquations {
         let cost = ResidualCost::new(self, theta, observations, selection);
-        cost.normal_equations(theta, beside, Some(&selection.weighting))
+        cost.into_normal_equations(theta, beside, Some(&selection.weighting))
     }
 }
