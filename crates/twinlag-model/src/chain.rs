@@ -221,7 +221,9 @@ impl<T: Real> Chain<T> {
     /// - `ends_s`: the least and the largest delay; where they are the same, it is one
     pub(crate) fn advance(&mut self, delay_s: impl Fn(f64) -> T, ends_s: [f64; 2], reach: usize) {
         let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
-        let whole = |shift: f64| shift.floor().clamp(-(reach as f64), reach as f64 - 1.0);
+        // A solver may ask for what is no number: then no value is one.
+        let finite = |shift: f64| if shift.is_finite() { shift } else { 0.0 };
+        let whole = |shift: f64| finite(shift).floor().clamp(-(reach as f64), reach as f64 - 1.0);
         let [low, high] = ends_s.map(|end_s| whole(end_s / period_s));
         // Value k is of sample k + reach + 1; its first tap is one sample before that.
         let first = (reach as f64 + low) as usize;
