@@ -32,6 +32,9 @@ const FEWEST_NOISE_SAMPLES: usize = 20;
 /// is less than noise parameters are known by.
 const NOISE_ROUNDS: usize = 10;
 const NOISE_TOLERANCE: f64 = 0.01;
+/// Times that the gas temperature is estimated again with an effect that depends on it. Each takes off most of what the estimate
+/// before was wrong by, since this is but a part of what the effect itself is.
+const GAS_ROUNDS: usize = 2;
 
 /// A candidate with its fit.
 #[derive(Clone)]
@@ -305,11 +308,20 @@ impl<'a> Search<'a> {
 
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
-        let model = &looked.fitted.model;
-        let fitted = model.fit(&looked.fitted.theta, self.observations, self.selection, Effort::Compare);
+        let fit = |from: &Fitted| from.model.fit(&from.theta, self.observations, self.selection, Effort::Compare);
+        let (mut effect, mut fitted) = (looked.effect.clone(), fit(&looked.fitted));
+        if effect.about().follows_gas {
+            // The estimate that it was made with is that of a model without it.
+            for _ in 0..GAS_ROUNDS {
+                let gas = fitted.estimated_gas(self.observations);
+                let Some(in_gas) = gas.and_then(|gas| effect.in_gas(&gas)) else { break };
+                fitted.model = fitted.model.replaced(current.model.effects.len(), in_gas.clone());
+                (effect, fitted) = (in_gas, fit(&fitted));
+            }
+        }
         let robust = robust_before - self.robust(&fitted);
-        let [white_gain, robust_gain] = self.gains(current, &fitted, &looked.effect, robust);
-        Candidate { fitted, white_gain, robust_gain, ..looked.clone() }
+        let [white_gain, robust_gain] = self.gains(current, &fitted, &effect, robust);
+        Candidate { effect, fitted, white_gain, robust_gain, ..looked.clone() }
     }
 
     fn is_far_off(&self, current: &Fitted) -> bool {

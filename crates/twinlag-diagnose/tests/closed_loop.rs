@@ -5,10 +5,10 @@
 mod common;
 
 use common::{
-    NOISE_K, PERIOD_S, SEED, TAU_S, even, found, found_without, limited, ramps, readings, record, recovers, told,
+    GAS_K, NOISE_K, PERIOD_S, SEED, TAU_S, even, found, found_without, limited, ramps, readings, record, recovers, told,
 };
 use twinlag_diagnose::{Diagnosis, Found, Identifier, KnownEffect, Observations, Settings, Verdict, fit_with};
-use twinlag_signal::{ColouredNoise, Sensor, Spikes};
+use twinlag_signal::{ColouredNoise, Sensor, Signal, Spikes, TemperatureDependence, Turbulence};
 
 /// Offset of T2, K. In white noise its standard error is `σ √2/√n` = 0.0026 K.
 const OFFSET_K: f64 = 2.0;
@@ -119,6 +119,30 @@ fn a_delay_in_ramps_is_found() {
     let simulated = readings(SEED, ramps(SEED), |sensors| sensors[0].delay_s = 5.0 * DELAY_S);
     let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
     assert_eq!(d.effects[0].effect, Identifier::DELAY, "{}", told(&d));
+}
+
+/// Both time constants follow the temperature halfway between sensor and gas, as conductivity and viscosity of the gas do. The
+/// sensor's own temperature is another effect: the gas is up to 60 K from it.
+#[test]
+fn time_constants_that_follow_the_film_are_found() {
+    const EXPONENT: f64 = -1.8;
+    let gas = Signal::Turbulence(Turbulence { std_k: 3.0 * GAS_K, corner_hz: 2.4, cutoff_hz: 200.0 });
+    let follow = |sensors: &mut [Sensor; 2]| {
+        let film = TemperatureDependence::of_film(EXPONENT, 300.0);
+        sensors.iter_mut().for_each(|sensor| sensor.temperature_dependence = Some(film));
+    };
+    let simulated = readings(SEED, gas, follow);
+    let d = found(&even(simulated.t1_c, simulated.t2_c).expect("finite and long"));
+    let told = told(&d);
+    assert_eq!(d.verdict, Verdict::Explained, "{told}");
+    let effect = &d.effects[0];
+    let seat = (effect.effect, effect.channel);
+    assert_eq!(seat, (Identifier::TEMPERATURE_DEPENDENT_TIME_CONSTANT, None), "{told}");
+    is_sized(effect, "exponent", EXPONENT);
+    // Time constants are those at the mean of the record, and not at 300 °C.
+    let mean_c = effect.parameters.iter().find(|p| p.name == "mean_temperature").expect("derived").value;
+    let factor = ((mean_c + 273.15) / 573.15).powf(EXPONENT);
+    recovers(&d.last, TAU_S.map(|tau_s| factor * tau_s), &told);
 }
 
 #[test]

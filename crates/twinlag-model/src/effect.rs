@@ -42,6 +42,7 @@ pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
 
 use crate::directions::Parts;
 use crate::error::ModelError;
+use crate::gas::Gas;
 use crate::number::Number;
 use crate::plant::Plant;
 
@@ -138,6 +139,11 @@ pub trait Effect: Send + Sync {
     /// This effect where the time constants are others, s: of noise that has passed a sensor's lag. `None` of one that does not
     /// depend on them.
     fn beside(&self, _tau_s: [f64; 2]) -> Option<Shared> {
+        None
+    }
+
+    /// This effect with another estimate of the gas temperature. `None` of one that does not depend on it.
+    fn in_gas(&self, _gas: &Arc<Gas>) -> Option<Shared> {
         None
     }
 

@@ -2,6 +2,7 @@
 
 use crate::error::ModelError;
 use crate::instants::Instants;
+use crate::number::Number;
 
 /// Least speed of sensors that move, as a share of their root mean square speed. Where they turn they are at rest for a moment, and
 /// what then carries heat is not their speed: the water follows them, and rises by itself. Chosen.
@@ -70,8 +71,13 @@ impl Flow {
     }
 
     /// `v_mean/v` with its sign at an instant, on straight lines between the samples.
-    pub fn inverse_ratio_at(&self, time_s: f64) -> f64 {
-        self.at(&self.inverse_ratio, time_s)
+    pub(crate) fn inverse_ratio_at(&self, time_s: Number) -> Number {
+        let (before, after, share) = self.place(time_s.re);
+        let [from, to] = [self.inverse_ratio[before], self.inverse_ratio[after]];
+        let step_s = self.time_s[after] - self.time_s[before];
+        let is_between = share > 0.0 && share < 1.0;
+        let slope = if is_between { (to - from) / step_s } else { 0.0 };
+        Number::from(from + share * (to - from)) + (time_s - time_s.re) * slope
     }
 
     /// The least and the largest `v_mean/v`.
@@ -81,12 +87,18 @@ impl Flow {
     }
 
     fn at(&self, values: &[f64], time_s: f64) -> f64 {
+        let (before, after, share) = self.place(time_s);
+        values[before] + share * (values[after] - values[before])
+    }
+
+    /// The samples on either side of an instant, and the share of the way from one to the other.
+    fn place(&self, time_s: f64) -> (usize, usize, f64) {
         let last = self.time_s.len() - 1;
         let after = self.time_s.partition_point(|t| *t <= time_s).clamp(1, last.max(1)).min(last);
         let before = after.saturating_sub(1);
         let step_s = self.time_s[after] - self.time_s[before];
         let share = if step_s > 0.0 { ((time_s - self.time_s[before]) / step_s).clamp(0.0, 1.0) } else { 0.0 };
-        values[before] + share * (values[after] - values[before])
+        (before, after, share)
     }
 
     /// Whether it changes by more than rounding.

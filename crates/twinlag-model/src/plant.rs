@@ -14,6 +14,9 @@ use crate::observations::{Observations, Stretch};
 
 /// 0 °C, K.
 pub const ZERO_CELSIUS_K: f64 = 273.15;
+/// Times that a delay is computed from the flow at the instant that it leads to: each takes off all but what the delay changes within
+/// itself.
+const DELAY_ROUNDS: usize = 3;
 /// Smallest factor by which a time constant changes: less would make a lag vanish, or turn it round.
 pub(crate) const MIN_TAU_FACTOR: f64 = 0.02;
 
@@ -215,10 +218,15 @@ impl Plant {
         }
     }
 
-    /// How much later channel 2 is at an instant, s.
+    /// How much later channel 2 shows what channel 1 shows at an instant, s: `d = L/v(t + d)`, beside a delay that is always there.
     pub(crate) fn delay_at(&self, time_s: f64) -> Number {
-        let apart = self.separation.as_ref().map(|apart| apart.delay_s * apart.flow.inverse_ratio_at(time_s));
-        self.delay_s.into_iter().chain(apart).sum()
+        let steady_s = self.delay_s.unwrap_or(Number::from(0.0));
+        let Some(apart) = &self.separation else { return steady_s };
+        let mut delay_s = steady_s;
+        for _ in 0..DELAY_ROUNDS {
+            delay_s = steady_s + apart.delay_s * apart.flow.inverse_ratio_at(delay_s + time_s);
+        }
+        delay_s
     }
 
     /// The least and the largest delay along the record, s.

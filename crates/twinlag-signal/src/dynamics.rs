@@ -28,7 +28,7 @@ impl Sensor {
             tau_s *= flow.factor(time_s);
         }
         if let Some(dependence) = &self.temperature_dependence {
-            tau_s *= dependence.factor(first_c);
+            tau_s *= dependence.factor(first_c, gas_c);
         }
         let loss_k = self.radiation.map_or(0.0, |radiation| radiation.loss_k(first_c));
         [

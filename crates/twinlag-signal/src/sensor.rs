@@ -66,7 +66,7 @@ pub struct Sensor {
     /// Radiation between the first body and a wall.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub radiation: Option<Radiation>,
-    /// Dependence of τ on the first body's own temperature.
+    /// Dependence of τ on the temperature of the first body, or on one between it and the gas's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_dependence: Option<TemperatureDependence>,
     /// Play between the junction and the reading.
@@ -255,7 +255,7 @@ impl Sensor {
                     field = format!("{field} (shortened by radiation)");
                 }
                 if let Some(dependence) = &self.temperature_dependence {
-                    shortest_s *= dependence.factor(mean_c);
+                    shortest_s *= dependence.factor(mean_c, mean_c);
                     field = format!("{field} (at the mean temperature of the gas)");
                 }
             }

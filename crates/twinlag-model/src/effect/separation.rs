@@ -27,7 +27,7 @@ pub(crate) static ABOUT: About = About::new("separation", 15, candidates)
 /// Usual delay at the mean flow, in sample periods. Chosen, as of a delay.
 const USUAL_PERIODS: f64 = 0.5;
 /// Delays from which a fit starts, in sample periods.
-const STARTS_PERIODS: [f64; 2] = [0.3, -0.3];
+const STARTS_PERIODS: [f64; 4] = [0.3, -0.3, 1.5, -1.5];
 
 struct Apart {
     seat: Seat,

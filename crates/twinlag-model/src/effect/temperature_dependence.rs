@@ -145,6 +145,12 @@ impl Effect for TemperatureDependence {
         Some((Self::shared(self.sensors, exponent, self.reference_k, follows), vec![values[0], *share]))
     }
 
+    fn in_gas(&self, gas: &Arc<Gas>) -> Option<Shared> {
+        let Follows::Gas { share, .. } = self.follows else { return None };
+        let follows = Follows::Gas { gas: gas.clone(), share };
+        Some(Self::shared(self.sensors, self.seat.parameters[0].clone(), self.reference_k, follows))
+    }
+
     fn derived(&self) -> Vec<Derived> {
         let mean = Derived::constant("mean_temperature", "°C", self.reference_k - ZERO_CELSIUS_K);
         let share = match self.follows {

@@ -43,6 +43,8 @@ pub enum Kind {
     Saturation,
     /// One channel picks up the other.
     Crosstalk,
+    /// Both time constants depend on the temperature of the film, halfway between sensor and gas.
+    FilmTemperature,
     /// Play in one sensor. No library of effects knows it.
     Hysteresis,
     /// A contact of one channel that opens now and then. No library of effects knows it.
@@ -55,7 +57,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, none first, the aliens last.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::None,
         Self::Gain,
         Self::Offset,
@@ -74,6 +76,7 @@ impl Kind {
         Self::Quantisation,
         Self::Saturation,
         Self::Crosstalk,
+        Self::FilmTemperature,
         Self::Hysteresis,
         Self::IntermittentContact,
         Self::ClockSlip,
@@ -81,7 +84,7 @@ impl Kind {
     ];
 
     /// The kinds that have an [`effect`](Kind::effect).
-    pub const EFFECTS: [Self; 17] = [
+    pub const EFFECTS: [Self; 18] = [
         Self::Gain,
         Self::Offset,
         Self::Curvature,
@@ -99,6 +102,7 @@ impl Kind {
         Self::Quantisation,
         Self::Saturation,
         Self::Crosstalk,
+        Self::FilmTemperature,
     ];
 
     /// The kinds that no library of effects knows: here a diagnosis ought to say that it does not
@@ -126,6 +130,7 @@ impl Kind {
             Self::Quantisation => "quantisation",
             Self::Saturation => "saturation",
             Self::Crosstalk => "crosstalk",
+            Self::FilmTemperature => "film-temperature",
             Self::Hysteresis => "hysteresis",
             Self::IntermittentContact => "intermittent-contact",
             Self::ClockSlip => "clock-slip",
@@ -140,6 +145,7 @@ impl Kind {
         match self {
             Self::None | Self::Hysteresis | Self::IntermittentContact | Self::ClockSlip | Self::Replaced => None,
             Self::Gain | Self::Offset | Self::Curvature => Some("calibration"),
+            Self::FilmTemperature => Some(Self::TemperatureDependentTimeConstant.name()),
             known => Some(known.name()),
         }
     }
@@ -163,6 +169,7 @@ impl Kind {
             | Self::SlowMode
             | Self::VaryingTimeConstant
             | Self::TemperatureDependentTimeConstant
+            | Self::FilmTemperature
             | Self::Saturation
             | Self::Crosstalk
             | Self::IntermittentContact

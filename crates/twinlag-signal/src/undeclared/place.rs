@@ -44,6 +44,7 @@ impl Draft {
         let (size, channel) = match kind {
             Kind::None => (0.0, None),
             Kind::VaryingTimeConstant => (self.vary(by, rng), None),
+            Kind::FilmTemperature => (self.follow_film(by, rng), None),
             Kind::InputMismatch => (self.mislead(channel, by, rng), Some(channel)),
             Kind::Saturation => (self.saturate(channel, by, rng)?, Some(channel)),
             Kind::Gain
@@ -73,6 +74,16 @@ impl Draft {
         let period_s = self.base.length_s() * rng.random_range(0.4..1.2);
         self.flow = Some(Flow::Sine(FlowSine::new(depth, period_s, rng.random_range(0.0..TAU))));
         depth
+    }
+
+    fn follow_film(&mut self, by: f64, rng: &mut impl Rng) -> f64 {
+        let mean_c = self.base.mean_c;
+        // From two standard deviations of the gas below its mean to two above, as where one sensor's own temperature counts.
+        let change = by * sign(rng) * log_uniform(0.1, 0.3, rng);
+        let exponent = change * (mean_c + ZERO_CELSIUS_K) / (4.0 * self.base.scale_k);
+        let of_film = TemperatureDependence::of_film(exponent, mean_c);
+        self.base.sensors.iter_mut().for_each(|sensor| sensor.temperature_dependence = Some(of_film));
+        exponent
     }
 
     fn mislead(&mut self, channel: usize, by: f64, rng: &mut impl Rng) -> f64 {

@@ -140,6 +140,20 @@ fn time_constant_in_inverse_proportion_to_temperature_makes_a_logistic_step() {
     }
 }
 
+/// With exponent −1 at a share `m` of the gas temperature, what a step from `T₀` to `x` (absolute) still lacks, `u = x − T`, is
+/// logistic: `u/(x − (1 − m) u) = u₀/(x − (1 − m) u₀) exp(−x t/(τ R))`. The rule's error is of order `(h/τ)⁴` of 200 K: 3e-8.
+#[test]
+fn time_constant_in_inverse_proportion_to_film_temperature_makes_a_logistic_step() {
+    let dependence = TemperatureDependence::of_film(-1.0, 426.85);
+    let sensor = with(|sensor| sensor.temperature_dependence = Some(dependence));
+    let got = clean(&rig_with(Record::new(200, 0.002), step(326.85, 526.85, 200), sensor));
+    for (t, y) in got.time_s.iter().zip(&got.readings_c[0]).skip(1) {
+        let odds = 200.0 / 700.0 * (-800.0 * (t - 0.002) / (TAU_S * 700.0)).exp();
+        let lacking_k = 800.0 * odds / (1.0 + 0.5 * odds);
+        assert_close("reading", *y, 526.85 - lacking_k, 3e-8);
+    }
+}
+
 /// The step response with `∫ dt/τ(t)` in place of `t/τ`:
 /// `∫ dθ/(1 + d sin θ) = 2/√(1 − d²) arctan((tan(θ/2) + d)/√(1 − d²))`, on one branch here. The rule's error is of order
 /// `(h/τ)⁴` of 100 K with the shortest time constant, 1e-7 at most.
