@@ -642,7 +642,7 @@ mod tests {
     /// thousands four times that again, 1.1e-11. The bound is twice as much. Effects that add factors to both inverses are smoothed once more, and left out.
     #[test]
     fn an_effect_of_no_size_changes_nothing() {
-        let adds_factors = ["delay", "second-order", "slow-mode", "coloured-noise", "input-mismatch"];
+        let adds_factors = ["delay", "separation", "second-order", "slow-mode", "coloured-noise", "input-mismatch"];
         for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
             let observations = record(kind);
             let (context, selection) = (context(&observations), selection(&observations));

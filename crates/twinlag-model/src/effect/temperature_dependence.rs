@@ -63,15 +63,13 @@ fn candidates(context: &Context) -> Vec<Shared> {
     std::iter::once(Follows::Sensor).chain(film).flat_map(|follows| about(mean_c, &follows, context)).collect()
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let here_c = 0.5 * (context.mean_c[0] + context.mean_c[1]);
     let mean_c = known.parameter("mean_temperature").unwrap_or(here_c);
-    let follows = match (known.parameter("gas_share"), &context.gas) {
-        (None, _) => Follows::Sensor,
-        (Some(_), Some(gas)) => Follows::Gas { gas: gas.clone(), share: None },
-        // The gas is as warm as the sensors, to all purposes.
-        (Some(_), None) => Follows::Sensor,
-    };
+    // Older models have no such share; and where there is no estimate of the gas, it is as warm as the sensors, to all purposes.
+    let gas = context.gas.as_ref().filter(|_| known.parameter("gas_share").is_some());
+    let follows = gas.map_or(Follows::Sensor, |gas| Follows::Gas { gas: gas.clone(), share: None });
     Ok(described_by(known, about(mean_c, &follows, context)))
 }
 

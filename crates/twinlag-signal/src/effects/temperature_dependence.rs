@@ -28,7 +28,7 @@ impl TemperatureDependence {
         Self { exponent, reference_c, gas_share: 0.0 }
     }
 
-    /// The same with the temperature of the film, halfway between body and gas.
+    /// `τ(T) = τ (H/R_K)^exponent` with the temperature `H` of the film, halfway between body and gas.
     pub fn of_film(exponent: f64, reference_c: f64) -> Self {
         Self { gas_share: 0.5, ..Self::new(exponent, reference_c) }
     }

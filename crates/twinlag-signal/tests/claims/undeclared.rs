@@ -27,7 +27,7 @@ fn every_kind_builds_for_twenty_seeds_within_its_ranges() {
                 let noise_k = sensor.noise.expect("every channel has noise").std_k;
                 assert!((0.002..=0.03).contains(&(noise_k / drawn.scale_k)), "{what}");
             }
-            let both = [Kind::None, Kind::VaryingTimeConstant].contains(&kind);
+            let both = [Kind::None, Kind::VaryingTimeConstant, Kind::FilmTemperature].contains(&kind);
             assert_eq!(drawn.channel.is_none(), both, "{what}");
             assert_eq!(drawn.size == 0.0, kind == Kind::None, "{what}");
             assert_eq!(drawn.effects(), Vec::from_iter(kind.effect()), "{what}");
