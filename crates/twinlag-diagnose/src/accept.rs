@@ -23,32 +23,23 @@ impl Search<'_> {
     pub(crate) fn accepted(&self, current: &Fitted, all: &[Candidate]) -> Option<(Candidate, Vec<Candidate>)> {
         let scores: Vec<Score> = all.iter().map(|c| c.score(current, self.policy)).collect();
         let considered = self.candidates(&current.model).len();
-        let mut open: Vec<usize> = (0..all.len()).collect();
-        loop {
-            // Where what comes first is rejected by what has not seen it, the others are ranked among themselves.
-            let of_open: Vec<Score> = open.iter().map(|i| scores[*i]).collect();
-            let ranked = rank(&of_open, considered, self.policy);
-            if ranked.is_empty() {
-                return None;
+        let mut order = VecDeque::from(rank(&scores, considered, self.policy));
+        while let Some(index) = order.pop_front() {
+            let mut first = self.resized(current, all[index].clone());
+            if !first.effect.is_noise() {
+                first.held_out_nats =
+                    held_out_gain(self.observations, self.selection, current, &first.fitted, self.policy);
             }
-            let mut order: VecDeque<usize> = ranked.into_iter().map(|place| open[place]).collect();
-            open.retain(|i| !order.contains(i));
-            while let Some(index) = order.pop_front() {
-                let mut first = self.resized(current, all[index].clone());
-                if !first.effect.is_noise() {
-                    first.held_out_nats =
-                        held_out_gain(self.observations, self.selection, current, &first.fitted, self.policy);
-                }
-                if first.held_out_nats > 0.0
-                    && self.has_size(&first.fitted, current.model.effects.len())
-                    && is_confirmed(&first, current, self.observations, self.policy)
-                {
-                    let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
-                    let tied = ties(&first.score(current, self.policy), &others, self.policy);
-                    return Some((first, tied.into_iter().map(|i| all[order[i]].clone()).collect()));
-                }
+            if first.held_out_nats > 0.0
+                && self.has_size(&first.fitted, current.model.effects.len())
+                && is_confirmed(&first, current, self.observations, self.policy)
+            {
+                let others: Vec<Score> = order.iter().map(|i| scores[*i]).collect();
+                let tied = ties(&first.score(current, self.policy), &others, self.policy);
+                return Some((first, tied.into_iter().map(|i| all[order[i]].clone()).collect()));
             }
         }
+        None
     }
 
     /// Whether effect `index`, if it puts a factor into both inverses, has a size of its own.

@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Number, Observations, Parameter,
-    Place, Plant, Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel,
-    lines, report, white_deviance,
+    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place,
+    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
+    white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -28,10 +28,6 @@ const GRID_TO_SHARE: f64 = 0.03;
 const MOST_GRID_PARAMETERS: usize = 3;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
-/// Times that noise and time constants are fitted in turn at most, and the relative change at which they stay: a hundredth, which
-/// is less than noise parameters are known by.
-const NOISE_ROUNDS: usize = 10;
-const NOISE_TOLERANCE: f64 = 0.01;
 /// Times that the gas temperature is estimated again with an effect that depends on it. Each takes off most of what the estimate
 /// before was wrong by, since this is but a part of what the effect itself is.
 const GAS_ROUNDS: usize = 2;
@@ -464,8 +460,10 @@ impl<'a> Search<'a> {
             return None;
         }
         let bands = self.bands(current);
-        let effect = &effect.beside([current.theta[0], current.theta[1]]).unwrap_or_else(|| effect.clone());
-        let place = place_of(effect, &plant)?;
+        let place = match effect.channel() {
+            Some(i) => Place::Reading(i),
+            None => Place::Gas,
+        };
         let starts: Vec<[f64; 2]> = effect.starts().iter().map(|s| [s[0], s[1]]).collect();
         let white = fit_noise(&plant, self.observations, &bands, None, &[], self.context.is_coarse);
         let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts, self.context.is_coarse);
@@ -473,47 +471,9 @@ impl<'a> Search<'a> {
         let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
         let mut theta = current.theta.clone();
         theta.extend([extra.std_k, extra.correlation_s]);
-        let mut fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
-        // The weights move the time constants, and these the noise. Of what is left over under the noise that was found the spectrum
-        // is about flat, so that no frequency hides in what leaks from a larger one.
-        for _ in 0..NOISE_ROUNDS {
-            let again = self.noise_again(&fitted);
-            let moved = again.theta.iter().zip(&fitted.theta).map(|(a, b)| (a / b).ln().abs()).fold(0.0, f64::max);
-            fitted = again;
-            if moved < NOISE_TOLERANCE {
-                break;
-            }
-        }
-        // Of time constants that differ likelihoods of the disagreement do not compare, but what each lacks of one with a free level in
-        // every band does.
-        let gain = white.likelihood - bands.saturated() - self.bands(&fitted).lack_of_fit();
+        // The weights move the time constants, and these the noise: once more is enough.
+        let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
         let held_out_nats = 0.5 * (white.held_out - with.held_out);
-        Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, gain, 0.0) })
+        Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }
-}
-
-impl Search<'_> {
-    /// The noise that was added last and the fit under it, each once more.
-    fn noise_again(&self, fitted: &Fitted) -> Fitted {
-        let plant = fitted.model.plant(&fitted.theta, self.observations);
-        let bands = self.bands(fitted);
-        let last = plant.extra[plant.extra.len() - 1];
-        let start = [[last.std_k, last.correlation_s]];
-        let with = fit_noise(&plant, self.observations, &bands, Some(last.place), &start, self.context.is_coarse);
-        let mut theta = fitted.theta.clone();
-        if let Some(extra) = with.extra {
-            let from = theta.len() - 2;
-            theta[from..].copy_from_slice(&[extra.std_k, extra.correlation_s]);
-        }
-        let model = fitted.model.clone().with_noise(with.noise_std_k);
-        model.fit(&theta, self.observations, self.selection, Effort::Compare)
-    }
-}
-
-/// Where a noise enters.
-fn place_of(effect: &Shared, plant: &Plant) -> Option<Place> {
-    let mut with = plant.clone();
-    let values: Vec<Number> = effect.starts().first()?.iter().copied().map(Number::from).collect();
-    effect.install(&values, &mut with);
-    with.extra.last().map(|extra| extra.place)
 }

@@ -80,20 +80,11 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
     threshold(added, policy.round_false_alarm_probability).max(added as f64 * count.ln())
 }
 
-/// Of candidates in the order of their white gains, puts first the one that occurs most often of those that hardly differ from the
-/// best.
-fn put_frequent_first(order: &mut [usize], scores: &[Score], policy: &Policy) {
-    let Some(highest) = order.first().map(|i| scores[*i].white()) else { return };
-    let is_same = |i: &usize| highest - scores[*i].white() < policy.same_deviance;
-    let first = (0..order.len()).filter(|at| is_same(&order[*at])).min_by_key(|at| scores[order[*at]].prevalence);
-    order.swap(0, first.unwrap_or(0));
-}
-
 /// The candidates that may be taken, the first choice first.
 ///
 /// 1. Effects of the sensors whose robust gain is beyond chance and whose white gain is beyond the
 ///    penalty. Noise comes where there are none, or where it explains incomparably more.
-/// 2. Of those with nearly the best robust gain the one with the best white gain; of these, and of noise, where
+/// 2. Of those with nearly the best robust gain the one with the best white gain; of these, where
 ///    they hardly differ, the one that occurs more often.
 /// 3. A static disagreement before its imitators, and where no effect explains the record. Noise
 ///    comes first there if there is no static disagreement.
@@ -103,8 +94,7 @@ fn put_frequent_first(order: &mut [usize], scores: &[Score], policy: &Policy) {
 pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<usize> {
     let probability = policy.round_false_alarm_probability / considered.max(scores.len()).max(1) as f64;
     let is_worth = |s: &Score, gain: f64| gain > threshold(s.added, probability) && s.white() > 0.0;
-    let mut noise = best_first(scores, Score::white, |s| s.is_noise() && is_worth(s, s.white_gain));
-    put_frequent_first(&mut noise, scores, policy);
+    let noise = best_first(scores, Score::white, |s| s.is_noise() && is_worth(s, s.white_gain));
     // Fitted with wrong weights, an effect absorbs a little of any noise.
     let loudest = noise.first().map_or(0.0, |i| scores[*i].white_gain);
     let is_beside_noise = |s: &Score| {
@@ -119,7 +109,11 @@ pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<
     let mut order: Vec<usize> = effects.iter().copied().filter(|i| near(&scores[*i])).collect();
     order.sort_by(|a, b| descending(scores[*a].white(), scores[*b].white()));
     let highest = scores[order[0]].white();
-    put_frequent_first(&mut order, scores, policy);
+    let is_same = |i: &usize| highest - scores[*i].white() < policy.same_deviance;
+    if let Some(at) = (0..order.len()).filter(|at| is_same(&order[*at])).min_by_key(|at| scores[order[*at]].prevalence)
+    {
+        order.swap(0, at);
+    }
     let first = &scores[order[0]];
     let is_incomplete = first.energy > policy.incomplete_energy;
     if first.kind == Kind::Imitator || is_incomplete {

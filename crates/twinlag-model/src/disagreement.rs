@@ -91,20 +91,19 @@ impl<T: Real> Disagreement<T> {
         self.extra_rows.resize_with(plant.extra.len(), Rows::identity);
         self.extra_variances.clear();
         for (index, extra) in plant.extra.iter().enumerate() {
-            self.extra_variances.push(Variance::same(extra.innovation_variance(step_s)));
+            let rho = extra.rho(step_s);
+            self.extra_variances.push(Variance::same(extra.std_k * extra.std_k * (1.0 - rho * rho)));
             let (before, rest) = self.extra_rows.split_at_mut(index);
-            match extra.channel() {
-                Some(i) if !self.inverse.has[i] => rest[0].begin(),
-                Some(i) => self.inverse.disagreement_rows(plant, i, &mut rest[0]),
-                None => rest[0].copy(&self.inverse.gas.rows),
+            match extra.place {
+                Place::Reading(i) if !self.inverse.has[i] => rest[0].begin(),
+                Place::Reading(i) => self.inverse.disagreement_rows(plant, i, &mut rest[0]),
+                Place::Gas => rest[0].copy(&self.inverse.gas.rows),
             }
-            for rho in extra.left_after(step_s) {
-                // Its innovations come with the next value; noise that is there already has one more difference.
-                rest[0].start += 1;
-                let count = self.inverse.count() - 1;
-                before.iter_mut().for_each(|rows| rows.difference(rho, count));
-                self.inverse.difference(rho, has_gas);
-            }
+            // Its innovations come with the next value; noise that is there already has one more difference.
+            rest[0].start += 1;
+            let count = self.inverse.count() - 1;
+            before.iter_mut().for_each(|rows| rows.difference(rho, count));
+            self.inverse.difference(rho, has_gas);
         }
         for (i, rows) in self.reading_rows.iter_mut().enumerate() {
             if self.inverse.has[i] {

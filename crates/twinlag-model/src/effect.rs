@@ -136,12 +136,6 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
-    /// This effect where the time constants are others, s: of noise that has passed a sensor's lag. `None` of one that does not
-    /// depend on them.
-    fn beside(&self, _tau_s: [f64; 2]) -> Option<Shared> {
-        None
-    }
-
     /// This effect with another estimate of the gas temperature. `None` of one that does not depend on it.
     fn in_gas(&self, _gas: &Arc<Gas>) -> Option<Shared> {
         None

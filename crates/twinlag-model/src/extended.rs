@@ -111,8 +111,8 @@ impl Extended {
 }
 
 fn rig(plant: &Plant) -> Rig {
-    let extra = |is_there: &dyn Fn(Place) -> bool| {
-        let found = plant.extra.iter().find(|e| is_there(e.place))?;
+    let extra = |place: Place| {
+        let found = plant.extra.iter().find(|e| e.place == place)?;
         Some(Coloured { std_k: found.std_k, correlation_s: found.correlation_s })
     };
     let sensors = [0, 1].map(|i| {
@@ -123,12 +123,10 @@ fn rig(plant: &Plant) -> Rig {
             second_tau_s: sensor.second_tau_s.map(|tau_s| tau_s.re),
             slow: sensor.slow.map(|slow| SlowPath { share: slow.share.re, tau_s: slow.tau_s.re }),
             noise_std_k: plant.noise_std_k[i] / gain,
-            coloured: extra(&|place| place == Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
+            coloured: extra(Place::Reading(i)).map(|c| Coloured { std_k: c.std_k / gain, ..c }),
         }
     });
-    // Which of both gas temperatures is the gas's nobody knows: what they differ is shared.
-    let mismatch = extra(&|place| matches!(place, Place::Gas | Place::GasAt { .. }));
-    Rig { sensors, delay_s: plant.delay_s.map_or(0.0, |delay_s| delay_s.re), clock: 0, mismatch }
+    Rig { sensors, delay_s: plant.delay_s.map_or(0.0, |delay_s| delay_s.re), clock: 0, mismatch: extra(Place::Gas) }
 }
 
 /// What each sensor does at each instant, where that changes.

@@ -4,7 +4,6 @@ use twinlag_optimise::{Budget, Cost, End, Fit, Minimiser, Optimiser, Problem, Va
 
 use crate::cost::{Linearised, ResidualCost};
 use crate::dense;
-use crate::effect::Shared;
 use crate::model::Model;
 use crate::normal::NormalEquations;
 use crate::observations::{Observations, evenly_spread};
@@ -61,11 +60,6 @@ impl Effort {
         }
     }
 }
-
-/// Fits after which the lag that noise has passed stays as it is. Each takes off most of what it differs from the fitted one.
-const MAX_LAG_ROUNDS: usize = 12;
-/// Relative change of the time constants at which it is the fitted one: less than a tenth of any standard error with such noise.
-const LAG_TOLERANCE: f64 = 1e-4;
 
 /// A fitted model.
 #[derive(Clone, Debug)]
@@ -131,40 +125,11 @@ pub(crate) fn minimised(
 }
 
 impl Model {
-    /// The fit from `start`, noise parameters held. Noise that has passed a sensor's lag passes that of the fit in the end.
+    /// The fit from `start`, noise parameters held.
     ///
     /// # Panics
     /// If both time constants are held, or `start` is not finite.
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
-        let (mut model, mut start) = (self.beside([start[0], start[1]]), start.to_vec());
-        for _ in 0..MAX_LAG_ROUNDS {
-            let Some(beside) = model.take() else { break };
-            let fitted = beside.fit_once(&start, observations, selection, effort);
-            let moved = (0..2).map(|i| (fitted.theta[i] / start[i]).ln().abs()).fold(0.0, f64::max);
-            if moved < LAG_TOLERANCE {
-                return fitted;
-            }
-            model = beside.beside([fitted.theta[0], fitted.theta[1]]);
-            start = fitted.theta;
-        }
-        model.as_ref().unwrap_or(self).fit_once(&start, observations, selection, effort)
-    }
-
-    /// This model with effects as they are beside other time constants, s; `None` where none depends on them.
-    fn beside(&self, tau_s: [f64; 2]) -> Option<Self> {
-        let beside: Vec<Option<Shared>> = self.effects.iter().map(|effect| effect.beside(tau_s)).collect();
-        if beside.iter().all(Option::is_none) {
-            return None;
-        }
-        let mut out = self.clone();
-        for (effect, beside) in out.effects.iter_mut().zip(beside) {
-            *effect = beside.unwrap_or_else(|| effect.clone());
-        }
-        Some(out)
-    }
-
-    /// The fit from `start` with everything held that the noise depends on.
-    fn fit_once(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
         let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
         let count = cost.count() as f64 * selection.weighting.mean();

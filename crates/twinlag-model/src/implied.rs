@@ -150,7 +150,7 @@ impl Plant {
             let [mut mean_c, mut difference_k] = inferred.map(|inferred| {
                 let mut gas = inferred.value;
                 self.undo_slow(&mut gas, start_c, observations.step_s());
-                gas.drain(..self.differences());
+                gas.drain(..self.extra.len());
                 gas.truncate(residual.len());
                 gas
             });
@@ -180,7 +180,7 @@ impl Plant {
             append(&mut out.residual, residual);
             out.time_s.append(time_s);
             out.samples.push(samples);
-            let skipped = self.differences();
+            let skipped = self.extra.len();
             out.parts.push(Part { stretch, rows, variances, weighted, inferred, skipped, before });
         });
         out

@@ -123,20 +123,12 @@ impl Sensor {
 }
 
 /// Where extra noise enters.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The reading of a channel, 0 or 1.
     Reading(usize),
     /// The gas: the sensors do not see the same.
     Gas,
-    /// The gas that one sensor sees. In its reading this is noise that has passed the sensor's lag, whatever time constant a fit
-    /// tries: were it noise of the inferred gas temperature, a shorter time constant would seem to take some of it away.
-    GasAt {
-        /// The sensor, 0 or 1.
-        sensor: usize,
-        /// Its time constant, s, which a fit holds.
-        lag_s: f64,
-    },
 }
 
 /// Noise beside the white noise of the channels: autoregressive of first order.
@@ -151,31 +143,9 @@ pub struct Extra {
 }
 
 impl Extra {
-    /// The channel whose readings it is noise of, 0 or 1; `None` of one of the gas between both.
-    pub(crate) fn channel(&self) -> Option<usize> {
-        match self.place {
-            Place::Reading(channel) | Place::GasAt { sensor: channel, .. } => Some(channel),
-            Place::Gas => None,
-        }
-    }
-
-    /// What is left after a sample, `ρ = exp(−Ts/T)`, of the noise and of what a lag makes of it.
-    pub(crate) fn left_after(&self, step_s: f64) -> impl Iterator<Item = f64> + Clone {
-        let lag_s = if let Place::GasAt { lag_s, .. } = self.place { Some(lag_s) } else { None };
-        std::iter::once(self.correlation_s).chain(lag_s).map(move |time_s| (-step_s / time_s).exp())
-    }
-
-    /// Differences that whiten it.
-    pub(crate) fn differences(&self) -> usize {
-        self.left_after(1.0).count()
-    }
-
-    /// Variance of its innovations, K²: `σ² (1 − ρ²)`, times `(1 − a)²` after a lag `a`.
-    pub(crate) fn innovation_variance(&self, step_s: f64) -> f64 {
-        let mut left = self.left_after(step_s);
-        let rho = left.next().unwrap_or(0.0);
-        let of_lag: f64 = left.map(|a| (1.0 - a) * (1.0 - a)).product();
-        self.std_k * self.std_k * (1.0 - rho * rho) * of_lag
+    /// What is left of it after a sample: `ρ = exp(−Ts/T)`.
+    pub(crate) fn rho(&self, step_s: f64) -> f64 {
+        (-step_s / self.correlation_s).exp()
     }
 }
 
@@ -247,12 +217,7 @@ impl Plant {
         let factors: usize = self.sensors.iter().map(of_sensor).sum();
         let (each, delay) = if is_even { (2, 2 * self.reach) } else { (1, 2 * UNEVEN_REACH) };
         let delay = if self.has_delay() { delay + DELAY_TAPS - 1 } else { 0 };
-        each * (1 + factors) + delay + self.differences()
-    }
-
-    /// Values at the front of a stretch that the differences take which whiten extra noise.
-    pub(crate) fn differences(&self) -> usize {
-        self.extra.iter().map(Extra::differences).sum()
+        each * (1 + factors) + delay + self.extra.len()
     }
 
     /// The temperatures of both sensors: readings without what calibration, lines and crosstalk make of them, °C.

@@ -15,6 +15,7 @@ use crate::dense;
 use crate::fit::Fitted;
 use crate::implied::{Details, Inferred, Part};
 use crate::observations::Observations;
+use crate::plant::Place;
 use crate::selection::Selection;
 use crate::weighting::Weighting;
 
@@ -40,7 +41,7 @@ impl Pairs {
     pub(crate) fn of(fitted: &Fitted, details: &Details, observations: &Observations, selection: &Selection) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
         // A channel without noise of its own beside the white.
-        let is_white = |i: usize| plant.extra.iter().all(|e| e.channel() != Some(i));
+        let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel =
             usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
         let (mut residual, mut input): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
@@ -88,7 +89,7 @@ fn joined(runs: &[Vec<f64>]) -> Cow<'_, [f64]> {
 pub(crate) fn estimated_gas(fitted: &Fitted, parts: Vec<Part>, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
-    let channel = usize::from(plant.extra.iter().any(|e| e.channel() == Some(0)));
+    let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
     let mut out = Vec::with_capacity(parts.iter().map(Part::len).sum());
     for part in parts {
         let stretch = &observations.stretches[part.stretch];

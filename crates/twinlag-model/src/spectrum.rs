@@ -102,16 +102,6 @@ impl Bands {
         self.0.iter().map(|b| weight(b.omega) * b.dof() * b.power().max(1e-300).ln()).sum()
     }
 
-    /// `−2 ln L` with a free level in every band, in full.
-    pub fn saturated(&self) -> f64 {
-        self.0.iter().map(|b| b.dof() * (1.0 + b.power().max(1e-300).ln())).sum()
-    }
-
-    /// What `−2 ln L` of white noise of unit variance is above that.
-    pub fn lack_of_fit(&self) -> f64 {
-        self.likelihood(Half::Both, |_, _| 1.0) - self.saturated()
-    }
-
     /// `−2 ln L` of noise whose power is `ratio` times that of the whitening, band by band, less its value for white noise of unit
     /// power.
     fn likelihood(&self, half: Half, ratio: impl Fn(usize, f64) -> f64) -> f64 {
@@ -149,10 +139,10 @@ fn power(row: &[f64], omega: f64) -> f64 {
     row.iter().enumerate().map(|(j, c)| c * Complex64::cis(-omega * j as f64)).sum::<Complex64>().norm_sqr()
 }
 
-/// Power of extra noise, K², at `omega` radians per sample.
-fn coloured(extra: &Extra, step_s: f64, omega: f64) -> f64 {
-    let passed: f64 = extra.left_after(step_s).map(|rho| 1.0 - 2.0 * rho * omega.cos() + rho * rho).product();
-    extra.innovation_variance(step_s) / passed
+/// What first-order autoregressive noise of unit variance has.
+fn autoregressive(correlation_s: f64, step_s: f64, omega: f64) -> f64 {
+    let rho = (-step_s / correlation_s).exp();
+    (1.0 - rho * rho) / (1.0 - 2.0 * rho * omega.cos() + rho * rho)
 }
 
 impl Paths {
@@ -167,7 +157,7 @@ impl Paths {
 
     fn through(&self, place: Place) -> &[f64] {
         match place {
-            Place::Reading(i) | Place::GasAt { sensor: i, .. } => &self.rows[i],
+            Place::Reading(i) => &self.rows[i],
             Place::Gas => &self.rows[2],
         }
     }
@@ -175,8 +165,15 @@ impl Paths {
     /// Power of the disagreement.
     fn total(&self, variance: [f64; 2], extra: &[Extra], omega: f64) -> f64 {
         let white: f64 = (0..2).map(|i| variance[i] * power(&self.rows[i], omega)).sum();
-        let coloured: f64 =
-            extra.iter().map(|e| coloured(e, self.step_s, omega) * power(self.through(e.place), omega)).sum();
+        let coloured: f64 = extra
+            .iter()
+            .map(|e| {
+                e.std_k
+                    * e.std_k
+                    * autoregressive(e.correlation_s, self.step_s, omega)
+                    * power(self.through(e.place), omega)
+            })
+            .sum();
         white + coloured
     }
 }
@@ -207,8 +204,6 @@ struct NoiseCost<'a> {
     /// Power of the whitening in each band.
     base: &'a [f64],
     place: Option<Place>,
-    /// Noise beside it.
-    kept: &'a [Extra],
     half: Half,
     /// Channels whose converter is coarse: third differences may say anything.
     is_coarse: [bool; 2],
@@ -217,7 +212,7 @@ struct NoiseCost<'a> {
 impl NoiseCost<'_> {
     fn parts(&self, x: &[f64]) -> ([f64; 2], Vec<Extra>) {
         let variance = [0, 1].map(|i| self.paths.base[i] * x[i] * x[i]);
-        let mut extra = self.kept.to_vec();
+        let mut extra = self.paths.extra.clone();
         if let Some(place) = self.place {
             extra.push(Extra { place, std_k: x[2], correlation_s: x[3] });
         }
@@ -263,15 +258,7 @@ impl<'a> NoiseSearch<'a> {
 
     fn cost(&self, half: Half) -> NoiseCost<'_> {
         let Self { bands, paths, base, place, is_coarse, .. } = self;
-        // Noise that is there already and is fitted again is not there twice.
-        let kept = paths.extra.len() - usize::from(place.is_some_and(|place| self.refines(place)));
-        NoiseCost { bands, paths, base, place: *place, kept: &paths.extra[..kept], half, is_coarse: *is_coarse }
-    }
-
-    /// Whether noise at `place` is there already.
-    fn refines(&self, place: Place) -> bool {
-        let is_alike = |extra: &Extra| std::mem::discriminant(&extra.place) == std::mem::discriminant(&place);
-        self.paths.extra.last().is_some_and(is_alike)
+        NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse }
     }
 
     /// The best levels, and the best extra noise, of a half.
@@ -309,8 +296,7 @@ pub fn white_deviance(plant: &Plant, observations: &Observations, bands: &Bands,
     search.cost(Half::Both).likelihood(&search.solve(Half::Both), Half::Both)
 }
 
-/// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`; where the last
-/// extra noise of the plant is at such a place, it is fitted anew.
+/// Fits the levels of white noise, and extra noise at `place` from each of `starts`, to the residual of `plant`.
 ///
 /// - `is_coarse`: channels whose levels third differences do not determine
 ///
