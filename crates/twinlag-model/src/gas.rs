@@ -38,6 +38,9 @@ impl Gas {
         }
         let mut details = fitted.model.details(&fitted.theta, observations);
         let mut gas_k = estimated_gas(fitted, std::mem::take(&mut details.parts), observations);
+        if gas_k.len() < 2 {
+            return None;
+        }
         let faster_s = fitted.theta[0].min(fitted.theta[1]);
         let half = (faster_s / observations.step_s()).max(1.0) as usize;
         for stretch in details.stretches() {
