@@ -70,8 +70,10 @@ impl Prepared {
         if let Some(std_k) = settings.noise_std_k {
             levels.std_k = std_k;
             levels.log_error = [0.0; 2];
-        } else if observations.is_joined() {
-            let factors = member_noise::factors(&observations, &levels, &policy);
+        } else {
+            // Those of an earlier preparation are over other levels: a record that is left of several has none.
+            let is_joined = observations.is_joined();
+            let factors = if is_joined { member_noise::factors(&observations, &levels, &policy) } else { Vec::new() };
             observations = observations.with_noise_factors(&factors);
         }
         let raw = (observations.clone(), levels);

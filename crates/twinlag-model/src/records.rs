@@ -211,6 +211,7 @@ impl OneRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     fn record(samples: u32, period_s: f64, from_s: f64) -> Observations {
         let time_s: Vec<f64> = (0..samples).map(|k| from_s + period_s * f64::from(k)).collect();
@@ -233,6 +234,30 @@ mod tests {
         assert_eq!(others.members()[1].ends_s, members[2].ends_s);
         // As long as the longest of them, not as all of them together.
         assert_eq!(joined.span_s(), 44.5);
+    }
+
+    /// Two records whose noise differs five times have levels of their own beside those of both; one that is left has its own levels
+    /// alone. Failed: it kept its part of the levels of both, and its residuals were weighted twice.
+    #[test]
+    fn a_record_that_is_left_of_two_has_no_levels_beside_its_own() {
+        // Alternating signs under a golden-ratio spread: third differences of it are those of noise, and the waves are slow beside them.
+        let noisy = |noise_k: f64| {
+            let time_s: Vec<f64> = (0..400).map(f64::from).collect();
+            let noise = |k: usize, salt: f64| noise_k * (((k * k) as f64 * 0.618_034 + salt * k as f64).fract() - 0.5);
+            let of = |salt: f64| {
+                let waves = time_s.iter().enumerate().map(|(k, t)| 20.0 + (t / 40.0).sin() + noise(k, salt));
+                waves.collect::<Vec<f64>>()
+            };
+            let reading_c = [0.31, 0.47].map(of);
+            Observations::new(vec![Stretch::new(time_s, reading_c)], Some(1.0)).expect("a record")
+        };
+        let both = Observations::joined(&[noisy(0.01), noisy(0.05)]).expect("two records");
+        let settings = Settings::default();
+        let prepared = Prepared::new(&both, &settings).expect("two records");
+        let factor = |observations: &Observations| observations.stretches[0].noise_factor;
+        assert!(factor(&prepared.raw.0) != [1.0; 2], "the levels differ");
+        let left = Prepared::new(&prepared.raw.0.without_member(1), &settings).expect("one record");
+        assert_eq!(factor(&left.raw.0), [1.0; 2]);
     }
 
     /// Records with different sample periods are as one whose samples are not evenly spaced.
