@@ -1,14 +1,14 @@
 //! What may be added to a model: made from what the record shows, screened by a linearisation,
 //! fitted.
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Beside, Context, Effort, Fitted, Identifier, Linearised, Model, ModelError, Observations, Parameter, Place,
-    Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines, report,
-    white_deviance,
+    Bands, Beside, Context, Effort, Fitted, Gas, Identifier, Linearised, Model, ModelError, Observations, Parameter,
+    Place, Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines,
+    report, white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -28,10 +28,6 @@ const GRID_TO_SHARE: f64 = 0.03;
 const MOST_GRID_PARAMETERS: usize = 3;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
-/// Times that the gas temperature is estimated again with an effect that depends on it. Each takes off most of what the estimate
-/// before was wrong by, since this is but a part of what the effect itself is.
-const GAS_ROUNDS: usize = 2;
-
 /// A candidate with its fit.
 #[derive(Clone)]
 pub(crate) struct Candidate {
@@ -188,6 +184,11 @@ impl<'a> Search<'a> {
         self
     }
 
+    /// The gas temperature that candidates were made for; `None` where none follows it.
+    pub(crate) fn gas(&self) -> Option<&Arc<Gas>> {
+        self.context.gas.as_ref()
+    }
+
     /// The candidates that `model` lacks and can take.
     pub(crate) fn candidates(&self, model: &Model) -> Vec<Shared> {
         candidates(self.allowed, &self.context).into_iter().filter(|c| accepts(model, c)).collect()
@@ -305,16 +306,12 @@ impl<'a> Search<'a> {
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
         let fit = |from: &Fitted| from.model.fit(&from.theta, self.observations, self.selection, Effort::Compare);
-        let (mut effect, mut fitted) = (looked.effect.clone(), fit(&looked.fitted));
-        if effect.about().follows_gas {
+        let mut fitted = fit(&looked.fitted);
+        if looked.effect.about().follows_gas {
             // The estimate that it was made with is that of a model without it.
-            for _ in 0..GAS_ROUNDS {
-                let gas = fitted.estimated_gas(self.observations);
-                let Some(in_gas) = gas.and_then(|gas| effect.in_gas(&gas)) else { break };
-                fitted.model = fitted.model.replaced(current.model.effects.len(), in_gas.clone());
-                (effect, fitted) = (in_gas, fit(&fitted));
-            }
+            fitted = fitted.in_own_gas(self.observations, fit);
         }
+        let effect = fitted.model.effects[current.model.effects.len()].clone();
         let robust = robust_before - self.robust(&fitted);
         let [white_gain, robust_gain] = self.gains(current, &fitted, &effect, robust);
         Candidate { effect, fitted, white_gain, robust_gain, ..looked.clone() }

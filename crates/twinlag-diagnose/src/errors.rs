@@ -53,6 +53,7 @@ impl Squares {
 
     /// Deviance that this saves against `before`, the level of the noise free.
     pub(crate) fn gain(self, before: Self) -> f64 {
-        self.count * (before.residual / self.residual.max(f64::MIN_POSITIVE)).ln()
+        let mean = |squares: Self| (squares.residual / squares.count.max(1.0)).max(f64::MIN_POSITIVE);
+        self.count * (mean(before) / mean(self)).ln()
     }
 }

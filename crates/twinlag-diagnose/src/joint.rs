@@ -7,14 +7,14 @@ use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
-use crate::transfer::{LeftOut, Seated, Transfer, transfer, withdraw_what_does_not_transfer};
+use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct OwnNumber {
     /// The effect that it is of.
-    pub effect: Seated,
+    pub effect: EffectInChannel,
     /// The number.
     pub number: Value,
 }
@@ -24,7 +24,7 @@ pub struct OwnNumber {
 #[non_exhaustive]
 pub struct Disagreement {
     /// The effect that it is of; `None` of a time constant.
-    pub effect: Option<Seated>,
+    pub effect: Option<EffectInChannel>,
     /// Its name: `T1`, `T2`, or a parameter of the effect.
     pub name: String,
     /// Its unit.

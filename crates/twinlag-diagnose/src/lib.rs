@@ -70,7 +70,7 @@ pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
 pub use moves::Move;
 pub use remark::Remark;
-pub use transfer::{LeftOut, Seated, Transfer};
+pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{
     About, Change, ChangePoint, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant, Line,
     ModelError, ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track,

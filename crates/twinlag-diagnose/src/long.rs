@@ -37,18 +37,20 @@ pub(crate) fn pieces(observations: &Observations) -> Option<Observations> {
     }
     let members = observations.members();
     let of_each = (PIECES / members.len()).max(1);
-    let starts = members.iter().flat_map(|member| starts_in(member.samples.clone(), of_each));
+    // Of more records than pieces every second one, or third.
+    let each = members.len().div_ceil(PIECES);
+    let starts = members.iter().step_by(each).flat_map(|member| starts_in(member.samples.clone(), of_each));
     let pieces = observations.excerpt(starts, PIECE_SAMPLES);
     (!is_long(&pieces)).then_some(pieces)
 }
 
-/// First samples of so many pieces of a record; of one in its middle, and of none where it is shorter.
+/// First samples of so many pieces of a record, or as many as lie in it side by side; of one in its middle.
 fn starts_in(samples: Range<usize>, pieces: usize) -> Vec<usize> {
     let Range { start, end } = samples;
-    match pieces {
-        _ if end - start < PIECE_SAMPLES => Vec::new(),
+    match pieces.min((end - start) / PIECE_SAMPLES) {
+        0 => Vec::new(),
         1 => vec![start + (end - start - PIECE_SAMPLES) / 2],
-        _ => evenly_spread(end - start, pieces, PIECE_SAMPLES).map(|first| start + first).collect(),
+        pieces => evenly_spread(end - start, pieces, PIECE_SAMPLES).map(|first| start + first).collect(),
     }
 }
 
@@ -63,7 +65,7 @@ impl<'a> State<'a> {
             }
         };
         let mut out = Self::of(base, prepared, settings, watch);
-        out.current = out.fitted(&current, Effort::Compare);
+        out.current = out.carried_fit(&current);
         if part.taken.iter().any(|taken| taken.candidate.effect.about().is_narrow) {
             out.prepared.find_levels(&out.current, settings);
             out.refit();
@@ -83,15 +85,18 @@ impl<'a> State<'a> {
         out
     }
 
-    fn fitted(&self, fitted: &Fitted, effort: Effort) -> Fitted {
-        fitted.model.fit(&fitted.theta, &self.prepared.observations, &self.prepared.searched, effort)
+    /// A model of pieces fitted to the whole record.
+    fn carried_fit(&self, of_pieces: &Fitted) -> Fitted {
+        let Prepared { observations, searched, .. } = &self.prepared;
+        let fit = |from: &Fitted| from.model.fit(&from.theta, observations, searched, Effort::Compare);
+        of_pieces.clone().carried_to(observations, fit)
     }
 
     /// An effect that pieces showed, with fits to the whole record.
     fn taken_in_whole(&self, taken: Taken) -> Taken {
         let candidate = Candidate { fitted: self.current.clone(), ..taken.candidate };
         let in_whole = |tie: Candidate| {
-            let fitted = self.fitted(&with_levels_of(&self.current, &tie.fitted), Effort::Compare);
+            let fitted = self.carried_fit(&with_levels_of(&self.current, &tie.fitted));
             Candidate { fitted, ..tie }
         };
         Taken { candidate, ties: taken.ties.into_iter().map(in_whole).collect() }
@@ -104,10 +109,18 @@ impl Search<'_> {
         let robust_before = self.robust(current);
         let is_beside = |far: &&Candidate| {
             let (effects, own) = (&far.fitted.model.effects, &current.model.effects);
-            let is_same = |(a, b): (&Shared, &Shared)| a.identifier() == b.identifier() && a.channel() == b.channel();
+            let is_same = |(a, b): (&Shared, &Shared)| {
+                let [a, b] = [a, b].map(|effect| (effect.identifier(), effect.channel(), effect.parameters().len()));
+                a == b
+            };
             effects.len() == own.len() + 1 && effects.iter().zip(own).all(is_same)
         };
-        let of_whole = |far: &Candidate| Candidate { fitted: with_levels_of(current, &far.fitted), ..far.clone() };
+        let of_whole = |far: &Candidate| {
+            let in_gas = self.gas().and_then(|gas| far.effect.in_gas(gas));
+            let effect = in_gas.unwrap_or_else(|| far.effect.clone());
+            let fitted = Fitted { model: current.model.with(effect.clone()), ..far.fitted.clone() };
+            Candidate { effect, fitted, ..far.clone() }
+        };
         let far: Vec<Candidate> = far.iter().filter(is_beside).map(of_whole).collect();
         self.each(&far, |far| self.finished(current, far, robust_before))
     }

@@ -14,7 +14,7 @@ use crate::moves::State;
 use crate::rapid::without_noise;
 
 /// An effect with its channel, 0 or 1; `None` where it is of both, or relative.
-pub type Seated = (Identifier, Option<usize>);
+pub type EffectInChannel = (Identifier, Option<usize>);
 
 /// Errors of a record that had no part in finding the model and its effects.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,8 +24,8 @@ pub struct LeftOut {
     pub normalised_rms: BeforeAfter<f64>,
     /// Root mean square of the difference between the two inferred gas temperatures, K.
     pub input_difference_k: BeforeAfter<f64>,
-    /// Effects that were found on the other records.
-    pub found: Vec<Seated>,
+    /// Effects that were found on the other records, noise aside.
+    pub found: Vec<EffectInChannel>,
 }
 
 /// Errors on records that were left out, one at a time.
@@ -55,7 +55,8 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
             *sum = sum.and(squares);
         }
         let [normalised_rms, input_difference_k] = before_and_after(squares);
-        let found = of_others.current.model.effects.iter().map(|e| (e.identifier(), e.channel())).collect();
+        let effects = of_others.current.model.effects.iter().filter(|effect| !effect.is_noise());
+        let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
         left_out.push(LeftOut { normalised_rms, input_difference_k, found });
     }
     let [normalised_rms, input_difference_k] = before_and_after(sums);

@@ -31,6 +31,33 @@ pub(crate) enum Along<'a, T> {
     Each(&'a [T]),
 }
 
+/// How much later a value is, s.
+#[derive(Clone, Copy)]
+pub(crate) enum Delay<'a, T> {
+    Same(T),
+    /// That of an instant, with the least and the largest of all.
+    Each {
+        at: &'a dyn Fn(f64) -> T,
+        ends_s: [f64; 2],
+    },
+}
+
+impl<T: Real> Delay<'_, T> {
+    fn at(&self, time_s: f64) -> T {
+        match self {
+            Self::Same(delay_s) => *delay_s,
+            Self::Each { at, .. } => at(time_s),
+        }
+    }
+
+    fn ends_s(&self) -> [f64; 2] {
+        match self {
+            Self::Same(delay_s) => [delay_s.value(); 2],
+            Self::Each { ends_s, .. } => *ends_s,
+        }
+    }
+}
+
 impl<T: Real> Along<'_, T> {
     fn at(&self, k: usize) -> T {
         match self {
@@ -216,25 +243,22 @@ impl<T: Real> Chain<T> {
 
     /// `S₀` at instants later by a delay, s, within `reach` samples either way, which are cut off at both ends: the spline's own
     /// values between the samples. On uneven samples other cubics stand in, and the reach is three.
-    ///
-    /// - `delay_s`: of the instant of each value
-    /// - `ends_s`: the least and the largest delay; where they are the same, it is one
-    pub(crate) fn advance(&mut self, delay_s: impl Fn(f64) -> T, ends_s: [f64; 2], reach: usize) {
-        let Some(period_s) = self.period_s else { return self.advance_uneven(delay_s) };
+    pub(crate) fn advance(&mut self, delay: Delay<'_, T>, reach: usize) {
+        let Some(period_s) = self.period_s else { return self.advance_uneven(|time_s| delay.at(time_s)) };
         // A solver may ask for what is no number: then no value is one.
         let finite = |shift: f64| if shift.is_finite() { shift } else { 0.0 };
         let whole = |shift: f64| finite(shift).floor().clamp(-(reach as f64), reach as f64 - 1.0);
-        let [low, high] = ends_s.map(|end_s| whole(end_s / period_s));
+        let [low, high] = delay.ends_s().map(|end_s| whole(end_s / period_s));
         // Value k is of sample k + reach + 1; its first tap is one sample before that.
         let first = (reach as f64 + low) as usize;
         let count = self.len() - 2 * reach - DELAY_TAPS + 1;
         let length = DELAY_TAPS + (high - low) as usize;
-        let is_one = ends_s[0] == ends_s[1];
+        let is_one = matches!(delay, Delay::Same(_));
         let mut taps = std::mem::take(&mut self.memory.taps);
         taps.clear();
         taps.resize(if is_one { length } else { count * length }, T::from(0.0));
         for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
-            let shift = delay_s(self.times_s()[k + reach + 1]) / period_s;
+            let shift = delay.at(self.times_s()[k + reach + 1]) / period_s;
             let whole = whole(shift.value()).clamp(low, high);
             // The cubic B-spline at the four samples around, and nothing at the fifth.
             let place = (whole - low) as usize;
@@ -366,7 +390,7 @@ mod tests {
         for (times, period_s) in [((0..60).map(f64::from).collect::<Vec<_>>(), Some(1.0)), (uneven, None)] {
             for delay_s in [-2.4, -1.0, 0.0, 0.3, 1.0, 2.49] {
                 let mut got = chain(|t| 3.0 - 0.5 * t, times.clone(), period_s);
-                got.advance(|_| delay_s, [delay_s; 2], 4);
+                got.advance(Delay::Same(delay_s), 4);
                 for (v, t) in got.value.iter().zip(got.times_s()) {
                     let want = 3.0 - 0.5 * (t + delay_s);
                     assert!((v - want).abs() < 1e-12, "{period_s:?}, {delay_s} at {t}: got {v}, want {want}");
@@ -389,7 +413,7 @@ mod tests {
             chain.map(&bent);
             let tau_s: Vec<f64> = (0..28).map(|k| 2.0 + 0.1 * f64::from(k)).collect();
             chain.factor(Along::Each(&tau_s), Curves::default());
-            chain.advance(|t| 0.3 + 0.02 * t, [0.3, 0.9], 2);
+            chain.advance(Delay::Each { at: &|t| 0.3 + 0.02 * t, ends_s: [0.3, 0.9] }, 2);
             chain
         };
         let (still, moved) = (through(None), through(Some(14)));

@@ -408,6 +408,10 @@ mod tests {
         Uneven,
         /// Even, with readings that say nothing.
         Masked,
+        /// Even, of sensors that move against the direction in which they are counted.
+        Moving,
+        /// Even, in two records of one rig.
+        Joined,
     }
 
     /// Two lags in a gas of three tones, with some hundredths of a kelvin of noise, and a flow beside them.
@@ -427,12 +431,26 @@ mod tests {
         // A sequence without order: what it is does not matter, only that it is no function of the gas.
         let noise = |k: usize, i: usize| 0.05 * ((k * k * 7 + 13 * i + k) as f64 * 2.399).sin();
         let channel = |i: usize| (0..SAMPLES).map(|k| reading(time_s[k], TAU_S[i]) + noise(k, i)).collect();
-        let flow = time_s.iter().map(|t| 5.0 + (0.05 * t).sin()).collect();
+        let flow: Vec<f64> = time_s.iter().map(|t| 5.0 + (0.05 * t).sin()).collect();
         let masked = [0, 1].map(|i| (0..SAMPLES).map(|k| kind == Kind::Masked && (k + 31 * i) % 97 == 5).collect());
-        let channels = [channel(0), channel(1)];
-        let stretch = Stretch::new(time_s, channels).with_missing(masked).with_flow(flow);
+        let channels: [Vec<f64>; 2] = [channel(0), channel(1)];
         let period_s = (kind != Kind::Uneven).then_some(1.0);
-        Observations::new(vec![stretch], period_s).expect("a record of 240 samples")
+        let of = |samples: Range<usize>| {
+            let stretch = Stretch::new(
+                time_s[samples.clone()].to_vec(),
+                channels.each_ref().map(|c| c[samples.clone()].to_vec()),
+            );
+            let stretch = stretch.with_missing(masked.each_ref().map(|m: &Vec<bool>| m[samples.clone()].to_vec()));
+            let stretch = match kind {
+                Kind::Moving => stretch.with_motion(flow[samples].iter().map(|v| -v).collect()),
+                _ => stretch.with_flow(flow[samples].to_vec()),
+            };
+            Observations::new(vec![stretch], period_s).expect("a record of 60 samples or more")
+        };
+        match kind {
+            Kind::Joined => Observations::joined(&[of(0..130), of(130..SAMPLES)]).expect("two records"),
+            _ => of(0..SAMPLES),
+        }
     }
 
     /// Every candidate of every effect, in all sizes, and what is made for other questions.
@@ -471,14 +489,14 @@ mod tests {
     }
 
     /// The derivatives of the residual with respect to every parameter of every effect are those of a derivative
-    /// checker, on even, uneven and masked readings. Its central differences reach 6e-6 of a hundred times a
+    /// checker, on even, uneven and masked readings, of sensors that move, and in several records. Its central differences reach 6e-6 of a hundred times a
     /// parameter's size, 6e-4 of it: they are wrong by a third derivative times 6e-8. In units of the size that is up to
     /// some thirty times the first (of `x⁻⁴`: 4 · 5 · 6 / 4), so the bound is 2e-6 of the largest derivative. Where
     /// readings are masked the noise is taken for 5 K, so that a masked one has 1e4 times the variance of the others and
     /// not 1e8: it multiplies the rounding that the differences see.
     #[test]
     fn derivatives_of_every_effect_are_exact() {
-        for kind in [Kind::Even, Kind::Uneven, Kind::Masked] {
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked, Kind::Moving, Kind::Joined] {
             let observations = record(kind);
             let (context, selection) = (context(&observations), selection(&observations));
             for effect in effects(&context) {

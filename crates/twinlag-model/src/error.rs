@@ -23,7 +23,9 @@ pub enum ModelError {
     TooFewRecords { records: usize },
     #[error("expected finite readings and times, got one that is not")]
     NotFinite,
-    #[error("expected a positive flow at every sample, as many as there are readings")]
+    #[error(
+        "expected a flow at every sample of every stretch, positive, or the speed of the sensors at each: as many finite numbers as there are readings"
+    )]
     Flow,
     #[error("channel {channel} never changes, so it shows no dynamics")]
     Constant { channel: usize },

@@ -106,7 +106,10 @@ impl Extended {
         }
         let locals = locals(&plant, &time_s, &temperature_c);
         let readings = Readings::with_missing(time_s, temperature_c, missing)?;
-        Ok((if let Some(locals) = locals { readings.with_locals(locals)? } else { readings }, rig(&plant)))
+        let mut rig = rig(&plant);
+        let factor = self.observations.noise_factor();
+        rig.sensors.iter_mut().zip(factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
+        Ok((if let Some(locals) = locals { readings.with_locals(locals)? } else { readings }, rig))
     }
 }
 

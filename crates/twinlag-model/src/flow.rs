@@ -8,6 +8,9 @@ use crate::number::Number;
 /// what then carries heat is not their speed: the water follows them, and rises by itself. Chosen.
 const MIN_SPEED_SHARE: f64 = 0.25;
 
+/// Relative change of a flow that is more than rounding.
+const MIN_RELATIVE_CHANGE: f64 = 1e-6;
+
 /// What is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlowKind {
@@ -101,8 +104,9 @@ impl Flow {
         (before, after, share)
     }
 
-    /// Whether it changes by more than rounding.
+    /// Whether its size or its direction changes by more than rounding.
     pub fn changes(&self) -> bool {
-        self.log_ratio.iter().any(|l| l.abs() > 1e-6)
+        let [least, largest] = self.inverse_ratios();
+        largest - least > MIN_RELATIVE_CHANGE
     }
 }

@@ -8,7 +8,9 @@
 
 use std::sync::Arc;
 
+use crate::effect::Shared;
 use crate::fit::Fitted;
+use crate::model::Model;
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::plant::ZERO_CELSIUS_K;
@@ -19,6 +21,9 @@ use crate::weighting::Weighting;
 /// sensor: the film's temperature is then up to three per cent from the sensor's, and time constants as far from each other as the
 /// widest interval that is of use.
 const MIN_RELATIVE_SWING: f64 = 0.03;
+/// Times that the gas temperature is estimated again with an effect that depends on it. Each takes off most of what the estimate
+/// before was wrong by, since this is but a part of what the effect itself is.
+const GAS_ROUNDS: usize = 2;
 
 /// An estimate of the gas temperature along a record, and the readings at the same instants.
 #[derive(Debug)]
@@ -43,9 +48,9 @@ impl Gas {
         }
         let faster_s = fitted.theta[0].min(fitted.theta[1]);
         let half = (faster_s / observations.step_s()).max(1.0) as usize;
-        for stretch in details.stretches() {
-            // Where no spectrum says which frequencies are noise, changes within the faster time constant are left out.
-            if !Weighting::of_gas(observations, fitted.model.noise_std_k()).has_filter() {
+        // Where no spectrum says which frequencies are noise, changes within the faster time constant are left out.
+        if !Weighting::of_gas(observations, fitted.model.noise_std_k()).has_filter() {
+            for stretch in details.stretches() {
                 let smooth = Weighting::default().smooth_or_mean(&gas_k[stretch.clone()], half);
                 gas_k[stretch].copy_from_slice(&smooth);
             }
@@ -74,5 +79,47 @@ impl Fitted {
     /// or a sensor.
     pub fn estimated_gas(&self, observations: &Observations) -> Option<Arc<Gas>> {
         Gas::of(self, observations)
+    }
+
+    /// This model of `observations` with the gas temperature that it implies itself in the effects that follow it: estimated, fitted by
+    /// `fit`, and again. As it is where no effect follows the gas.
+    #[must_use]
+    pub fn in_own_gas(self, observations: &Observations, fit: impl Fn(&Self) -> Self) -> Self {
+        let mut out = self;
+        for _ in 0..GAS_ROUNDS {
+            let Some(model) = out.model_in_gas(&out, observations) else { break };
+            out = fit(&Self { model, ..out });
+        }
+        out
+    }
+
+    /// A model of other observations fitted to these by `fit`. What follows the gas does so in the gas temperature of these, of which
+    /// the first estimate is made as if nothing followed it.
+    #[must_use]
+    pub fn carried_to(self, observations: &Observations, fit: impl Fn(&Self) -> Self) -> Self {
+        match self.model_in_gas(&self.following_nothing(), observations) {
+            Some(model) => fit(&Self { model, ..self }).in_own_gas(observations, fit),
+            None => fit(&self),
+        }
+    }
+
+    /// This model in the gas temperature that `estimator` has; `None` where no effect follows it.
+    fn model_in_gas(&self, estimator: &Self, observations: &Observations) -> Option<Model> {
+        self.model.effects.iter().any(|effect| effect.about().follows_gas).then_some(())?;
+        let gas = estimator.estimated_gas(observations)?;
+        let in_gas = self.model.effects.iter().enumerate().filter_map(|(i, effect)| Some((i, effect.in_gas(&gas)?)));
+        let in_gas: Vec<(usize, Shared)> = in_gas.collect();
+        let replaced = |model: Model, (index, effect): (usize, Shared)| model.replaced(index, effect);
+        (!in_gas.is_empty()).then(|| in_gas.into_iter().fold(self.model.clone(), replaced))
+    }
+
+    /// This model with each effect that follows the gas where its fits start, which is where it changes nothing.
+    fn following_nothing(&self) -> Self {
+        let mut out = self.clone();
+        for (index, effect) in self.model.effects.iter().enumerate().filter(|(_, effect)| effect.about().follows_gas) {
+            let start = effect.starts().into_iter().next().unwrap_or_default();
+            out.theta[self.model.range(index)].copy_from_slice(&start);
+        }
+        out
     }
 }

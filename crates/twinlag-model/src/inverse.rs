@@ -1,6 +1,6 @@
 //! The inverse of a plant: from both channels' readings to the gas temperatures that they imply.
 
-use crate::chain::{Along, Chain, Curves};
+use crate::chain::{Along, Chain, Curves, Delay};
 use crate::number::{Number, Real, is_exactly};
 use crate::observations::Cut;
 use crate::plant::{Place, Plant, Sensor};
@@ -51,12 +51,16 @@ impl<T: Real> Inverse<T> {
             gas.begin(cut, 0, period_s);
         }
         if plant.has_delay() {
-            let at_once = |chain: &mut Chain<T>| chain.advance(|_| T::from(0.0), [0.0; 2], plant.reach);
+            let at_once = |chain: &mut Chain<T>| chain.advance(Delay::Same(T::from(0.0)), plant.reach);
             if has[0] {
                 at_once(&mut chains[0]);
             }
             if has[1] {
-                chains[1].advance(|time_s| T::of(plant.delay_at(time_s)), plant.delays_s(), plant.reach);
+                let at = |time_s| T::of(plant.delay_at(time_s));
+                let ends_s = plant.delays_s();
+                let is_same = plant.separation.is_none();
+                let delay = if is_same { Delay::Same(at(0.0)) } else { Delay::Each { at: &at, ends_s } };
+                chains[1].advance(delay, plant.reach);
             }
             if has_gas {
                 at_once(gas);

@@ -2,7 +2,7 @@
 
 use crate::effect::{self, Identifier, KnownEffect, Parameter};
 use crate::error::ModelError;
-use crate::fit::Fitted;
+use crate::fit::{Effort, Fitted};
 use crate::fitted::KnownFit;
 use crate::model::Model;
 use crate::observations::Observations;
@@ -68,6 +68,7 @@ impl Known {
         let mut model = Model::new(&settings.known, prepared.levels.std_k);
         model.is_frozen = true;
         if effects.iter().any(|known| known.effect.about().follows_gas) {
+            // Those that follow it are then in the gas of a model that has them.
             let two_lags = model.fit_over_grid(&[], GRID_STARTS, &prepared.observations, &prepared.everything);
             prepared.context.gas = two_lags.estimated_gas(&prepared.observations);
         }
@@ -92,7 +93,10 @@ impl Known {
         let fit = |prepared: &Prepared, model: &Model| {
             model.fit_over_grid(&rest, GRID_STARTS, &prepared.observations, &prepared.everything)
         };
-        let mut fitted = fit(&prepared, &model);
+        let fit_again =
+            |from: &Fitted| from.model.fit(&from.theta, &prepared.observations, &prepared.everything, Effort::Look);
+        let mut fitted = fit(&prepared, &model).in_own_gas(&prepared.observations, fit_again);
+        model = fitted.model.clone();
         let has_spikes = settings.effects.contains(&Identifier::SPIKES) && prepared.mask_spikes(&fitted);
         let has_line = model.effects.iter().any(|e| e.about().is_narrow);
         if has_spikes || has_line || !prepared.found.is_empty() {

@@ -1,7 +1,6 @@
 //! Noise levels of several records, each with its own where they differ.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
+use crate::between::BetweenRecords;
 use crate::defects::{self, ChannelNoise};
 use crate::observations::Observations;
 use crate::policy::Policy;
@@ -27,13 +26,9 @@ pub(crate) fn factors(observations: &Observations, levels: &ChannelNoise, policy
 
 /// Whether values with standard errors differ by more than these explain.
 fn differ(values: &[(f64, f64)], probability: f64) -> bool {
-    if values.len() < 2 {
-        return false;
-    }
-    let weights: f64 = values.iter().map(|(_, error)| error.powi(-2)).sum();
-    let mean = values.iter().map(|(value, error)| value * error.powi(-2)).sum::<f64>() / weights;
-    let statistic: f64 = values.iter().map(|(value, error)| ((value - mean) / error).powi(2)).sum();
-    ChiSquared::new((values.len() - 1) as f64).is_ok_and(|chi2| chi2.sf(statistic) < probability)
+    let values: Vec<(usize, f64, f64)> =
+        values.iter().enumerate().map(|(i, (value, error))| (i, *value, *error)).collect();
+    BetweenRecords::of(&values).is_some_and(|between| between.p_value < probability)
 }
 
 #[cfg(test)]

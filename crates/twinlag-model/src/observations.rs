@@ -74,6 +74,11 @@ impl Stretch {
         Self { flow: Some((FlowKind::Motion, speed_m_s)), ..self }
     }
 
+    /// Its instants with the flow or the speed at each.
+    fn flow_along(&self) -> Option<(&Instants, &[f64])> {
+        self.flow.as_ref().map(|(_, flow)| (&self.time_s, &flow[..]))
+    }
+
     /// This stretch as one of a record among others, `later_s` seconds later.
     pub(crate) fn as_member(&self, member: usize, later_s: f64) -> Self {
         Self { time_s: self.time_s.later(later_s), member, ..self.clone() }
@@ -127,6 +132,8 @@ pub struct Observations {
     swing_k: f64,
     /// Flow, where it was measured.
     flow: Option<Arc<Flow>>,
+    /// How many samples a delay may reach: in a record of several as in all of them.
+    reach: usize,
 }
 
 impl Observations {
@@ -154,7 +161,7 @@ impl Observations {
     ///
     /// # Errors
     /// [`ModelError::TooShort`] for fewer than 60 samples; [`ModelError::NotFinite`]; [`ModelError::Flow`] for a flow that is
-    /// not positive everywhere, or of another length.
+    /// not positive everywhere, of another length, or missing in a stretch.
     pub fn new(mut stretches: Vec<Stretch>, period_s: Option<f64>) -> Result<Self, ModelError> {
         stretches.retain(|s| s.len() >= MIN_STRETCH_SAMPLES);
         let samples: usize = stretches.iter().map(Stretch::len).sum();
@@ -166,16 +173,16 @@ impl Observations {
             return Err(ModelError::NotFinite);
         }
         let kind = stretches.first().and_then(|s| s.flow.as_ref()).map(|(kind, _)| *kind);
-        let of = |s: &Stretch| s.flow.as_ref().filter(|(of_it, _)| Some(*of_it) == kind).map(|(_, flow)| flow.clone());
-        let flows: Option<Vec<Vec<f64>>> = stretches.iter().map(of).collect();
-        let flow = kind.zip(flows).map(|(kind, flows)| {
-            let of_stretches: Vec<(&Instants, &[f64])> =
-                stretches.iter().zip(&flows).map(|(s, flow)| (&s.time_s, &flow[..])).collect();
-            Flow::new(kind, &of_stretches).map(Arc::new)
+        if stretches.iter().any(|s| s.flow.as_ref().map(|(kind, _)| *kind) != kind) {
+            return Err(ModelError::Flow);
+        }
+        let flow = kind.map(|kind| {
+            Flow::new(kind, &stretches.iter().filter_map(Stretch::flow_along).collect::<Vec<_>>()).map(Arc::new)
         });
         let flow = flow.transpose()?;
-        let stretches = stretches.into_iter().map(Arc::new).collect();
-        let mut out = Self { stretches, period_s, swing_k: 0.0, flow };
+        let stretches: Vec<Arc<Stretch>> = stretches.into_iter().map(Arc::new).collect();
+        let reach = reach(&stretches);
+        let mut out = Self { stretches, period_s, swing_k: 0.0, flow, reach };
         out.swing_k = out.mean_and_std(0)[1].max(out.mean_and_std(1)[1]);
         Ok(out)
     }
@@ -273,11 +280,32 @@ impl Observations {
                 break;
             }
         }
-        if stretches.is_empty() { self.clone() } else { self.with_stretches(stretches) }
+        if stretches.is_empty() {
+            return self.clone();
+        }
+        Self { reach: reach(&stretches), ..self.with_stretches(stretches) }
     }
 
-    /// Other stretches of the record.
+    /// How many samples a delay may reach.
+    pub(crate) fn reach(&self) -> usize {
+        self.reach
+    }
+
+    /// Some stretches of the record, with the flow and the reach of all of it.
     pub(crate) fn with_stretches(&self, stretches: Vec<Arc<Stretch>>) -> Self {
         Self { stretches, flow: self.flow.clone(), ..*self }
     }
+}
+
+/// How many samples a delay may reach: not so many that stretches with a tenth of the samples or more are lost to it.
+fn reach(stretches: &[Arc<Stretch>]) -> usize {
+    let mut lengths: Vec<usize> = stretches.iter().map(|s| s.len()).collect();
+    let samples: usize = lengths.iter().sum();
+    lengths.sort_unstable();
+    let mut shorter = 0;
+    let typical = lengths.into_iter().find(|n| {
+        shorter += n;
+        10 * shorter >= samples
+    });
+    (samples / 50).min(typical.unwrap_or(0) / 10).clamp(2, 64)
 }

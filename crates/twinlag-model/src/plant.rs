@@ -14,8 +14,8 @@ use crate::observations::{Observations, Stretch};
 
 /// 0 °C, K.
 pub const ZERO_CELSIUS_K: f64 = 273.15;
-/// Times that a delay is computed from the flow at the instant that it leads to: each takes off all but what the delay changes within
-/// itself.
+/// Rounds in which a delay is computed from the flow at the instant that it leads to. Each leaves of the error before as much as the
+/// delay changes from one of these instants to the other.
 const DELAY_ROUNDS: usize = 3;
 /// Smallest factor by which a time constant changes: less would make a lag vanish, or turn it round.
 pub(crate) const MIN_TAU_FACTOR: f64 = 0.02;
@@ -184,7 +184,7 @@ impl Plant {
             delay_s: None,
             separation: None,
             extra: Vec::new(),
-            reach: reach(observations),
+            reach: observations.reach(),
         }
     }
 
@@ -239,17 +239,4 @@ impl Plant {
             }
         }
     }
-}
-
-/// How many samples a delay may reach: not so many that stretches with a tenth of the record or more are lost to it.
-pub(crate) fn reach(observations: &Observations) -> usize {
-    let samples = observations.samples();
-    let mut lengths: Vec<usize> = observations.stretches.iter().map(|s| s.len()).collect();
-    lengths.sort_unstable();
-    let mut shorter = 0;
-    let typical = lengths.into_iter().find(|n| {
-        shorter += n;
-        10 * shorter >= samples
-    });
-    (samples / 50).min(typical.unwrap_or(0) / 10).clamp(2, 64)
 }

@@ -9,7 +9,6 @@ use crate::fitted::Defect;
 use crate::member_noise;
 use crate::model::Model;
 use crate::observations::Observations;
-use crate::plant::reach;
 use crate::policy::Policy;
 use crate::range_end::{Judge, RangeEnd, range_ends};
 use crate::selection::Selection;
@@ -199,7 +198,8 @@ impl Prepared {
     pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
         self.levels.scale(fitted.mean_energy().sqrt());
         self.levels.is_of_residual = true;
-        self.context = context(&self.observations, &self.levels);
+        self.context.noise_std_k = self.levels.std_k;
+        self.context.is_coarse = self.levels.coarse_step_k().map(|step_k| step_k.is_some());
         if settings.effects.contains(&Identifier::QUANTISATION) {
             self.found.extend(coarse_steps(&self.levels));
         }
@@ -328,7 +328,7 @@ pub(crate) fn whole_selection(observations: &Observations, weighting: &Weighting
 /// - `judging`: the policy whose judging blocks, and their surroundings, are left out
 fn selection(observations: &Observations, judging: Option<&Policy>, weighting: &Weighting) -> Selection {
     let samples = observations.samples();
-    let mut out = away_from_ends(observations, reach(observations), weighting);
+    let mut out = away_from_ends(observations, observations.reach(), weighting);
     if let Some(policy) = judging {
         let gap = policy.block_gap_samples(samples, policy.judging_blocks);
         for (k, counts) in out.counts.iter_mut().enumerate() {
@@ -365,7 +365,7 @@ fn context(observations: &Observations, levels: &ChannelNoise) -> Context {
         step_s,
         is_even: observations.period_s.is_some(),
         samples: observations.samples(),
-        reach: reach(observations),
+        reach: observations.reach(),
         mean_c: [0, 1].map(|i| observations.mean_and_std(i)[0]),
         moments: observations.moments(),
         swing_k: observations.swing_k(),

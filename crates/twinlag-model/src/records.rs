@@ -113,6 +113,11 @@ impl Observations {
         self.with_stretches(stretches)
     }
 
+    /// Noise of each channel over that of all records together, in one of them; one where these are several.
+    pub(crate) fn noise_factor(&self) -> [f64; 2] {
+        if self.is_joined() { [1.0; 2] } else { self.stretches[0].noise_factor }
+    }
+
     /// These with the noise of each record's channels over that of all, in the order of [`Self::members`].
     #[must_use]
     pub(crate) fn with_noise_factors(mut self, factors: &[[f64; 2]]) -> Self {
@@ -164,7 +169,7 @@ impl Prepared {
 impl OneRecord {
     /// Noise of its channels, K, where that of all records together is `std_k`.
     pub fn noise_std_k(&self, std_k: [f64; 2]) -> [f64; 2] {
-        let factor = self.observations.stretches[0].noise_factor;
+        let factor = self.observations.noise_factor();
         [0, 1].map(|i| std_k[i] * factor[i])
     }
 
@@ -190,10 +195,14 @@ impl OneRecord {
         }
         let own = own.holding(0, theta[0]).holding(1, theta[1]);
         let has_own = own.effects.iter().any(|effect| effect.is_of_the_record());
-        if has_own {
-            return Ok(own.fit(&values, &self.observations, &self.everything, Effort::Compare));
-        }
-        Ok(Fitted { model: own, theta: values, ..fitted.clone() })
+        let carried = Fitted { model: own, theta: values, ..fitted.clone() };
+        Ok(carried.carried_to(&self.observations, |from| {
+            if has_own {
+                from.model.fit(&from.theta, &self.observations, &self.everything, Effort::Compare)
+            } else {
+                from.clone()
+            }
+        }))
     }
 
     /// An effect that belongs to a record in the form that others have it.

@@ -28,9 +28,10 @@ impl Record {
     /// # Ok::<(), twinlag_record::RecordError>(())
     /// ```
     pub fn joined(records: &[(&Self, f64)]) -> Option<Self> {
-        let ((first, _), others) = records.split_first()?;
+        let ((first, later_s), others) = records.split_first()?;
         let mut out = (*first).clone().without_lines();
         out.notes.clear();
+        out.time_s.iter_mut().for_each(|t| *t += later_s);
         for (record, later_s) in others {
             let rows = out.len();
             out.source = format!("{}, {}", out.source, record.source);

@@ -2,9 +2,12 @@
 //!
 //! The slope at a row is that of the straight line through its neighbours. As many are taken on either side as it takes for the
 //! slope to be known well beside the speed: a position is written in steps, and from row to row the slope is that of these steps.
+//! Where a gap in time is, nobody knows how the sensors moved, so that rows on its other side are no neighbours.
+
+use std::ops::Range;
 
 /// Neighbours on either side, from few to many.
-const NEIGHBOURS: [usize; 6] = [1, 2, 4, 8, 16, 32];
+const NEIGHBOURS: [usize; 5] = [2, 4, 8, 16, 32];
 /// Root mean square error of the slopes over that of the speed at which neighbours are enough: with a time constant that goes as
 /// the speed it is a twentieth of that in each row, and far less in what a fit finds from all of them. Chosen.
 const MAX_ERROR_SHARE: f64 = 0.05;
@@ -12,22 +15,26 @@ const MAX_ERROR_SHARE: f64 = 0.05;
 /// The speed in each row, in units of the position over s; NaN where the position is missing.
 ///
 /// - `time_s`: rising; `position`: as many, NaN where missing
-pub(crate) fn speed(time_s: &[f64], position: &[f64]) -> Vec<f64> {
-    let rows: Vec<usize> = (0..position.len()).filter(|row| position[*row].is_finite()).collect();
-    let points: Vec<[f64; 2]> = rows.iter().map(|row| [time_s[*row], position[*row]]).collect();
+/// - `runs`: rows without a gap between them
+pub(crate) fn speed(time_s: &[f64], position: &[f64], runs: &[Range<usize>]) -> Vec<f64> {
+    let known = |run: &Range<usize>| run.clone().filter(|row| position[*row].is_finite()).collect();
+    let runs: Vec<Vec<usize>> = runs.iter().map(known).collect();
+    let points = |rows: &Vec<usize>| rows.iter().map(|row| [time_s[*row], position[*row]]).collect();
+    let points: Vec<Vec<[f64; 2]>> = runs.iter().map(points).collect();
     let mut slopes = Vec::new();
     for neighbours in NEIGHBOURS {
-        let fits: Vec<Line> = (0..points.len()).map(|at| Line::around(&points, at, neighbours)).collect();
+        let of_run =
+            |points: &Vec<[f64; 2]>| (0..points.len()).map(|at| Line::around(points, at, neighbours)).collect();
+        let fits: Vec<Line> = points.iter().flat_map(|points| -> Vec<Line> { of_run(points) }).collect();
         let mean_square = |of: fn(&Line) -> f64| fits.iter().map(of).sum::<f64>() / fits.len().max(1) as f64;
         let error = (mean_square(|line| line.variance) / mean_square(|line| line.slope * line.slope)).sqrt();
         slopes = fits.iter().map(|line| line.slope).collect();
-        // A line through two points leaves nothing to tell its error by.
-        if neighbours > 1 && error <= MAX_ERROR_SHARE {
+        if error <= MAX_ERROR_SHARE {
             break;
         }
     }
     let mut out = vec![f64::NAN; position.len()];
-    rows.into_iter().zip(slopes).for_each(|(row, slope)| out[row] = slope);
+    runs.into_iter().flatten().zip(slopes).for_each(|(row, slope)| out[row] = slope);
     out
 }
 
@@ -65,7 +72,9 @@ mod tests {
     fn steps_of_a_position_are_smoothed() {
         let time_s: Vec<f64> = (0..200).map(f64::from).collect();
         let position: Vec<f64> = time_s.iter().map(|t| (0.2013 * t * 100.0).round() / 100.0).collect();
-        for (row, speed) in speed(&time_s, &position).iter().enumerate().skip(2).take(196) {
+        for (row, speed) in
+            speed(&time_s, &position, std::slice::from_ref(&(0..200))).iter().enumerate().skip(2).take(196)
+        {
             assert!((speed - 0.2013).abs() < 4.0 * 0.0009, "row {row}: {speed} m/s");
         }
     }
@@ -76,8 +85,36 @@ mod tests {
         let time_s: Vec<f64> = (0..60).map(f64::from).collect();
         let mut position: Vec<f64> = time_s.iter().map(|t| 100.0 - 0.5 * t).collect();
         position[20] = f64::NAN;
-        let got = speed(&time_s, &position);
+        let got = speed(&time_s, &position, std::slice::from_ref(&(0..60)));
         assert!(got[20].is_nan());
         assert!(got.iter().enumerate().all(|(row, v)| row == 20 || (v + 0.5).abs() < 1e-9), "{got:?}");
+    }
+
+    /// A sonde goes down at 0.5 m/s, is lost for a quarter of an hour, and is found on its way up: no row has the speed of the line from
+    /// there to here.
+    #[test]
+    fn no_speed_is_taken_across_a_gap() {
+        let time_s: Vec<f64> = (0..40).map(|k| f64::from(k) + if k < 20 { 0.0 } else { 900.0 }).collect();
+        let position: Vec<f64> =
+            (0..40).map(|k| if k < 20 { 0.5 * f64::from(k) } else { 80.0 - 0.5 * f64::from(k) }).collect();
+        for (row, speed) in speed(&time_s, &position, &[0..20, 20..40]).iter().enumerate() {
+            let want = if row < 20 { 0.5 } else { -0.5 };
+            assert!((speed - want).abs() < 1e-9, "row {row}: {speed} m/s");
+        }
+    }
+
+    /// A glider turns at the bottom: far from the turn the speed is exact, in the row of it there is none, and there is half of it
+    /// nowhere but in the rows whose neighbours lie on both sides.
+    #[test]
+    fn a_turn_is_as_short_as_the_neighbours_are_few() {
+        let time_s: Vec<f64> = (0..200).map(f64::from).collect();
+        let position: Vec<f64> = time_s.iter().map(|t| (t - 100.0).abs() * 0.2).collect();
+        for (row, speed) in speed(&time_s, &position, std::slice::from_ref(&(0..200))).iter().enumerate() {
+            let away = row as f64 - 100.0;
+            if away.abs() > 2.0 {
+                assert!((speed - 0.2 * away.signum()).abs() < 1e-9, "row {row}: {speed} m/s");
+            }
+        }
+        assert!(speed(&time_s, &position, std::slice::from_ref(&(0..200)))[100].abs() < 1e-9);
     }
 }

@@ -211,13 +211,17 @@ impl Record {
     /// This record of sensors that move, with their position in each row, m.
     ///
     /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::BadPosition`], [`RecordError::ConstantPosition`].
+    /// [`RecordError::LengthMismatch`], [`RecordError::BadPosition`], [`RecordError::ConstantPosition`];
+    /// [`RecordError::FlowAndPosition`] of a record that has a flow.
     pub fn with_position(self, position_m: &[f64]) -> Result<Self, RecordError> {
         self.moving(position_m, "position", |row| Place::Sample(row + 1))
     }
 
     fn moving(mut self, position_m: &[f64], column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
         let (file, expected) = (self.source.clone(), self.len());
+        if self.flow.is_some() {
+            return Err(RecordError::FlowAndPosition { file });
+        }
         if position_m.len() != expected {
             let (name, like) = (column.to_owned(), "time_s".to_owned());
             return Err(RecordError::LengthMismatch { file, name, found: position_m.len(), like, expected });
@@ -226,24 +230,29 @@ impl Record {
         if let Some(row) = used.find(|&row| !position_m[row].is_finite()) {
             return Err(RecordError::BadPosition { file, at: at(row), column: column.to_owned() });
         }
-        let speed_m_s = motion::speed(&self.time_s, position_m);
-        if self.segments.iter().cloned().flatten().all(|row| speed_m_s[row] == 0.0) {
+        let mut values = self.segments.iter().cloned().flatten().map(|row| position_m[row]);
+        if values.next().is_none_or(|first| values.all(|value| value == first)) {
             return Err(RecordError::ConstantPosition { file, column: column.to_owned() });
         }
-        self.speed_m_s = Some(speed_m_s);
+        let runs: Vec<_> = sampling::runs(&self.time_s, self.sampling.gap_s()).collect();
+        self.speed_m_s = Some(motion::speed(&self.time_s, position_m, &runs));
         Ok(self)
     }
 
     /// This record with a flow velocity or density, in any unit, one value for each row.
     ///
     /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::ConstantFlow`].
+    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::ConstantFlow`];
+    /// [`RecordError::FlowAndPosition`] of a record of sensors that move.
     pub fn with_flow(self, flow: Vec<f64>) -> Result<Self, RecordError> {
         self.flowing(flow, "flow", |row| Place::Sample(row + 1))
     }
 
     fn flowing(mut self, flow: Vec<f64>, column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
         let (file, expected) = (self.source.clone(), self.len());
+        if self.speed_m_s.is_some() {
+            return Err(RecordError::FlowAndPosition { file });
+        }
         if flow.len() != expected {
             let (name, like) = (column.to_owned(), "time_s".to_owned());
             return Err(RecordError::LengthMismatch { file, name, found: flow.len(), like, expected });

@@ -37,6 +37,18 @@ impl RowOfSample {
         Self { runs }
     }
 
+    /// Those of several records, one after the other as [`Record::joined`] has them.
+    pub(crate) fn joined(records: &[Record], rows: &[Rows]) -> Self {
+        let (mut samples, mut rows_before, mut runs) = (0, 0, Vec::new());
+        for (record, rows) in records.iter().zip(rows) {
+            let moved = |[first, row, count]: &[usize; 3]| [first + samples, row + rows_before, *count];
+            runs.extend(rows.of_sample.runs.iter().map(moved));
+            samples += rows.observations.samples();
+            rows_before += record.len();
+        }
+        Self { runs }
+    }
+
     /// The row of a sample; `None` of one that is missing from the record.
     pub(crate) fn get(&self, sample: usize) -> Option<usize> {
         let run = self.runs.partition_point(|[first, ..]| *first <= sample).checked_sub(1)?;

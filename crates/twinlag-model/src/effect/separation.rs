@@ -26,6 +26,9 @@ pub(crate) static ABOUT: About = About::new("separation", 15, candidates)
 
 /// Usual delay at the mean flow, in sample periods. Chosen, as of a delay.
 const USUAL_PERIODS: f64 = 0.5;
+/// Largest difference between the delays along a record, in sample periods: each residual then depends on as many samples more, which
+/// is what it takes to whiten them. Chosen.
+const MAX_VARIATION_PERIODS: f64 = 16.0;
 /// Delays from which a fit starts, in sample periods.
 const STARTS_PERIODS: [f64; 4] = [0.3, -0.3, 1.5, -1.5];
 
@@ -40,7 +43,8 @@ fn candidates(context: &Context) -> Vec<Shared> {
     let of = |flow: &Arc<Flow>| {
         // At the slowest flow no longer than the model reaches.
         let [least, largest] = flow.inverse_ratios();
-        let longest_s = longest / least.abs().max(largest.abs());
+        let most_varied_s = MAX_VARIATION_PERIODS * context.step_s / (largest - least);
+        let longest_s = (longest / least.abs().max(largest.abs())).min(most_varied_s);
         let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest_s, longest_s);
         let delay = Parameter::new("delay_at_mean_flow", "s", variable);
         let seat = Seat::new(Identifier::SEPARATION, Some(1), vec![delay]);

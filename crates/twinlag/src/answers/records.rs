@@ -1,7 +1,7 @@
 //! What a diagnosis of several records says of each of them.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{BeforeAfter, Disagreement, Identifier, LeftOut, Masked, Seated, Transfer};
+use twinlag_diagnose::{BeforeAfter, Disagreement, EffectInChannel, Identifier, LeftOut, Masked, Transfer};
 
 /// What is left out in turn, so that what is found has no part in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,7 +67,7 @@ pub struct EffectInPlace {
 }
 
 impl EffectInPlace {
-    fn of((effect, channel): Seated, channels: &[String; 2]) -> Self {
+    fn of((effect, channel): EffectInChannel, channels: &[String; 2]) -> Self {
         Self { effect, channel: channel.map(|i| channels[i].clone()) }
     }
 }

@@ -5,7 +5,8 @@ use twinlag_record::Record;
 
 use crate::answers::{Diagnosis, ErrorBeforeAfter, RecordAnswer, TransferAnswer};
 use crate::error::Error;
-use crate::rows::Rows;
+use crate::reference::Reference;
+use crate::rows::{RowOfSample, Rows};
 use crate::verbs::diagnose::{DiagnoseOptions, answer, settings};
 use crate::watch::{UNWATCHED, Watch};
 
@@ -50,7 +51,10 @@ pub fn diagnose_records_watched(
     let joint = close_the_loop(&observations, &settings(options), watch)?;
     let joined = in_a_row(records, &observations)?;
     let JointDiagnosis { diagnosis: core, records: of_records, transfer, .. } = joint;
-    let error = ErrorBeforeAfter { budget: core.error, reference_rmse_k: None };
+    let of_sample = RowOfSample::joined(records, &rows);
+    let reference = Reference::of(&joined, &of_sample);
+    let reference_rmse_k = reference.and_then(|reference| reference.before_and_after(&core));
+    let error = ErrorBeforeAfter { budget: core.error, reference_rmse_k };
     let mut out = answer(&joined, options, core, error, |_| ());
     let masked = masked(&out, &rows, records);
     for effect in &mut out.effects {

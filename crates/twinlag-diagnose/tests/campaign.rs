@@ -1,0 +1,101 @@
+//! Several records of one rig: what they share, what is of each, and what is worth nothing on a record that was left out.
+
+mod common;
+
+use std::ops::ControlFlow;
+
+use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told};
+use twinlag_diagnose::{Identifier, JointDiagnosis, Observations, Settings, Verdict, diagnose_records};
+use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Turbulence};
+
+fn joint(records: &[Observations]) -> JointDiagnosis {
+    diagnose_records(records, &Settings::default(), &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
+}
+
+/// Effects with the channels that they are of.
+fn named(joint: &JointDiagnosis) -> Vec<(Identifier, Option<usize>)> {
+    joint.diagnosis.effects.iter().map(|effect| (effect.effect, effect.channel)).collect()
+}
+
+/// Normalised residuals of records that were left out are those of noise: their root mean square over some thousand samples is 1 within
+/// two per cent, and noise levels from third differences are as uncertain.
+const MAX_NOISE_RMS: f64 = 1.06;
+
+/// The film's temperature is made of the gas of each record: of the record that is left out as well, which had no part in the estimate.
+#[test]
+fn time_constants_that_follow_the_film_do_so_in_a_record_that_was_left_out() {
+    const EXPONENT: f64 = -1.8;
+    let of = |seed: u64| {
+        let gas = Signal::Turbulence(Turbulence { std_k: 60.0, corner_hz: 2.4, cutoff_hz: 200.0 });
+        let film = TemperatureDependence::of_film(EXPONENT, 300.0);
+        let follow = |sensors: &mut [Sensor; 2]| sensors.iter_mut().for_each(|s| s.temperature_dependence = Some(film));
+        let simulated = readings(seed, gas, follow);
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let joint = joint(&[of(SEED), of(SEED + 1)]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::TEMPERATURE_DEPENDENT_TIME_CONSTANT, None)], "{told}");
+    let rms = joint.transfer.normalised_rms;
+    assert!(rms.before > 1.3 && rms.after < MAX_NOISE_RMS, "{rms:?}: {told}");
+}
+
+/// Noise of one record three times that of the others: each has its own levels, residuals are those of noise in each, and none
+/// contradicts.
+#[test]
+fn records_with_noise_of_their_own_agree() {
+    let of = |seed: u64, noise_k: f64| {
+        record(seed, |sensors| {
+            sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(noise_k)));
+            sensors[1].second_time_constant_s = Some(0.018);
+        })
+    };
+    let joint = joint(&[of(SEED, NOISE_K), of(SEED + 1, 3.0 * NOISE_K), of(SEED + 2, NOISE_K)]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::SECOND_ORDER, Some(1))], "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+    for (record, want_k) in joint.records.iter().zip([NOISE_K, 3.0 * NOISE_K, NOISE_K]) {
+        assert!(record.disagreements.is_empty(), "{:?}", record.disagreements);
+        assert!(record.left_out.normalised_rms.after < MAX_NOISE_RMS, "{:?}", record.left_out);
+        // Levels are known to some per cent.
+        assert!(record.noise_std_k.iter().all(|k| (k / want_k - 1.0).abs() < 0.1), "{:?}", record.noise_std_k);
+    }
+}
+
+/// A delay of 20 samples, as far as a third of what all records together can reach and beyond what one of them could by itself.
+#[test]
+fn a_long_delay_is_one_of_every_record() {
+    const DELAY_S: f64 = 0.020;
+    let of = |seed: u64| record(seed, |sensors| sensors[1].delay_s = DELAY_S);
+    let all: Vec<Observations> = (0..3).map(|k| of(SEED + k)).collect();
+    let joint = joint(&all);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::DELAY, Some(1))], "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+    assert!(joint.records.iter().all(|record| record.disagreements.is_empty()), "{told}");
+    assert!(joint.transfer.normalised_rms.after < MAX_NOISE_RMS, "{:?}", joint.transfer);
+}
+
+/// Someone exchanged the second sensor before the last record: that one is named, with its time constant.
+#[test]
+fn a_record_of_another_sensor_is_named() {
+    let of = |seed: u64, tau_s: f64| record(seed, |sensors| sensors[1].time_constant_s = tau_s);
+    let joint =
+        joint(&[of(SEED, TAU_S[1]), of(SEED + 1, TAU_S[1]), of(SEED + 2, TAU_S[1]), of(SEED + 3, 1.15 * TAU_S[1])]);
+    let told = told(&joint.diagnosis);
+    let disagreeing: Vec<bool> = joint.records.iter().map(|record| !record.disagreements.is_empty()).collect();
+    assert_eq!(disagreeing, [false, false, false, true], "{told}");
+    assert!(joint.records[3].disagreements.iter().any(|d| d.name == "T2"), "{:?}", joint.records[3].disagreements);
+    assert_ne!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
+}
+
+/// One record of three has a delay: it contradicts the others on what is made of it, and they do not.
+#[test]
+fn what_one_record_alone_has_is_told_by_that_record() {
+    let of = |seed: u64| record(seed, |_| ());
+    let late = record(SEED + 2, |sensors| sensors[1].delay_s = 3.0 * PERIOD_S);
+    let joint = joint(&[of(SEED), of(SEED + 1), late]);
+    let told = told(&joint.diagnosis);
+    assert_ne!(joint.diagnosis.verdict, Verdict::Explained, "{told}");
+    let disagreeing: Vec<bool> = joint.records.iter().map(|record| !record.disagreements.is_empty()).collect();
+    assert_eq!(disagreeing, [false, false, true], "{told}");
+}
