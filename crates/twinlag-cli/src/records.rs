@@ -1,13 +1,15 @@
 //! What each of several records has for itself, as a table.
 
-use twinlag::{Diagnosis, DisagreementAnswer, EffectInPlace, RecordAnswer};
+use twinlag::{Diagnosis, DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer};
 use twinlag_pages::parameter_in_words;
 
 use crate::print::{digits, interval};
 
 /// The table, after an empty line; nothing of a single record.
 pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
-    let Some(transfer) = &answer.transfer else { return Vec::new() };
+    let Some(transfer) = answer.transfer.as_ref().filter(|transfer| transfer.left_out == LeftOutUnit::Record) else {
+        return Vec::new();
+    };
     let mut lines = vec![
         String::new(),
         "on a record that had no part in finding the model (rms of the whitened residual):".to_owned(),

@@ -112,6 +112,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         limits,
         if_known,
         remarks,
+        transfer: None,
         moves: state.moves,
         policy: policy.clone(),
     })

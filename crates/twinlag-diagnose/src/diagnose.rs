@@ -9,6 +9,7 @@ use crate::excitation::{SINGLE, tones};
 use crate::long::pieces;
 use crate::moves::{Proposal, Searched, State};
 use crate::rapid::rapid_variation;
+use crate::transfer::over_blocks;
 
 /// Finds what two first-order lags leave over in `observations`, and which effects account for it.
 ///
@@ -32,7 +33,9 @@ use crate::rapid::rapid_variation;
 /// policy that means nothing, and for a run that `watch` cancels.
 pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'_>) -> Result<Diagnosis, ModelError> {
     let (state, tones) = searched(observations, settings, watch)?;
-    conclude(state, settings, tones)
+    let is_of_all = state.rapid.is_none() && tones != Some(SINGLE);
+    let transfer = if is_of_all { Some(over_blocks(&state, watch)?) } else { None };
+    Ok(Diagnosis { transfer, ..conclude(state, settings, tones)? })
 }
 
 /// The loop at its end, and how many separate tones the gas has, where it has few.

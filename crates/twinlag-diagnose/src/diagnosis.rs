@@ -9,6 +9,7 @@ use crate::if_known::IfKnown;
 use crate::judge::Judgements;
 use crate::moves::Move;
 use crate::remark::Remark;
+use crate::transfer::Transfer;
 
 /// Whether the model is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -194,6 +195,9 @@ pub struct Diagnosis {
     pub if_known: Option<IfKnown>,
     /// Why the record was refused, or what to know before using the numbers.
     pub remarks: Vec<Remark>,
+    /// Errors on blocks of the record that had no part in fitting the model; `None` of several records, of which
+    /// [`crate::JointDiagnosis`] has those on records, and where no model is of the whole record.
+    pub transfer: Option<Transfer>,
     /// What the loop did, in order.
     pub moves: Vec<Move>,
     /// The numbers that decided.

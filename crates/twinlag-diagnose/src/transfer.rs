@@ -3,6 +3,9 @@
 //! Each record is left out in turn: the loop runs on the others, and its model is carried to the record that was left out, where
 //! nothing is fitted but what belongs to a record. An effect that does not lower the error there stands in for something else,
 //! however well it fits. What was found as noise is no part of the model here: it lowers no error, it is taken for granted.
+//!
+//! Of a single record errors are those of its blocks, and tell how far the model carries within it. Nothing is taken out for them: a
+//! block may be hotter than all others, and what goes with temperature is then not tried on it but extrapolated to it.
 
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
 
@@ -47,7 +50,7 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
     let mut left_out = Vec::new();
     for (done, record) in records.iter().enumerate() {
         report(watch, "records left out", done, records.len())?;
-        let others = state.prepared.raw.0.without_member(record.member.number);
+        let others = state.prepared.raw.0.without_member(record.number);
         let (of_others, _) = searched(&others, settings, watch)?;
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
         let squares = [of(&of_others.base)?, of(&of_others.current)?];
@@ -61,6 +64,33 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
     }
     let [normalised_rms, input_difference_k] = before_and_after(sums);
     Ok(Transfer { normalised_rms, input_difference_k, records: left_out })
+}
+
+/// Errors of one record on each of its blocks in turn, with a model of the effects that all of it shows, fitted to the other blocks.
+pub(crate) fn over_blocks(state: &State<'_>, watch: Watch<'_>) -> Result<Transfer, ModelError> {
+    let current = without_noise(&state.current, &state.prepared);
+    let found: Vec<EffectInChannel> = current.model.effects.iter().map(|e| (e.identifier(), e.channel())).collect();
+    let blocks = state.prepared.each_block();
+    let mut sums = [Squares::default(); 2];
+    let mut left_out = Vec::new();
+    for (done, block) in blocks.iter().enumerate() {
+        report(watch, "blocks left out", done, blocks.len())?;
+        let of = |fitted: &Fitted| on(block, &of_the_others(block, &fitted.model, &fitted.theta));
+        let squares = [of(&state.base)?, of(&current)?];
+        for (sum, squares) in sums.iter_mut().zip(squares) {
+            *sum = sum.and(squares);
+        }
+        let [normalised_rms, input_difference_k] = before_and_after(squares);
+        left_out.push(LeftOut { normalised_rms, input_difference_k, found: found.clone() });
+    }
+    let [normalised_rms, input_difference_k] = before_and_after(sums);
+    Ok(Transfer { normalised_rms, input_difference_k, records: left_out })
+}
+
+/// A model fitted to all records or blocks but one.
+fn of_the_others(record: &OneRecord, model: &Model, theta: &[f64]) -> Fitted {
+    let (others, selection) = &record.others;
+    model.fit(theta, others, selection, Effort::Compare)
 }
 
 fn before_and_after([before, after]: [Squares; 2]) -> [BeforeAfter<f64>; 2] {
@@ -78,7 +108,7 @@ fn bare(fitted: Fitted, of_others: &State<'_>, all: &State<'_>) -> Fitted {
 /// Errors of a model of the others on a record.
 fn on(record: &OneRecord, fitted: &Fitted) -> Result<Squares, ModelError> {
     let carried = record.carried(fitted)?;
-    Ok(Squares::of(&carried, &record.observations, |sample| record.everything.holds(sample)))
+    Ok(Squares::of(&carried, &record.observations, |sample| record.tried.holds(sample)))
 }
 
 /// Takes out effects that do not help on records which had no part in fitting them, the worst first.
@@ -103,9 +133,7 @@ fn least_gain(state: &State<'_>, watch: Watch<'_>) -> Result<Option<(usize, f64)
     let records = state.prepared.each_record();
     for (done, record) in records.iter().enumerate() {
         report(watch, "effects on records left out", done, records.len())?;
-        let (others, selection) = state.prepared.without_record(record);
-        let of_others =
-            |model: &Model, theta: &[f64]| on(record, &model.fit(theta, &others, &selection, Effort::Compare));
+        let of_others = |model: &Model, theta: &[f64]| on(record, &of_the_others(record, model, theta));
         let with = of_others(&current.model, &current.theta)?;
         for (index, gain) in gains.iter_mut().enumerate() {
             let (model, theta) = current.without(index);

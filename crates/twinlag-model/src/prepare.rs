@@ -218,10 +218,15 @@ impl Prepared {
         model.fit(&fitted.theta, &self.observations, &self.searched, Effort::Compare)
     }
 
+    /// Whether pieces of the record are enough for a quick look.
+    pub(crate) fn is_excerpted(&self) -> bool {
+        self.observations.samples() >= MIN_EXCERPTED_SAMPLES
+    }
+
     /// Pieces of a long record, for a quick look, and what counts of them; all of a short one.
     pub fn excerpt(&self) -> (Observations, Selection) {
         let samples = self.observations.samples();
-        if samples < MIN_EXCERPTED_SAMPLES {
+        if !self.is_excerpted() {
             return (self.observations.clone(), self.searched.clone());
         }
         // After each block that judges.

@@ -133,36 +133,63 @@ impl Observations {
     }
 }
 
-/// One of several records that were prepared together.
+/// Blocks that a record is divided into, each of which is left out in turn: long enough that a drift has gone on, and three quarters
+/// of the record left to fit. Chosen.
+const BLOCKS: usize = 4;
+
+/// One of several records that were prepared together, or a block of a single one: what a model of the others is tried on.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct OneRecord {
-    /// Which of them it is.
-    pub member: Member,
-    /// The record, where it lies among the others.
+    /// Which of them it is, from 0.
+    pub number: usize,
+    /// The record, where it lies among the others; of a block all of the record.
     pub observations: Observations,
-    /// Its residuals that count.
+    /// Its residuals on which a model of the others is tried.
+    pub tried: Selection,
+    /// Its residuals that count where what is its own is fitted; of a block those of all of the record, since what belongs to a record
+    /// is of all of it.
     pub everything: Selection,
+    /// The others, and what fits of them count.
+    pub others: (Observations, Selection),
     context: Context,
 }
 
 impl Prepared {
     /// Each of several records.
     pub fn each_record(&self) -> Vec<OneRecord> {
-        let of = |(member, context): (Member, Context)| OneRecord {
-            observations: self.observations.of_member(member.number),
-            everything: self.everything.of_samples(member.samples.clone()),
-            member,
-            context,
+        let of = |(member, context): (Member, Context)| {
+            let mut others = self.everything.clone();
+            others.counts.drain(member.samples.clone());
+            OneRecord {
+                number: member.number,
+                observations: self.observations.of_member(member.number),
+                tried: self.everything.of_samples(member.samples.clone()),
+                everything: self.everything.of_samples(member.samples.clone()),
+                others: (self.observations.without_member(member.number), others),
+                context,
+            }
         };
         self.context.each_member().map(of).collect()
     }
 
-    /// All of several records but one, and what fits of them count.
-    pub fn without_record(&self, record: &OneRecord) -> (Observations, Selection) {
-        let mut others = self.everything.clone();
-        others.counts.drain(record.member.samples.clone());
-        (self.observations.without_member(record.member.number), others)
+    /// Each of a few long blocks of a single record; of a long one pieces, as [`Self::excerpt`] takes them.
+    pub fn each_block(&self) -> Vec<OneRecord> {
+        let (observations, everything) =
+            if self.is_excerpted() { self.excerpt() } else { (self.observations.clone(), self.everything.clone()) };
+        let samples = observations.samples();
+        let of = |number: usize| {
+            let block = number * samples / BLOCKS..(number + 1) * samples / BLOCKS;
+            OneRecord {
+                number,
+                observations: observations.clone(),
+                tried: everything.where_in(|sample| block.contains(&sample)),
+                everything: everything.clone(),
+                others: (observations.clone(), everything.where_in(|sample| !block.contains(&sample))),
+                context: self.context.clone(),
+            }
+        };
+        (0..BLOCKS).map(of).collect()
     }
 }
 

@@ -25,6 +25,12 @@ impl Selection {
         Self { counts: self.counts[samples].to_vec(), weighting: self.weighting.clone() }
     }
 
+    /// Those of these samples that are in some part of the record.
+    pub(crate) fn where_in(&self, is_in: impl Fn(usize) -> bool) -> Self {
+        let counts = self.counts.iter().enumerate().map(|(sample, counts)| *counts && is_in(sample)).collect();
+        Self { counts, weighting: self.weighting.clone() }
+    }
+
     /// How many samples count.
     pub(crate) fn counted(&self) -> usize {
         self.counts.iter().filter(|counts| **counts).count()

@@ -1,6 +1,6 @@
 //! Time constants, noise and errors, before and after.
 
-use twinlag::{IntervalMethod, SensorEstimate};
+use twinlag::{IntervalMethod, LeftOutUnit, SensorEstimate};
 use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table, rounded};
 
 use super::{Column, Page};
@@ -83,6 +83,14 @@ impl Page<'_> {
         .into_iter()
         .map(|(name, unit, pair)| (name, unit, pair.before, pair.after))
         .collect::<Vec<_>>();
+        if let Some(transfer) = self.answer.transfer.filter(|_| self.changed) {
+            let name = match transfer.left_out {
+                LeftOutUnit::Block => "Residual on a quarter of the record left out of the fit, root mean square",
+                _ => "Residual on a record left out of the search, root mean square",
+            };
+            let rms = transfer.error.held_out_normalised_rms;
+            rows.push((name, "", rms.before, rms.after));
+        }
         if let Some(rmse) = self.answer.error.reference_rmse_k {
             rows.push((
                 "Reconstructed gas temperature less the reference on held-out blocks, root mean square",

@@ -6,7 +6,7 @@ use twinlag_diagnose::{
     Move, Policy, Unexplained, Verdict,
 };
 
-use crate::answers::{Characterisation, FoundIn, Model, ModelEffect, RecordAnswer, TransferAnswer};
+use crate::answers::{Characterisation, FoundIn, LeftOutUnit, Model, ModelEffect, RecordAnswer, TransferAnswer};
 
 /// A number of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -135,7 +135,8 @@ pub struct Diagnosis {
     /// What each of several records of a rig has for itself; none of a single record.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub records: Vec<RecordAnswer>,
-    /// Errors of records that had no part in finding the model; `None` of a single record.
+    /// Errors of records that had no part in finding the model, or of blocks of a single one; `None` where no model is of the whole
+    /// record.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transfer: Option<TransferAnswer>,
     /// What to know before using the numbers.
@@ -162,6 +163,12 @@ pub struct Diagnosis {
 impl Diagnosis {
     /// The schema's name and number.
     pub const SCHEMA: &'static str = "twinlag.diagnosis/1";
+
+    /// Root mean square of the whitened residual on blocks of a single record that were left out of the fit; `None` of several.
+    pub fn on_blocks_left_out(&self) -> Option<BeforeAfter<f64>> {
+        let of_blocks = self.transfer.filter(|transfer| transfer.left_out == LeftOutUnit::Block);
+        of_blocks.map(|transfer| transfer.error.held_out_normalised_rms)
+    }
 
     /// Why errors are larger with the effects than without them, where they are. The difference of the inferred inputs is not
     /// among them: it grows with a longer lag, whatever the model.

@@ -10,6 +10,8 @@ use twinlag_diagnose::{BeforeAfter, Disagreement, EffectInChannel, Identifier, L
 pub enum LeftOutUnit {
     /// A record of several.
     Record,
+    /// A block of a single record.
+    Block,
 }
 
 /// Errors on a record that had no part in finding the model.
@@ -24,7 +26,8 @@ pub struct TransferError {
 }
 
 /// Errors of records that had no part in finding the model: each is left out in turn, the loop runs on the others, and its model
-/// is carried to the one that was left out, where nothing is fitted but what belongs to a record.
+/// is carried to the one that was left out, where nothing is fitted but what belongs to a record. Of a single record the same of its
+/// blocks, to which the model is fitted, but not found again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TransferAnswer {
@@ -38,12 +41,12 @@ pub struct TransferAnswer {
 }
 
 impl TransferAnswer {
-    pub(crate) fn of(transfer: &Transfer) -> Self {
+    pub(crate) fn of(transfer: &Transfer, left_out: LeftOutUnit) -> Self {
         let error = TransferError {
             held_out_normalised_rms: transfer.normalised_rms,
             held_out_input_difference_k: transfer.input_difference_k,
         };
-        Self { error, left_out: LeftOutUnit::Record, count: transfer.records.len() }
+        Self { error, left_out, count: transfer.records.len() }
     }
 }
 

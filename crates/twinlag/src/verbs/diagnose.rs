@@ -9,7 +9,8 @@ use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, NamedEffect, Status,
+    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, LeftOutUnit, NamedEffect,
+    Status, TransferAnswer,
 };
 use crate::error::Error;
 use crate::options::Options;
@@ -101,7 +102,7 @@ pub(crate) fn answer(
         limits: core.limits.iter().map(|l| l.named(&record.channels)).collect(),
         if_known: core.if_known.as_ref().map(|values| values.named(&record.channels)),
         records: Vec::new(),
-        transfer: None,
+        transfer: core.transfer.as_ref().map(|transfer| TransferAnswer::of(transfer, LeftOutUnit::Block)),
         remarks,
         without: options.without.clone(),
         found_in: Some(FoundIn::of(record)),

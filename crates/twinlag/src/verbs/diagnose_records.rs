@@ -3,7 +3,7 @@
 use twinlag_diagnose::{JointDiagnosis, Masked, ModelError, Observations, diagnose_records as close_the_loop};
 use twinlag_record::Record;
 
-use crate::answers::{Diagnosis, ErrorBeforeAfter, RecordAnswer, TransferAnswer};
+use crate::answers::{Diagnosis, ErrorBeforeAfter, LeftOutUnit, RecordAnswer, TransferAnswer};
 use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::{RowOfSample, Rows};
@@ -64,7 +64,7 @@ pub fn diagnose_records_watched(
     out.records = each
         .map(|((found, record), masked)| RecordAnswer::of(found, &record.source, &record.channels, masked))
         .collect();
-    out.transfer = Some(TransferAnswer::of(&transfer));
+    out.transfer = Some(TransferAnswer::of(&transfer, LeftOutUnit::Record));
     Ok(out)
 }
 
