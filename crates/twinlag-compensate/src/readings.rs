@@ -1,5 +1,7 @@
 //! What is compensated.
 
+use std::sync::Arc;
+
 use crate::error::CompensateError;
 use crate::rig::SensorAt;
 
@@ -8,7 +10,7 @@ use crate::rig::SensorAt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Readings {
     time_s: Vec<f64>,
-    reading_c: [Vec<f64>; 2],
+    reading_c: [Arc<Vec<f64>>; 2],
     missing: [Vec<bool>; 2],
     locals: Option<[Vec<SensorAt>; 2]>,
 }
@@ -45,6 +47,18 @@ impl Readings {
         reading_c: [Vec<f64>; 2],
         missing: [Vec<bool>; 2],
     ) -> Result<Self, CompensateError> {
+        Self::sharing(time_s, reading_c.map(Arc::new), missing)
+    }
+
+    /// As [`Readings::with_missing`], of readings that others hold as well.
+    ///
+    /// # Errors
+    /// As [`Readings::new`].
+    pub fn sharing(
+        time_s: Vec<f64>,
+        reading_c: [Arc<Vec<f64>>; 2],
+        missing: [Vec<bool>; 2],
+    ) -> Result<Self, CompensateError> {
         let expected = time_s.len();
         let lengths = [reading_c[0].len(), reading_c[1].len(), missing[0].len(), missing[1].len()];
         if let Some(&got) = lengths.iter().find(|n| **n != expected) {
@@ -79,7 +93,7 @@ impl Readings {
         let locals = self.locals.as_ref().map(|locals| [0, 1].map(|i| locals[i][..count].to_vec()));
         Self {
             time_s: self.time_s[..count].to_vec(),
-            reading_c: [0, 1].map(|i| self.reading_c[i][..count].to_vec()),
+            reading_c: [0, 1].map(|i| Arc::new(self.reading_c[i][..count].to_vec())),
             missing: [0, 1].map(|i| self.missing[i][..count].to_vec()),
             locals,
         }
@@ -98,6 +112,11 @@ impl Readings {
     /// Instants, s.
     pub fn time_s(&self) -> &[f64] {
         &self.time_s
+    }
+
+    /// Instants, s, of readings that are not needed any more.
+    pub fn into_time_s(self) -> Vec<f64> {
+        self.time_s
     }
 
     /// The reading of `channel` at instant `k`, °C; `None` where it is missing.

@@ -1,7 +1,7 @@
 //! The energy of the whitened residual as a cost, with exact derivatives.
 
 use std::cell::RefCell;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::{Arc, Mutex};
 
 use rayon::prelude::*;
@@ -9,13 +9,14 @@ use twinlag_optimise::{Cost, Derivatives, Variable};
 
 use crate::dense;
 use crate::directions::{Direction, Directions, constants, moved};
-use crate::disagreement::{Again, Disagreement, Evaluator, Moved};
+use crate::disagreement::{Again, Disagreement, Evaluator, Moved, Piece};
 use crate::model::Model;
 use crate::normal::{Beside, NormalEquations, Sums};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
 use crate::selection::{Samples, Selection, Sieve};
 use crate::weighting::Weighting;
+use crate::whitening::Factor;
 
 /// Residuals, over all columns, from which on columns are computed side by side: below, threads cost more than they save
 /// (some tens of microseconds against as many nanoseconds for each residual).
@@ -36,11 +37,8 @@ struct Memory<'a> {
     evaluator: Evaluator<'a>,
     /// Parameters of the last evaluation.
     at: Vec<f64>,
-    /// Its residuals that count, where they are kept, and what is known beforehand.
+    /// Its residuals that count, and what is known beforehand.
     residual: Vec<f64>,
-    is_kept: bool,
-    /// Those of one window, where they are not.
-    passing: Vec<f64>,
     /// Where the residuals of each window end among all.
     ends: Vec<usize>,
     sieve: Sieve,
@@ -72,6 +70,12 @@ pub(crate) struct Block<'a> {
     pub(crate) columns: Vec<&'a [f64]>,
 }
 
+/// A column for each direction.
+fn first_columns<'c>(columns: &'c mut Vec<Column>, directions: &Directions) -> &'c mut [Column] {
+    columns.resize_with(columns.len().max(directions.all.len()), Column::default);
+    &mut columns[..directions.all.len()]
+}
+
 /// Computes what belongs to each direction in a window of so many residuals.
 fn each_direction<T: Send>(
     items: &mut [T],
@@ -99,8 +103,6 @@ impl<'a> ResidualCost<'a> {
             evaluator: Evaluator::new(observations, model.noise_std_k()),
             at: Vec::new(),
             residual: Vec::new(),
-            is_kept: true,
-            passing: Vec::new(),
             ends: Vec::new(),
             sieve: Sieve::default(),
             columns: Vec::new(),
@@ -131,8 +133,13 @@ impl<'a> ResidualCost<'a> {
         if memory.at == theta {
             return;
         }
-        let numbers = self.evaluate_plant(theta, memory);
+        let numbers = constants(theta);
+        memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
+        memory.at.clear();
+        memory.at.extend_from_slice(theta);
         let Memory { evaluator, residual, ends, sieve, .. } = memory;
+        residual.clear();
+        ends.clear();
         residual.reserve_exact(evaluator.residual.len().min(self.selection.counted()) + theta.len());
         for (index, window) in evaluator.windows().iter().enumerate() {
             let values = &evaluator.residual[window.residuals()];
@@ -140,36 +147,6 @@ impl<'a> ResidualCost<'a> {
             ends.push(residual.len());
         }
         residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
-        memory.is_kept = true;
-    }
-
-    /// Evaluates, and visits the residuals that count, window after window, and what is known beforehand, with their places among
-    /// all; only the latter is kept.
-    fn pass(&self, theta: &[f64], memory: &mut Memory<'_>, mut visit: impl FnMut(Range<usize>, &[f64])) {
-        let numbers = self.evaluate_plant(theta, memory);
-        let Memory { evaluator, residual, passing, ends, sieve, .. } = memory;
-        let mut done = 0;
-        for (index, window) in evaluator.windows().iter().enumerate() {
-            passing.clear();
-            sieve.pick(&evaluator.residual[window.residuals()], evaluator.span(index), self.selection, passing);
-            let end = done + passing.len();
-            visit(std::mem::replace(&mut done, end)..end, passing);
-            ends.push(end);
-        }
-        residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
-        visit(done..done + residual.len(), residual);
-        memory.is_kept = false;
-    }
-
-    /// Evaluates the plant of these parameters, and returns them as numbers.
-    fn evaluate_plant(&self, theta: &[f64], memory: &mut Memory<'_>) -> Vec<Number> {
-        let numbers = constants(theta);
-        memory.evaluator.evaluate(&self.model.plant_of(&numbers, self.observations));
-        memory.residual.clear();
-        memory.ends.clear();
-        memory.at.clear();
-        memory.at.extend_from_slice(theta);
-        numbers
     }
 
     /// The directions of the parameters from `first` on that are not held.
@@ -180,47 +157,98 @@ impl<'a> ResidualCost<'a> {
     /// Visits residuals with their derivatives, window after window, and what is known beforehand at the end, of which
     /// derivatives are those with respect to the parameters. At the point that was evaluated last.
     fn walk(&self, theta: &[f64], directions: &Directions, memory: &mut Memory<'_>, mut visit: impl FnMut(Block<'_>)) {
-        let Memory { evaluator, residual, is_kept, passing, ends, sieve, columns, spare, again, .. } = memory;
-        let (evaluator, spare) = (&*evaluator, &*spare);
+        let Memory { evaluator, residual, ends, columns, spare, again, .. } = memory;
         let still = self.model.plant_of(&constants(theta), self.observations);
-        columns.resize_with(columns.len().max(directions.all.len()), Column::default);
-        let columns = &mut columns[..directions.all.len()];
+        let columns = first_columns(columns, directions);
         let mut done = 0;
-        for (index, window) in evaluator.windows().iter().enumerate() {
+        for index in 0..evaluator.windows().len() {
             let factor = evaluator.factor(&still, index, again);
-            let compute = |(column, direction): (&mut Column, &Direction)| {
-                let Column { moved, sieve, picked } = column;
-                picked.clear();
-                if direction.plant.is_none() {
-                    return;
-                }
-                let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
-                let values = evaluator.derivative(direction, index, factor, &mut disagreement, moved);
-                sieve.pick(values, evaluator.span(index), self.selection, picked);
-                if picked.iter().all(|value| *value == 0.0) {
-                    picked.clear();
-                }
-                spare.lock().expect("no thread panics").push(disagreement);
-            };
-            each_direction(columns, directions, window.residuals().len(), compute);
+            self.derive(directions, evaluator, (index, factor), spare, columns);
             let range = std::mem::replace(&mut done, ends[index])..ends[index];
             let columns = columns.iter().map(|column| &column.picked[..]).collect();
-            let residual = if *is_kept {
-                &residual[range.clone()]
-            } else {
-                passing.clear();
-                sieve.pick(&evaluator.residual[window.residuals()], evaluator.span(index), self.selection, passing);
-                &passing[..]
-            };
-            visit(Block { residual, range, is_prior: false, columns });
+            visit(Block { residual: &residual[range.clone()], range, is_prior: false, columns });
         }
+        self.visit_knowledge(theta, directions.first, done, &residual[done..], visit);
+    }
+
+    /// Evaluates and visits what [`Self::walk`] does, of which only one window is kept, as long as the visitor says.
+    fn pass(
+        &self,
+        theta: &[f64],
+        directions: &Directions,
+        memory: &mut Memory<'_>,
+        mut visit: impl FnMut(&[Piece], Block<'_>) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let Memory { evaluator, residual, at, sieve, columns, spare, again, .. } = memory;
+        at.clear();
+        let numbers = constants(theta);
+        let still = self.model.plant_of(&numbers, self.observations);
+        let columns = first_columns(columns, directions);
+        let mut done = 0;
+        evaluator.pass(&still, |evaluator, index| {
+            residual.clear();
+            let values = &evaluator.residual[evaluator.windows()[index].residuals()];
+            sieve.pick(values, evaluator.span(index), self.selection, residual);
+            let factor = evaluator.factor(&still, index, again);
+            self.derive(directions, evaluator, (index, factor), spare, columns);
+            let range = done..done + residual.len();
+            done = range.end;
+            let columns = columns.iter().map(|column| &column.picked[..]).collect();
+            visit(&evaluator.pieces, Block { residual, range, is_prior: false, columns })
+        })?;
+        let known: Vec<f64> = self.model.knowledge(&numbers).map(|k| k.re).collect();
+        let mut goes_on = ControlFlow::Continue(());
+        self.visit_knowledge(theta, directions.first, done, &known, |block| goes_on = visit(&evaluator.pieces, block));
+        goes_on
+    }
+
+    /// The derivatives of the residuals of a window in each direction.
+    ///
+    /// - `window`: its place, and its factor
+    fn derive(
+        &self,
+        directions: &Directions,
+        evaluator: &Evaluator<'_>,
+        (index, factor): (usize, &Factor),
+        spare: &Mutex<Vec<Disagreement<Number>>>,
+        columns: &mut [Column],
+    ) {
+        let compute = |(column, direction): (&mut Column, &Direction)| {
+            let Column { moved, sieve, picked } = column;
+            picked.clear();
+            if direction.plant.is_none() {
+                return;
+            }
+            let mut disagreement = spare.lock().expect("no thread panics").pop().unwrap_or_default();
+            let values = evaluator.derivative(direction, index, factor, &mut disagreement, moved);
+            sieve.pick(values, evaluator.span(index), self.selection, picked);
+            if picked.iter().all(|value| *value == 0.0) {
+                picked.clear();
+            }
+            spare.lock().expect("no thread panics").push(disagreement);
+        };
+        each_direction(columns, directions, evaluator.windows()[index].residuals().len(), compute);
+    }
+
+    /// Visits what is known beforehand.
+    ///
+    /// - `first`: the first parameter whose derivatives are computed
+    /// - `done`: residuals before it
+    /// - `prior`: its part of the residual
+    fn visit_knowledge(
+        &self,
+        theta: &[f64],
+        first: usize,
+        done: usize,
+        prior: &[f64],
+        mut visit: impl FnMut(Block<'_>),
+    ) {
         let known = |i: usize| -> Vec<f64> {
-            let is_computed = i >= directions.first && !self.is_held(i);
+            let is_computed = i >= first && !self.is_held(i);
             if is_computed { self.model.knowledge(&moved(theta, i)).map(|k| k.eps).collect() } else { Vec::new() }
         };
         let known: Vec<Vec<f64>> = (0..theta.len()).map(known).collect();
         let columns = known.iter().map(Vec::as_slice).collect();
-        let prior = &residual[if *is_kept { done } else { 0 }..];
         visit(Block { residual: prior, range: done..done + prior.len(), is_prior: true, columns });
     }
 
@@ -273,15 +301,16 @@ impl<'a> ResidualCost<'a> {
         self.variables[i].lower == self.variables[i].upper
     }
 
-    /// Residual and derivatives at a point; columns of the parameters before `first` are left empty.
-    pub(crate) fn linearised(&self, theta: &[f64], first: usize) -> Linearised {
-        let mut memory = self.memory.borrow_mut();
-        self.evaluate(theta, &mut memory);
+    /// Residual and derivatives at the one point that is of interest; columns of the parameters before `first` are left empty.
+    pub(crate) fn into_linearised(self, theta: &[f64], first: usize) -> Linearised {
+        let memory = &mut *self.memory.borrow_mut();
         // No more memory than it takes: of a long record the columns are most of all that there is.
-        let length = |i: usize| if i >= first { memory.residual.len() } else { 0 };
+        let most = self.observations.samples().min(self.selection.counted()) + theta.len();
+        let length = |i: usize| if i >= first { most } else { 0 };
         let mut columns: Vec<Vec<f64>> = (0..theta.len()).map(|i| Vec::with_capacity(length(i))).collect();
         let directions = self.directions(theta, first);
-        self.walk(theta, &directions, &mut memory, |block| {
+        let mut residual = Vec::new();
+        let mut append = |block: &Block<'_>| {
             let (end, of_directions) = (block.range.end, &block.columns);
             for (i, all) in columns.iter_mut().enumerate().skip(first) {
                 match directions.of_parameters.as_ref().filter(|_| !block.is_prior) {
@@ -296,8 +325,20 @@ impl<'a> ResidualCost<'a> {
                 }
                 all.resize(end, 0.0);
             }
-        });
-        let residual = memory.residual.clone();
+        };
+        if memory.evaluator.keeps_factors() {
+            self.evaluate(theta, memory);
+            self.walk(theta, &directions, memory, |block| append(&block));
+            residual = std::mem::take(&mut memory.residual);
+        } else {
+            residual.reserve_exact(most);
+            let all = self.pass(theta, &directions, memory, |_, block| {
+                residual.extend_from_slice(block.residual);
+                append(&block);
+                ControlFlow::Continue(())
+            });
+            debug_assert!(all.is_continue(), "each window is visited");
+        }
         columns[first..].iter_mut().for_each(|column| column.resize(residual.len(), 0.0));
         Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces).collect(), residual }
     }
@@ -309,7 +350,7 @@ impl<'a> ResidualCost<'a> {
         self.summed(theta, &mut memory, None, None)
     }
 
-    /// The normal equations at the one point that is of interest: residuals of a long record are filtered twice rather than kept.
+    /// The normal equations at the one point that is of interest: of a long record one window is in memory.
     ///
     /// - `beside`: what is known of the columns, as [`Model::normal_equations`] has it
     /// - `filter`: that of the covariance of the slope, where that is of interest
@@ -319,38 +360,64 @@ impl<'a> ResidualCost<'a> {
         beside: Option<Beside<'_>>,
         filter: Option<&Weighting>,
     ) -> NormalEquations {
-        let mut memory = self.memory.borrow_mut();
-        let mut agrees = true;
-        let mut compare = |range: Range<usize>, residual: &[f64]| {
-            agrees = agrees && beside.is_none_or(|beside| beside.agrees_with(residual, range.start));
-        };
-        if memory.evaluator.keeps_factors() {
-            self.evaluate(theta, &mut memory);
-            compare(0..memory.residual.len(), &memory.residual);
-        } else {
-            self.pass(theta, &mut memory, compare);
+        let memory = &mut *self.memory.borrow_mut();
+        if !memory.evaluator.keeps_factors() {
+            let known = beside.and_then(|beside| self.summed_in_passing(theta, memory, Some(beside), filter));
+            let out = known.or_else(|| self.summed_in_passing(theta, memory, None, filter));
+            return out.expect("without another model there is nothing to differ from");
         }
-        self.summed(theta, &mut memory, beside.filter(|_| agrees), filter)
+        self.evaluate(theta, memory);
+        let pieces = &memory.evaluator.pieces;
+        let is_beside = |beside: &Beside<'_>| {
+            beside.agrees_with(&memory.residual, 0) && self.selection.samples(pieces).eq(beside.without.samples.iter())
+        };
+        let known = beside.filter(is_beside).map(|beside| beside.without);
+        self.summed(theta, memory, known, filter)
     }
 
     /// Sums at the point that was evaluated last.
     ///
-    /// - `beside`: a model of the same residuals, if they are of the same samples
+    /// - `known`: a model of the same residuals
     fn summed(
+        &self,
+        theta: &[f64],
+        memory: &mut Memory<'_>,
+        known: Option<&Linearised>,
+        filter: Option<&Weighting>,
+    ) -> NormalEquations {
+        let directions = self.directions(theta, known.map_or(0, |known| known.columns.len()));
+        let mut sums = Sums::of(&directions, known, filter);
+        self.walk(theta, &directions, memory, |block| sums.add(&block));
+        sums.normal_equations()
+    }
+
+    /// Sums of a record of which one window is in memory; `None` once residuals are not those of the model beside.
+    fn summed_in_passing(
         &self,
         theta: &[f64],
         memory: &mut Memory<'_>,
         beside: Option<Beside<'_>>,
         filter: Option<&Weighting>,
-    ) -> NormalEquations {
-        let pieces = &memory.evaluator.pieces;
-        let has_samples = |of: &Linearised| self.selection.samples(pieces).eq(of.samples.iter());
-        let known = beside.map(|beside| beside.without).filter(|without| has_samples(without));
-        let first = known.map_or(0, |known| known.columns.len());
-        let directions = self.directions(theta, first);
+    ) -> Option<NormalEquations> {
+        let known = beside.map(|beside| beside.without);
+        let directions = self.directions(theta, known.map_or(0, |known| known.columns.len()));
         let mut sums = Sums::of(&directions, known, filter);
-        self.walk(theta, &directions, memory, |block| sums.add(&block));
-        sums.normal_equations()
+        let mut pieces_seen = 0;
+        let all = self.pass(theta, &directions, memory, |pieces, block| {
+            let is_beside = |beside: &Beside<'_>| {
+                // Of each piece before the first window of it is summed, and of all once there are no more of them.
+                let has_samples = (pieces.len() == pieces_seen && !block.is_prior)
+                    || beside.has_samples(self.selection.samples(pieces), block.is_prior);
+                has_samples && beside.agrees_with(block.residual, block.range.start)
+            };
+            if !beside.as_ref().is_none_or(is_beside) {
+                return ControlFlow::Break(());
+            }
+            pieces_seen = pieces.len();
+            sums.add(&block);
+            ControlFlow::Continue(())
+        });
+        all.is_continue().then(|| sums.normal_equations())
     }
 }
 
@@ -512,18 +579,19 @@ mod tests {
                 let start = effect.starts().remove(0);
                 let values = effect.parameters().iter().zip(start).map(off);
                 let theta: Vec<f64> = TAU_S.into_iter().chain(values).collect();
-                let cost = ResidualCost::new(&model, &theta, &observations, &selection);
+                let new = || ResidualCost::new(&model, &theta, &observations, &selection);
+                let cost = new();
                 let size = |i: usize| match cost.variables[i].scale {
                     Scale::Logarithmic => 100.0 * theta[i],
                     Scale::Linear { typical } => 100.0 * typical,
                 };
                 let residual = |z: &Vec<f64>| {
                     let theta: Vec<f64> = z.iter().enumerate().map(|(i, z)| z * size(i)).collect();
-                    Ok(cost.linearised(&theta, theta.len()).residual)
+                    Ok(new().into_linearised(&theta, theta.len()).residual)
                 };
                 let z: Vec<f64> = theta.iter().enumerate().map(|(i, x)| x / size(i)).collect();
                 let want = central_jacobian(&residual)(&z).expect("residuals are finite");
-                let got = cost.linearised(&theta, 0).columns;
+                let got = new().into_linearised(&theta, 0).columns;
                 for i in (0..theta.len()).filter(|i| !cost.is_held(*i)) {
                     let largest = want.iter().map(|row| row[i].abs()).fold(0.0, f64::max);
                     for (k, row) in want.iter().enumerate() {
@@ -558,7 +626,7 @@ mod tests {
                     memory.evaluator.max_kept_samples = window_samples;
                     memory.evaluator.block_samples = block_samples;
                     drop(memory);
-                    cost.linearised(&theta, 0)
+                    cost.into_linearised(&theta, 0)
                 };
                 let whole = linearised(SAMPLES, SAMPLES);
                 for cut in [linearised(37, SAMPLES), linearised(SAMPLES, 16), linearised(64, 5)] {

@@ -92,7 +92,7 @@ pub fn levels(observations: &Observations) -> Option<ChannelNoise> {
 fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
     let out = part.scores(channel, samples);
     let scale = 1.4826 * median(out.iter().map(|s| s.abs()).collect());
-    out.iter().map(|s| if scale > 0.0 { s / scale } else { 0.0 }).collect()
+    out.into_iter().map(|s| if scale > 0.0 { s / scale } else { 0.0 }).collect()
 }
 
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
@@ -123,7 +123,7 @@ pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, poli
             let other = &stretch.reading_c[1 - channel];
             let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
             let mut slopes: Vec<f64> = (0..n).map(slope).collect();
-            slopes.sort_by(f64::total_cmp);
+            slopes.sort_unstable_by(f64::total_cmp);
             for k in 0..n {
                 let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
                 let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);

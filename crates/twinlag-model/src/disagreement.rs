@@ -4,7 +4,7 @@
 //! The derivative is exact: the inverse is computed in numbers that carry it along. Where the parameter moves none of
 //! the rows that carry noise, as an offset does, the factor of the residual whitens the derivative as well.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use crate::directions::Direction;
@@ -324,10 +324,50 @@ impl<'a> Evaluator<'a> {
 
     /// As [`Self::evaluate`], and visits the standard deviation of each disagreement, given those before it.
     pub(crate) fn evaluate_with(&mut self, plant: &Plant, mut visit: impl FnMut(f64)) {
+        self.residual.clear();
+        self.residual.reserve_exact(self.observations.samples());
+        let all = self.each_window(plant, |evaluator| {
+            let window = &evaluator.windows[evaluator.used - 1];
+            (window.lead..window.factor.len()).for_each(|k| visit(window.factor.row(k)[0]));
+            ControlFlow::Continue(())
+        });
+        debug_assert!(all.is_continue(), "no window is the last one before the end");
+    }
+
+    /// The whitened residual of `plant`, window after window, of which only the last one is kept: visits the place of each among
+    /// [`Self::windows`]. As long as the visitor says.
+    pub(crate) fn pass(
+        &mut self,
+        plant: &Plant,
+        mut visit: impl FnMut(&Self, usize) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        self.each_window(plant, |evaluator| {
+            visit(evaluator, evaluator.used - 1)?;
+            evaluator.forget();
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// Keeps no more than the next window begins with: the last window, the first one that is like others, and the last residuals.
+    fn forget(&mut self) {
+        let Self { windows, used, residual, .. } = self;
+        let last = *used - 1;
+        let like = windows[..last].iter().position(|window| window.factor.is_stationary());
+        if let Some(like) = like {
+            windows.swap(0, like);
+        }
+        let place = usize::from(like.is_some());
+        windows.swap(place, last);
+        *used = place + 1;
+        let needless = residual.len().saturating_sub(windows[place].band());
+        residual.drain(..needless);
+    }
+
+    /// Evaluates one window after the other, and visits what there is after each, as long as the visitor says.
+    fn each_window(&mut self, plant: &Plant, mut visit: impl FnMut(&mut Self) -> ControlFlow<()>) -> ControlFlow<()> {
         let is_even = self.observations.period_s.is_some();
         self.pieces.clear();
         self.residual.clear();
-        self.residual.reserve_exact(self.observations.samples());
         self.used = 0;
         let mut before = 0;
         for (index, stretch) in self.observations.stretches.iter().enumerate() {
@@ -338,12 +378,12 @@ impl<'a> Evaluator<'a> {
                 let most = if is_even { self.window_samples } else { count };
                 for first in (0..count).step_by(most) {
                     self.evaluate_window(plant, first, most.min(count - first));
-                    let window = &self.windows[self.used - 1];
-                    (window.lead..window.factor.len()).for_each(|k| visit(window.factor.row(k)[0]));
+                    visit(self)?;
                 }
             }
             before += stretch.len();
         }
+        ControlFlow::Continue(())
     }
 
     /// The residual of the next window of the last piece.

@@ -92,20 +92,21 @@ impl Extended {
         if plant.separation.is_some() {
             return Err(ModelError::ChangingDelay);
         }
-        let mut time_s = Vec::new();
-        let mut temperature_c: [Vec<f64>; 2] = Default::default();
-        let mut missing: [Vec<bool>; 2] = Default::default();
-        for stretch in &self.observations.stretches {
-            let [one, two] = plant.temperatures(stretch);
-            temperature_c[0].extend(one);
-            temperature_c[1].extend(two);
-            time_s.extend(stretch.time_s.iter());
-            for (all, masked) in missing.iter_mut().zip(&stretch.masked) {
-                all.extend_from_slice(masked);
+        let stretches = &self.observations.stretches;
+        let time_s: Vec<f64> = stretches.iter().flat_map(|stretch| stretch.time_s.iter()).collect();
+        let missing = [0, 1].map(|i| stretches.iter().flat_map(|stretch| stretch.masked[i].iter().copied()).collect());
+        let temperature_c = match &stretches[..] {
+            [stretch] if plant.leaves_readings() => stretch.reading_c.clone(),
+            _ => {
+                let mut all: [Vec<f64>; 2] = Default::default();
+                for stretch in stretches {
+                    all.iter_mut().zip(plant.temperatures(stretch)).for_each(|(all, own)| all.extend(own));
+                }
+                all.map(Arc::new)
             }
-        }
+        };
         let locals = locals(&plant, &time_s, &temperature_c);
-        let readings = Readings::with_missing(time_s, temperature_c, missing)?;
+        let readings = Readings::sharing(time_s, temperature_c, missing)?;
         let mut rig = rig(&plant);
         let factor = self.observations.noise_factor();
         rig.sensors.iter_mut().zip(factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
@@ -133,12 +134,12 @@ fn rig(plant: &Plant) -> Rig {
 }
 
 /// What each sensor does at each instant, where that changes.
-fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Vec<f64>; 2]) -> Option<[Vec<SensorAt>; 2]> {
+fn locals(plant: &Plant, time_s: &[f64], temperature_c: &[Arc<Vec<f64>>; 2]) -> Option<[Vec<SensorAt>; 2]> {
     let changes = |s: &crate::plant::Sensor| !s.changes.is_empty() || s.rest.is_some() || s.heat.is_some();
     plant.sensors.iter().any(changes).then(|| {
         [0, 1].map(|i| {
             let sensor = &plant.sensors[i];
-            let each = time_s.iter().zip(&temperature_c[i]).map(|(&time_s, &c)| {
+            let each = time_s.iter().zip(temperature_c[i].iter()).map(|(&time_s, &c)| {
                 let temperature_c = Number::from(c);
                 // The slope of the heat that it holds is the factor of its time constant.
                 let with_temperature = sensor.heat.as_ref().map_or(1.0, |heat| heat(temperature_c).1.re);

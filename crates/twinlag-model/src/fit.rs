@@ -177,7 +177,7 @@ impl Model {
 
     /// Residual and its derivatives at a point, in units of the parameters, for the samples that count.
     pub fn linearised(&self, theta: &[f64], observations: &Observations, selection: &Selection) -> Linearised {
-        ResidualCost::new(self, theta, observations, selection).linearised(theta, 0)
+        ResidualCost::new(self, theta, observations, selection).into_linearised(theta, 0)
     }
 
     /// Half the second derivatives of the energy at `theta`, symmetric, in units of the parameters; averages over a part of a

@@ -69,6 +69,17 @@ impl Details {
     pub(crate) fn stretches(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         places(&self.samples)
     }
+
+    /// The parts without inferred inputs: what scores need.
+    pub(crate) fn into_scored(mut self) -> Vec<Part> {
+        self.parts.iter_mut().flat_map(|part| &mut part.inferred).for_each(|inferred| inferred.value = Vec::new());
+        self.parts
+    }
+
+    /// The samples of the residuals of each stretch, and their places.
+    pub(crate) fn samples_and_places(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> + '_ {
+        self.samples.iter().cloned().zip(self.stretches())
+    }
 }
 
 /// Ranges as long, one after the other.
@@ -240,7 +251,7 @@ impl Plant {
 }
 
 /// Puts `values` after those that there are.
-fn append(all: &mut Vec<f64>, values: Vec<f64>) {
+pub(crate) fn append(all: &mut Vec<f64>, values: Vec<f64>) {
     if all.is_empty() {
         *all = values;
     } else {

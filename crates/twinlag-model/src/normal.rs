@@ -88,6 +88,14 @@ impl Beside<'_> {
         let mut pairs = residual.iter().zip(self.without.residual.get(first..).unwrap_or(&[]));
         self.max_difference.is_infinite() || pairs.all(|(a, b)| (a - b).abs() < self.max_difference)
     }
+
+    /// Whether samples are those of the model without the effect.
+    ///
+    /// - `are_all`: whether there are no more of them
+    pub(crate) fn has_samples(&self, mut samples: impl Iterator<Item = usize>, are_all: bool) -> bool {
+        let mut known = self.without.samples.iter();
+        samples.all(|sample| known.next() == Some(sample)) && !(are_all && known.next().is_some())
+    }
 }
 
 /// Normal equations that are summed up block by block.

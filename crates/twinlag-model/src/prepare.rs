@@ -149,7 +149,7 @@ impl Prepared {
     }
 
     pub(crate) fn mask_spikes(&mut self, base: &Fitted) -> bool {
-        let parts = base.model.details(&base.theta, &self.observations).parts;
+        let parts = base.model.details(&base.theta, &self.observations).into_scored();
         let mut new = [Vec::new(), Vec::new()];
         let policy = &self.policy;
         for (round, far) in

@@ -5,6 +5,7 @@
 //! uncorrelated with the disagreement. Coherence is the same whatever filter lies between it and the gas.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF, Normal};
 use twinlag_cross_relation::{ResidualTest, TestName};
@@ -13,7 +14,7 @@ use twinlag_transform::{Complex64, Forward, Tapered, fast_length, hann};
 use crate::defects::MAX_TRANSFORMED_AS_IT_IS;
 use crate::dense;
 use crate::fit::Fitted;
-use crate::implied::{Details, Inferred, Part};
+use crate::implied::{Details, Inferred, Part, append};
 use crate::observations::Observations;
 use crate::plant::Place;
 use crate::selection::Selection;
@@ -38,40 +39,71 @@ pub(crate) struct Pairs {
 
 impl Pairs {
     /// - `details`: of the fitted model
-    pub(crate) fn of(fitted: &Fitted, details: &Details, observations: &Observations, selection: &Selection) -> Self {
+    pub(crate) fn of(
+        fitted: &Fitted,
+        mut details: Details,
+        observations: &Observations,
+        selection: &Selection,
+    ) -> Self {
         let plant = fitted.model.plant(&fitted.theta, observations);
         // A channel without noise of its own beside the white.
         let is_white = |i: usize| plant.extra.iter().all(|e| e.place != Place::Reading(i));
         let channel =
             usize::from(!is_white(0) || (is_white(1) && plant.sensors[1].tau_s.re < plant.sensors[0].tau_s.re));
-        let (mut residual, mut input): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
-        let mut last = None;
-        for ((part, samples), places) in details.parts.iter().zip(&details.samples).zip(details.stretches()) {
+        let mut input = Runs::default();
+        for (part, (samples, places)) in std::mem::take(&mut details.parts).iter().zip(details.samples_and_places()) {
             let stretch = &observations.stretches[part.stretch];
             let noise = part.noise_of(channel, stretch.len());
             let reading_c = &stretch.reading_c[channel];
-            for (place, sample) in places.zip(samples.clone()).filter(|(_, sample)| selection.holds(*sample)) {
-                if last.replace(sample).is_none_or(|last| sample != last + 1) {
-                    for runs in [&mut residual, &mut input] {
-                        runs.push(Vec::with_capacity(samples.end - sample));
-                    }
-                }
-                // A masked reading takes one residual away; those around it are white all the same.
-                if details.is_informed[place] {
-                    let k = sample - part.before;
-                    residual.last_mut().expect("begun").push(details.residual[place]);
-                    input.last_mut().expect("begun").push(reading_c[k] - noise[k]);
-                }
-            }
+            input.take(samples, places, selection, &details.is_informed, |_, sample| {
+                let k = sample - part.before;
+                reading_c[k] - noise[k]
+            });
         }
-        for run in residual.iter_mut().chain(&mut input) {
-            run.shrink_to_fit();
+        // What the parts held, as long as the record, is not there any more.
+        let mut residual = Runs::default();
+        for (samples, places) in details.samples_and_places() {
+            residual.take(samples, places, selection, &details.is_informed, |place, _| details.residual[place]);
         }
-        Self { residual, input, noise_std_k: plant.noise_std_k[channel] }
+        Self { residual: residual.all, input: input.all, noise_std_k: plant.noise_std_k[channel] }
     }
 
     fn runs(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
         self.residual.iter().map(Vec::as_slice).zip(self.input.iter().map(Vec::as_slice))
+    }
+}
+
+/// Values where residuals count and say anything, in unbroken runs.
+#[derive(Default)]
+struct Runs {
+    all: Vec<Vec<f64>>,
+    last: Option<usize>,
+}
+
+impl Runs {
+    /// Appends the values of a stretch.
+    ///
+    /// - `places`: those of its residuals among all
+    /// - `value`: of a residual by its place and its sample
+    fn take(
+        &mut self,
+        samples: Range<usize>,
+        places: Range<usize>,
+        selection: &Selection,
+        is_informed: &[bool],
+        value: impl Fn(usize, usize) -> f64,
+    ) {
+        let (end, from) = (samples.end, self.all.len());
+        for (place, sample) in places.zip(samples).filter(|(_, sample)| selection.holds(*sample)) {
+            if self.last.replace(sample).is_none_or(|last| sample != last + 1) {
+                self.all.push(Vec::with_capacity(end - sample));
+            }
+            // A masked reading takes one residual away; those around it are white all the same.
+            if is_informed[place] {
+                self.all.last_mut().expect("begun").push(value(place, sample));
+            }
+        }
+        self.all[from..].iter_mut().for_each(Vec::shrink_to_fit);
     }
 }
 
@@ -85,18 +117,19 @@ fn joined(runs: &[Vec<f64>]) -> Cow<'_, [f64]> {
 
 /// The gas temperature that both readings together give, °C, smoothed as the operators do and where there is only noise.
 ///
-/// - `parts`: of the fitted model
-pub(crate) fn estimated_gas(fitted: &Fitted, parts: Vec<Part>, observations: &Observations) -> Vec<f64> {
+/// - `parts`: of the fitted model, which keep no inferred inputs
+pub(crate) fn estimated_gas(fitted: &Fitted, mut parts: impl AsMut<[Part]>, observations: &Observations) -> Vec<f64> {
     let plant = fitted.model.plant(&fitted.theta, observations);
     let filter = Weighting::of_gas(observations, plant.noise_std_k);
     let channel = usize::from(plant.extra.iter().any(|e| e.place == Place::Reading(0)));
-    let mut out = Vec::with_capacity(parts.iter().map(Part::len).sum());
-    for part in parts {
+    let mut out = Vec::new();
+    for part in parts.as_mut() {
+        part.inferred[1 - channel].value = Vec::new();
         let stretch = &observations.stretches[part.stretch];
         let noise = part.noise_of(channel, stretch.len());
         let (skipped, count) = (part.skipped, part.len());
-        let [one, two] = part.inferred;
-        let Inferred { value: mut gas, rows } = if channel == 0 { one } else { two };
+        let Inferred { value, rows } = &mut part.inferred[channel];
+        let mut gas = std::mem::take(value);
         gas.drain(..skipped);
         gas.truncate(count);
         for (k, gas) in gas.iter_mut().enumerate() {
@@ -107,7 +140,7 @@ pub(crate) fn estimated_gas(fitted: &Fitted, parts: Vec<Part>, observations: &Ob
         }
         plant.undo_slow(&mut gas, stretch.start_c(), observations.step_s());
         drop(noise);
-        out.extend(filter.smooth(&gas));
+        append(&mut out, filter.smooth(&gas));
     }
     out
 }

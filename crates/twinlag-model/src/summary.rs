@@ -150,11 +150,11 @@ impl Left {
         levels: &ChannelNoise,
         policy: &Policy,
     ) -> Self {
-        let details = fitted.model.details(&fitted.theta, observations);
-        let pairs = Pairs::of(fitted, &details, observations, selection);
         // What is as long as the record goes as soon as it can.
-        let bands = Bands::of(&pairs.residual);
-        let trace = Trace::of(fitted, details, &bands, observations, selection, policy);
+        let mut details = fitted.model.details(&fitted.theta, observations);
+        let trace = Trace::of(fitted, &mut details, observations, selection, policy);
+        let pairs = Pairs::of(fitted, details, observations, selection);
+        let trace = trace.with_bands(&Bands::of(&pairs.residual), observations);
         let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
         let mut tests = residual_tests(&pairs.residual, fitted.model.free_count(), level_std);
         let count: usize = pairs.residual.iter().map(Vec::len).sum();

@@ -33,9 +33,9 @@ impl Line {
     /// with NaN then, but for the first.
     ///
     /// - `stretches`: their places among the values
-    fn thinned(time_s: &Instants, value: Vec<f64>, stretches: impl Iterator<Item = Range<usize>>) -> Self {
+    fn thinned(time_s: &Instants, value: &[f64], stretches: impl Iterator<Item = Range<usize>>) -> Self {
         if value.len() <= MAX_POINTS {
-            return Self { time_s: time_s.iter().collect(), value };
+            return Self { time_s: time_s.iter().collect(), value: value.to_vec() };
         }
         let together = value.len().div_ceil(MAX_POINTS / 2);
         let mut out = Self::default();
@@ -104,32 +104,36 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// - `details`: of the fitted model
-    /// - `bands`: of its residual
+    /// The trace without the bands.
+    ///
+    /// - `details`: of the fitted model, which keep no inferred inputs
     pub(crate) fn of(
         fitted: &Fitted,
-        mut details: Details,
-        bands: &Bands,
+        details: &mut Details,
         observations: &Observations,
         selection: &Selection,
         policy: &Policy,
     ) -> Self {
-        let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
         let is_judge = |s: usize| selection.holds(s) && blocks::is_judge(s, observations.samples(), policy);
-        let gas_c = crate::residual::estimated_gas(fitted, std::mem::take(&mut details.parts), observations);
-        let residual = std::mem::take(&mut details.residual);
-        let (time_s, n) = (&details.time_s, residual.len());
+        let gas_c = crate::residual::estimated_gas(fitted, &mut details.parts[..], observations);
+        let (time_s, residual, n) = (&details.time_s, &details.residual[..], details.residual.len());
         let size = n.div_ceil(SHOWN_PARTS).max(1);
-        let parts = (0..n).step_by(size).map(|from| ResidualPart::of(time_s, &residual, from..(from + size).min(n)));
+        let parts = (0..n).step_by(size).map(|from| ResidualPart::of(time_s, residual, from..(from + size).min(n)));
         Self {
             parts: parts.collect(),
-            worst: worst(time_s, &residual),
+            worst: worst(time_s, residual),
             residual: Line::thinned(time_s, residual, details.stretches()),
             judged: ranges(details.sample().filter(|s| is_judge(*s))),
             gas_change_k: gas_change_k(fitted, details.sample(), &gas_c, observations),
-            gas_c: Line::thinned(time_s, gas_c, details.stretches()),
-            bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(),
+            gas_c: Line::thinned(time_s, &gas_c, details.stretches()),
+            bands: Vec::new(),
         }
+    }
+
+    /// This trace with the bands of its residual.
+    pub(crate) fn with_bands(self, bands: &Bands, observations: &Observations) -> Self {
+        let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
+        Self { bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(), ..self }
     }
 }
 
@@ -186,7 +190,7 @@ mod tests {
         let n = 3 * MAX_POINTS + 17;
         let time_s: Vec<f64> = (0..n).map(|k| if k < 70_000 { k as f64 } else { k as f64 + 500.0 }).collect();
         let value: Vec<f64> = (0..n).map(|k| ((k * k * 7 + k) as f64 * 2.399).sin()).collect();
-        let line = Line::thinned(&time_s.clone().into(), value.clone(), [0..70_000, 70_000..n].into_iter());
+        let line = Line::thinned(&time_s.clone().into(), &value, [0..70_000, 70_000..n].into_iter());
         assert!(line.value.len() <= MAX_POINTS + 2, "{}", line.value.len());
         assert!(line.time_s.is_sorted());
         let points: Vec<(u64, u64)> =
@@ -199,7 +203,7 @@ mod tests {
         }
         let gaps: Vec<f64> = line.time_s.iter().zip(&line.value).filter(|(_, v)| v.is_nan()).map(|(t, _)| *t).collect();
         assert_eq!(gaps, [70_500.0]);
-        let short = Line::thinned(&time_s[..900].to_vec().into(), value[..900].to_vec(), std::iter::once(0..900));
+        let short = Line::thinned(&time_s[..900].to_vec().into(), &value[..900], std::iter::once(0..900));
         assert_eq!((&short.time_s[..], &short.value[..]), (&time_s[..900], &value[..900]));
     }
 }

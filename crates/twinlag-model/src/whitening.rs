@@ -85,13 +85,20 @@ fn plain_end<T: Real>(sources: &[Source<'_, T>], k: usize, band: usize) -> usize
     ends.fold(usize::MAX, usize::min).max(k + 1)
 }
 
+/// The row that is kept for row `k` of a factor: the last one stands for all after it.
+fn kept_for(kept: &[u32], k: usize) -> usize {
+    kept[k.min(kept.len() - 1)] as usize
+}
+
 /// The factor `L` of a covariance: lags `0..=band` of each row; rows that are the same are kept once.
 #[derive(Clone, Debug)]
 pub(crate) struct Factor {
     band: usize,
     rows: Vec<f64>,
-    /// Which of the rows that are kept stands for each row of `L`.
+    /// Which of the rows that are kept stands for each row of `L`, up to the last that is not the one before it.
     kept: Vec<u32>,
+    /// Rows of `L`.
+    len: usize,
     /// Entries of a row of the covariance without masked readings, where all are the same.
     same: Vec<f64>,
     /// Rows in a row that agreed at the end.
@@ -103,7 +110,15 @@ pub(crate) struct Factor {
 
 impl Factor {
     pub(crate) fn empty() -> Self {
-        Self { band: 0, rows: Vec::new(), kept: Vec::new(), same: Vec::new(), agreeing: 0, is_stationary: false }
+        Self {
+            band: 0,
+            rows: Vec::new(),
+            kept: Vec::new(),
+            len: 0,
+            same: Vec::new(),
+            agreeing: 0,
+            is_stationary: false,
+        }
     }
 
     /// Values before one that it is correlated with.
@@ -131,6 +146,7 @@ impl Factor {
         }
         self.rows.clear();
         self.kept.clear();
+        self.len = 0;
         self.is_stationary =
             before.is_none() && settles && !is_masked_around(sources, 0, band) && plain_end(sources, 0, band) >= count;
         let is_alike = |like: &&Self| like.is_stationary && like.len() >= count && like.same == self.same;
@@ -146,18 +162,17 @@ impl Factor {
             agreeing = before.agreeing;
             self.lead(before);
         }
-        while self.kept.len() < count {
-            let k = self.kept.len();
+        while self.len < count {
+            let k = self.len;
             let is_plain = settles && !is_masked_around(sources, k, band);
             if is_plain && agreeing >= SETTLED_ROWS {
-                let end = plain_end(sources, k, band).min(count);
-                self.kept.resize(end, self.kept[k - 1]);
+                self.len = plain_end(sources, k, band).min(count);
                 continue;
             }
             let from = self.rows.len();
             self.rows.resize(from + stride, 0.0);
             let (before, row) = self.rows.split_at_mut(from);
-            let older_row = |k: usize| &before[self.kept[k] as usize * stride..][..stride];
+            let older_row = |k: usize| &before[kept_for(&self.kept, k) * stride..][..stride];
             let reach = band.min(k);
             for lag in (0..=reach).rev() {
                 let mut entry = if is_plain { self.same[lag] } else { covariance(sources, k, lag) };
@@ -175,9 +190,18 @@ impl Factor {
             let agrees = |(a, b): (&f64, &f64)| (a - b).abs() <= ROUNDING * scale;
             let has_settled = is_plain && (k > band || has_lead) && row.iter().zip(older_row(k - 1)).all(agrees);
             agreeing = if has_settled { agreeing + 1 } else { 0 };
-            self.kept.push((from / stride) as u32);
+            self.push(from / stride);
         }
         self.agreeing = agreeing;
+    }
+
+    /// Adds a row, for which the kept one in this place stands: another than the one before it.
+    fn push(&mut self, kept: usize) {
+        if let Some(&last) = self.kept.last() {
+            self.kept.resize(self.len, last);
+        }
+        self.kept.push(kept as u32);
+        self.len += 1;
     }
 
     /// Whether all of its rows follow from one of the covariance.
@@ -187,8 +211,9 @@ impl Factor {
 
     /// Becomes the first `count` rows of another.
     fn begin_as(&mut self, like: &Self, count: usize) {
-        self.kept.extend_from_slice(&like.kept[..count]);
-        let rows = like.kept[count - 1] as usize + 1;
+        self.kept.extend_from_slice(&like.kept[..count.min(like.kept.len())]);
+        self.len = count;
+        let rows = kept_for(&like.kept, count - 1) + 1;
         self.rows.extend_from_slice(&like.rows[..rows * (self.band + 1)]);
         self.agreeing = if count == like.len() { like.agreeing } else { 0 };
     }
@@ -196,7 +221,7 @@ impl Factor {
     /// Keeps no more than the next window begins with, if the rows have not settled: there are as many of them as of values.
     pub(crate) fn shorten(&mut self) {
         // A window no longer than the band is its own end.
-        if self.kept.len() > self.band && 2 * self.rows.len() > self.kept.len() * (self.band + 1) {
+        if self.len > self.band && 2 * self.rows.len() > self.len * (self.band + 1) {
             let mut end = Self { band: self.band, agreeing: self.agreeing, ..Self::empty() };
             end.lead(self);
             *self = end;
@@ -205,30 +230,32 @@ impl Factor {
 
     /// Rows that there are, those of the lead as well.
     pub(crate) fn len(&self) -> usize {
-        self.kept.len()
+        self.len
     }
 
     /// Begins with the last rows of the window before, as many as the band.
     fn lead(&mut self, before: &Self) {
         debug_assert_eq!(before.band, self.band, "windows of one stretch");
-        let last = before.kept.len() - self.band..before.kept.len();
+        let last = before.len - self.band..before.len;
         for k in last.clone() {
             if k == last.start || !before.is_settled(k) {
+                self.push(self.rows.len() / (self.band + 1));
                 self.rows.extend_from_slice(before.row(k));
+            } else {
+                self.len += 1;
             }
-            self.kept.push((self.rows.len() / (self.band + 1) - 1) as u32);
         }
     }
 
     /// Row `k` of `L`: the standard deviation of value `k` given those before it, then the lags.
     pub(crate) fn row(&self, k: usize) -> &[f64] {
         let stride = self.band + 1;
-        &self.rows[self.kept[k] as usize * stride..][..stride]
+        &self.rows[kept_for(&self.kept, k) * stride..][..stride]
     }
 
     /// Whether row `k` is the one before it.
     fn is_settled(&self, k: usize) -> bool {
-        k > 0 && self.kept[k] == self.kept[k - 1]
+        k > 0 && kept_for(&self.kept, k) == kept_for(&self.kept, k - 1)
     }
 
     /// `L⁻¹ u` in place.

@@ -45,10 +45,10 @@ pub(crate) struct Banded {
     pub(crate) rig: Rig,
     pub(crate) prior: Prior,
     pub(crate) parts: GasParts,
+    /// The gas temperature; its standard deviation is that of the whole band.
     pub(crate) gas: Gas,
-    pub(crate) std_k: Vec<f64>,
-    /// The share of the model's parameters in it, K.
-    pub(crate) parameter_std_k: Vec<f64>,
+    /// The share of the model's parameters in it, K: the median.
+    pub(crate) parameter_std_k: f64,
     pub(crate) widened_by: f64,
     pub(crate) faults: Vec<GasFault>,
 }
@@ -131,15 +131,19 @@ impl<'a> Reconstruction<'a> {
         let gas = self.gas(theta, &motion, noise_factor)?;
         let widened_by = if is_excessive(&gas) { gas.innovation_energy.sqrt() } else { 1.0 };
         let run = |case: &Case| self.gas(&case.theta, &Motion { prior: &case.prior, ..motion }, noise_factor).ok();
-        let Moved { gas, of_model, of_prior } = chosen.moved(gas, intensity.is_some(), self.stop, run);
+        let Moved { mut gas, of_model, of_prior } = chosen.moved(gas, intensity.is_some(), self.stop, run);
         self.stop.check()?;
-        let shares = of_model.iter().zip(of_prior).map(|(model, prior)| model + prior);
-        let std_k: Vec<f64> = gas.std_k.iter().zip(shares).map(|(s, v)| widened_by * (s * s + v).sqrt()).collect();
-        let parameter_std_k = of_model.into_iter().map(|v| widened_by * v.sqrt()).collect();
+        let of_parameters = gas.std_k.iter().enumerate().map(|(k, std_k)| widened_by * of_model.at(k, *std_k).sqrt());
+        let parameter_std_k = median(of_parameters.collect());
+        for (k, std_k) in gas.std_k.iter_mut().enumerate() {
+            let share = of_model.at(k, *std_k) + of_prior.at(k, *std_k);
+            *std_k = widened_by * (*std_k * *std_k + share).sqrt();
+        }
+        drop((of_model, of_prior));
         let (_, rig) = self.rig(theta, noise_factor)?;
-        let faults = faults::of(readings, &rig, *scale, &gas.gas_c, &std_k, widened_by);
-        let time_s = readings.time_s().to_vec();
-        Ok(Banded { time_s, rig, prior, parts, gas, std_k, parameter_std_k, widened_by, faults })
+        let faults = faults::of(readings, &rig, *scale, &gas.gas_c, &gas.std_k, widened_by);
+        let time_s = self.nominal.readings.into_time_s();
+        Ok(Banded { time_s, rig, prior, parts, gas, parameter_std_k, widened_by, faults })
     }
 
     /// The prior, the noise, the intensity, and how the gas temperature is to be moved; of a long record, pieces show which of
@@ -267,6 +271,12 @@ impl<'a> Reconstruction<'a> {
         }
         Ok(best)
     }
+}
+
+/// The value in the middle, 0 of none.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    let middle = values.len() / 2;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// [`Nominal::scale`] with other parameters.

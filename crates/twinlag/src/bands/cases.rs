@@ -39,11 +39,40 @@ pub(super) struct Chosen {
     of_prior: f64,
 }
 
-/// The gas temperature, with what the model and the prior add to its variance at each sample, K².
+/// The gas temperature, with what the model and the prior add to its variance.
 pub(super) struct Moved {
     pub(super) gas: Gas,
-    pub(super) of_model: Vec<f64>,
-    pub(super) of_prior: Vec<f64>,
+    pub(super) of_model: Added,
+    pub(super) of_prior: Added,
+}
+
+/// What is added to the variance of a gas temperature.
+pub(super) struct Added {
+    /// The share of the variance that is added at each sample.
+    share: f64,
+    /// That with what cases add, at each sample, K²; empty where there is none.
+    sums: Vec<f64>,
+}
+
+impl Added {
+    fn of_share(share: f64) -> Self {
+        Self { share, sums: Vec::new() }
+    }
+
+    /// At sample `k`, K².
+    ///
+    /// - `std_k`: standard deviation of the gas temperature there, K
+    pub(super) fn at(&self, k: usize, std_k: f64) -> f64 {
+        self.sums.get(k).copied().unwrap_or(self.share * std_k * std_k)
+    }
+
+    /// At each sample of `gas`, K².
+    fn each(&mut self, gas: &Gas) -> &mut [f64] {
+        if self.sums.is_empty() {
+            self.sums.extend(gas.std_k.iter().map(|s| self.share * s * s));
+        }
+        &mut self.sums
+    }
 }
 
 /// What is done in the meantime.
@@ -96,8 +125,7 @@ impl Chosen {
         stop: &Stop<'_>,
         run: impl Fn(&Case) -> Option<Gas> + Sync,
     ) -> Moved {
-        let of_others = |share: f64| gas.std_k.iter().map(|s| share * s * s).collect::<Vec<f64>>();
-        let (mut of_model, mut of_prior) = (of_others(self.of_model), of_others(self.of_prior));
+        let (mut of_model, mut of_prior) = (Added::of_share(self.of_model), Added::of_share(self.of_prior));
         let mut others = Vec::new();
         // As many at once as there are processors, so that memory does not grow with the number of cases; sums in their order.
         let at_once = rayon::current_num_threads();
@@ -117,7 +145,7 @@ impl Chosen {
                         continue;
                     }
                 };
-                for ((sum, a), b) in sums.iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
+                for ((sum, a), b) in sums.each(&gas).iter_mut().zip(&other.gas_c).zip(&gas.gas_c) {
                     *sum += times * (a - b) * (a - b);
                 }
             }
@@ -125,8 +153,14 @@ impl Chosen {
         if has_intensity {
             judge(&gas, &mut others);
         }
-        let gas = if others.is_empty() { gas } else { averaged(&gas, &others) };
-        Moved { gas, of_model, of_prior }
+        if others.is_empty() {
+            return Moved { gas, of_model, of_prior };
+        }
+        // The shares are those of the likeliest model and prior.
+        [&mut of_model, &mut of_prior].into_iter().for_each(|added| {
+            added.each(&gas);
+        });
+        Moved { gas: averaged(&gas, &others), of_model, of_prior }
     }
 }
 

@@ -5,7 +5,7 @@ use twinlag_diagnose::{Grade, Judgement, Masked, ModelFit, Reason, Trace, Verdic
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
-use crate::bands::{Banded, GasFault, Reconstruction};
+use crate::bands::{Banded, GasFault, Reconstruction, median};
 use crate::error::Error;
 use crate::reference::Reference;
 use crate::rows::RowOfSample;
@@ -154,22 +154,17 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, best_effort: boo
     let reference = Reference::of(record, &row_of_sample);
     out.status = Status::Ok;
     out.gas = Some(Quality {
-        median_std_k: median(found.std_k.clone()),
-        parameter_std_k: median(found.parameter_std_k),
+        median_std_k: median(found.gas.std_k.clone()),
+        parameter_std_k: found.parameter_std_k,
         bandwidth_hz: bandwidth_hz(&found.rig, &found.prior, out.last.record.sample_period_s),
         innovation_energy: found.gas.innovation_energy,
         widened_by: found.widened_by,
         faults: found.faults,
-        reference: reference.and_then(|r| r.against(&found.gas.gas_c, &found.std_k, faster)),
+        reference: reference.and_then(|r| r.against(&found.gas.gas_c, &found.gas.std_k, faster)),
         prior: found.prior,
     });
     out.time_s = found.time_s;
-    (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.std_k, Some(found.rig));
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    (out.gas_c, out.gas_std_k, out.rig) = (found.gas.gas_c, found.gas.std_k, Some(found.rig));
 }
 
 /// A fit without what is for its picture.

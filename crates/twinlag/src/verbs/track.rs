@@ -125,11 +125,14 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let narrow = found.fit.time_constants;
     let judgements = circumstances.judge(&mut found.fit);
     let widened_by = widening(&narrow, &found.fit.time_constants);
-    let sensors = |widened_by: f64| {
-        let sensors = found.log_error.as_ref().map(|e| [0, 1].map(|i| along(&found.tau_s[i], &e[i], widened_by)));
-        sensors.filter(is_any)
-    };
-    let (is_determined, sensors) = (sensors(1.0).is_some(), sensors(widened_by));
+    let bands = found.log_error.take().map(|log_error| {
+        let [one, two] = std::mem::take(&mut found.tau_s);
+        let [of_one, of_two] = log_error;
+        [(one, of_one), (two, of_two)]
+    });
+    let is_determined = bands.as_ref().is_some_and(|bands| bands.iter().all(|(tau_s, e)| is_given_anywhere(tau_s, e)));
+    let sensors = bands.map(|bands| bands.map(|(tau_s, log_error)| along(tau_s, log_error, widened_by)));
+    let sensors = sensors.filter(is_any);
     let numbers = following_both(&record.channels, judgements.time_constants.each_ref());
     let mut judgement = Judgement::of(&circumstances.whole_basis().reasons).and_following(numbers);
     if !is_determined || (sensors.is_none() && judgement.grade != Grade::NoGo) {
@@ -211,15 +214,22 @@ fn widening(narrow: &[TimeConstant; 2], wide: &[TimeConstant; 2]) -> f64 {
     factors.filter(|factor| factor.is_finite()).fold(1.0, f64::max)
 }
 
+/// Whether a time constant is determined at any instant, its band not widened.
+fn is_given_anywhere(tau_s: &[f64], log_error: &[f64]) -> bool {
+    tau_s.iter().zip(log_error).any(|(tau_s, e)| *e <= MAX_LOG_STANDARD_ERROR && tau_s.is_finite())
+}
+
 /// A time constant with its band, whose logarithm is normal, widened by a factor; NaN where it is not determined.
-fn along(tau_s: &[f64], log_error: &[f64], widened_by: f64) -> Along {
-    let by = |sign: f64| {
-        let pairs = tau_s.iter().zip(log_error).map(|(tau, e)| (tau, widened_by * e));
-        pairs
-            .map(|(tau, e)| if e <= MAX_LOG_STANDARD_ERROR { tau * (sign * Z_975 * e).exp() } else { f64::NAN })
-            .collect()
-    };
-    Along { tau_s: by(0.0), low_s: by(-1.0), high_s: by(1.0) }
+fn along(mut tau_s: Vec<f64>, mut log_error: Vec<f64>, widened_by: f64) -> Along {
+    let mut low_s = Vec::with_capacity(tau_s.len());
+    // The upper end comes in the place of the error: all of them are as long as the record.
+    for (tau_s, error) in tau_s.iter_mut().zip(&mut log_error) {
+        let (at, e) = (*tau_s, widened_by * *error);
+        let by = |sign: f64| if e <= MAX_LOG_STANDARD_ERROR { at * (sign * Z_975 * e).exp() } else { f64::NAN };
+        low_s.push(by(-1.0));
+        (*tau_s, *error) = (by(0.0), by(1.0));
+    }
+    Along { tau_s, low_s, high_s: log_error }
 }
 
 /// Takes out what is longer than `most_s`, or grades it where it was asked for all the same, and says so.
