@@ -64,8 +64,9 @@ pub fn pieces_of_long(samples: usize) -> Option<Vec<Range<usize>>> {
 /// ```
 ///
 /// Looks at ever longer pieces are taken until all that would move a number is improbable enough, and at those effects alone of
-/// which a shorter one has left it open: whatever part of a record makes an effect improbable, it is. A record of more than
-/// 65 536 samples is judged by four pieces of it.
+/// which a shorter one has left it open: whatever part of a record makes an effect improbable, it is. The likeliest come first,
+/// and where these are improbable enough after all, the others are not looked at again. A record of more than 65 536 samples is
+/// judged by four pieces of it.
 ///
 /// - `tau_s`: where to begin the fit of the two lags, s
 /// - `beside`: effects that are in the model beside these, each with its channel
@@ -83,32 +84,23 @@ pub fn unseen(
 ) -> Result<[Vec<Identifier>; 3], ModelError> {
     let asked = Asked { settings, tau_s, beside, watch };
     let most = settings.policy.hidden_effect_probability;
-    let (mut hidden, mut open): (Vec<Hidden>, Option<Vec<Identifier>>) = (Vec::new(), None);
+    let above = |hidden: &[Hidden], share: f64| decisive(hidden, &half_s, share * most).concat();
+    let is_settled = |hidden: &[Hidden]| above(hidden, SETTLED_SHARE).is_empty();
+    let (mut hidden, mut stages) = (Vec::new(), vec![settings.effects.clone()]);
     for look in first_looks(observations) {
-        let is_open = |kind: Identifier| open.as_ref().is_none_or(|open| open.contains(&kind));
-        match asked.hidden(&look, is_open) {
-            Ok(found) => replace(&mut hidden, is_open, found),
+        match asked.look(&look, &stages, &mut hidden, is_settled) {
+            Ok(true) => return Ok([const { Vec::new() }; 3]),
+            Ok(false) => stages = vec![above(&hidden, SETTLED_SHARE), above(&hidden, CLOSED_SHARE)],
             Err(ModelError::Cancelled) => return Err(ModelError::Cancelled),
             // What pieces cannot show, all of the record may.
-            Err(_) => continue,
+            Err(_) => {}
         }
-        if decisive(&hidden, &half_s, SETTLED_SHARE * most).iter().all(Vec::is_empty) {
-            return Ok([const { Vec::new() }; 3]);
-        }
-        open = Some(decisive(&hidden, &half_s, CLOSED_SHARE * most).concat());
     }
-    let is_open = |kind: Identifier| open.as_ref().is_none_or(|open| open.contains(&kind));
     let excerpt = pieces_of_long(observations.samples())
         .map(|pieces| observations.excerpt(pieces.iter().map(|piece| piece.start), PIECE_SAMPLES));
-    replace(&mut hidden, is_open, asked.hidden(excerpt.as_ref().unwrap_or(observations), is_open)?);
+    asked.look(excerpt.as_ref().unwrap_or(observations), &stages, &mut hidden, is_settled)?;
     let mut lists = decisive(&hidden, &half_s, most);
     Ok([0, 1, 2].map(|i| std::mem::take(&mut lists[i])))
-}
-
-/// Puts what was `found` in the place of the effects of the kinds that were open.
-fn replace(hidden: &mut Vec<Hidden>, is_open: impl Fn(Identifier) -> bool, found: Vec<Hidden>) {
-    hidden.retain(|hidden| !is_open(hidden.effect));
-    hidden.extend(found);
 }
 
 /// Pieces of a record that is much longer, ever longer ones.
@@ -130,27 +122,50 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// The effects of those kinds that are `open`, as `observations` show them.
-    fn hidden(
+    /// Puts what `observations` show in the place of what is known of `hidden` effects, stage by stage, each of some kinds, until
+    /// it is settled; whether it is.
+    fn look(
         &self,
         observations: &Observations,
-        open: impl Fn(Identifier) -> bool,
-    ) -> Result<Vec<Hidden>, ModelError> {
-        let Self { settings, tau_s, beside, watch } = self;
+        stages: &[Vec<Identifier>],
+        hidden: &mut Vec<Hidden>,
+        is_settled: impl Fn(&[Hidden]) -> bool,
+    ) -> Result<bool, ModelError> {
+        let Self { settings, watch, .. } = self;
         let prepared = Prepared::new(observations, settings)?;
+        let fitted = self.fitted(&prepared);
+        let search = Search::of(&prepared, settings, *watch).beside(&fitted);
+        let mut done: Vec<Identifier> = Vec::new();
+        for kinds in stages {
+            let is_next = |kind: Identifier| kinds.contains(&kind) && !done.contains(&kind);
+            if !kinds.iter().any(|kind| is_next(*kind)) {
+                continue;
+            }
+            let around = search.quickly_around(&fitted, |effect| is_broad(effect) && is_next(effect.identifier()))?;
+            hidden.retain(|hidden| !is_next(hidden.effect));
+            hidden.extend(search.near(&around));
+            if is_settled(hidden) {
+                return Ok(true);
+            }
+            done.extend(kinds);
+        }
+        Ok(false)
+    }
+
+    /// Two lags with what is in the model beside them.
+    fn fitted(&self, prepared: &Prepared) -> Fitted {
+        let Self { settings, tau_s, beside, watch } = self;
         let fit =
             |model: &Model, theta: &[f64]| model.fit(theta, &prepared.observations, &prepared.searched, Effort::Finish);
         let mut fitted = fit(&Model::new(&settings.known, prepared.levels.std_k), tau_s);
         for (identifier, channel) in *beside {
-            let search = Search::of(&prepared, settings, *watch).beside(&fitted);
+            let search = Search::of(prepared, settings, *watch).beside(&fitted);
             let is_it = |effect: &Shared| effect.identifier() == *identifier && effect.channel() == Some(*channel);
             let Some(effect) = search.candidates(&fitted.model).into_iter().find(is_it) else { continue };
             let start = effect.starts().into_iter().next().unwrap_or_default();
             fitted = fit(&fitted.model.with(effect), &[&fitted.theta[..], &start].concat());
         }
-        let search = Search::of(&prepared, settings, *watch).beside(&fitted);
-        let around = search.quickly_around(&fitted, |effect| is_broad(effect) && open(effect.identifier()))?;
-        Ok(search.near(&around))
+        fitted
     }
 }
 

@@ -5,6 +5,7 @@
 //! held at each value of a grid, everything else is fitted again with the effects that were found, and the likelihood says which
 //! of the values the record excludes.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::CHI2_95;
 use twinlag_model::{
@@ -142,12 +143,13 @@ pub(crate) fn if_known(
     // From where the free fit is outwards, each from its neighbour.
     let middle = grid_s.partition_point(|tau_s| *tau_s < free.theta[0]);
     let (below, above) = grid_s.split_at(middle);
-    let mut fits = along(below.iter().rev(), free, state);
+    let (mut fits, fits_above) =
+        rayon::join(|| along(below.iter().rev(), free, state), || along(above.iter(), free, state));
     fits.reverse();
-    fits.extend(along(above.iter(), free, state));
+    fits.extend(fits_above);
     let best = fits.iter().fold(free.chi2, |best, f| best.min(f.chi2));
     let unit = free.mean_energy().max(1.0);
-    let values = grid_s.iter().zip(&fits).map(|(tau_s, fitted)| {
+    let values = grid_s.par_iter().zip(&fits).map(|(tau_s, fitted)| {
         let deviance = (fitted.chi2 - best) / unit;
         let is_excluded = is_whole.then_some(deviance > CHI2_95);
         let mut out = Held { deviance, is_excluded, ..held(*tau_s, fitted, state, policy) };

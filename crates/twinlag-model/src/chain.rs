@@ -94,6 +94,8 @@ struct Memory<T> {
     /// Values of `F` and of `G`, each with its slope.
     curves: [Vec<(T, T)>; 2],
     taps: Vec<T>,
+    /// The interval between samples in which each value lies, later by a delay.
+    intervals: Vec<usize>,
 }
 
 impl<T: Real> Chain<T> {
@@ -104,7 +106,7 @@ impl<T: Real> Chain<T> {
             value: Vec::new(),
             rows: Rows::identity(),
             period_s: None,
-            memory: Memory { curves: [Vec::new(), Vec::new()], taps: Vec::new() },
+            memory: Memory { curves: [Vec::new(), Vec::new()], taps: Vec::new(), intervals: Vec::new() },
         }
     }
 
@@ -118,7 +120,7 @@ impl<T: Real> Chain<T> {
     /// Begins again, with the readings of a channel as they are.
     pub(crate) fn begin(&mut self, cut: Cut<'_>, channel: usize, period_s: Option<f64>) {
         self.time_s.clear();
-        self.time_s.extend(cut.time_s.of(cut.first..cut.first + cut.reading_c[channel].len()));
+        cut.time_s.write(cut.first..cut.first + cut.reading_c[channel].len(), &mut self.time_s);
         self.skipped = 0;
         self.value.clear();
         self.value.extend(cut.reading_c[channel].iter().map(|y| T::from(*y)));
@@ -210,7 +212,7 @@ impl<T: Real> Chain<T> {
         tau_s: Along<'_, T>,
         curves: Curves<'_>,
     ) {
-        let Memory { curves: [of_f, of_g], taps } = &mut self.memory;
+        let Memory { curves: [of_f, of_g], taps, .. } = &mut self.memory;
         for (out, curve) in [(&mut *of_f, curves.value), (&mut *of_g, curves.slope)] {
             out.clear();
             if let Some(curve) = curve {
@@ -296,15 +298,16 @@ impl<T: Real> Chain<T> {
             let at_s = middle_s + delay_s(middle_s).value();
             times_s[k..k + span].partition_point(|t| *t <= at_s).clamp(2, span - 2) - 1
         };
-        let intervals = (0..count).map(|k| interval(&self.time_s, k));
-        let [low, high] = intervals.fold([span, 0], |[low, high], j| [low.min(j), high.max(j)]);
+        let Memory { taps, intervals, .. } = &mut self.memory;
+        intervals.clear();
+        intervals.extend((0..count).map(|k| interval(&self.time_s, k)));
+        let [low, high] = intervals.iter().fold([span, 0], |[low, high], j| [low.min(*j), high.max(*j)]);
         // Samples that any of them reaches: four, and as many more as the intervals differ.
         let (first, length) = (low - 1, high - low + DELAY_TAPS);
-        let taps = &mut self.memory.taps;
         taps.clear();
         taps.resize(count * length, T::from(0.0));
-        for (k, taps) in taps.chunks_exact_mut(length).enumerate() {
-            let j = interval(&self.time_s, k) - first;
+        for (k, (taps, interval)) in taps.chunks_exact_mut(length).zip(intervals).enumerate() {
+            let j = *interval - first;
             let window = &self.time_s[k + first..k + first + length];
             let middle_s = middle_s(&self.time_s, k);
             let at = delay_s(middle_s) + middle_s;

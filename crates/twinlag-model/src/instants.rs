@@ -79,6 +79,17 @@ impl Instants {
         samples.map(|k| self.at(k))
     }
 
+    /// Writes those of some samples behind what is in `out`, s.
+    pub(crate) fn write(&self, samples: Range<usize>, out: &mut Vec<f64>) {
+        match &self.0 {
+            Kind::Even { origin_s, step_s, places } => {
+                let places = places.start + samples.start..places.start + samples.end;
+                out.extend(places.map(|k| origin_s + k as f64 * step_s));
+            }
+            Kind::Stamped(time_s) => out.extend_from_slice(&time_s[samples]),
+        }
+    }
+
     /// The first sample at `time_s` or later; how many there are if none is.
     pub fn first_not_before(&self, time_s: f64) -> usize {
         let (mut from, mut to) = (0, self.len());

@@ -106,6 +106,45 @@ impl<T: Real> Rows<T> {
     }
 
     fn combine(&mut self, count: usize, length: usize, tap: impl Fn(usize, usize) -> T) {
+        // A factor has two taps on uneven samples and three on even ones.
+        match (self.width, length) {
+            (1, 2) => self.combine_known::<1, 2>(count, tap),
+            (2, 2) => self.combine_known::<2, 2>(count, tap),
+            (3, 2) => self.combine_known::<3, 2>(count, tap),
+            (4, 2) => self.combine_known::<4, 2>(count, tap),
+            (5, 2) => self.combine_known::<5, 2>(count, tap),
+            (6, 2) => self.combine_known::<6, 2>(count, tap),
+            (1, 3) => self.combine_known::<1, 3>(count, tap),
+            (3, 3) => self.combine_known::<3, 3>(count, tap),
+            (4, 3) => self.combine_known::<4, 3>(count, tap),
+            (5, 3) => self.combine_known::<5, 3>(count, tap),
+            (6, 3) => self.combine_known::<6, 3>(count, tap),
+            _ => self.combine_any(count, length, tap),
+        }
+    }
+
+    /// Of rows of `W` weights and `L` taps, at most as many together as are kept in registers.
+    fn combine_known<const W: usize, const L: usize>(&mut self, count: usize, tap: impl Fn(usize, usize) -> T) {
+        const MOST: usize = 8;
+        let step = if self.is_same { 0 } else { W };
+        self.spare.clear();
+        self.spare.reserve(count * (W + L - 1));
+        for k in 0..count {
+            let mut sums = [T::from(0.0); MOST];
+            for j in 0..L {
+                let tap = tap(k, j);
+                let old: &[T; W] = self.weights[(k + j) * step..].first_chunk().expect("a row for each tap");
+                for (new, old) in sums[j..].iter_mut().zip(old) {
+                    *new += tap * *old;
+                }
+            }
+            self.spare.extend_from_slice(&sums[..W + L - 1]);
+        }
+        std::mem::swap(&mut self.weights, &mut self.spare);
+        self.width = W + L - 1;
+    }
+
+    fn combine_any(&mut self, count: usize, length: usize, tap: impl Fn(usize, usize) -> T) {
         let width = self.width + length - 1;
         self.spare.clear();
         self.spare.resize(count * width, T::from(0.0));

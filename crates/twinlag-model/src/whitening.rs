@@ -174,8 +174,13 @@ impl Factor {
             let (before, row) = self.rows.split_at_mut(from);
             let older_row = |k: usize| &before[kept_for(&self.kept, k) * stride..][..stride];
             let reach = band.min(k);
+            if is_plain {
+                row[..=reach].copy_from_slice(&self.same[..=reach]);
+            } else {
+                covariances(sources, k, &mut row[..=reach]);
+            }
             for lag in (0..=reach).rev() {
-                let mut entry = if is_plain { self.same[lag] } else { covariance(sources, k, lag) };
+                let mut entry = row[lag];
                 if lag == 0 {
                     entry -= row[1..=reach].iter().map(|l| l * l).sum::<f64>();
                     row[0] = entry.max(f64::MIN_POSITIVE).sqrt();
@@ -364,9 +369,11 @@ impl Adjoint {
             rows.for_each(|(_, row)| sums.iter_mut().zip(row).for_each(|(sum, by)| *sum += by));
             return sums.iter().enumerate().map(|(lag, by)| by * derivative_of_same(sources, lag)).sum();
         }
+        let mut entries = vec![0.0; band + 1];
         let of_row = |(k, row): (usize, &[f64])| -> f64 {
-            let entries = row.iter().enumerate().take(k + 1);
-            entries.map(|(lag, by)| by * derivative_of_covariance(sources, k, lag)).sum()
+            let entries = &mut entries[..=band.min(k)];
+            derivatives_of_covariances(sources, k, entries);
+            row.iter().zip(entries).map(|(by, entry)| by * *entry).sum()
         };
         rows.map(of_row).sum()
     }
@@ -547,8 +554,13 @@ impl FactorDerivative {
         let reach = factor.band.min(k);
         let l = &factor.row(first_row + k)[..=reach];
         let Last { recent, at, row, .. } = &mut self.now;
+        if is_plain {
+            row[..=reach].copy_from_slice(&self.same[..=reach]);
+        } else {
+            derivatives_of_covariances(sources, k, &mut row[..=reach]);
+        }
         for lag in (1..=reach).rev() {
-            let mut entry = if is_plain { self.same[lag] } else { derivative_of_covariance(sources, k, lag) };
+            let mut entry = row[lag];
             let other = &factor.row(first_row + k - lag)[..=reach - lag];
             // The row before is in place `at`.
             let place = if *at + 1 >= lag { *at + 1 - lag } else { *at + 1 + stride - lag };
@@ -559,10 +571,8 @@ impl FactorDerivative {
             }
             row[lag] = (entry - l[lag] * d_other[0]) / other[0];
         }
-        let mut entry = if is_plain { self.same[0] } else { derivative_of_covariance(sources, k, 0) };
         let products = l[1..].iter().zip(&row[1..]).map(|(l, dl)| l * dl);
-        entry -= 2.0 * products.sum::<f64>();
-        row[0] = 0.5 * entry / l[0];
+        row[0] = 0.5 * (row[0] - 2.0 * products.sum::<f64>()) / l[0];
     }
 }
 
@@ -580,14 +590,14 @@ fn backwards(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().rev().zip(values).fold(0.0, |sum, (weight, value)| sum + weight * value)
 }
 
-/// Covariance of value `k` with value `k − lag`.
-fn covariance(sources: &[Source<'_, f64>], k: usize, lag: usize) -> f64 {
-    sum_over_readings(sources, k, lag, |a, b| a * b)
+/// Covariances of value `k` with itself and with those before it, one for each lag.
+fn covariances(sources: &[Source<'_, f64>], k: usize, of_lags: &mut [f64]) {
+    sum_over_readings(sources, k, of_lags, |a, b| a * b);
 }
 
-/// Derivative of the covariance of value `k` with value `k − lag`.
-fn derivative_of_covariance(sources: &[Source<'_, Number>], k: usize, lag: usize) -> f64 {
-    sum_over_readings(sources, k, lag, |a, b| a.eps * b.re + a.re * b.eps)
+/// Derivatives of the covariances of value `k` with itself and with those before it, one for each lag.
+fn derivatives_of_covariances(sources: &[Source<'_, Number>], k: usize, of_lags: &mut [f64]) {
+    sum_over_readings(sources, k, of_lags, |a, b| a.eps * b.re + a.re * b.eps);
 }
 
 /// Covariance with the value `lag` before, of rows that are all the same and no masked reading.
@@ -609,24 +619,22 @@ fn sum_over_same<T: Real>(sources: &[Source<'_, T>], lag: usize, product: impl F
     sources.iter().map(of_source).sum()
 }
 
-/// `Σ σ² product(weight in value k, weight in value k − lag)` over the readings that both have in common.
-fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, lag: usize, product: impl Fn(T, T) -> f64) -> f64 {
-    let mut sum = 0.0;
+/// `Σ σ² product(weight in value k, weight in value k − lag)` over the readings that both have in common, for each lag.
+fn sum_over_readings<T: Real>(sources: &[Source<'_, T>], k: usize, of_lags: &mut [f64], product: impl Fn(T, T) -> f64) {
+    of_lags.fill(0.0);
     for source in sources {
         let Source { rows, variance, .. } = source;
-        let (now, then) = (rows.at(k), rows.at(k - lag));
-        if lag >= now.len() {
-            continue;
+        let (now, first) = (rows.at(k), source.reading(k));
+        let has_masked = variance.has_masked_in(first..first + now.len());
+        for (lag, sum) in of_lags.iter_mut().enumerate().take(now.len()) {
+            let products = now.iter().zip(&rows.at(k - lag)[lag..]).map(|(a, b)| product(*a, *b));
+            *sum += if has_masked {
+                products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
+            } else {
+                variance.plain * products.sum::<f64>()
+            };
         }
-        let products = now.iter().zip(&then[lag..]).map(|(a, b)| product(*a, *b));
-        let first = source.reading(k);
-        sum += if !variance.masked.is_empty() && variance.has_masked_in(first..first + now.len()) {
-            products.enumerate().map(|(j, p)| p * variance.at(first + j)).sum()
-        } else {
-            variance.plain * products.sum::<f64>()
-        };
     }
-    sum
 }
 
 #[cfg(test)]
