@@ -64,11 +64,31 @@ impl PartScatter {
     /// assert!(along(&step).p_value < 1e-6);
     /// ```
     pub fn of<S: AsRef<[f64]>>(residual: &[S], influence: &[S], standard_error: f64) -> Option<Self> {
-        let runs = || residual.iter().map(AsRef::as_ref).zip(influence.iter().map(AsRef::as_ref));
-        let along = runs().flat_map(|(r, d): (&[f64], &[f64])| r.iter().zip(d).map(|(r, d)| term(*r, *d)));
+        Self::with_influence(residual, |run, k| influence[run].as_ref()[k], standard_error)
+    }
+
+    /// As [`Self::of`], with the influence of residual `k` of a run computed where it is needed, so that a long one is not in memory.
+    pub fn with_influence<S: AsRef<[f64]>>(
+        residual: &[S],
+        influence: impl Fn(usize, usize) -> f64,
+        standard_error: f64,
+    ) -> Option<Self> {
+        let influence = &influence;
+        let runs = || residual.iter().map(AsRef::as_ref).enumerate();
+        let along = runs()
+            .flat_map(|(run, r): (usize, &[f64])| r.iter().enumerate().map(move |(k, r)| term(*r, influence(run, k))));
         let along = between(along, standard_error)?;
-        let pieces: Vec<Vec<[f64; 2]>> =
-            runs().flat_map(|(r, d)| pieces(r).zip(pieces(d))).map(|(r, d)| spectrum(r, d)).collect();
+        let of_run = |(run, r): (usize, &[f64])| -> Vec<Vec<[f64; 2]>> {
+            let mut end = 0;
+            let of_piece = |piece: &[f64]| {
+                let places = end..end + piece.len();
+                end = places.end;
+                let d: Vec<f64> = places.map(|k| influence(run, k)).collect();
+                spectrum(piece, &d)
+            };
+            pieces(r).map(of_piece).collect()
+        };
+        let pieces: Vec<Vec<[f64; 2]>> = runs().flat_map(of_run).collect();
         Some(Self { along, by_frequency: between(ByFrequency::of(&pieces), standard_error)? })
     }
 

@@ -159,6 +159,8 @@ impl Model {
             pairs.map(|(i, j)| [at(i), at(j)].into_iter().chain(rest.iter().copied()).collect()).collect();
         let cost = ResidualCost::new(self, &points[0], observations, selection);
         let mut starts: Vec<(f64, Vec<f64>)> = points.into_iter().map(|p| (cost.energy(&p), p)).collect();
+        // Its memory is as long as the record, and each fit has its own.
+        drop(cost);
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Of either order the best.
         let is_first_faster = |theta: &[f64]| theta[0] < theta[1];

@@ -39,12 +39,20 @@ impl<'a> Influence<'a> {
             sum.iter().map(|(i, s)| sum.iter().map(|(j, t)| s * t * self.covariance[*i][*j]).sum::<f64>()).sum();
         let weights: Vec<f64> = self.inverse.iter().map(|row| sum.iter().map(|(j, t)| row[*j] * t).sum()).collect();
         let Linearised { columns, residual, samples, .. } = &self.linearised;
-        let n = samples.len();
-        let mut influence = vec![0.0; n];
-        for (column, weight) in columns.iter().zip(&weights).filter(|(_, weight)| **weight != 0.0) {
-            influence.iter_mut().zip(column).for_each(|(d, x)| *d += weight * x);
-        }
-        PartScatter::of(&runs(residual, samples), &runs(&influence, samples), variance.max(0.0).sqrt())
+        let weighted: Vec<(&[f64], f64)> =
+            columns.iter().map(Vec::as_slice).zip(weights).filter(|(_, weight)| *weight != 0.0).collect();
+        let starts: Vec<usize> = samples
+            .runs()
+            .iter()
+            .scan(0, |end, run| {
+                *end += run.len();
+                Some(*end - run.len())
+            })
+            .collect();
+        let influence = |run: usize, k: usize| {
+            weighted.iter().fold(0.0, |sum, (column, weight)| sum + weight * column[starts[run] + k])
+        };
+        PartScatter::with_influence(&runs(residual, samples), influence, variance.max(0.0).sqrt())
     }
 }
 

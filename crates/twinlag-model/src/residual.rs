@@ -149,20 +149,24 @@ pub(crate) fn estimated_gas(fitted: &Fitted, mut parts: impl AsMut<[Part]>, obse
 ///
 /// - `pairs`: of the fitted model
 /// - `is_coarse`: whether a converter is, whose rounding has no tails
-pub(crate) fn tests(fitted: &Fitted, pairs: &Pairs, observations: &Observations, is_coarse: bool) -> Vec<ResidualTest> {
+pub(crate) fn tests(fitted: &Fitted, pairs: Pairs, observations: &Observations, is_coarse: bool) -> Vec<ResidualTest> {
     let r = joined(&pairs.residual);
     if r.len() < 100 {
         return Vec::new();
     }
     let mut out = Vec::new();
-    out.extend(coherence(pairs));
-    out.extend(level(pairs, &r));
-    out.push(rate(pairs, &r));
+    out.extend(coherence(&pairs));
+    out.extend(level(&pairs, &r));
+    out.push(rate(&pairs, &r));
     out.push(time(&r));
     if !is_coarse {
         out.push(tails(&r));
     }
-    out.extend(lines(pairs));
+    drop(r);
+    let Pairs { residual, input, .. } = pairs;
+    // The transform of the residual takes several times its memory.
+    drop(input);
+    out.extend(lines(&residual));
     out.extend(repeated_values(observations, fitted.model.noise_std_k()));
     out
 }
@@ -279,9 +283,9 @@ fn time(r: &[f64]) -> ResidualTest {
 
 /// Largest power of a single frequency over the mean of its neighbours', in the longest run: among `m` neighbours of the same
 /// expectation it exceeds `x` times their mean with probability `(1 + x/m)^−m`.
-fn lines(pairs: &Pairs) -> Option<ResidualTest> {
+fn lines(residual: &[Vec<f64>]) -> Option<ResidualTest> {
     const NEIGHBOURS: usize = 30;
-    let run = pairs.residual.iter().max_by_key(|r| r.len())?;
+    let run = residual.iter().max_by_key(|r| r.len())?;
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }

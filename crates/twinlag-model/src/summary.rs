@@ -161,7 +161,7 @@ impl Left {
         let dof = count.saturating_sub(fitted.model.free_count()).max(1);
         let chi2_per_dof = pairs.residual.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
         let is_coarse = levels.coarse_step_k().iter().any(Option::is_some);
-        tests.extend(crate::residual::tests(fitted, &pairs, observations, is_coarse));
+        tests.extend(crate::residual::tests(fitted, pairs, observations, is_coarse));
         Self { tests, chi2_per_dof, trace }
     }
 }

@@ -14,6 +14,9 @@ use crate::selection::Samples;
 /// A pivot that is less than this share of what it was is rounding.
 const PIVOT_SHARE: f64 = 1e-12;
 
+/// Energies from which on those are left out that turned out to be too far from the least, again where there are twice as many. Chosen.
+const SIFTED_ENERGIES: usize = 4096;
+
 /// The least energy of a step at each sample.
 pub(super) struct Scan {
     /// A sample from which on the time constants are others, and the least energy with it: those within a limit of the least.
@@ -39,11 +42,18 @@ impl Scan {
         // What is known beforehand comes after the samples.
         (before.samples.len()..before.residual.len()).for_each(|i| add(&mut sums, &row_before(i), 1.0));
         let mut energies: Vec<(usize, f64)> = Vec::new();
+        let mut most_energies = SIFTED_ENERGIES;
         let mut best: Option<(usize, f64, Vec<Vec<f64>>)> = None;
         for (sample, i, j) in common() {
             if within.contains(&sample) {
                 let energy = least_energy(&sums);
                 if best.as_ref().is_none_or(|(_, least, _)| energy - least < limit) {
+                    if energies.len() >= most_energies
+                        && let Some((_, least, _)) = &best
+                    {
+                        energies.retain(|(_, of_sample)| of_sample - least < limit);
+                        most_energies = most_energies.max(2 * energies.len());
+                    }
                     energies.push((sample, energy));
                 }
                 if best.as_ref().is_none_or(|(_, least, _)| energy < *least) {

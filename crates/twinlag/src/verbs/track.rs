@@ -107,6 +107,8 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     let effects = options.model.as_ref().map(Model::known_effects).unwrap_or_default();
     let Rows { observations, .. } = Rows::of(record)?;
     let settings = settings_of(&options.characterise);
+    // Before there is anything as long as the record.
+    let is_single_tone = is_single_tone(&observations, &settings.policy);
     let mut found = follow(&observations, &settings, &effects, watch)?;
     let is_left = found.fit.is_contradicted();
     let stays = found.ratio.p_value >= RATIO_CHANGES;
@@ -117,7 +119,6 @@ fn whole(record: &Record, options: &TrackOptions, watch: Watch<'_>) -> Result<Tr
     if found.log_error.is_some() && !stays {
         basis.reasons.insert(0, Reason::RatioChanges { p_value: found.ratio.p_value });
     }
-    let is_single_tone = is_single_tone(&observations, policy);
     if is_single_tone {
         basis.reasons.push(Reason::SingleTone);
     }
