@@ -19,7 +19,7 @@ use twinlag_transform::sine_transform;
 
 use crate::bands::points_of_long;
 use crate::inverse::row;
-use crate::parameters::{Pair, parts};
+use crate::parameters::{CostValue, Pair, parts};
 use crate::sandwich::{inverse, sandwich};
 use crate::transform::Plan;
 use crate::whitened::{MAX_KEPT_BINS, Whitened};
@@ -41,7 +41,12 @@ impl Whitened<'_> {
     /// the Gauss-Newton matrix it does not count noise as signal. Not positive definite where
     /// `theta` is no minimum.
     pub fn observed_information<const P: usize>(&self, theta: &[f64; P]) -> [[f64; P]; P] {
-        let normal = self.evaluate(theta).hessian;
+        self.observed_information_at(theta, &self.evaluate(theta))
+    }
+
+    /// - `here`: the cost at `theta`
+    fn observed_information_at<const P: usize>(&self, theta: &[f64; P], here: &CostValue<P>) -> [[f64; P]; P] {
+        let normal = &here.hessian;
         let mut half = [[0.0; P]; P];
         for i in 0..P {
             // Gain and offset are linear; a time constant must stay positive, and a second lag that
@@ -138,8 +143,9 @@ impl Whitened<'_> {
     /// # Source
     /// Rao 1948, with the noise-noise term of this module.
     pub fn score_test<const P: usize>(&self, theta: &[f64; P], fitted: &[usize], tested: &[usize]) -> Option<f64> {
-        let (a, e) = (self.observed_information(theta), self.noise_noise(theta));
-        let gradient = self.evaluate(theta).gradient;
+        let here = self.evaluate(theta);
+        let (a, e) = (self.observed_information_at(theta, &here), self.noise_noise(theta));
+        let gradient = here.gradient;
         let order: Vec<usize> = fitted.iter().chain(tested).copied().collect();
         let scale: Vec<f64> = order.iter().map(|&i| (a[i][i] + e[i][i]).sqrt()).collect();
         let block = |m: &dyn Fn(usize, usize) -> f64| {

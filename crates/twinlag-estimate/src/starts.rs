@@ -34,9 +34,10 @@ pub(crate) fn starts<const P: usize>(
     let (shortest, longest) = (GRID_MIN_PERIODS * step_s, GRID_MAX_SPANS * readings.span_s());
     let axis: Vec<f64> =
         (0..GRID_POINTS).map(|i| shortest * (longest / shortest).powf((i as f64 + 0.5) / GRID_POINTS as f64)).collect();
+    let offset_k = if P > 2 { mean_difference(readings) } else { 0.0 };
     let mut grid: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut add = |tau1: f64, tau2: f64| {
-        let mut x: Vec<f64> = [tau1, tau2, 1.0, mean_difference(readings), 0.0, 0.0][..P].to_vec();
+        let mut x: Vec<f64> = [tau1, tau2, 1.0, offset_k, 0.0, 0.0][..P].to_vec();
         hold_known(&mut x, variables);
         settle_calibration(objective, &mut x, variables);
         let value = objective.at(&x).value;
