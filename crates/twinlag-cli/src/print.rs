@@ -413,8 +413,10 @@ fn before_and_after(answer: &Diagnosis) -> Vec<String> {
     let k = |x: f64| format!("{} K", digits(x, 3));
     let inputs = e.held_out_input_difference_k;
     row("rms input difference, held out", &k(inputs.before), &k(inputs.after));
-    if let Some(rms) = answer.on_blocks_left_out().filter(|rms| rms.after != rms.before) {
-        row("rms residual, blocks left out", &number(rms.before), &number(rms.after));
+    // What was found as noise is no part of these models.
+    let on_blocks = answer.on_blocks_left_out().map(|rms| [number(rms.before), number(rms.after)]);
+    if let Some([before, after]) = on_blocks.filter(|[before, after]| before != after) {
+        row("rms residual, blocks left out", &before, &after);
     }
     if let Some(r) = answer.error.reference_rmse_k {
         row("rms gas error against reference", &k(r.before), &k(r.after));
