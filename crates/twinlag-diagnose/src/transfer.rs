@@ -4,7 +4,7 @@
 //! nothing is fitted but what belongs to a record. An effect that does not lower the error there stands in for something else,
 //! however well it fits. What was found as noise is no part of the model here: it lowers no error, it is taken for granted.
 //!
-//! Of a single record errors are those of its blocks, and tell how far the model carries within it. Nothing is taken out for them: a
+//! Of a single record errors are those of its blocks, and show how far the model carries within it. Nothing is taken out for them: a
 //! block may be hotter than all others, and what goes with temperature is then not tried on it but extrapolated to it.
 
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
