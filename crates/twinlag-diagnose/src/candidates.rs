@@ -28,6 +28,7 @@ const GRID_TO_SHARE: f64 = 0.03;
 const MOST_GRID_PARAMETERS: usize = 3;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
+
 /// A candidate with its fit.
 #[derive(Clone)]
 pub(crate) struct Candidate {

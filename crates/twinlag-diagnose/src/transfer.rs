@@ -19,7 +19,7 @@ use crate::rapid::without_noise;
 /// An effect with its channel, 0 or 1; `None` where it is of both, or relative.
 pub type EffectInChannel = (Identifier, Option<usize>);
 
-/// Errors of a record that had no part in finding the model and its effects.
+/// Errors of a record that had no part in finding the model and its effects, or of a block of one that had none in fitting it.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct LeftOut {
@@ -46,45 +46,53 @@ pub struct Transfer {
 /// What each record is when it is left out, with the model of the others.
 pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>) -> Result<Transfer, ModelError> {
     let records = state.prepared.each_record();
-    let mut sums = [Squares::default(); 2];
-    let mut left_out = Vec::new();
+    let mut out = Errors::default();
     for (done, record) in records.iter().enumerate() {
         report(watch, "records left out", done, records.len())?;
         let others = state.prepared.raw.0.without_member(record.number);
         let (of_others, _) = searched(&others, settings, watch)?;
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
-        let squares = [of(&of_others.base)?, of(&of_others.current)?];
-        for (sum, squares) in sums.iter_mut().zip(squares) {
-            *sum = sum.and(squares);
-        }
-        let [normalised_rms, input_difference_k] = before_and_after(squares);
-        let effects = of_others.current.model.effects.iter().filter(|effect| !effect.is_noise());
-        let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
-        left_out.push(LeftOut { normalised_rms, input_difference_k, found });
+        out.add([of(&of_others.base)?, of(&of_others.current)?], &of_others.current.model);
     }
-    let [normalised_rms, input_difference_k] = before_and_after(sums);
-    Ok(Transfer { normalised_rms, input_difference_k, records: left_out })
+    Ok(out.transfer())
 }
 
 /// Errors of one record on each of its blocks in turn, with a model of the effects that all of it shows, fitted to the other blocks.
 pub(crate) fn over_blocks(state: &State<'_>, watch: Watch<'_>) -> Result<Transfer, ModelError> {
     let current = without_noise(&state.current, &state.prepared);
-    let found: Vec<EffectInChannel> = current.model.effects.iter().map(|e| (e.identifier(), e.channel())).collect();
     let blocks = state.prepared.each_block();
-    let mut sums = [Squares::default(); 2];
-    let mut left_out = Vec::new();
+    let mut out = Errors::default();
     for (done, block) in blocks.iter().enumerate() {
         report(watch, "blocks left out", done, blocks.len())?;
         let of = |fitted: &Fitted| on(block, &of_the_others(block, &fitted.model, &fitted.theta));
-        let squares = [of(&state.base)?, of(&current)?];
-        for (sum, squares) in sums.iter_mut().zip(squares) {
+        out.add([of(&state.base)?, of(&current)?], &current.model);
+    }
+    Ok(out.transfer())
+}
+
+/// Errors before and after, of what was left out, and of all of it together.
+#[derive(Default)]
+struct Errors {
+    sums: [Squares; 2],
+    each: Vec<LeftOut>,
+}
+
+impl Errors {
+    /// - `model`: that of the others
+    fn add(&mut self, squares: [Squares; 2], model: &Model) {
+        for (sum, squares) in self.sums.iter_mut().zip(squares) {
             *sum = sum.and(squares);
         }
         let [normalised_rms, input_difference_k] = before_and_after(squares);
-        left_out.push(LeftOut { normalised_rms, input_difference_k, found: found.clone() });
+        let effects = model.effects.iter().filter(|effect| !effect.is_noise());
+        let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
+        self.each.push(LeftOut { normalised_rms, input_difference_k, found });
     }
-    let [normalised_rms, input_difference_k] = before_and_after(sums);
-    Ok(Transfer { normalised_rms, input_difference_k, records: left_out })
+
+    fn transfer(self) -> Transfer {
+        let [normalised_rms, input_difference_k] = before_and_after(self.sums);
+        Transfer { normalised_rms, input_difference_k, records: self.each }
+    }
 }
 
 /// A model fitted to all records or blocks but one.

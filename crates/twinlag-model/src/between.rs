@@ -7,7 +7,7 @@
 //! error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a number has a large standard
 //! error, and so little weight.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use crate::dense;
 use crate::fit::Fitted;
@@ -20,9 +20,6 @@ use crate::summary::covariance;
 const HALVINGS: usize = 60;
 /// Fewest records of which one can be said to contradict the others.
 const FEWEST_TO_CONTRADICT: usize = 3;
-
-/// Probability of as large a scatter by chance above which records agree. Chosen.
-const MIN_AGREEING_P: f64 = 0.05;
 
 /// An estimate from one record alone, beside what all share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,8 +63,7 @@ pub struct Contradicted {
     pub others: f64,
     /// The standard error of that, with what they differ from each other.
     pub others_error: f64,
-    /// Probability of at least as large a difference by chance, if records differ as the others do: by their standard errors where
-    /// these agree.
+    /// Probability of at least as large a difference by chance, if records differ as the others do.
     pub p_value: f64,
 }
 
@@ -138,13 +134,8 @@ impl BetweenRecords {
             let others = Self::of(&others)?;
             let spread = others.standard_error.hypot(others.standard_deviation);
             let deviations = (own.value - others.mean).abs() / own.standard_error.hypot(spread);
-            // Where the others agree, their errors are what the model says, and else what the others tell of them.
-            let p_value = 2.0
-                * if others.p_value > MIN_AGREEING_P {
-                    Normal::standard().sf(deviations)
-                } else {
-                    StudentsT::new(0.0, 1.0, (records - 2) as f64).ok()?.sf(deviations)
-                };
+            let student = StudentsT::new(0.0, 1.0, (records - 2) as f64).ok()?;
+            let p_value = 2.0 * student.sf(deviations);
             let is_far = p_value * (records as f64) < probability;
             is_far.then_some(Contradicted { own, others: others.mean, others_error: others.standard_error, p_value })
         };

@@ -68,7 +68,7 @@ impl Known {
         let mut model = Model::new(&settings.known, prepared.levels.std_k);
         model.is_frozen = true;
         if effects.iter().any(|known| known.effect.about().follows_gas) {
-            // Those that follow it are then in the gas of a model that has them.
+            // A first estimate; with the effects in the model it is made again.
             let two_lags = model.fit_over_grid(&[], GRID_STARTS, &prepared.observations, &prepared.everything);
             prepared.context.gas = two_lags.estimated_gas(&prepared.observations);
         }

@@ -161,11 +161,12 @@ impl Prepared {
         let of = |(member, context): (Member, Context)| {
             let mut others = self.everything.clone();
             others.counts.drain(member.samples.clone());
+            let everything = self.everything.of_samples(member.samples);
             OneRecord {
                 number: member.number,
                 observations: self.observations.of_member(member.number),
-                tried: self.everything.of_samples(member.samples.clone()),
-                everything: self.everything.of_samples(member.samples.clone()),
+                tried: everything.clone(),
+                everything,
                 others: (self.observations.without_member(member.number), others),
                 context,
             }
@@ -276,7 +277,7 @@ mod tests {
     /// alone. Failed: it kept its part of the levels of both, and its residuals were weighted twice.
     #[test]
     fn a_record_that_is_left_of_two_has_no_levels_beside_its_own() {
-        // Alternating signs under a golden-ratio spread: third differences of it are those of noise, and the waves are slow beside them.
+        // The golden ratio spreads it evenly and without order, and the waves are slow beside it.
         let noisy = |noise_k: f64| {
             let time_s: Vec<f64> = (0..400).map(f64::from).collect();
             let noise = |k: usize, salt: f64| noise_k * (((k * k) as f64 * 0.618_034 + salt * k as f64).fract() - 0.5);

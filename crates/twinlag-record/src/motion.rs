@@ -103,8 +103,8 @@ mod tests {
         }
     }
 
-    /// A glider turns at the bottom: far from the turn the speed is exact, in the row of it there is none, and there is half of it
-    /// nowhere but in the rows whose neighbours lie on both sides.
+    /// A glider turns at the bottom: the speed is exact in every row whose two neighbours on either side lie on one side of the turn, and
+    /// nothing in the row of the turn.
     #[test]
     fn a_turn_is_as_short_as_the_neighbours_are_few() {
         let time_s: Vec<f64> = (0..200).map(f64::from).collect();
