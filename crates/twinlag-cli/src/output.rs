@@ -196,6 +196,23 @@ fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
 mod tests {
     use super::*;
 
+    /// A run that is broken off while it writes leaves what was there, and nothing beside it.
+    #[test]
+    fn a_file_that_is_not_finished_leaves_the_old_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("out.csv");
+        write(&path, "old").expect("can be written");
+        let broken = whole(&path, |file| {
+            file.write_all(b"half of").expect("can be written");
+            Err(Failure::Other("broken off".into()))
+        });
+        assert!(broken.is_err());
+        assert_eq!(std::fs::read(&path).expect("is there"), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).expect("is there").count(), 1);
+        write(&path, "new").expect("can be written");
+        assert_eq!(std::fs::read(&path).expect("is there"), b"new");
+    }
+
     /// Text may come in pieces that end anywhere.
     #[test]
     fn each_row_gets_its_cell() {

@@ -311,6 +311,26 @@ fn an_output_that_exists_is_overwritten_by_force() {
     assert_eq!(text(&model, "schema"), "twinlag.model/1");
 }
 
+/// A record that is there twice is not left out when one of the two is.
+#[test]
+fn a_copy_of_a_record_is_refused() {
+    let bench = offset("diagnose-copy");
+    bench.write("copy.csv", with_offset(Trace::GOOD));
+    bench.refuses(2, &["diagnose", "run.csv", "copy.csv"], &["copy.csv has the readings of run.csv"]);
+}
+
+/// Of several records the one that cannot be used is named.
+#[test]
+fn the_record_that_is_too_short_is_named() {
+    let bench = offset("diagnose-short");
+    bench.write("short.csv", csv(&Trace::GOOD.rows()[..30]));
+    bench.refuses(
+        3,
+        &["diagnose", "run.csv", "short.csv"],
+        &["short.csv: a model of the rig needs at least 60 samples"],
+    );
+}
+
 #[test]
 fn a_model_that_cannot_be_written_is_said() {
     let answer = offset("no_place").run(&["diagnose", "run.csv", "--save", "nowhere/model.json"]);

@@ -46,10 +46,7 @@ pub fn diagnose_records_watched(
         let (expected, found) = (first.unwrap_or_default(), other.channels.clone());
         return Err(Error::OtherChannels { file: other.source.clone(), expected, found });
     }
-    let rows_of = |record: &Record| {
-        Rows::of(record).map_err(|error| Error::InRecord { file: record.source.clone(), error: Box::new(error) })
-    };
-    let rows: Vec<Rows> = records.iter().map(rows_of).collect::<Result<_, _>>()?;
+    let rows: Vec<Rows> = records.iter().map(rows).collect::<Result<_, _>>()?;
     let observations: Vec<Observations> = rows.iter().map(|rows| rows.observations.clone()).collect();
     let joint = close_the_loop(&observations, &settings(options), watch)?;
     let joined = in_a_row(records, &observations)?;
@@ -71,6 +68,11 @@ pub fn diagnose_records_watched(
     Ok(out)
 }
 
+/// Rows of one of several records.
+fn rows(record: &Record) -> Result<Rows, Error> {
+    Rows::of(record).map_err(|error| Error::InRecord { file: record.source.clone(), error: Box::new(error) })
+}
+
 /// The rows of several records, one record after the other as the model of [`diagnose_records`] has them: what pictures of its
 /// answer are drawn with.
 ///
@@ -78,7 +80,7 @@ pub fn diagnose_records_watched(
 /// As [`diagnose_records`].
 pub fn joined(records: &[Record]) -> Result<Record, Error> {
     let observations =
-        records.iter().map(|record| Ok(Rows::of(record)?.observations)).collect::<Result<Vec<_>, Error>>()?;
+        records.iter().map(|record| Ok(rows(record)?.observations)).collect::<Result<Vec<_>, Error>>()?;
     in_a_row(records, &observations)
 }
 
