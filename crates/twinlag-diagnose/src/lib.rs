@@ -58,6 +58,7 @@ mod remark;
 mod size;
 mod transfer;
 
+pub use candidates::accepts;
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;
