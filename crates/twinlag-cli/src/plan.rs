@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::json;
+use twinlag::diagnosis::Identifier;
 use twinlag::signal::Rig;
 use twinlag::{Diagnosis, Model};
 use twinlag_pages::parameter_in_words;
@@ -31,7 +32,9 @@ pub(crate) fn run(command: &Command, console: Console) -> Result<u8, Failure> {
         Err(error @ PlanError::NoTimeConstant { .. }) => {
             if console.json {
                 let because = error.to_string();
-                print::json(&json!({"schema": Plan::SCHEMA, "status": PlanStatus::NotIdentifiable, "because": because}))?;
+                print::json(
+                    &json!({"schema": Plan::SCHEMA, "status": PlanStatus::NotIdentifiable, "because": because}),
+                )?;
             }
             return Err(Failure::Undetermined(format!("{}: {error}", command.file.display())));
         }
@@ -75,7 +78,9 @@ impl Subject {
         let model = match schema.as_str() {
             Model::SCHEMA => serde_json::from_str(&text).map_err(not_json)?,
             Diagnosis::SCHEMA => serde_json::from_str::<Diagnosis>(&text).map_err(not_json)?.model(),
-            other => return Err(wrong(format!("expected schema {} or {}, got {other}", Model::SCHEMA, Diagnosis::SCHEMA))),
+            other => {
+                return Err(wrong(format!("expected schema {} or {}, got {other}", Model::SCHEMA, Diagnosis::SCHEMA)));
+            }
         };
         Ok(Self::Model(Box::new(model)))
     }
@@ -106,20 +111,25 @@ fn text(plan: &Plan, file: &Path) -> String {
         let cells = record.numbers.iter().map(over_now);
         std::iter::once(record.description.clone()).chain(cells).collect::<Vec<_>>()
     };
-    lines.extend(table(std::iter::once(header.collect()).chain(plan.changed.iter().map(row)).collect()));
-    if !now.rivals.is_empty() {
+    lines.extend(table(&std::iter::once(header.collect()).chain(plan.changed.iter().map(row)).collect::<Vec<_>>()));
+    let mut first = 0;
+    for rivals in now.rivals.chunk_by(|a, b| (&a.effect, &a.channel) == (&b.effect, &b.channel)) {
+        let places = first..first + rivals.len();
+        first = places.end;
         lines.push(String::new());
         lines.push(format!(
-            "expected deviance between effects that look alike (above {} one is named, two standard deviations above it is clear):",
+            "expected deviance between {} and what looks like it (deciding: {}; clear: two standard deviations more):",
+            named(&rivals[0].effect, rivals[0].channel.as_deref()),
             digits(plan.deciding_deviance, 2)
         ));
-        let header = std::iter::once("record".to_owned()).chain(now.rivals.iter().map(pair));
+        let rival = |rival: &PlannedRival| named(&rival.rival, rival.rival_channel.as_deref());
+        let header = std::iter::once("record".to_owned()).chain(rivals.iter().map(rival));
         let row = |record: &PlannedRecord| {
-            let cells = record.rivals.iter().map(deviance);
+            let cells = record.rivals.get(places.clone()).unwrap_or_default().iter().map(deviance);
             std::iter::once(record.description.clone()).chain(cells).collect::<Vec<_>>()
         };
         let all = std::iter::once(now).chain(&plan.changed);
-        lines.extend(table(std::iter::once(header.collect()).chain(all.map(row)).collect()));
+        lines.extend(table(&std::iter::once(header.collect()).chain(all.map(row)).collect::<Vec<_>>()));
     }
     lines.push(String::new());
     lines.push("advice:".to_owned());
@@ -158,12 +168,8 @@ fn over_now(number: &PlannedNumber) -> String {
     }
 }
 
-fn pair(rival: &PlannedRival) -> String {
-    let named = |effect: &dyn std::fmt::Display, channel: &Option<String>| match channel {
-        Some(channel) => format!("{effect} of {channel}"),
-        None => effect.to_string(),
-    };
-    format!("{}, not {}", named(&rival.effect, &rival.channel), named(&rival.rival, &rival.rival_channel))
+fn named(effect: &Identifier, channel: Option<&str>) -> String {
+    channel.map_or_else(|| effect.to_string(), |channel| format!("{effect} of {channel}"))
 }
 
 fn deviance(rival: &PlannedRival) -> String {
@@ -172,7 +178,7 @@ fn deviance(rival: &PlannedRival) -> String {
 }
 
 /// Rows with cells under each other.
-fn table(rows: Vec<Vec<String>>) -> Vec<String> {
+fn table(rows: &[Vec<String>]) -> Vec<String> {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |i: usize| rows.iter().filter_map(|row| Some(row.get(i)?.chars().count())).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();

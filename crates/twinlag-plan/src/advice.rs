@@ -65,17 +65,18 @@ fn rate(plan: &Plan) -> Option<String> {
     } else if twice > 1.0 - NOTICEABLE_SHARE {
         format!("rate: {now:.4} Hz is enough; twice the rate narrows no interval by a tenth")
     } else {
-        format!("rate: twice the rate, {:.4} Hz, makes the intervals {:.0} % of what they are", 2.0 * now, 100.0 * twice)
+        format!(
+            "rate: twice the rate, {:.4} Hz, makes the intervals {:.0} % of what they are",
+            2.0 * now,
+            100.0 * twice
+        )
     })
 }
 
 /// The change of gas and sensors that narrows the intervals most.
 fn best(plan: &Plan) -> Option<String> {
     let is_of_rig = |record: &&PlannedRecord| {
-        matches!(
-            record.change,
-            Some(Change::Excitation { .. } | Change::GasAround { .. } | Change::Pair { .. })
-        )
+        matches!(record.change, Some(Change::Excitation { .. } | Change::GasAround { .. } | Change::Pair { .. }))
     };
     // An interval is compared with the value that it is of, which another pair changes.
     let now = plan.as_it_is.worst_time_constant();
@@ -86,7 +87,10 @@ fn best(plan: &Plan) -> Option<String> {
     }
     let what = &record.description;
     Some(if !now.is_finite() {
-        format!("gas and sensors: {what} determines both time constants, the less certain one within {:.1} %", 100.0 * least)
+        format!(
+            "gas and sensors: {what} determines both time constants, the less certain one within {:.1} %",
+            100.0 * least
+        )
     } else if least < (1.0 - NOTICEABLE_SHARE) * now {
         format!(
             "gas and sensors: {what} helps most: the less certain time constant has a standard error of {:.2} % instead of \
@@ -120,6 +124,8 @@ fn tie(plan: &Plan, place: usize, rival: &PlannedRival) -> String {
             "{pair}: none of the changes alone distinguishes them; nearest is {}, with an expected deviance of {deviance:.1}",
             record.description
         ),
-        None => format!("{pair}: none of the changes distinguishes them; inspect the rig, or measure one of the two by itself"),
+        None => format!(
+            "{pair}: none of the changes distinguishes them; inspect the rig, or measure one of the two by itself"
+        ),
     }
 }

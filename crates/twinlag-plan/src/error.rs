@@ -26,7 +26,9 @@ pub enum PlanError {
          determines both, give one that is known (--known {channel}.time_constant_s=0.5), or describe the rig"
     )]
     NoTimeConstant { channel: String },
-    #[error("the model has no {what}: expected one that this version saved with `twinlag diagnose`. Diagnose the record again")]
+    #[error(
+        "the model has no {what}: expected one that this version saved with `twinlag diagnose`. Diagnose the record again"
+    )]
     NotSaved { what: &'static str },
     #[error(
         "the model has no spectrum of the gas, as it is for unevenly sampled records, records with gaps, and records of more than \

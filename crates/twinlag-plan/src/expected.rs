@@ -69,8 +69,11 @@ impl Expected {
         let clean = rig.clone().with_record(record)?.clean(0)?;
         let gas_std_k = std(&clean.gas_c);
         let observations = Observations::new(vec![Stretch::new(clean.time_s, clean.readings_c)], Some(period_s))?;
-        let settings =
-            Settings { noise_std_k: Some(noise_std_k), effects: Identifier::ALL.into_iter().filter(can_be_planned).collect(), ..Settings::default() };
+        let settings = Settings {
+            noise_std_k: Some(noise_std_k),
+            effects: Identifier::ALL.into_iter().filter(can_be_planned).collect(),
+            ..Settings::default()
+        };
         let mut prepared = Prepared::new(&observations, &settings)?;
         let tau_s = rig.sensors().each_ref().map(|s| s.time_constant_s.max(s.second_time_constant_s.unwrap_or(0.0)));
         prepared.context.tau_s = tau_s;
@@ -99,7 +102,8 @@ impl Expected {
     /// The expected standard error of a sum of parameters, each with its weight.
     pub(crate) fn error_of(&self, sum: &[(usize, f64)]) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
-        let variance: f64 = sum.iter().map(|(i, a)| sum.iter().map(|(j, b)| a * b * covariance[*i][*j]).sum::<f64>()).sum();
+        let variance: f64 =
+            sum.iter().map(|(i, a)| sum.iter().map(|(j, b)| a * b * covariance[*i][*j]).sum::<f64>()).sum();
         let error = (variance / self.share).sqrt();
         (error.is_finite() && error > 0.0).then_some(error)
     }

@@ -5,7 +5,8 @@
 
 use twinlag::model::ZERO_CELSIUS_K;
 use twinlag::signal::{
-    ColouredNoise, Gas, Mismatch, MultiTone, Noise, Radiation, Record, Rig, Sensor, Signal, SlowMode, TemperatureDependence, Tone,
+    ColouredNoise, Gas, Mismatch, MultiTone, Noise, Radiation, Record, Rig, Sensor, Signal, SlowMode,
+    TemperatureDependence, Tone,
 };
 use twinlag::{GasSpectrum, Model, ModelEffect};
 
@@ -145,7 +146,8 @@ impl Made {
             _ => false,
         };
         if !is_added {
-            self.remarks.push(format!("{} is in the model and not in the plan: it is taken to be absent", effect.effect));
+            self.remarks
+                .push(format!("{} is in the model and not in the plan: it is taken to be absent", effect.effect));
         }
     }
 

@@ -252,7 +252,8 @@ impl Now<'_> {
         let rig = change.of(rig, self.expected.gas_std_k)?;
         let expected = Expected::of(&rig)?;
         let has_same_effects = expected.fitted.theta.len() == self.expected.fitted.theta.len();
-        let rivals = self.rivals.iter().filter(|_| has_same_effects).map(|rival| rival.on(&expected)).collect::<Vec<_>>();
+        let rivals =
+            self.rivals.iter().filter(|_| has_same_effects).map(|rival| rival.on(&expected)).collect::<Vec<_>>();
         Ok(self.record(Some(change), &rig, &expected, &rivals))
     }
 
@@ -325,7 +326,9 @@ impl Now<'_> {
     fn remarks(&self, rig: &Rig) -> Vec<String> {
         let mut out: Vec<String> = Vec::new();
         for effect in &self.expected.missing {
-            out.push(format!("{effect} is in the rig, and no model of this record has it: the plan takes it to be absent"));
+            out.push(format!(
+                "{effect} is in the rig, and no model of this record has it: the plan takes it to be absent"
+            ));
         }
         for sensor in rig.sensors() {
             let faults = [
@@ -337,7 +340,10 @@ impl Now<'_> {
                 ("an intermittent contact", sensor.intermittent_contact.is_some()),
             ];
             for (what, _) in faults.into_iter().filter(|(_, is_there)| *is_there) {
-                out.push(format!("{}: {what} is not in the model, so the plan is only that of what else is there", sensor.channel));
+                out.push(format!(
+                    "{}: {what} is not in the model, so the plan is only that of what else is there",
+                    sensor.channel
+                ));
             }
         }
         let samples = rig.record().samples;
@@ -352,4 +358,3 @@ impl Now<'_> {
         out
     }
 }
-

@@ -105,7 +105,8 @@ pub(crate) fn rivals(expected: &Expected) -> Vec<Rival> {
             !id.about().is_defect
                 && !other.is_noise()
                 && !other.is_of_the_record()
-                && (effect.identifier().resembles(id) || (id == effect.identifier() && other.channel() != effect.channel()))
+                && (effect.identifier().resembles(id)
+                    || (id == effect.identifier() && other.channel() != effect.channel()))
                 && accepts(&rest, other)
         };
         let all = candidates(&Identifier::ALL, &expected.prepared.context);

@@ -26,9 +26,8 @@ impl Seat {
                 && names.iter().all(|p| value(p.name).is_some())
         };
         let effect = candidates(&[self.effect], context).into_iter().rfind(is_this)?;
-        let inside = |p: &twinlag::model::Parameter| {
-            value(p.name).unwrap_or_default().clamp(p.variable.lower, p.variable.upper)
-        };
+        let inside =
+            |p: &twinlag::model::Parameter| value(p.name).unwrap_or_default().clamp(p.variable.lower, p.variable.upper);
         let values = effect.parameters().iter().map(inside).collect();
         Some((effect, values))
     }

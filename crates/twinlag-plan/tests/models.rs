@@ -6,19 +6,16 @@ use twinlag_plan::{Plan, PlanError, PlanStatus, Source};
 
 /// A model as `twinlag diagnose --save` writes it, with what counts here.
 fn saved() -> Value {
-    json!({
-        "schema": "twinlag.model/1",
-        "channels": ["fine", "coarse"],
-        "time_constants_s": [0.05, 0.16],
-        "noise_std_K": [0.05, 0.08],
-        "effects": [{"effect": "delay", "channel": "coarse", "parameters": [
-            {"name": "delay", "value": -0.006, "standard_error": 0.001, "interval_95": null, "unit": "s"}]}],
-        "found_in": {"source": "run.csv", "sha256": "", "samples": 2000, "sample_period_s": 0.004, "length_s": 7.996,
-                     "temperatures_C": [[280.0, 320.0], [285.0, 315.0]]},
-        "gas_spectrum": {"mean_C": 300.0, "bands": [{"frequency_hz": 0.5, "power_K2": 18.0}, {"frequency_hz": 2.75, "power_K2": 8.0},
-                         {"frequency_hz": 5.0, "power_K2": 4.5}]},
-        "made_by": {"program": "twinlag", "version": "0.1.0", "estimator": "whitened", "optimiser": "levenberg-marquardt", "hold": "auto"}
-    })
+    let mut value = serde_json::to_value(Model::of_two_lags(["fine".into(), "coarse".into()])).expect("JSON");
+    value["time_constants_s"] = json!([0.05, 0.16]);
+    value["noise_std_K"] = json!([0.05, 0.08]);
+    value["effects"] = json!([{"effect": "delay", "channel": "coarse", "parameters": [
+        {"name": "delay", "value": -0.006, "standard_error": 0.001, "interval_95": null, "unit": "s"}]}]);
+    value["found_in"] = json!({"source": "run.csv", "sha256": "", "samples": 2000, "sample_period_s": 0.004, "length_s": 7.996,
+                               "temperatures_C": [[280.0, 320.0], [285.0, 315.0]]});
+    value["gas_spectrum"] = json!({"mean_C": 300.0, "bands": [{"frequency_hz": 0.5, "power_K2": 18.0},
+        {"frequency_hz": 2.75, "power_K2": 8.0}, {"frequency_hz": 5.0, "power_K2": 4.5}]});
+    value
 }
 
 fn model(change: impl Fn(&mut Value)) -> Model {
@@ -47,5 +44,7 @@ fn a_model_without_what_a_rig_needs_is_refused_with_what_was_expected() {
     assert!(error.to_string().contains("--known coarse.time_constant_s"), "{error}");
     assert_eq!(refused(&|m| m["gas_spectrum"] = Value::Null), PlanError::NoSpectrum);
     assert!(matches!(refused(&|m| m["found_in"] = Value::Null), PlanError::NotSaved { .. }));
-    assert!(matches!(refused(&|m| m["noise_std_K"][0] = json!(-1.0)), PlanError::ModelNumber { got, .. } if got == -1.0));
+    assert!(
+        matches!(refused(&|m| m["noise_std_K"][0] = json!(-1.0)), PlanError::ModelNumber { got, .. } if got == -1.0)
+    );
 }

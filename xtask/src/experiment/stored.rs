@@ -9,7 +9,9 @@ use twinlag_study::{Results, Study};
 
 use super::reconstruction::Reconstruction;
 use super::tracking::Tracking;
-use super::{Run, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking};
+use super::{
+    Run, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking,
+};
 
 /// What a plan begins with.
 pub(super) struct Head<'a> {

@@ -6,7 +6,9 @@ use twinlag_diagnose::{
     Move, Policy, Unexplained, Verdict,
 };
 
-use crate::answers::{Characterisation, FoundIn, GasSpectrum, LeftOutUnit, Model, ModelEffect, RecordAnswer, TransferAnswer};
+use crate::answers::{
+    Characterisation, FoundIn, GasSpectrum, LeftOutUnit, Model, ModelEffect, RecordAnswer, TransferAnswer,
+};
 
 /// A number of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,8 +9,8 @@ use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, GasSpectrum, LeftOutUnit, NamedEffect,
-    Status, TransferAnswer,
+    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, GasSpectrum, LeftOutUnit,
+    NamedEffect, Status, TransferAnswer,
 };
 use crate::error::Error;
 use crate::options::Options;
