@@ -61,9 +61,9 @@ fn rate(plan: &Plan) -> Option<String> {
     let now = 1.0 / plan.as_it_is.sample_period_s;
     let (half, twice) = (of(0.5), of(2.0)?);
     Some(if half.is_some_and(|ratio| ratio < 1.0 + NOTICEABLE_SHARE) {
-        format!("rate: half the rate is enough, {:.4} Hz, in the same time", 0.5 * now)
+        format!("rate: half the rate is enough, {} Hz, in the same time", hertz(0.5 * now))
     } else if twice > 1.0 - NOTICEABLE_SHARE {
-        format!("rate: {now:.4} Hz is enough; twice the rate narrows no interval by a tenth")
+        format!("rate: {} Hz is enough; twice the rate narrows no interval by a tenth", hertz(now))
     } else {
         format!(
             "rate: twice the rate, {:.4} Hz, makes the intervals {:.0} % of what they are",
@@ -71,6 +71,13 @@ fn rate(plan: &Plan) -> Option<String> {
             100.0 * twice
         )
     })
+}
+
+/// A frequency to four digits.
+fn hertz(frequency_hz: f64) -> f64 {
+    let unit = 10_f64.powf(frequency_hz.log10().floor() - 3.0);
+    // Divided by a power of ten it prints without digits of rounding.
+    (frequency_hz / unit).round() / (1.0 / unit).round().max(1.0) * if unit > 1.0 { unit } else { 1.0 }
 }
 
 /// The change of gas and sensors that narrows the intervals most.
@@ -106,7 +113,7 @@ fn best(plan: &Plan) -> Option<String> {
 /// What breaks a tie.
 fn tie(plan: &Plan, place: usize, rival: &PlannedRival) -> String {
     let named = |effect: &dyn std::fmt::Display, channel: &Option<String>| match channel {
-        Some(channel) => format!("{effect} in {channel}"),
+        Some(channel) => format!("{effect} of {channel}"),
         None => effect.to_string(),
     };
     let pair = format!("{} or {}", named(&rival.effect, &rival.channel), named(&rival.rival, &rival.rival_channel));

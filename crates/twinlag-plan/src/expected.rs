@@ -10,7 +10,7 @@
 //! two can be compared. What is of second order, noise multiplied by noise, is not in it.
 
 use twinlag::diagnosis::{Observations, Settings, Stretch};
-use twinlag::model::{Bands, Effort, Fitted, Identifier, Model, Prepared, covariance, white_deviance};
+use twinlag::model::{Effort, Fitted, Identifier, Model, Prepared, covariance, dense};
 use twinlag::signal::Rig;
 
 use crate::error::PlanError;
@@ -30,6 +30,8 @@ pub struct Expected {
     pub(crate) share: f64,
     /// Covariance of the parameters, where they are determined.
     pub(crate) covariance: Option<Vec<Vec<f64>>>,
+    /// Inverse of the information, which is there only where all parameters are determined together.
+    inverse: Option<Vec<Vec<f64>>>,
     /// Effects of the rig that no model of the record has.
     pub(crate) missing: Vec<Identifier>,
     /// Standard deviation of the gas, K.
@@ -85,8 +87,10 @@ impl Expected {
             theta.extend(values);
         }
         let fitted = model.fit(&theta, &prepared.observations, &prepared.everything, Effort::Finish);
+        let normal = fitted.model.normal_equations(&fitted.theta, &prepared.observations, &prepared.everything, None);
+        let inverse = without_held(&normal.products);
         let covariance = covariance(&fitted, &prepared.observations, &prepared.everything, false);
-        Ok(Self { prepared, fitted, share, covariance, missing, gas_std_k })
+        Ok(Self { prepared, fitted, share, covariance, inverse, missing, gas_std_k })
     }
 
     /// The value of a parameter, time constants first.
@@ -96,7 +100,12 @@ impl Expected {
 
     /// The expected standard error of a parameter, time constants first; `None` where the record does not determine it.
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
-        self.error_of(&[(parameter, 1.0)])
+        let error = self.error_of(&[(parameter, 1.0)])?;
+        // The weights of frequencies may hide that two parameters do the same: the inverse of the information does not.
+        let unweighted = (self.inverse.as_ref()?[parameter][parameter] / self.share).sqrt();
+        let is_tau = parameter < 2;
+        let is_vague = is_tau && unweighted / self.value(parameter) > self.prepared.policy.vague_log_std;
+        (unweighted.is_finite() && !is_vague).then_some(error)
     }
 
     /// The expected standard error of a sum of parameters, each with its weight.
@@ -113,16 +122,22 @@ impl Expected {
         self.share * fitted.chi2
     }
 
-    /// `−2 ln L` that is to be expected of `fitted` on a noisy record, both levels of white noise fitted to what it leaves over.
-    pub(crate) fn expected_deviance(&self, fitted: &Fitted) -> f64 {
-        let observations = &self.prepared.observations;
-        let plant = fitted.model.plant(&fitted.theta, observations);
-        let runs = fitted.model.residual_runs(&fitted.theta, observations, |_| true);
-        let count: usize = runs.iter().map(Vec::len).sum();
-        let bands = Bands::of(&runs).with_white_noise();
-        let deviance = white_deviance(&plant, observations, &bands, [false; 2]);
-        self.share * count as f64 / bands.dof().max(1.0) * deviance
+    /// Residuals of a fit as it weighs frequencies, all samples of the record counted.
+    pub(crate) fn residuals(&self) -> f64 {
+        self.share * self.fitted.count.max(1.0)
     }
+}
+
+/// The inverse of a matrix; of parameters that are held, whose rows are zero, that is zero as well.
+fn without_held(products: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let free: Vec<usize> = (0..products.len()).filter(|i| products[*i][*i] > 0.0).collect();
+    let of_free: Vec<Vec<f64>> = free.iter().map(|i| free.iter().map(|j| products[*i][*j]).collect()).collect();
+    let inverse = dense::inverse(&of_free)?;
+    let mut out = vec![vec![0.0; products.len()]; products.len()];
+    for (a, i) in free.iter().enumerate() {
+        free.iter().enumerate().for_each(|(b, j)| out[*i][*j] = inverse[a][b]);
+    }
+    Some(out)
 }
 
 /// Whether an effect can be in a plan: defects of data and steady lines are no part of what the sensors do.

@@ -57,7 +57,7 @@ pub struct PlannedRival {
     pub rival: Identifier,
     /// The channel of that.
     pub rival_channel: Option<String>,
-    /// Deviance to expect between both, everything fitted again, the levels of the noise among it.
+    /// Deviance to expect between both, everything fitted again, one factor of both levels of the noise among it.
     pub deviance: f64,
     /// No deviance is expected to be more: the one to expect if the levels of the noise are known.
     pub deviance_at_most: f64,
@@ -278,11 +278,12 @@ impl Now<'_> {
         let theta = &expected.fitted.theta;
         let number = |name: &str, effect, channel, sum: &[(usize, f64)], unit: &str| {
             let value: f64 = sum.iter().map(|(i, weight)| weight * theta[*i]).sum();
-            let is_tau = effect == None::<Identifier> && channel != None::<usize>;
-            // An interval of a time constant that spans a factor of seven is no estimate, as in a characterisation.
-            let is_clear = |error: &f64| !is_tau || error / value < self.policy.vague_log_std;
-            let standard_error = expected.error_of(sum).filter(is_clear);
-            let now = self.expected.error_of(sum);
+            // The difference may be determined where neither time constant is.
+            let error_in = |expected: &Expected| match sum {
+                [(parameter, _)] => expected.standard_error(*parameter),
+                _ => expected.error_of(sum),
+            };
+            let (standard_error, now) = (error_in(expected), error_in(self.expected));
             PlannedNumber {
                 name: name.into(),
                 effect,

@@ -1,7 +1,7 @@
 //! The models of a plan, fitted to a noisy record: what a record gives of that which was expected.
 
 use twinlag::diagnosis::{Observations, Settings};
-use twinlag::model::{Bands, Effort, Fitted, Prepared, white_deviance};
+use twinlag::model::{Effort, Fitted, Prepared};
 use twinlag::signal::Rig;
 
 use crate::error::PlanError;
@@ -39,11 +39,9 @@ pub struct Rehearsal {
 pub struct Rehearsed {
     /// Parameters, time constants first.
     pub parameters: Vec<f64>,
-    /// For each rival how much larger `−2 ln L` is than that of the right model, with the levels of the noise fitted to what each
-    /// leaves over.
+    /// For each rival how much larger `−2 ln L` is than that of the right model, with one unknown factor of both levels of the noise: `n ln` of
+    /// the ratio of the energies per residual, as `twinlag diagnose` compares effects.
     pub deviances: Vec<f64>,
-    /// The same with one unknown factor of both levels, `n ln` of the ratio of the energies, as `twinlag diagnose` compares effects.
-    pub scaled_deviances: Vec<f64>,
 }
 
 impl Rehearsal {
@@ -62,7 +60,7 @@ impl Rehearsal {
         &self.expected
     }
 
-    /// The deviance to expect of each rival with the levels of the noise fitted again, and with known ones.
+    /// The deviance to expect of each rival with one factor of both noise levels fitted again, and with known levels.
     pub fn deviances(&self) -> Vec<[f64; 2]> {
         self.rivals.iter().map(|rival| [rival.fitted_noise, rival.known_noise]).collect()
     }
@@ -93,22 +91,11 @@ impl Rehearsal {
             let model = of.model.clone().with_noise(prepared.levels.std_k);
             model.fit(&of.theta, &prepared.observations, &prepared.everything, Effort::Finish)
         };
-        let deviance = |fitted: &Fitted| {
-            let plant = fitted.model.plant(&fitted.theta, &prepared.observations);
-            let runs = fitted.model.residual_runs(&fitted.theta, &prepared.observations, |_| true);
-            let count: usize = runs.iter().map(Vec::len).sum();
-            let bands = Bands::of(&runs);
-            count as f64 / bands.dof().max(1.0) * white_deviance(&plant, &prepared.observations, &bands, [false; 2])
-        };
         let right = fit(&self.expected.fitted);
         let rivals: Vec<Fitted> = self.rivals.iter().map(|rival| fit(rival.fitted())).collect();
-        let of_right = deviance(&right);
+        let ratio = |rival: &Fitted| rival.mean_energy() / right.mean_energy().max(f64::MIN_POSITIVE);
         Ok(Rehearsed {
-            deviances: rivals.iter().map(|rival| deviance(rival) - of_right).collect(),
-            scaled_deviances: rivals
-                .iter()
-                .map(|rival| right.count * (rival.mean_energy() / right.mean_energy().max(f64::MIN_POSITIVE)).ln())
-                .collect(),
+            deviances: rivals.iter().map(|rival| right.count * ratio(rival).ln()).collect(),
             parameters: right.theta,
         })
     }

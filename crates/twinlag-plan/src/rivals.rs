@@ -2,8 +2,9 @@
 //!
 //! A rival takes the place of an effect, and everything else is fitted again: time constants, the other effects. On a record without
 //! noise of the rig it leaves the energy `λ` more than the model that is right; on noisy records the deviance between the two scatters
-//! about `λ` with the standard deviation `2 √λ`, if the levels of the noise are known. Where they are not, the rival may take a part of what
-//! it leaves over for noise. Then the deviance to expect is that of both models with their levels fitted again.
+//! about `λ` with a standard deviation of `2 √λ` at most, if the levels of the noise are known. Where they are not, the rival takes what it
+//! leaves over for noise: of `n` residuals, one factor of both levels fitted again, `n ln(1 + λ/n)` is left. This is the deviance by which
+//! `twinlag diagnose` compares effects.
 
 use twinlag::diagnosis::accepts;
 use twinlag::model::{Effort, Fitted, Identifier, Shared, candidates};
@@ -25,7 +26,7 @@ pub(crate) struct Rival {
     beside_tau_s: [f64; 2],
     /// Energy that it leaves over beyond that of the model, all samples counted: the deviance if noise levels are known.
     pub(crate) known_noise: f64,
-    /// The deviance with noise levels fitted again.
+    /// The deviance with one factor of both noise levels fitted again.
     pub(crate) fitted_noise: f64,
 }
 
@@ -35,14 +36,15 @@ impl Rival {
         let (identifier, channel) = (effect.identifier(), effect.channel());
         let of_own = &expected.fitted;
         let known_noise = (expected.energy(&fitted) - expected.energy(of_own)).max(0.0);
-        let fitted_noise = expected.expected_deviance(&fitted) - expected.expected_deviance(of_own);
+        let residuals = expected.residuals();
+        let fitted_noise = residuals * (known_noise / residuals).ln_1p();
         Self {
             index,
             effect: identifier,
             channel,
             beside_tau_s: [of_own.theta[0], of_own.theta[1]],
             known_noise,
-            fitted_noise: fitted_noise.clamp(0.0, known_noise),
+            fitted_noise,
             fitted,
         }
     }

@@ -44,14 +44,13 @@ pub(super) struct Plan {
 }
 
 /// What is kept of each trial.
-const QUANTITIES: [&str; 7] = [
+const QUANTITIES: [&str; 6] = [
     "error of tau 1 over expected",
     "error of tau 2 over expected",
     "error of the effect over expected",
     "deviance expected",
     "deviance expected, noise known",
     "deviance found",
-    "deviance found, one level",
 ];
 /// Records that a gas's standard deviation is taken from.
 const RECORDS: u64 = 20;
@@ -133,10 +132,8 @@ impl Study for Plan {
                 outcome.value(place, (found.parameters[place] - expected.value(place)) / error);
             }
         }
-        if let (Some([fitted, known]), Some(deviance), Some(scaled)) =
-            (rehearsal.deviances().first(), found.deviances.first(), found.scaled_deviances.first())
-        {
-            [*fitted, *known, *deviance, *scaled].iter().enumerate().for_each(|(i, x)| outcome.value(3 + i, *x));
+        if let (Some([fitted, known]), Some(deviance)) = (rehearsal.deviances().first(), found.deviances.first()) {
+            [*fitted, *known, *deviance].iter().enumerate().for_each(|(i, x)| outcome.value(3 + i, *x));
         }
         Ok(())
     }
@@ -166,9 +163,10 @@ impl Stored for Plan {
     }
 
     fn tables(&self, results: &Results, out: &Path) -> Result<()> {
-        let mut text = "| gas | effect | noise (%) | `τ1` | `τ2` | its parameter | expected | expected, noise known | found | found, one level |\n\
-                        |---|---|---|---|---|---|---|---|---|---|\n"
-            .to_owned();
+        let mut text =
+            "| gas | effect | noise (%) | `τ1` | `τ2` | its parameter | expected | expected, noise known | found |\n\
+                        |---|---|---|---|---|---|---|---|---|\n"
+                .to_owned();
         for (cell, tally) in results.cells().iter().enumerate() {
             let moments = |place: usize| tally.values(QUANTITIES[place]).map(twinlag_study::Values::moments);
             let scatter = |place: usize| {
@@ -184,7 +182,7 @@ impl Stored for Plan {
                 of.map_or("–".into(), |(mean, error)| format!("{mean:.1} ± {error:.1}"))
             };
             let (gas, effect, percent) = self.place(cell);
-            let row = [scatter(0), scatter(1), scatter(2), mean(3), mean(4), found(5), found(6)].join(" | ");
+            let row = [scatter(0), scatter(1), scatter(2), mean(3), mean(4), found(5)].join(" | ");
             let _ = writeln!(text, "| {} | {} | {percent} | {row} |", self.gases[gas].name, self.effect_name(effect));
         }
         Ok(fs::write(out.join("planning.md"), text)?)
