@@ -66,18 +66,18 @@ fn rate(plan: &Plan) -> Option<String> {
         format!("rate: {} Hz is enough; twice the rate narrows no interval by a tenth", hertz(now))
     } else {
         format!(
-            "rate: twice the rate, {:.4} Hz, makes the intervals {:.0} % of what they are",
-            2.0 * now,
+            "rate: twice the rate, {} Hz, makes the intervals {:.0} % of what they are, if the noise of a reading stays the same",
+            hertz(2.0 * now),
             100.0 * twice
         )
     })
 }
 
 /// A frequency to four digits.
-fn hertz(frequency_hz: f64) -> f64 {
-    let unit = 10_f64.powf(frequency_hz.log10().floor() - 3.0);
-    // Divided by a power of ten it prints without digits of rounding.
-    (frequency_hz / unit).round() / (1.0 / unit).round().max(1.0) * if unit > 1.0 { unit } else { 1.0 }
+fn hertz(frequency_hz: f64) -> String {
+    let decimals = (3.0 - frequency_hz.log10().floor()).clamp(0.0, 9.0) as usize;
+    let text = format!("{frequency_hz:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// The change of gas and sensors that narrows the intervals most.

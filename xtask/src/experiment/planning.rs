@@ -170,8 +170,9 @@ impl Stored for Plan {
         for (cell, tally) in results.cells().iter().enumerate() {
             let moments = |place: usize| tally.values(QUANTITIES[place]).map(twinlag_study::Values::moments);
             let scatter = |place: usize| {
-                let of = moments(place).and_then(|m| Some((m.root_mean_square()?, m.root_mean_square_error()?)));
-                of.map_or("–".into(), |(rms, error)| format!("{rms:.2} ± {error:.2}"))
+                let of = moments(place)
+                    .and_then(|m| Some((m.mean()?, m.standard_deviation()?, m.standard_deviation_error()?)));
+                of.map_or("–".into(), |(mean, std, error)| format!("{std:.2} ± {error:.2} ({mean:+.1})"))
             };
             let mean = |place: usize| {
                 let of = moments(place).and_then(|m| m.mean());
