@@ -97,21 +97,6 @@ impl Bands {
         Self(bands)
     }
 
-    /// These with the power that white noise of unit variance has on average added: what to expect of a residual of which these are the
-    /// part without noise.
-    #[must_use]
-    pub fn with_white_noise(mut self) -> Self {
-        for band in &mut self.0 {
-            band.sum.iter_mut().zip(band.dof).for_each(|(sum, dof)| *sum += dof);
-        }
-        self
-    }
-
-    /// Degrees of freedom of all bands.
-    pub fn dof(&self) -> f64 {
-        self.0.iter().map(Band::dof).sum()
-    }
-
     /// `−2 ln L` with a free level in every band, each with its weight: what is left however the noise is coloured.
     pub fn robust(&self, weight: impl Fn(f64) -> f64) -> f64 {
         self.0.iter().map(|b| weight(b.omega) * b.dof() * b.power().max(1e-300).ln()).sum()
