@@ -65,8 +65,27 @@ fn files(command: &Diagnose) -> Result<Vec<&Path>, Failure> {
     }
 }
 
+/// Refuses a record that is a copy of another: left out, it would be there all the same.
+fn no_copies(records: &[Record]) -> Result<(), Failure> {
+    // Missing readings are NaN, which equal nothing.
+    let are_same = |one: &[f64], other: &[f64]| {
+        one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
+    };
+    for (place, record) in records.iter().enumerate() {
+        let is_copy = |other: &&Record| are_same(&other.t1_c, &record.t1_c) && are_same(&other.t2_c, &record.t2_c);
+        if let Some(other) = records[..place].iter().find(is_copy) {
+            return Err(Failure::Usage(format!(
+                "{} has the readings of {}: a record that is counted twice is not left out when it is left out once",
+                record.source, other.source
+            )));
+        }
+    }
+    Ok(())
+}
+
 fn diagnose_records(records: &[Record], options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
     let samples: usize = records.iter().map(Record::len).sum();
+    no_copies(records)?;
     let progress = Progress::start(console, format!("diagnosing {samples} samples of {} records", records.len()));
     let watch = |task: &str, done, total| progress.watch(task, done, total);
     let all: Vec<&str> = records.iter().map(|record| record.source.as_str()).collect();

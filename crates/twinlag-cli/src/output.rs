@@ -1,9 +1,10 @@
 //! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
-use std::fs::File;
+use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
+use tempfile::Builder;
 use twinlag::Model;
 use twinlag::record::{Decimals, RecordError, write_csv};
 
@@ -101,8 +102,30 @@ pub(crate) fn data<T: ToString>(
     if to_stdout {
         return written(&mut stdout().lock(), "standard output");
     }
-    let mut file = File::create(out).map_err(|e| cannot_be_written(out, &e))?;
-    written(&mut file, &out.display().to_string())
+    whole(out, |file| written(file, &out.display().to_string()))
+}
+
+/// Writes a file beside the one that it becomes when it is whole: a run that is broken off leaves the old one, or none. What is
+/// no file, a pipe or a device, is written as it is.
+fn whole(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
+    let failed = |error: &std::io::Error| cannot_be_written(path, error);
+    // What a link leads to is replaced, and not the link.
+    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let old = std::fs::metadata(&path).ok();
+    if old.as_ref().is_some_and(|old| !old.is_file()) {
+        let mut device = OpenOptions::new().write(true).open(&path).map_err(|e| failed(&e))?;
+        return write(&mut device);
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Opened by hand, it can be read by whoever may read other new files of the user.
+    let new = |path: &Path| File::options().write(true).create_new(true).open(path);
+    let mut part = Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new).map_err(|e| failed(&e))?;
+    write(part.as_file_mut())?;
+    let file = part.as_file();
+    let kept = old.map_or(Ok(()), |old| file.set_permissions(old.permissions()));
+    kept.and_then(|()| file.sync_all()).map_err(|e| failed(&e))?;
+    part.persist(&path).map_err(|e| failed(&e.error))?;
+    Ok(())
 }
 
 /// A table that gets a cell at the end of each row.
@@ -149,7 +172,7 @@ impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
 }
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| cannot_be_written(path, &e))
+    whole(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
 }
 
 /// The command line of this run, quoted for a shell.

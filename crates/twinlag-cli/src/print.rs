@@ -4,11 +4,11 @@ use std::io::{Write, stdout};
 use std::path::Path;
 
 use serde::Serialize;
-use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Verdict};
+use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Value, Verdict};
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::{Note, Record};
 use twinlag::{
-    Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NoiseSource, SecondLag,
+    Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NamedTwin, NoiseSource, SecondLag,
     SensorEstimate, Status, Track,
 };
 use twinlag_pages::parameter_in_words;
@@ -390,8 +390,24 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         let names: Vec<&str> = effect.alternatives.iter().map(|a| a.name()).collect();
         lines.push(format!("    equally well explained by: {}", names.join(", ")));
     }
+    lines.extend(effect.exact_twins.iter().map(twin_line));
     lines.push(format!("    at the rig: {}", about.advice));
     lines
+}
+
+/// What the numbers are if an exact twin is the cause.
+fn twin_line(twin: &NamedTwin) -> String {
+    let number = |number: &Value| {
+        let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
+        let Some([low, high]) = number.interval_95 else {
+            return format!("{} {}{unit}", number.name, digits(number.value, 4));
+        };
+        let decimals = decimals_of([low, high]);
+        format!("{} {:.decimals$}{unit} [{low:.decimals$}, {high:.decimals$}]", number.name, number.value)
+    };
+    let channel = twin.of.channel.as_deref().unwrap_or_default();
+    let [parameter, t1, t2] = [&twin.parameter, &twin.time_constants[0], &twin.time_constants[1]].map(number);
+    format!("    no record distinguishes {} in {channel}: {parameter}, then {t1} and {t2} (95 %)", twin.of.effect)
 }
 
 /// The table of both models, after an empty line.

@@ -20,7 +20,11 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
     };
     let of_record = |record: &RecordAnswer| {
         let rms = record.error.held_out_normalised_rms;
-        let agrees = if record.agrees { "yes" } else { "no" };
+        let agrees = match record.agrees {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "not known",
+        };
         row(&record.source, rms.before, rms.after, effects(&record.found_on_others), agrees)
     };
     let rms = transfer.error.held_out_normalised_rms;
@@ -37,6 +41,9 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
     for record in &answer.records {
         lines.extend(own(record));
         lines.extend(record.disagreements.iter().map(|one| disagreement(&record.source, one)));
+        if record.agrees == Some(false) && record.disagreements.is_empty() {
+            lines.push(format!("  {} contradicts the others: without it they are explained", record.source));
+        }
     }
     lines
 }

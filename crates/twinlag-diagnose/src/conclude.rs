@@ -12,10 +12,12 @@ use crate::if_known::{IfKnown, if_known};
 use crate::judge::{Circumstances, Judgements};
 use crate::left_over::what_is_left;
 use crate::limits::not_testable;
-use crate::moves::{Move, Searched, State, Taken};
-use crate::naming::{Tie, judge_effect, name, of_defect, of_rapid, widen};
+use crate::moves::{Move, Searched, State};
+use crate::naming::{judge_effect, name, of_defect, of_rapid};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
+use crate::ties::{Tie, widen};
+use crate::twins::{ExactTwin, exact_twins};
 
 /// The answer, its numbers fitted once more to the whole record.
 ///
@@ -37,9 +39,11 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     if let Searched::Pieces { samples, is_screened } = state.searched {
         remarks.push(Remark::SearchedInPieces { samples, all, is_screened });
     }
-    let (remark, causes) = widen(&mut last, &whole_ties(&state), &state.prepared, policy);
+    let places = 0..state.taken.len();
+    let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, &last, &settings.effects)).collect();
+    let (remark, causes) = widen(&mut last, &whole_ties(&state, &twins), policy);
     remarks.extend(remark);
-    let mut found = found(&state, &with_effects, &last);
+    let mut found = found(&state, twins, &with_effects, &last);
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
@@ -82,8 +86,12 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     } else {
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
     };
-    let effects = judged(found, &with_effects, &last, &circumstances);
+    let mut effects = judged(found, &with_effects, &last, &circumstances);
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
+    if !is_given {
+        // What they would be under another cause follows from both.
+        effects.iter_mut().for_each(|found| found.exact_twins.clear());
+    }
     let if_known = if is_refused || (is_whole && is_given) {
         None
     } else {
@@ -147,16 +155,25 @@ fn base_fit(state: &State<'_>, unmasked: Option<&Fitted>, policy: &Policy) -> Mo
 }
 
 /// Ties of the whole model: those of a time when less was known have been looked at again. None of
-/// them is noise.
-fn whole_ties<'a>(state: &'a State<'_>) -> Vec<Tie<'a>> {
+/// them is noise, and those that are exact twins are known without a fit.
+///
+/// - `twins`: of each effect
+fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>]) -> Vec<Tie> {
     let effects = state.current.model.effects.len();
-    let of = |taken: &'a Taken| taken.ties.iter().map(move |t| (taken.candidate.effect.identifier(), t));
-    let whole = state
-        .taken
-        .iter()
-        .flat_map(of)
-        .filter(|(_, t)| !t.effect.is_noise() && t.fitted.model.effects.len() == effects);
-    whole.map(|(named, t)| Tie { named, other: t.effect.identifier(), fitted: &t.fitted }).collect()
+    let mut out = Vec::new();
+    for (taken, twins) in state.taken.iter().zip(twins) {
+        let named = taken.candidate.effect.identifier();
+        out.extend(twins.iter().map(|twin| Tie::exact(named, twin)));
+        let fitted = taken.ties.iter().filter_map(|tie| {
+            let other = tie.effect.identifier();
+            let is_exact = twins.iter().any(|twin| twin.effect == other);
+            let is_whole = tie.fitted.model.effects.len() == effects;
+            let is_new = !tie.effect.is_noise() && is_whole && !is_exact;
+            is_new.then(|| Tie::fitted(named, other, &tie.fitted, &state.prepared)).flatten()
+        });
+        out.extend(fitted);
+    }
+    out
 }
 
 /// Effects that are no noise.
@@ -176,11 +193,14 @@ fn remarks_of(moves: &[Move]) -> Vec<Remark> {
 }
 
 /// Defects and effects, each with its place in the model `last`, if it is in there.
-fn found(state: &State<'_>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
+///
+/// - `twins`: of each effect
+fn found(state: &State<'_>, twins: Vec<Vec<ExactTwin>>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
     let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, fit)));
     let rapid = state.rapid.iter().map(|variation| (None, of_rapid(variation)));
-    let named = state.taken.iter().enumerate();
-    defects.chain(rapid).chain(named.map(|(index, taken)| (Some(index), name(index, taken, last, fit)))).collect()
+    let named = state.taken.iter().zip(twins).enumerate();
+    let named = named.map(|(index, (taken, twins))| (Some(index), name(index, taken, twins, last, fit)));
+    defects.chain(rapid).chain(named).collect()
 }
 
 /// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what

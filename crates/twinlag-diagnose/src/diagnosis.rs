@@ -10,6 +10,7 @@ use crate::judge::Judgements;
 use crate::moves::Move;
 use crate::remark::Remark;
 use crate::transfer::Transfer;
+use crate::twins::ExactTwin;
 
 /// Whether the model is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +49,8 @@ pub struct Found {
     pub evidence: Option<Evidence>,
     /// Other effects that explain this record equally well.
     pub alternatives: Vec<Identifier>,
+    /// Those of them that no record distinguishes from it, with the time constants that they mean; none where these are not given.
+    pub exact_twins: Vec<ExactTwin>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
     /// Readings of the channel that are left out of the fit, in order.

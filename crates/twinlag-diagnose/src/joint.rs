@@ -1,6 +1,8 @@
 //! Several records of one rig: one model, and what each record says of it.
 
-use twinlag_model::{Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Settings, Value, Watch};
+use twinlag_model::{
+    Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Policy, Settings, Value, Watch,
+};
 
 use crate::conclude::{conclude, to_the_end};
 use crate::diagnose::searched;
@@ -45,7 +47,10 @@ pub struct OfRecord {
     pub noise_std_k: [f64; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
-    /// Shared numbers on which it contradicts all others together. None in a record that agrees.
+    /// Whether it agrees with the others: not so if it contradicts them on a number, or if without it they are explained and with it
+    /// they are not. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    pub agrees: Option<bool>,
+    /// Shared numbers on which it contradicts all others together.
     pub disagreements: Vec<Disagreement>,
 }
 
@@ -109,15 +114,36 @@ pub fn diagnose_records(
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
     let diagnosis = conclude(state, settings, tones)?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
+    let between = diagnosis.last.between.as_ref();
+    let disagreements: Vec<_> =
+        (0..records.len()).map(|record| disagreements(record, &last, between, settings)).collect();
+    let contradicts = |record: usize| !disagreements[record].is_empty();
+    let alone = (!is_whole).then(|| the_one_without_which_others_are_explained(&transfer)).flatten();
+    let is_one_named = alone.is_some() || (0..records.len()).any(contradicts);
+    let is_known = is_one_named || (is_whole && !between.is_some_and(|between| differ(between, &settings.policy)));
     let of = |record: usize| OfRecord {
         samples: records[record].samples(),
         left_out: transfer.records[record].clone(),
         noise_std_k: noise_std_k[record],
         own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
-        disagreements: disagreements(record, &last, diagnosis.last.between.as_ref(), settings),
+        agrees: is_known.then_some(!contradicts(record) && alone != Some(record)),
+        disagreements: disagreements[record].clone(),
     };
     let records = (0..records.len()).map(of).collect();
     Ok(JointDiagnosis { diagnosis, records, transfer })
+}
+
+/// The record without which all others are explained, if there is only one.
+fn the_one_without_which_others_are_explained(transfer: &Transfer) -> Option<usize> {
+    let mut explained =
+        transfer.records.iter().enumerate().filter(|(_, left_out)| left_out.are_others_explained == Some(true));
+    let (record, _) = explained.next()?;
+    explained.next().is_none().then_some(record)
+}
+
+/// Whether the records differ in a shared number by more than chance.
+fn differ(between: &Between, policy: &Policy) -> bool {
+    between.parameters.iter().flatten().any(|number| number.p_value < policy.records_rejection_probability)
 }
 
 /// Noise of the channels of each record, K.

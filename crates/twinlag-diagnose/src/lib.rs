@@ -52,11 +52,14 @@ mod limits;
 mod long;
 mod moves;
 mod naming;
+mod propagate;
 mod rank;
 mod rapid;
 mod remark;
 mod size;
+mod ties;
 mod transfer;
+mod twins;
 
 pub use candidates::accepts;
 pub use diagnose::diagnose;
@@ -77,6 +80,7 @@ pub use twinlag_model::{
     ModelError, ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track,
     Value, Watch, evenly_spread, fit_with, track,
 };
+pub use twins::ExactTwin;
 
 /// A diagnosis may go to any thread, and be read by several.
 const _: () = {

@@ -3,9 +3,7 @@
 use std::ops::Range;
 
 use twinlag_cross_relation::{Z_975, log_normal_interval_95};
-use twinlag_model::{
-    Defect, Derived, Effort, Fitted, Identifier, ModelFit, Parameter, Policy, Prepared, Shared, Value, covariance,
-};
+use twinlag_model::{Defect, Derived, Fitted, Identifier, ModelFit, Parameter, Prepared, Shared, Value};
 use twinlag_optimise::{End, Scale};
 
 use crate::candidates::is_inside_bounds;
@@ -15,16 +13,10 @@ use crate::grade::{Judgement, Number, Reason, RecordScatter};
 use crate::joint::OwnNumber;
 use crate::judge::Circumstances;
 use crate::moves::Taken;
+use crate::propagate::variance;
 use crate::rapid::RapidVariation;
-use crate::remark::{Remark, to_digits_of};
-
-/// Relative change of an end of an interval that is worth a remark.
-const NOTICEABLE: f64 = 1e-3;
-/// Share of an interval by which other effects make it longer before the number is one of its cause: half as long again.
-const DECISIVE: f64 = 0.5;
-/// Step of the derivatives of a number that follows from parameters, in standard errors of these: small enough that a function
-/// that bends within ten of them is straight over it.
-const DERIVATIVE_STEP_SE: f64 = 0.1;
+use crate::remark::to_digits_of;
+use crate::twins::ExactTwin;
 
 /// Numbers of an effect whose values are in `range`, and those that follow from them, whose uncertainty is that of `fit`.
 fn numbers(effect: &Shared, range: Range<usize>, last: &Fitted, fit: &ModelFit) -> Vec<Value> {
@@ -51,11 +43,14 @@ pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<O
 
 /// Effect `index` of the model `last` with its numbers, whose uncertainty is that of `fit`; without those that belong to one of
 /// several records.
-pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -> Found {
+///
+/// - `exact_twins`: of the effect
+pub(crate) fn name(index: usize, taken: &Taken, exact_twins: Vec<ExactTwin>, last: &Fitted, fit: &ModelFit) -> Found {
     let effect = &taken.candidate.effect;
     let is_of_records = effect.record_of(0).is_some();
     let parameters = if is_of_records { Vec::new() } else { numbers(effect, last.model.range(index), last, fit) };
-    let mut alternatives: Vec<Identifier> = taken.ties.iter().map(|t| t.effect.identifier()).collect();
+    let ties = taken.ties.iter().map(|t| t.effect.identifier());
+    let mut alternatives: Vec<Identifier> = ties.chain(exact_twins.iter().map(|twin| twin.effect)).collect();
     let is_of_either = alternatives.contains(&effect.identifier());
     alternatives.retain(|other| *other != effect.identifier());
     alternatives.sort_unstable();
@@ -68,6 +63,7 @@ pub(crate) fn name(index: usize, taken: &Taken, last: &Fitted, fit: &ModelFit) -
         parameters,
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
+        exact_twins,
         seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
         masked: Vec::new(),
         is_of_each_record: is_of_records,
@@ -88,7 +84,7 @@ fn value(parameter: &Parameter, value: f64, variance: Option<f64>) -> Value {
 
 /// The 95 % interval of a value, on the scale on which it was fitted: of a positive one it is a
 /// factor either way.
-fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
+pub(crate) fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
     match scale {
         Scale::Logarithmic => log_normal_interval_95(value, error),
         Scale::Linear { .. } => [value - Z_975 * error, value + Z_975 * error],
@@ -98,23 +94,8 @@ fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
 /// A number that follows from the parameters in `range`, its error to first order.
 fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Option<&Vec<Vec<f64>>>) -> Value {
     let at = &theta[range.clone()];
-    let slope = |c: &[Vec<f64>]| -> Vec<f64> {
-        let of = |i: usize, by: f64| {
-            let mut moved = at.to_vec();
-            moved[i] += by;
-            (derived.of)(&moved)
-        };
-        let one = |i: usize| {
-            let step = DERIVATIVE_STEP_SE * c[range.start + i][range.start + i].max(0.0).sqrt();
-            if step > 0.0 { (of(i, step) - of(i, -step)) / (2.0 * step) } else { 0.0 }
-        };
-        (0..at.len()).map(one).collect()
-    };
-    let variance = covariance.map(|c| {
-        let slope = slope(c);
-        let pairs = (0..at.len()).flat_map(|i| (0..at.len()).map(move |j| (i, j)));
-        pairs.map(|(i, j)| slope[i] * slope[j] * c[range.start + i][range.start + j]).sum::<f64>()
-    });
+    let places: Vec<usize> = range.collect();
+    let variance = covariance.map(|c| variance(derived.of.as_ref(), &places, theta, c));
     let value = (derived.of)(at);
     let error = variance.map(f64::sqrt).filter(|s| *s > 0.0 && s.is_finite());
     Value {
@@ -143,6 +124,7 @@ pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
         judgements: Vec::new(),
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives: Vec::new(),
+        exact_twins: Vec::new(),
         seen: Some(seen),
         masked: Vec::new(),
         is_of_each_record: false,
@@ -164,6 +146,7 @@ pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -
         judgements: Vec::new(),
         evidence: None,
         alternatives: Vec::new(),
+        exact_twins: Vec::new(),
         seen: Some(seen),
         masked: Masked::runs(&defect.masked, &prepared.observations),
         is_of_each_record: false,
@@ -221,56 +204,8 @@ pub(crate) fn judge_effect(
         own.extend(is_bound.then_some(Reason::OnBound));
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
     }
-}
-
-/// An effect that explains the record as well as the one that is named, with the fit of the whole model.
-pub(crate) struct Tie<'a> {
-    pub(crate) named: Identifier,
-    pub(crate) other: Identifier,
-    pub(crate) fitted: &'a Fitted,
-}
-
-/// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
-/// the right one; returns what to say of that, and with which effect alone each of them was right before.
-pub(crate) fn widen(
-    fit: &mut ModelFit,
-    ties: &[Tie<'_>],
-    prepared: &Prepared,
-    policy: &Policy,
-) -> (Option<Remark>, [Option<Identifier>; 3]) {
-    let (mut effects, mut causes) = (Vec::new(), [None; 3]);
-    for Tie { named, other, fitted } in ties {
-        let (observations, everything) = (&prepared.observations, &prepared.everything);
-        let fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
-        let Some(covariance) = covariance(&fitted, observations, everything, false) else { continue };
-        let theta = &fitted.theta;
-        let variance = |i: usize, j: usize| covariance[i][j];
-        let of_difference = variance(0, 0) + variance(1, 1) - 2.0 * variance(0, 1);
-        let numbers = [
-            (theta[0], variance(0, 0), Scale::Logarithmic),
-            (theta[1], variance(1, 1), Scale::Logarithmic),
-            (theta[1] - theta[0], of_difference, Scale::Linear { typical: 1.0 }),
-        ];
-        for (i, (value, variance, scale)) in numbers.into_iter().enumerate() {
-            let error = variance.max(0.0).sqrt();
-            let number = if i < 2 { &mut fit.time_constants[i] } else { &mut fit.difference };
-            let Some([low, high]) = &mut number.interval_95_s else { continue };
-            if error > 0.0 && (i == 2 || error < policy.vague_log_std * value) {
-                let [from, to] = interval_95(value, error, &scale);
-                let more = (*low - from).max(0.0) + (to - *high).max(0.0);
-                if i < 2 && more > NOTICEABLE * value {
-                    effects.push(*other);
-                }
-                if more > DECISIVE * (*high - *low) {
-                    causes[i] = Some(*named);
-                }
-                (*low, *high) = (low.min(from), high.max(to));
-            }
-        }
-    }
-    effects.sort_unstable_by_key(|e| e.name());
-    effects.dedup();
-    ((!effects.is_empty()).then_some(Remark::Widened { effects }), causes)
+    // What a twin follows from comes first.
+    found.exact_twins.iter_mut().for_each(|twin| twin.widen(range.start, fit, circumstances));
 }
 
 #[cfg(test)]

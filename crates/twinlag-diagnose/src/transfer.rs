@@ -9,7 +9,7 @@
 
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
 
-use crate::conclude::to_the_end;
+use crate::conclude::{leaves_more_than_noise, to_the_end};
 use crate::diagnose::searched;
 use crate::diagnosis::BeforeAfter;
 use crate::errors::Squares;
@@ -27,19 +27,21 @@ pub struct LeftOut {
     pub normalised_rms: BeforeAfter<f64>,
     /// Root mean square of the difference between the two inferred gas temperatures, K.
     pub input_difference_k: BeforeAfter<f64>,
-    /// Effects that were found on the other records, noise aside.
+    /// Effects that were found on the other records, or on the whole record of a block; noise aside.
     pub found: Vec<EffectInChannel>,
+    /// Whether two lags and what was found on them explain the other records; `None` of a block.
+    pub are_others_explained: Option<bool>,
 }
 
-/// Errors on records that were left out, one at a time.
+/// Errors on records, or blocks of one, that were left out, one at a time.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Transfer {
-    /// Root mean square of the whitened residual, of all records.
+    /// Root mean square of the whitened residual, of all of them.
     pub normalised_rms: BeforeAfter<f64>,
-    /// Root mean square of the difference between the two inferred gas temperatures, of all records, K.
+    /// Root mean square of the difference between the two inferred gas temperatures, of all of them, K.
     pub input_difference_k: BeforeAfter<f64>,
-    /// Errors of each record, in the order in which the records came.
+    /// Errors of each, in their order.
     pub records: Vec<LeftOut>,
 }
 
@@ -52,7 +54,8 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
         let others = state.prepared.raw.0.without_member(record.number);
         let (of_others, _) = searched(&others, settings, watch)?;
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
-        out.add([of(&of_others.base)?, of(&of_others.current)?], &of_others.current.model);
+        let squares = [of(&of_others.base)?, of(&of_others.current)?];
+        out.add(squares, &of_others.current.model, Some(!leaves_more_than_noise(&of_others, settings)));
     }
     Ok(out.transfer())
 }
@@ -65,7 +68,7 @@ pub(crate) fn over_blocks(state: &State<'_>, watch: Watch<'_>) -> Result<Transfe
     for (done, block) in blocks.iter().enumerate() {
         report(watch, "blocks left out", done, blocks.len())?;
         let of = |fitted: &Fitted| on(block, &of_the_others(block, &fitted.model, &fitted.theta));
-        out.add([of(&state.base)?, of(&current)?], &current.model);
+        out.add([of(&state.base)?, of(&current)?], &current.model, None);
     }
     Ok(out.transfer())
 }
@@ -79,14 +82,14 @@ struct Errors {
 
 impl Errors {
     /// - `model`: that of the others
-    fn add(&mut self, squares: [Squares; 2], model: &Model) {
+    fn add(&mut self, squares: [Squares; 2], model: &Model, are_others_explained: Option<bool>) {
         for (sum, squares) in self.sums.iter_mut().zip(squares) {
             *sum = sum.and(squares);
         }
         let [normalised_rms, input_difference_k] = before_and_after(squares);
         let effects = model.effects.iter().filter(|effect| !effect.is_noise());
         let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
-        self.each.push(LeftOut { normalised_rms, input_difference_k, found });
+        self.each.push(LeftOut { normalised_rms, input_difference_k, found, are_others_explained });
     }
 
     fn transfer(self) -> Transfer {

@@ -75,7 +75,7 @@ fn a_long_delay_is_one_of_every_record() {
     let told = told(&joint.diagnosis);
     assert_eq!(named(&joint), [(Identifier::DELAY, Some(1))], "{told}");
     recovers(&joint.diagnosis.last, TAU_S, &told);
-    assert!(joint.records.iter().all(|record| record.disagreements.is_empty()), "{told}");
+    assert!(joint.records.iter().all(|record| record.agrees == Some(true)), "{told}");
     assert!(joint.transfer.normalised_rms.after < MAX_NOISE_RMS, "{:?}", joint.transfer);
 }
 
@@ -85,8 +85,29 @@ fn disagreeing(change_last: impl Fn(&mut [Sensor; 2])) -> (JointDiagnosis, Vec<b
     let mut all: Vec<Observations> = (0..5).map(|k| record(SEED + k, |_| ())).collect();
     all.push(record(SEED + 5, |sensors| change_last(sensors)));
     let joint = joint(&all);
-    let disagreeing = joint.records.iter().map(|record| !record.disagreements.is_empty()).collect();
+    let disagreeing: Vec<bool> = joint.records.iter().map(|record| !record.disagreements.is_empty()).collect();
+    let agreeing: Vec<Option<bool>> = disagreeing.iter().map(|disagrees| Some(!disagrees)).collect();
+    assert_eq!(joint.records.iter().map(|record| record.agrees).collect::<Vec<_>>(), agreeing);
     (joint, disagreeing)
+}
+
+/// Two records do not say how much records of the rig differ. Without the one of another sensor they are explained, and with it no two
+/// are.
+#[test]
+fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
+    let told = told(&joint.diagnosis);
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+}
+
+/// Of two records that differ either may be the odd one.
+#[test]
+fn of_two_records_none_is_named() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let joint = joint(&[record(SEED, |_| ()), of_another]);
+    assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{}", told(&joint.diagnosis));
 }
 
 /// Someone exchanged the second sensor before the last record: that one is named, with its time constant.

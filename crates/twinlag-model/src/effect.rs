@@ -28,6 +28,7 @@ mod identifier;
 mod known;
 mod of_members;
 mod parameter;
+mod twin;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -39,6 +40,7 @@ pub use context::Context;
 pub use identifier::Identifier;
 pub use known::KnownEffect;
 pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
+pub use twin::Twin;
 
 use crate::directions::Parts;
 use crate::error::ModelError;
@@ -129,6 +131,14 @@ pub trait Effect: Send + Sync {
     /// The effect as one record has it, and the places of its values, in a model of several where each has its own.
     fn in_record(&self, _number: usize) -> Option<(Shared, Range<usize>)> {
         None
+    }
+
+    /// What a record would mean if an exact twin of the effect were the cause: each is right with the time constants that it says, and
+    /// no record distinguishes them. By default there are none.
+    ///
+    /// - `tau_s`: time constants with this effect, s, where both sensors are first-order lags
+    fn twins(&self, _values: &[f64], _tau_s: [f64; 2]) -> Vec<Twin> {
+        Vec::new()
     }
 
     /// Prior knowledge of the parameters: functions of `values` that have zero mean and unit variance beforehand.

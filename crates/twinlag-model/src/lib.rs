@@ -51,7 +51,7 @@ pub use defects::{ChannelNoise, levels, line_channel, lines};
 pub use directions::{Install, Part, Parts};
 pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
-    candidates, described_by,
+    Twin, candidates, described_by,
 };
 pub use error::ModelError;
 pub use extended::Extended;

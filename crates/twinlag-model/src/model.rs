@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
-use crate::effect::{Identifier, Parameter, Shared};
+use crate::effect::{Identifier, Parameter, Shared, Twin};
 use crate::implied::{Details, Evaluation};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
@@ -22,6 +22,9 @@ const MIN_TAU_STEPS_BESIDE_KNOWN: f64 = 1e-3;
 /// Factor by which a fit may move a time constant that is known with a standard deviation, either way, wherever the samples end:
 /// further off than any data sheet.
 const KNOWN_TAU_FACTOR: f64 = 10.0;
+
+/// Standard deviations of what is known of a time constant within which another cause may move it: 95 %.
+const KNOWN_DEVIATIONS: f64 = 1.96;
 
 /// Prior knowledge of a time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +105,27 @@ impl Model {
     /// The first effect that is noise.
     pub fn noise(&self) -> Option<usize> {
         self.effects.iter().position(|e| e.is_noise())
+    }
+
+    /// What a record would mean if an exact twin of effect `index` were the cause, where there can be such a rig; none where an
+    /// effect of the model makes of a sensor more than a first-order lag of the gas, or where it contradicts what is known of a time
+    /// constant.
+    ///
+    /// - `theta`: all parameters
+    pub fn twins(&self, index: usize, theta: &[f64]) -> Vec<Twin> {
+        let leaves_lags = |(other, effect): (usize, &Shared)| other == index || effect.about().leaves_lags;
+        if !self.effects.iter().enumerate().all(leaves_lags) {
+            return Vec::new();
+        }
+        let tau_s = [theta[0], theta[1]];
+        let agrees = |twin: &Twin, known: &KnownTimeConstant| {
+            let off_s = (twin.time_constants_s[known.sensor] - known.value_s).abs();
+            twin.time_constants_s[known.sensor] == tau_s[known.sensor]
+                || known.std_s.is_some_and(|std_s| off_s <= KNOWN_DEVIATIONS * std_s)
+        };
+        let mut out = self.effects[index].twins(&theta[self.range(index)], tau_s);
+        out.retain(|twin| twin.is_possible() && self.known.iter().all(|known| agrees(twin, known)));
+        out
     }
 
     /// This model with another effect in place of effect `index`.

@@ -52,6 +52,8 @@ pub enum Error {
          same two sensors: choose their columns", expected[0], expected[1], found[0], found[1]
     )]
     OtherChannels { file: String, expected: [String; 2], found: [String; 2] },
+    #[error("{file}: {error}")]
+    InRecord { file: String, error: Box<Error> },
     #[error(
         "quiet segment {from_s}..{to_s}: expected seconds from the start of the record, which ends at {last_s} s, with \
          {needed} samples or more in unbroken stretches there"

@@ -45,6 +45,8 @@ pub struct About {
     pub follows_gas: bool,
     /// Whether a filter can undo it sample by sample, as readings come.
     pub is_streamable: bool,
+    /// Whether both sensors are first-order lags of the gas with it as without it.
+    pub leaves_lags: bool,
     /// Every form in which it may be added to a model of a record.
     pub candidates: fn(&Context) -> Vec<Shared>,
     /// The effect with the parameters that it was found with in another record.
@@ -74,6 +76,7 @@ impl About {
             changes_time_constants: false,
             follows_gas: false,
             is_streamable: false,
+            leaves_lags: false,
             candidates,
             restore: |known, context| Ok(described_by(known, (known.effect.about().candidates)(context))),
         }
@@ -160,6 +163,13 @@ impl About {
     #[must_use]
     pub const fn streamable(mut self) -> Self {
         self.is_streamable = true;
+        self
+    }
+
+    /// Both sensors are first-order lags of the gas with it as without it: it adds to what they read.
+    #[must_use]
+    pub const fn leaving_lags(mut self) -> Self {
+        self.leaves_lags = true;
         self
     }
 

@@ -8,7 +8,7 @@ use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
 use crate::effect::{
-    About, Context, Derived, Domain, Effect, Freedom, Identifier, Parameter, Seat, Shared, described_by,
+    About, Context, Derived, Domain, Effect, Freedom, Identifier, Parameter, Seat, Shared, Twin, described_by,
 };
 use crate::error::ModelError;
 use crate::number::{Curve, Number};
@@ -25,6 +25,7 @@ pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     )
     .imitating(&["radiation", "drift"])
     .at_rest()
+    .leaving_lags()
     .streamable()
     .restored_by(restore);
 
@@ -106,6 +107,13 @@ impl Effect for Calibration {
             Kind::Curved => return None,
         };
         Some((of_kind(kind, &self.context), start))
+    }
+
+    fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
+        match self.kind {
+            Kind::Gain | Kind::Both => (0..2).map(|channel| Twin::crosstalk(channel, values[0], tau_s)).collect(),
+            Kind::Offset | Kind::Curved => Vec::new(),
+        }
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

@@ -18,6 +18,7 @@ pub(crate) static ABOUT: About = About::new("coloured-noise", 13, candidates)
     )
     .imitating(&["input-mismatch", "drift"])
     .of_noise()
+    .leaving_lags()
     .streamable();
 
 struct ColouredNoise {

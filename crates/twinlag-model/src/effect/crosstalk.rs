@@ -1,8 +1,7 @@
 //! A share `ε` of one channel in the other, on top of its own reading: `y₁ + ε (y₂ − about)`; between the wires, or in a
 //! multiplexer that has not settled.
 //!
-//! With two first-order sensors `y₁ = H₁ x + ε H₂ x` has `y₁/y₂ = (1 + ε) (1 + τ' s)/(1 + τ₁ s)`,
-//! `τ' = (τ₂ + ε τ₁)/(1 + ε)`: no record distinguishes it from a gain of `1 + ε` and another `τ₂`.
+//! With two first-order sensors no record distinguishes it from a gain of `1 + ε` and another `τ₂`: see [`Twin`].
 //! If the share takes the place of a part of the reading, so that the static gain stays 1, it is a
 //! wrong `τ₂` and nothing else, and cannot be seen at all.
 
@@ -11,7 +10,7 @@ use std::sync::Arc;
 use twinlag_optimise::Variable;
 
 use crate::effect::KnownEffect;
-use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, described_by};
+use crate::effect::{About, Context, Derived, Domain, Effect, Identifier, Parameter, Seat, Shared, Twin, described_by};
 use crate::error::ModelError;
 use crate::number::Number;
 use crate::plant::Plant;
@@ -27,7 +26,7 @@ pub(crate) static ABOUT: About = About::new("crosstalk", 8, candidates)
     .restored_by(restore);
 
 /// Largest share: of more, wires are not crossed but swapped.
-const MAX_SHARE: f64 = 0.25;
+pub(super) const MAX_SHARE: f64 = 0.25;
 
 struct Crosstalk {
     channel: usize,
@@ -60,6 +59,11 @@ impl Effect for Crosstalk {
 
     fn starts(&self) -> Vec<Vec<f64>> {
         vec![vec![0.03]]
+    }
+
+    fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
+        let gain = Twin::calibration(self.channel, values[0], tau_s);
+        vec![gain, Twin::crosstalk(1 - self.channel, gain.value, gain.time_constants_s)]
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {

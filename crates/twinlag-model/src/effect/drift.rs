@@ -17,7 +17,8 @@ pub(crate) static ABOUT: About = About::new("drift", 12, candidates)
         "drift that both channels share",
     )
     .imitating(&["calibration", "slow-mode", "coloured-noise", "input-mismatch"])
-    .imitating_rest();
+    .imitating_rest()
+    .leaving_lags();
 
 struct Drift {
     seat: Seat,

@@ -18,6 +18,7 @@ pub(crate) static ABOUT: About = About::new("input-mismatch", 14, candidates)
     )
     .imitating(&["coloured-noise"])
     .of_noise()
+    .leaving_lags()
     .streamable();
 
 struct InputMismatch {

@@ -19,6 +19,7 @@ pub(crate) static ABOUT: About = About::new("mains-pickup", 3, candidates)
         "pick-up in both channels that their lags happen to make equal",
     )
     .at_one_frequency()
+    .leaving_lags()
     .restored_by(restore);
 
 struct MainsPickup {

@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, Found, Grade, Identifier, IfKnown, Judgement, Limit, Masked,
-    Move, Policy, Unexplained, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, ExactTwin, Found, Grade, Identifier, IfKnown, Judgement,
+    Limit, Masked, Move, Policy, Unexplained, Value, Verdict,
 };
 
 use crate::answers::{
-    Characterisation, FoundIn, GasSpectrum, LeftOutUnit, Model, ModelEffect, RecordAnswer, TransferAnswer,
+    Characterisation, EffectInPlace, FoundIn, GasSpectrum, LeftOutUnit, Model, ModelEffect, RecordAnswer,
+    TransferAnswer,
 };
 
 /// A number of an effect.
@@ -47,6 +48,9 @@ pub struct NamedEffect {
     pub evidence: Option<Evidence>,
     /// Other effects that explain this record equally well.
     pub alternatives: Vec<Identifier>,
+    /// Those of them that no record distinguishes from it, with the time constants that they mean; none where these are not given.
+    #[serde(default)]
+    pub exact_twins: Vec<NamedTwin>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
     /// Readings of the channel that are left out of the fit, in order, by their lines in the file.
@@ -78,8 +82,32 @@ impl NamedEffect {
             parameters: graded.collect(),
             evidence: found.evidence,
             alternatives: found.alternatives.clone(),
+            exact_twins: found.exact_twins.iter().map(|twin| NamedTwin::of(twin, channels)).collect(),
             seen: found.seen.clone(),
             masked: found.masked.clone(),
+        }
+    }
+}
+
+/// An effect that no record distinguishes from one that was found, and the numbers if it is the cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct NamedTwin {
+    /// The twin, with its channel.
+    #[serde(flatten)]
+    pub of: EffectInPlace,
+    /// Its parameter.
+    pub parameter: Value,
+    /// Time constants of both sensors, by the names of the channels.
+    pub time_constants: [Value; 2],
+}
+
+impl NamedTwin {
+    fn of(twin: &ExactTwin, channels: &[String; 2]) -> Self {
+        Self {
+            of: EffectInPlace { effect: twin.effect, channel: Some(channels[twin.channel].clone()) },
+            parameter: twin.parameter.clone(),
+            time_constants: [0, 1].map(|i| Value { name: channels[i].clone(), ..twin.time_constants[i].clone() }),
         }
     }
 }

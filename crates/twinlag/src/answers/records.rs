@@ -154,8 +154,11 @@ pub struct RecordAnswer {
     pub noise_std_k: [f64; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<RecordNumber>,
-    /// Whether it contradicts the others on no number.
-    pub agrees: bool,
+    /// Whether it agrees with the others: not so if it contradicts them on a number, or if without it they are explained and with it
+    /// they are not. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    pub agrees: Option<bool>,
+    /// Whether two lags and the effects that were found on them explain the others.
+    pub are_others_explained: bool,
     /// Shared numbers on which it contradicts all others together.
     pub disagreements: Vec<DisagreementAnswer>,
     /// Readings that are left out of the fit, by their lines in its file.
@@ -186,7 +189,8 @@ impl RecordAnswer {
             found_on_others: found.left_out.found.iter().map(|e| EffectInPlace::of(*e, channels)).collect(),
             noise_std_k: found.noise_std_k,
             own: found.own.iter().map(number).collect(),
-            agrees: disagreements.is_empty(),
+            agrees: found.agrees,
+            are_others_explained: found.left_out.are_others_explained == Some(true),
             disagreements,
             masked,
         }

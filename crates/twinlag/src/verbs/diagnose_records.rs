@@ -15,8 +15,8 @@ use crate::watch::{UNWATCHED, Watch};
 /// worth on a record that had no part in finding it.
 ///
 /// # Errors
-/// As [`crate::diagnose`], for any of the records; [`Error::Model`] for less than two; [`Error::OtherChannels`] for records of other
-/// sensors than the first.
+/// As [`crate::diagnose`]; [`Error::Model`] for less than two; [`Error::OtherChannels`] for records of other
+/// sensors than the first; [`Error::InRecord`] for one that cannot be used.
 ///
 /// ```
 #[doc = include_str!("../example.txt")]
@@ -46,7 +46,10 @@ pub fn diagnose_records_watched(
         let (expected, found) = (first.unwrap_or_default(), other.channels.clone());
         return Err(Error::OtherChannels { file: other.source.clone(), expected, found });
     }
-    let rows: Vec<Rows> = records.iter().map(Rows::of).collect::<Result<_, _>>()?;
+    let rows_of = |record: &Record| {
+        Rows::of(record).map_err(|error| Error::InRecord { file: record.source.clone(), error: Box::new(error) })
+    };
+    let rows: Vec<Rows> = records.iter().map(rows_of).collect::<Result<_, _>>()?;
     let observations: Vec<Observations> = rows.iter().map(|rows| rows.observations.clone()).collect();
     let joint = close_the_loop(&observations, &settings(options), watch)?;
     let joined = in_a_row(records, &observations)?;

@@ -1,0 +1,85 @@
+//! What explains a record as well as what is named, and what the time constants are then.
+
+use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, Value, covariance};
+use twinlag_optimise::Scale;
+
+use crate::naming::interval_95;
+use crate::remark::Remark;
+use crate::twins::ExactTwin;
+
+/// Relative change of an end of an interval that is worth a remark.
+const NOTICEABLE: f64 = 1e-3;
+/// Share of an interval by which other effects make it longer before the number is one of its cause: half as long again.
+const DECISIVE: f64 = 0.5;
+
+/// An effect that explains the record as well as the one that is named.
+pub(crate) struct Tie {
+    named: Identifier,
+    other: Identifier,
+    /// Both time constants and their difference if it is the cause.
+    numbers: [Option<Estimate>; 3],
+}
+
+struct Estimate {
+    value: f64,
+    standard_error: f64,
+    interval_95: [f64; 2],
+}
+
+impl Tie {
+    /// By the fit of the whole model with the other effect, which is done once more to the end.
+    pub(crate) fn fitted(named: Identifier, other: Identifier, fitted: &Fitted, prepared: &Prepared) -> Option<Self> {
+        let (observations, everything) = (&prepared.observations, &prepared.everything);
+        let fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
+        let covariance = covariance(&fitted, observations, everything, false)?;
+        let theta = &fitted.theta;
+        let variance = |i: usize, j: usize| covariance[i][j];
+        let estimate = |value: f64, variance: f64, scale: Scale| {
+            let standard_error = variance.max(0.0).sqrt();
+            Some(Estimate { value, standard_error, interval_95: interval_95(value, standard_error, &scale) })
+        };
+        let of_difference = variance(0, 0) + variance(1, 1) - 2.0 * variance(0, 1);
+        let numbers = [
+            estimate(theta[0], variance(0, 0), Scale::Logarithmic),
+            estimate(theta[1], variance(1, 1), Scale::Logarithmic),
+            estimate(theta[1] - theta[0], of_difference, Scale::Linear { typical: 1.0 }),
+        ];
+        Some(Self { named, other, numbers })
+    }
+
+    /// By algebra.
+    pub(crate) fn exact(named: Identifier, twin: &ExactTwin) -> Self {
+        let estimate = |number: &Value| {
+            let (standard_error, interval_95) = number.standard_error.zip(number.interval_95)?;
+            Some(Estimate { value: number.value, standard_error, interval_95 })
+        };
+        let [one, two] = &twin.time_constants;
+        Self { named, other: twin.effect, numbers: [one, two, &twin.difference].map(estimate) }
+    }
+}
+
+/// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
+/// the right one; returns what to say of that, and with which effect alone each of them was right before.
+pub(crate) fn widen(fit: &mut ModelFit, ties: &[Tie], policy: &Policy) -> (Option<Remark>, [Option<Identifier>; 3]) {
+    let (mut effects, mut causes) = (Vec::new(), [None; 3]);
+    for Tie { named, other, numbers } in ties {
+        for (i, estimate) in numbers.iter().enumerate() {
+            let Some(Estimate { value, standard_error, interval_95: [from, to] }) = estimate else { continue };
+            let number = if i < 2 { &mut fit.time_constants[i] } else { &mut fit.difference };
+            let Some([low, high]) = &mut number.interval_95_s else { continue };
+            if *standard_error > 0.0 && (i == 2 || *standard_error < policy.vague_log_std * value) {
+                let more = (*low - from).max(0.0) + (to - *high).max(0.0);
+                if i < 2 && more > NOTICEABLE * value {
+                    effects.push(*other);
+                }
+                if more > DECISIVE * (*high - *low) {
+                    causes[i] = Some(*named);
+                }
+                (*low, *high) = (low.min(*from), high.max(*to));
+            }
+        }
+    }
+    effects.sort_unstable_by_key(|e| e.name());
+    effects.dedup();
+    ((!effects.is_empty()).then_some(Remark::Widened { effects }), causes)
+}

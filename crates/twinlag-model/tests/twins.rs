@@ -1,0 +1,120 @@
+//! Which effects no record distinguishes: the derivatives of the residual by their parameters are parallel.
+
+use std::collections::BTreeSet;
+
+use twinlag_model::{
+    Context, Freedom, Identifier, Linearised, Model, Observations, Prepared, Settings, Shared, Stretch, candidates,
+};
+use twinlag_optimise::Scale;
+use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+const TAU_S: [f64; 2] = [0.012, 0.060];
+const PERIOD_S: f64 = 0.001;
+const SAMPLES: usize = 2000;
+const NOISE_K: f64 = 0.1;
+
+/// Share of the energy of a score that is left of it beside those of a twin: rounding of 1e-16 in each of two scores whose parts in
+/// common are some 1e4 times what differs between two effects leaves up to 1e-24.
+const PARALLEL: f64 = 1e-24;
+
+fn record() -> Prepared {
+    let sensors = [("T1", TAU_S[0]), ("T2", TAU_S[1])].map(|(name, tau_s)| {
+        let mut sensor = Sensor::new(name, tau_s);
+        sensor.noise = Some(Noise::white(NOISE_K));
+        sensor
+    });
+    let turbulence = Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 };
+    let gas = Gas::new(300.0, Signal::Turbulence(turbulence));
+    let rig = Rig::new(4, Record::new(SAMPLES, PERIOD_S), gas, sensors).expect("a rig");
+    let simulated = rig.simulate().expect("finite numbers");
+    let time_s = (0..SAMPLES).map(|k| k as f64 * PERIOD_S).collect();
+    let stretch = Stretch::new(time_s, [simulated.t1_c, simulated.t2_c]);
+    let observations = Observations::new(vec![stretch], Some(PERIOD_S)).expect("finite and long");
+    Prepared::new(&observations, &Settings::default()).expect("a record")
+}
+
+/// Effects whose numbers are those of a rig. What follows the gas needs an estimate of it, and what lies at one frequency a line.
+fn of_rigs(context: &Context) -> Vec<Shared> {
+    let all = Identifier::ALL.into_iter().filter(|id| {
+        let about = id.about();
+        !about.is_noise && !about.is_defect && !about.is_narrow && !about.follows_gas && !about.changes_time_constants
+    });
+    let mut context = context.clone();
+    context.tau_s = TAU_S;
+    candidates(&all.collect::<Vec<_>>(), &context)
+}
+
+/// Values with which an effect changes next to nothing.
+fn next_to_nothing(effect: &Shared) -> Vec<f64> {
+    let values = effect.parameters().iter().zip(effect.starts().remove(0)).map(|(parameter, start)| {
+        match (parameter.name, &parameter.variable.scale) {
+            ("gain", _) => 1.0,
+            ("offset", _) => 0.0,
+            (_, Scale::Logarithmic) => 1e-2 * start,
+            _ => 1e-6 * start,
+        }
+    });
+    values.collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// Share of the energy of the score of an effect's main parameter that scores of another model do not account for.
+///
+/// - `before`: parameters of that model, which come first
+fn left_of_main(scores: &Linearised, before: usize, effect: &Shared) -> Option<f64> {
+    let without = |v: &[f64], basis: &[Vec<f64>]| {
+        let mut out = v.to_vec();
+        // Once more takes off what rounding has left.
+        for q in basis.iter().chain(basis) {
+            let along = dot(&out, q);
+            out.iter_mut().zip(q).for_each(|(v, q)| *v -= along * q);
+        }
+        out
+    };
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for score in &scores.columns[..before] {
+        let left = without(score, &basis);
+        let norm = dot(&left, &left).sqrt();
+        if norm > 1e-12 * dot(score, score).sqrt() {
+            basis.push(left.iter().map(|v| v / norm).collect());
+        }
+    }
+    let score = &scores.columns[before + effect.main()?];
+    let left = without(score, &basis);
+    Some(dot(&left, &left) / dot(score, score))
+}
+
+/// Of all pairs the library calls those twins whose scores are parallel to rounding, and no others: beside an effect of some size and
+/// both time constants, the score of another effect is a sum of theirs.
+#[test]
+fn twins_are_those_whose_scores_are_parallel() {
+    let prepared = record();
+    let all = of_rigs(&prepared.context);
+    let two_lags = Model::new(&[], [NOISE_K; 2]);
+    let (mut parallel, mut twins) = (BTreeSet::new(), BTreeSet::new());
+    for one in &all {
+        let theta = [&TAU_S[..], &one.starts()[0]].concat();
+        let model = two_lags.with(one.clone());
+        let name = |effect: Identifier, channel: Option<usize>| (effect.name(), channel);
+        let named = name(one.identifier(), one.channel());
+        twins.extend(model.twins(0, &theta).into_iter().map(|twin| (named, name(twin.effect, Some(twin.channel)))));
+        // A form of the same effect in the same channel is no twin of it, and an offset none of an effect that has one.
+        let numbers: Vec<Freedom> = one.parameters().iter().filter_map(|parameter| parameter.determines).collect();
+        let is_another = |other: &&Shared| {
+            let main = other.main().map(|main| &other.parameters()[main]);
+            let is_in_it = main.and_then(|main| main.determines).is_some_and(|number| numbers.contains(&number));
+            name(other.identifier(), other.channel()) != named && !is_in_it
+        };
+        for other in all.iter().filter(is_another) {
+            let both = [&theta[..], &next_to_nothing(other)].concat();
+            let scores = model.with(other.clone()).linearised(&both, &prepared.observations, &prepared.everything);
+            if left_of_main(&scores, theta.len(), other).is_some_and(|left| left < PARALLEL) {
+                parallel.insert((named, name(other.identifier(), other.channel())));
+            }
+        }
+    }
+    assert_eq!(parallel, twins);
+}
