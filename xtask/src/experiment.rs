@@ -4,6 +4,7 @@ mod coverage;
 mod grades;
 mod loops;
 mod pair;
+mod planning;
 mod policy;
 mod reconstruction;
 mod stored;

@@ -30,6 +30,7 @@ Find missing effects:     twinlag diagnose run.csv --report run.html
 What a name means:        twinlag explain two-sensors
 Get the gas temperature:  twinlag compensate run.csv --out gas.csv
 Follow changing flow:     twinlag track run.csv --out tau.csv
+Plan the next record:     twinlag plan rig.toml
 Use it in a script:       twinlag characterise run.csv --json
 
 Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer the question,
@@ -65,6 +66,8 @@ pub(crate) enum Command {
     Track(Box<Track>),
     /// Simulate a record from the description of a rig: gas, sensors, noise, converter.
     Simulate(Simulate),
+    /// Say what the next record would have to be for narrower intervals, or to distinguish two effects, from a rig or a diagnosis.
+    Plan(Plan),
     /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the
     /// results.
     #[command(subcommand)]
@@ -523,6 +526,24 @@ pub(crate) struct Simulate {
     /// Overwrite the output if it exists.
     #[arg(long)]
     pub(crate) force: bool,
+}
+
+/// Say what the next record would have to be.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+FILE is a rig (see 'twinlag simulate --help'), a model written by 'twinlag diagnose --save', or the output of
+'twinlag diagnose --json'. A rig is taken as it is described. After a diagnosis the sensors are those that it found, in a gas
+with the spectrum that the record showed.
+
+Standard errors are expected from a record of the rig that is simulated without noise, to first order in the noise: for the record
+as it is, for other rates and lengths, for other gas, for other sensors, and for noise levels that are known. The deviance
+between two effects is that to expect with everything fitted again. Nothing is said of effects that are not in the rig.
+
+Exit codes: 0 planned, 4 the record as it is does not determine both time constants, or the model has none, 2 wrong usage, 3 the file
+cannot be used, 1 any other error.")]
+pub(crate) struct Plan {
+    /// The rig, a TOML file; or a model or a diagnosis, a JSON file.
+    pub(crate) file: PathBuf,
 }
 
 /// Explain a name in plain words.

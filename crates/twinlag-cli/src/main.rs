@@ -19,6 +19,7 @@ mod grades;
 mod if_known;
 mod live;
 mod output;
+mod plan;
 mod print;
 mod progress;
 mod records;
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Command::Diagnose(command) => diagnose::run(&command, console),
         Command::Compensate(command) => compensate::run(&command, console),
         Command::Simulate(command) => simulate::run(&command, console),
+        Command::Plan(command) => plan::run(&command, console),
         Command::Track(command) => track::run(&command, console),
         Command::Study(command) => study::run(&command, console),
         Command::Explain(command) => explain::run(&command, console),

@@ -62,7 +62,7 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
 }
 
 /// Reads the rig in `spec`; relative paths in it are relative to its folder.
-fn read(spec: &Path) -> Result<Rig, Failure> {
+pub(crate) fn read(spec: &Path) -> Result<Rig, Failure> {
     let name = spec.display();
     let text =
         std::fs::read_to_string(spec).map_err(|error| Failure::File(format!("{name}: cannot be read: {error}")))?;

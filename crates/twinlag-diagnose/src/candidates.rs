@@ -127,7 +127,7 @@ pub(crate) fn white_gain(before: &Fitted, after: &Fitted) -> f64 {
 
 /// Whether the model lacks the effect, and can take it: it repeats none, excludes none, and determines
 /// nothing that another one determines.
-pub(crate) fn accepts(model: &Model, effect: &Shared) -> bool {
+pub fn accepts(model: &Model, effect: &Shared) -> bool {
     let id = effect.identifier();
     let is_form_of =
         |e: &Shared| e.identifier() == id && (e.channel() == effect.channel() || !effect.about().is_narrow);

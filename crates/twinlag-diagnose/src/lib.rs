@@ -61,6 +61,7 @@ mod ties;
 mod transfer;
 mod twins;
 
+pub use candidates::accepts;
 pub use diagnose::diagnose;
 pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;

@@ -82,6 +82,23 @@ pub enum Signal {
     Series(Series),
 }
 
+impl Signal {
+    /// This signal with every deviation so many times as large. A series is left as it is, since its mean is its own.
+    #[must_use]
+    pub fn excited(&self, factor: f64) -> Self {
+        let of_tone = |tone: &Tone| Tone { amplitude_k: factor * tone.amplitude_k, ..*tone };
+        match self {
+            Self::Sine(tone) => Self::Sine(of_tone(tone)),
+            Self::MultiTone(tones) => Self::MultiTone(MultiTone { tones: tones.tones.iter().map(of_tone).collect() }),
+            Self::Engine(engine) => Self::Engine(Engine { amplitude_k: factor * engine.amplitude_k, ..*engine }),
+            Self::Turbulence(signal) => Self::Turbulence(Turbulence { std_k: factor * signal.std_k, ..*signal }),
+            Self::Plunge(plunge) => Self::Plunge(Plunge { amplitude_k: factor * plunge.amplitude_k, ..*plunge }),
+            Self::Broadband(signal) => Self::Broadband(Broadband { std_k: factor * signal.std_k, ..*signal }),
+            Self::Series(series) => Self::Series(series.clone()),
+        }
+    }
+}
+
 impl Gas {
     /// A continuous gas with one signal for all trials.
     ///

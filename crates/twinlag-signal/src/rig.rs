@@ -122,6 +122,29 @@ impl Rig {
         Self { sensors, ..self }.checked()
     }
 
+    /// This rig in another gas.
+    ///
+    /// ```
+    /// use twinlag_signal::{Broadband, Gas, Record, Rig, Sensor, Signal};
+    ///
+    /// let sensors = [Sensor::new("fine", 0.02), Sensor::new("coarse", 0.1)];
+    /// let gas = Gas::new(300.0, Signal::Broadband(Broadband { std_k: 5.0, corner_hz: 1.0 }));
+    /// let rig = Rig::new(1, Record::new(100, 0.01), gas, sensors)?;
+    /// let mut gas = rig.gas().clone();
+    /// gas.signal = gas.signal.excited(2.0);
+    /// let louder = rig.clone().with_gas(gas)?;
+    /// // The same random numbers, twice as far from the mean.
+    /// let (quiet, loud) = (rig.clean(0)?.gas_c, louder.clean(0)?.gas_c);
+    /// assert!(quiet.iter().zip(&loud).all(|(a, b)| (2.0 * (a - 300.0) - (b - 300.0)).abs() < 1e-9));
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_gas(self, gas: Gas) -> Result<Self, SignalError> {
+        Self { gas, ..self }.checked()
+    }
+
     /// This rig with a different gas for one of the sensors.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ mod compensation;
 mod diagnosis;
 mod fitted;
 mod found_in;
+mod gas_spectrum;
 mod model;
 mod records;
 mod track;
@@ -17,6 +18,7 @@ pub use characterisation::{
 pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit, NamedTwin};
 pub use found_in::FoundIn;
+pub use gas_spectrum::{GasBand, GasSpectrum};
 pub use model::{Model, ModelEffect, ModelNumber};
 pub use records::{
     DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer, RecordNumber, TransferAnswer, TransferError,

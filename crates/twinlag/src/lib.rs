@@ -84,9 +84,9 @@ mod watch;
 
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
-    ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasFault, IntervalMethod, LeftOutUnit, MadeBy, Model,
-    ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, Quality, Ratio, RecordAnswer, RecordNumber,
-    RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
+    ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, IntervalMethod, LeftOutUnit,
+    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, Quality, Ratio, RecordAnswer,
+    RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
 pub use error::Error;
 pub use options::Options;

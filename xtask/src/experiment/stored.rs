@@ -9,7 +9,9 @@ use twinlag_study::{Results, Study};
 
 use super::reconstruction::Reconstruction;
 use super::tracking::Tracking;
-use super::{Run, coverage, grades, loops, observed, options, place, policy, provenance, reconstruction, tracking};
+use super::{
+    Run, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking,
+};
 
 /// What a plan begins with.
 pub(super) struct Head<'a> {
@@ -53,6 +55,7 @@ pub(super) fn read(name: &str, text: &str) -> Option<Result<Box<dyn Own>>> {
     Some(match name {
         coverage::NAME => coverage::Plan::read(text).map(own),
         grades::NAME => grades::Plan::read(text).map(own),
+        planning::NAME => planning::Plan::read(text).map(own),
         policy::NAME => policy::Plan::read(text).map(own),
         reconstruction::NAME => reconstruction::Plan::read(text).map(Reconstruction::new).map(own),
         tracking::NAME => tracking::Plan::read(text).map(Tracking::new).map(own),

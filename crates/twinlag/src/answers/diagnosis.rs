@@ -7,7 +7,8 @@ use twinlag_diagnose::{
 };
 
 use crate::answers::{
-    Characterisation, EffectInPlace, FoundIn, LeftOutUnit, Model, ModelEffect, RecordAnswer, TransferAnswer,
+    Characterisation, EffectInPlace, FoundIn, GasSpectrum, LeftOutUnit, Model, ModelEffect, RecordAnswer,
+    TransferAnswer,
 };
 
 /// A number of an effect.
@@ -175,6 +176,10 @@ pub struct Diagnosis {
     /// The data that it is of; `None` in answers of earlier versions.
     #[serde(default)]
     pub found_in: Option<FoundIn>,
+    /// The spectrum of the gas as the record shows it; `None` of unevenly sampled records, of those with gaps, and of those with more
+    /// than 65 536 samples.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas_spectrum: Option<GasSpectrum>,
     /// Whether a measured flow was there, with which time constants may go.
     pub has_flow: bool,
     /// What the loop did to the model, move by move; channels are counted from 0.
@@ -228,6 +233,7 @@ impl Diagnosis {
                 explained_to: self.explained_to,
                 effects: self.effects.iter().map(ModelEffect::given).collect(),
                 found_in: self.found_in.clone(),
+                gas_spectrum: self.gas_spectrum.clone(),
                 ..Model::of(&self.last)
             },
         }

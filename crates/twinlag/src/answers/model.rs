@@ -5,7 +5,7 @@ use twinlag_compensate::GasParts;
 use twinlag_diagnose::{Diagnosis, Found, Grade, Identifier, Judgement, KnownEffect, Reason, Value, Verdict};
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, EffectNumber, FoundIn, MadeBy, NamedEffect};
+use crate::answers::{Characterisation, EffectNumber, FoundIn, GasSpectrum, MadeBy, NamedEffect};
 use crate::error::Error;
 use crate::options::Options;
 
@@ -40,6 +40,10 @@ pub struct Model {
     /// record begins, and ends there if nothing else explains more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas: Option<GasParts>,
+    /// The spectrum of the gas as the record of a diagnosis shows it; `None` as in [`Self::verdict`], and where that record has
+    /// none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gas_spectrum: Option<GasSpectrum>,
     /// What made it.
     pub made_by: MadeBy,
 }
@@ -123,6 +127,7 @@ impl Model {
             time_constant_grades: None,
             found_in: None,
             gas: None,
+            gas_spectrum: None,
             made_by: MadeBy::with(&Options::default()),
         }
     }
@@ -142,6 +147,7 @@ impl Model {
             verdict: Some(core.verdict),
             explained_to: core.explained_to,
             found_in,
+            gas_spectrum: GasSpectrum::of(&core.last.trace.gas_c),
             ..of_last
         }
     }

@@ -9,8 +9,8 @@ use twinlag_estimate::{Hold, Intervals};
 use twinlag_record::Record;
 
 use crate::answers::{
-    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, LeftOutUnit, NamedEffect,
-    Status, TransferAnswer,
+    Characterisation, Diagnosis, ErrorBeforeAfter, FittedAnswer, FoundIn, FreeParameters, GasSpectrum, LeftOutUnit,
+    NamedEffect, Status, TransferAnswer,
 };
 use crate::error::Error;
 use crate::options::Options;
@@ -106,6 +106,7 @@ pub(crate) fn answer(
         remarks,
         without: options.without.clone(),
         found_in: Some(FoundIn::of(record)),
+        gas_spectrum: GasSpectrum::of(&core.last.trace.gas_c),
         has_flow: record.flow.is_some() || record.speed_m_s.is_some(),
         moves: core.moves.clone(),
         policy: core.policy.clone(),

@@ -1,0 +1,90 @@
+//! The spectrum of the gas that a record shows, in bands: what a record to come may expect.
+
+use serde::{Deserialize, Serialize};
+use twinlag_diagnose::Line;
+use twinlag_transform::{Tapered, hann};
+
+/// Fewest samples of a usable spectrum.
+const MIN_SAMPLES: usize = 64;
+/// Ratio of the ends of a band: a sixth of an octave.
+const BAND_RATIO: f64 = 1.122_462_048_309_373;
+/// Share of the variance below which a band is left out.
+const MIN_SHARE: f64 = 1e-9;
+/// Part of a sample period by which a step may differ.
+const MAX_UNEVEN_SHARE: f64 = 1e-3;
+
+/// The power of a gas temperature in bands of a sixth of an octave.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct GasSpectrum {
+    /// Mean temperature, °C.
+    #[serde(rename = "mean_C")]
+    pub mean_c: f64,
+    /// Bands in order of frequency. Their powers add up to the variance.
+    pub bands: Vec<GasBand>,
+}
+
+/// The power of a gas temperature in a band.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct GasBand {
+    /// Mean frequency, each weighted by its power, Hz.
+    pub frequency_hz: f64,
+    /// Power, K².
+    #[serde(rename = "power_K2")]
+    pub power_k2: f64,
+}
+
+impl GasSpectrum {
+    /// The spectrum of a line: its tapered periodogram (Hann), bin by bin `2 |X|² / (n Σ w²)`, scaled so that all bands together
+    /// have the variance of the values. `None` where values are missing, are not evenly spaced or do not change, or are fewer than 64.
+    ///
+    /// ```
+    /// use twinlag::GasSpectrum;
+    /// use twinlag::diagnosis::Line;
+    ///
+    /// let mut line = Line::default();
+    /// line.time_s = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+    /// line.value = line.time_s.iter().map(|t| 300.0 + 4.0 * (std::f64::consts::TAU * 2.0 * t).sin()).collect();
+    /// let spectrum = GasSpectrum::of(&line).expect("even, and it changes");
+    /// // Half the square of the amplitude; 20 whole periods, so that the variance is exact.
+    /// let power_k2: f64 = spectrum.bands.iter().map(|band| band.power_k2).sum();
+    /// assert!((spectrum.mean_c - 300.0).abs() < 1e-9 && (power_k2 - 8.0).abs() < 1e-9);
+    /// // Hann's taper spreads a line over three bins of 0.1 Hz.
+    /// let near = spectrum.bands.iter().filter(|band| (band.frequency_hz - 2.0).abs() < 0.21);
+    /// assert!(near.map(|band| band.power_k2).sum::<f64>() > 0.999 * power_k2);
+    /// ```
+    pub fn of(line: &Line) -> Option<Self> {
+        let (time_s, values) = (&line.time_s, &line.value);
+        let n = values.len();
+        if n < MIN_SAMPLES || n != time_s.len() || !values.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let period_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
+        let is_even = |pair: &[f64]| (pair[1] - pair[0] - period_s).abs() <= MAX_UNEVEN_SHARE * period_s;
+        if !time_s.windows(2).all(is_even) {
+            return None;
+        }
+        let mean_c = values.iter().sum::<f64>() / n as f64;
+        let variance_k2 = values.iter().map(|v| (v - mean_c).powi(2)).sum::<f64>() / n as f64;
+        let transform = Tapered::new(hann(n)).transform(values.iter().map(|v| v - mean_c));
+        let power: Vec<f64> = transform.iter().map(|x| x.norm_sqr()).collect();
+        let total: f64 = power[1..].iter().sum();
+        if !(variance_k2 > 0.0 && total > 0.0) {
+            return None;
+        }
+        let to_hz = 1.0 / (n as f64 * period_s);
+        let mut bands = Vec::new();
+        let mut from = 1;
+        while from < power.len() {
+            let to = ((from as f64 * BAND_RATIO).ceil() as usize).clamp(from + 1, power.len());
+            let sum: f64 = power[from..to].iter().sum();
+            if sum > MIN_SHARE * total {
+                let moment: f64 = (from..to).map(|bin| bin as f64 * power[bin]).sum();
+                bands.push(GasBand { frequency_hz: to_hz * moment / sum, power_k2: variance_k2 * sum / total });
+            }
+            from = to;
+        }
+        Some(Self { mean_c, bands })
+    }
+}
