@@ -33,6 +33,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         print::notes(&record, console);
         records.push(record);
     }
+    no_copies(&records)?;
     let (record, answer) = match &records[..] {
         [record] => (Cow::Borrowed(record), diagnose(record, &options, console)?),
         records => (Cow::Owned(twinlag::joined(records)?), diagnose_records(records, &options, console)?),
@@ -85,7 +86,6 @@ fn no_copies(records: &[Record]) -> Result<(), Failure> {
 
 fn diagnose_records(records: &[Record], options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
     let samples: usize = records.iter().map(Record::len).sum();
-    no_copies(records)?;
     let progress = Progress::start(console, format!("diagnosing {samples} samples of {} records", records.len()));
     let watch = |task: &str, done, total| progress.watch(task, done, total);
     let all: Vec<&str> = records.iter().map(|record| record.source.as_str()).collect();

@@ -1,6 +1,6 @@
 //! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, Permissions};
 use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
@@ -102,29 +102,56 @@ pub(crate) fn data<T: ToString>(
     if to_stdout {
         return written(&mut stdout().lock(), "standard output");
     }
-    whole(out, |file| written(file, &out.display().to_string()))
+    replace(out, |file| written(file, &out.display().to_string()))
 }
 
-/// Writes a file beside the one that it becomes when it is whole: a run that is broken off leaves the old one, or none. What is
-/// no file, a pipe or a device, is written as it is.
-fn whole(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
-    let failed = |error: &std::io::Error| cannot_be_written(path, error);
-    // What a link leads to is replaced, and not the link.
-    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let old = std::fs::metadata(&path).ok();
-    if old.as_ref().is_some_and(|old| !old.is_file()) {
-        let mut device = OpenOptions::new().write(true).open(&path).map_err(|e| failed(&e))?;
-        return write(&mut device);
+/// Writes a file beside the one that it replaces when it is whole: a run that fails leaves the old one, or none; one that is killed
+/// leaves the part beside it, `.twinlag-*.part`. The new file has the permissions of the old one, and no other hard links. What is no
+/// file, a pipe or a device, and a file in a folder that takes no new ones, is written in place.
+fn replace(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| cannot_be_written(path, &error);
+    let is_link = std::fs::symlink_metadata(path).is_ok_and(|there| there.is_symlink());
+    let Ok(target) = path.canonicalize() else {
+        // A link that leads nowhere yet is kept as well.
+        return if is_link {
+            write(&mut File::create(path).map_err(failed)?)
+        } else {
+            replace_in(path, path, None, write)
+        };
+    };
+    // A file that may not be written is not replaced either.
+    let old = OpenOptions::new().write(true).open(&target).and_then(|old| old.metadata()).map_err(failed)?;
+    // Whoever opened the standard streams holds the file itself.
+    if !old.is_file() || path.starts_with("/dev") {
+        return write(&mut OpenOptions::new().write(true).open(path).map_err(failed)?);
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    replace_in(path, &target, Some(old.permissions()), write)
+}
+
+/// - `path`: the name that messages have
+/// - `target`: the file that it is
+/// - `permissions`: those of the old file, if there is one
+fn replace_in(
+    path: &Path,
+    target: &Path,
+    permissions: Option<Permissions>,
+    write: impl FnOnce(&mut File) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| cannot_be_written(path, &error);
+    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // Opened by hand, it can be read by whoever may read other new files of the user.
     let new = |path: &Path| File::options().write(true).create_new(true).open(path);
-    let mut part = Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new).map_err(|e| failed(&e))?;
+    let mut part = match Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new) {
+        Ok(part) => part,
+        Err(_) if permissions.is_some() => return write(&mut File::create(target).map_err(failed)?),
+        Err(error) => return Err(failed(error)),
+    };
+    if let Some(permissions) = permissions {
+        part.as_file().set_permissions(permissions).map_err(failed)?;
+    }
     write(part.as_file_mut())?;
-    let file = part.as_file();
-    let kept = old.map_or(Ok(()), |old| file.set_permissions(old.permissions()));
-    kept.and_then(|()| file.sync_all()).map_err(|e| failed(&e))?;
-    part.persist(&path).map_err(|e| failed(&e.error))?;
+    part.as_file().sync_all().map_err(failed)?;
+    part.persist(target).map_err(|error| failed(error.error))?;
     Ok(())
 }
 
@@ -172,7 +199,7 @@ impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
 }
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
-    whole(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
+    replace(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
 }
 
 /// The command line of this run, quoted for a shell.
@@ -202,7 +229,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("out.csv");
         write(&path, "old").expect("can be written");
-        let broken = whole(&path, |file| {
+        let broken = replace(&path, |file| {
             file.write_all(b"half of").expect("can be written");
             Err(Failure::Other("broken off".into()))
         });

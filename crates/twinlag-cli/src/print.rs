@@ -407,7 +407,10 @@ fn twin_line(twin: &NamedTwin) -> String {
     };
     let channel = twin.of.channel.as_deref().unwrap_or_default();
     let [parameter, t1, t2] = [&twin.parameter, &twin.time_constants[0], &twin.time_constants[1]].map(number);
-    format!("    no record distinguishes {} in {channel}: {parameter}, then {t1} and {t2} (95 %)", twin.of.effect)
+    format!(
+        "    {} in {channel} would look the same: {parameter}, and then {t1}, {t2}, each with its 95 % interval",
+        twin.of.effect
+    )
 }
 
 /// The table of both models, after an empty line.

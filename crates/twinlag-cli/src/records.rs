@@ -42,7 +42,10 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
         lines.extend(own(record));
         lines.extend(record.disagreements.iter().map(|one| disagreement(&record.source, one)));
         if record.agrees == Some(false) && record.disagreements.is_empty() {
-            lines.push(format!("  {} contradicts the others: without it they are explained", record.source));
+            lines.push(format!(
+                "  {} contradicts the others: it is explained alone, and they are without it, but not together",
+                record.source
+            ));
         }
     }
     lines

@@ -56,9 +56,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         // The model lacks what looks like noise of the gas.
         found.retain(|(_, found)| !found.effect.is_noise());
     }
-    let has_noise = with_effects.model.noise().is_some();
-    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.rapid.is_none();
-    let excess = excess(&last, has_noise).filter(is_bounded);
+    let excess = bounded_excess(&state, &with_effects, &last, policy);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
     let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
@@ -126,6 +124,22 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     })
 }
 
+/// What is left over beside the noise, where intervals can cover it.
+fn bounded_excess(state: &State<'_>, fitted: &Fitted, fit: &ModelFit, policy: &Policy) -> Option<Excess> {
+    let is_bounded = |excess: &Excess| excess.share <= policy.explained_excess_share && state.rapid.is_none();
+    excess(fit, fitted.model.noise().is_some()).filter(is_bounded)
+}
+
+/// Whether two lags and what a search has found explain its record.
+pub(crate) fn is_explained(state: &State<'_>, settings: &Settings) -> bool {
+    let policy = &settings.policy;
+    let fitted = to_the_end(&state.current, state);
+    let fit = summary(&fitted, state, policy);
+    let left = what_is_left(&fit, policy);
+    let unbounded = left.as_ref().filter(|_| bounded_excess(state, &fitted, &fit, policy).is_none());
+    matches!(verdict(state, state.taken.is_empty(), unbounded, policy), Verdict::Adequate | Verdict::Explained)
+}
+
 /// Whether a search has left more than noise in its record.
 pub(crate) fn leaves_more_than_noise(state: &State<'_>, settings: &Settings) -> bool {
     let fitted = to_the_end(&state.current, state);
@@ -166,7 +180,8 @@ fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>]) -> Vec<Tie> {
         out.extend(twins.iter().map(|twin| Tie::exact(named, twin)));
         let fitted = taken.ties.iter().filter_map(|tie| {
             let other = tie.effect.identifier();
-            let is_exact = twins.iter().any(|twin| twin.effect == other);
+            let place = (other, tie.effect.channel());
+            let is_exact = twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == place);
             let is_whole = tie.fitted.model.effects.len() == effects;
             let is_new = !tie.effect.is_noise() && is_whole && !is_exact;
             is_new.then(|| Tie::fitted(named, other, &tie.fitted, &state.prepared)).flatten()

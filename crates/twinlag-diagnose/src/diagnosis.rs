@@ -49,7 +49,7 @@ pub struct Found {
     pub evidence: Option<Evidence>,
     /// Other effects that explain this record equally well.
     pub alternatives: Vec<Identifier>,
-    /// Those of them that no record distinguishes from it, with the time constants that they mean; none where these are not given.
+    /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     pub exact_twins: Vec<ExactTwin>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,

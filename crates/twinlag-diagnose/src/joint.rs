@@ -4,12 +4,15 @@ use twinlag_model::{
     Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Policy, Settings, Value, Watch,
 };
 
-use crate::conclude::{conclude, to_the_end};
+use crate::conclude::{conclude, is_explained, to_the_end};
 use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
 use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
+
+/// Fewest records of which one can be the odd one.
+const FEWEST_TO_HAVE_AN_ODD_ONE: usize = 3;
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,8 +50,8 @@ pub struct OfRecord {
     pub noise_std_k: [f64; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
-    /// Whether it agrees with the others: not so if it contradicts them on a number, or if without it they are explained and with it
-    /// they are not. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
+    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all.
     pub agrees: Option<bool>,
     /// Shared numbers on which it contradicts all others together.
     pub disagreements: Vec<Disagreement>,
@@ -112,38 +115,59 @@ pub fn diagnose_records(
     let transfer = transfer(&state, settings, watch)?;
     let last = to_the_end(&state.current, &state);
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
+    let odd = odd_one(&state, &transfer, settings, watch)?;
     let diagnosis = conclude(state, settings, tones)?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
+    let odd = odd.filter(|_| !is_whole);
     let between = diagnosis.last.between.as_ref();
     let disagreements: Vec<_> =
         (0..records.len()).map(|record| disagreements(record, &last, between, settings)).collect();
-    let contradicts = |record: usize| !disagreements[record].is_empty();
-    let alone = (!is_whole).then(|| the_one_without_which_others_are_explained(&transfer)).flatten();
-    let is_one_named = alone.is_some() || (0..records.len()).any(contradicts);
-    let is_known = is_one_named || (is_whole && !between.is_some_and(|between| differ(between, &settings.policy)));
+    let is_any_named = disagreements.iter().any(|of_record| !of_record.is_empty());
+    let differ = between.is_some_and(|between| differ(between, &settings.policy));
+    let do_others_agree = odd.is_some() || (is_whole && (is_any_named || !differ));
+    let agrees = |record: usize| {
+        if odd == Some(record) || !disagreements[record].is_empty() {
+            Some(false)
+        } else {
+            do_others_agree.then_some(true)
+        }
+    };
     let of = |record: usize| OfRecord {
         samples: records[record].samples(),
         left_out: transfer.records[record].clone(),
         noise_std_k: noise_std_k[record],
         own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
-        agrees: is_known.then_some(!contradicts(record) && alone != Some(record)),
+        agrees: agrees(record),
         disagreements: disagreements[record].clone(),
     };
     let records = (0..records.len()).map(of).collect();
     Ok(JointDiagnosis { diagnosis, records, transfer })
 }
 
-/// The record without which all others are explained, if there is only one.
-fn the_one_without_which_others_are_explained(transfer: &Transfer) -> Option<usize> {
-    let mut explained =
-        transfer.records.iter().enumerate().filter(|(_, left_out)| left_out.are_others_explained == Some(true));
-    let (record, _) = explained.next()?;
-    explained.next().is_none().then_some(record)
+/// The one record without which the others are explained, if it is explained alone as well: then it is another rig. One that is not
+/// may only show what the others are too short or too quiet for. `None` of two records, either of which may be it.
+fn odd_one(
+    state: &State<'_>,
+    transfer: &Transfer,
+    settings: &Settings,
+    watch: Watch<'_>,
+) -> Result<Option<usize>, ModelError> {
+    let explained: Vec<usize> = (0..transfer.records.len())
+        .filter(|record| transfer.records[*record].are_others_explained == Some(true))
+        .collect();
+    let &[odd] = &explained[..] else { return Ok(None) };
+    if transfer.records.len() < FEWEST_TO_HAVE_AN_ODD_ONE {
+        return Ok(None);
+    }
+    let number = state.prepared.each_record()[odd].number;
+    let (alone, _) = searched(&state.prepared.raw.0.of_member(number), settings, watch)?;
+    Ok(is_explained(&alone, settings).then_some(odd))
 }
 
 /// Whether the records differ in a shared number by more than chance.
 fn differ(between: &Between, policy: &Policy) -> bool {
-    between.parameters.iter().flatten().any(|number| number.p_value < policy.records_rejection_probability)
+    let mut numbers = between.parameters.iter().chain([&between.difference]).flatten();
+    numbers.any(|number| number.p_value < policy.records_rejection_probability)
 }
 
 /// Noise of the channels of each record, K.

@@ -205,7 +205,7 @@ pub(crate) fn judge_effect(
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
     }
     // What a twin follows from comes first.
-    found.exact_twins.iter_mut().for_each(|twin| twin.widen(range.start, fit, circumstances));
+    found.exact_twins.iter_mut().for_each(|twin| twin.widen(range.start, last, fit, circumstances));
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@
 
 use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
 
-use crate::conclude::{leaves_more_than_noise, to_the_end};
+use crate::conclude::{is_explained, to_the_end};
 use crate::diagnose::searched;
 use crate::diagnosis::BeforeAfter;
 use crate::errors::Squares;
@@ -55,7 +55,7 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
         let (of_others, _) = searched(&others, settings, watch)?;
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
         let squares = [of(&of_others.base)?, of(&of_others.current)?];
-        out.add(squares, &of_others.current.model, Some(!leaves_more_than_noise(&of_others, settings)));
+        out.add(squares, &of_others.current.model, Some(is_explained(&of_others, settings)));
     }
     Ok(out.transfer())
 }

@@ -58,22 +58,38 @@ pub(crate) fn exact_twins(index: usize, last: &Fitted, fit: &ModelFit, allowed: 
 }
 
 impl ExactTwin {
-    /// Makes the intervals as wide as those of the numbers that they follow from.
+    /// Makes the intervals wider by as much as those of the numbers that they follow from: by the largest factor of these.
     ///
-    /// - `parameter`: place of the parameter of the effect among all of the model
-    pub(crate) fn widen(&mut self, parameter: usize, fit: &ModelFit, circumstances: &Circumstances<'_>) {
-        let basis = circumstances.whole_basis();
+    /// - `parameter`: place of the parameter of the effect among all of the model `last`
+    pub(crate) fn widen(&mut self, parameter: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
+        let factor = [0, 1, parameter]
+            .into_iter()
+            .filter_map(|place| widening(place, last, fit, circumstances))
+            .fold(1.0, f64::max);
         let [one, two] = &mut self.time_constants;
-        for (place, value) in [(0, one), (1, two), (parameter, &mut self.parameter)] {
-            let between = fit.between.as_ref().and_then(|between| between.parameters[place].as_ref());
-            let number = Number {
-                value: value.value,
-                interval_95: value.interval_95,
-                scatter: fit.scatter[place],
-                between: RecordScatter::of(between),
-                is_positive: place < 2,
-            };
-            value.interval_95 = number.judged(Vec::new(), &basis, circumstances.policy).1;
+        for number in [one, two] {
+            number.interval_95 =
+                number.standard_error.map(|error| log_normal_interval_95(number.value, factor * error));
+        }
+        for number in [&mut self.parameter, &mut self.difference] {
+            let half = number.standard_error.map(|error| factor * Z_975 * error);
+            number.interval_95 = half.map(|half| [number.value - half, number.value + half]);
         }
     }
+}
+
+/// Factor by which the interval of a number is wider with all that it has to cover; `None` of one without an interval.
+fn widening(place: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) -> Option<f64> {
+    let value = last.theta[place];
+    let half = Z_975 * fit.covariance.as_ref()?[place][place].max(0.0).sqrt();
+    let between = fit.between.as_ref().and_then(|between| between.parameters[place].as_ref());
+    let number = Number {
+        value,
+        interval_95: (half > 0.0).then_some([value - half, value + half]),
+        scatter: fit.scatter[place],
+        between: RecordScatter::of(between),
+        is_positive: false,
+    };
+    let [low, high] = number.judged(Vec::new(), &circumstances.whole_basis(), circumstances.policy).1?;
+    Some((value - low).max(high - value) / half)
 }

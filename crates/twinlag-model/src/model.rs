@@ -3,6 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
+use twinlag_cross_relation::Z_975;
 use twinlag_optimise::Variable;
 
 use crate::effect::{Identifier, Parameter, Shared, Twin};
@@ -22,9 +23,6 @@ const MIN_TAU_STEPS_BESIDE_KNOWN: f64 = 1e-3;
 /// Factor by which a fit may move a time constant that is known with a standard deviation, either way, wherever the samples end:
 /// further off than any data sheet.
 const KNOWN_TAU_FACTOR: f64 = 10.0;
-
-/// Standard deviations of what is known of a time constant within which another cause may move it: 95 %.
-const KNOWN_DEVIATIONS: f64 = 1.96;
 
 /// Prior knowledge of a time constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +119,7 @@ impl Model {
         let agrees = |twin: &Twin, known: &KnownTimeConstant| {
             let off_s = (twin.time_constants_s[known.sensor] - known.value_s).abs();
             twin.time_constants_s[known.sensor] == tau_s[known.sensor]
-                || known.std_s.is_some_and(|std_s| off_s <= KNOWN_DEVIATIONS * std_s)
+                || known.std_s.is_some_and(|std_s| off_s <= Z_975 * std_s)
         };
         let mut out = self.effects[index].twins(&theta[self.range(index)], tau_s);
         out.retain(|twin| twin.is_possible() && self.known.iter().all(|known| agrees(twin, known)));

@@ -87,6 +87,43 @@ fn left_of_main(scores: &Linearised, before: usize, effect: &Shared) -> Option<f
     Some(dot(&left, &left) / dot(score, score))
 }
 
+/// With the values of a twin the whitened residual is what it was, to rounding, but for its sign.
+#[test]
+fn a_twin_has_the_same_residual() {
+    let prepared = record();
+    let all = of_rigs(&prepared.context);
+    let residual = |effect: &Shared, tau_s: [f64; 2], value: f64| {
+        let model = Model::new(&[], [NOISE_K; 2]).with(effect.clone());
+        let theta = [tau_s[0], tau_s[1], value];
+        (model.linearised(&theta, &prepared.observations, &prepared.everything).residual, model.twins(0, &theta))
+    };
+    let of = |id: Identifier, channel: usize, parameter: &str| {
+        let is_it = |effect: &&Shared| {
+            let names: Vec<&str> = effect.parameters().iter().map(|parameter| parameter.name).collect();
+            effect.identifier() == id && effect.channel() == Some(channel) && names == [parameter]
+        };
+        // The first crosstalk of a channel is about 0 °C, as a gain without an offset is.
+        all.iter().find(is_it).expect("an effect of the library")
+    };
+    let ones = [
+        (Identifier::CALIBRATION, 1, "gain", 1.04),
+        (Identifier::CROSSTALK, 0, "share", 0.03),
+        (Identifier::CROSSTALK, 1, "share", -0.05),
+    ];
+    for (id, channel, parameter, value) in ones {
+        let (want, twins) = residual(of(id, channel, parameter), TAU_S, value);
+        assert_eq!(twins.len(), 2, "{id}");
+        for twin in twins {
+            let effect = of(twin.effect, twin.channel, twin.parameter);
+            let (got, _) = residual(effect, twin.time_constants_s, twin.value);
+            let differences = |sign: f64| got.iter().zip(&want).map(|(a, b)| (a - sign * b).powi(2)).sum::<f64>();
+            let off = differences(1.0).min(differences(-1.0)) / dot(&want, &want);
+            // As the scores, by parts that are some 1e4 times what differs.
+            assert!(off < PARALLEL, "{id} in {channel}: {twin:?} off by {off:e}");
+        }
+    }
+}
+
 /// Of all pairs the library calls those twins whose scores are parallel to rounding, and no others: beside an effect of some size and
 /// both time constants, the score of another effect is a sum of theirs.
 #[test]

@@ -65,13 +65,19 @@ pub(crate) fn with_unit(number: &str, of: &str) -> String {
     if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
 }
 
+/// A number with its interval.
+pub(crate) fn with_interval(value: f64, interval_95: Option<[f64; 2]>, unit: &str) -> String {
+    let ends = interval_95.map_or(String::new(), |ends| format!(", 95 % from {}", between(ends)));
+    format!("{}{ends}", with_unit(&rounded(value, 4), unit))
+}
+
 /// A number of an effect with its interval and its grade, or why it is not given.
 pub(crate) fn parameter(number: &EffectNumber) -> String {
     let name = parameter_in_words(&number.name);
     match number.value {
         Some(value) => {
-            let ends = number.interval_95.map_or(String::new(), |ends| format!(", 95 % from {}", between(ends)));
-            format!("{name} {}{ends} ({})", with_unit(&rounded(value, 4), &number.unit), number.judgement.grade)
+            let number_in_words = with_interval(value, number.interval_95, &number.unit);
+            format!("{name} {number_in_words} ({})", number.judgement.grade)
         }
         None => format!("{name} not given ({})", number.judgement.because),
     }

@@ -28,16 +28,17 @@ pub(crate) static ABOUT: About = About::new("delay", 5, candidates)
 const USUAL_SHARE: f64 = 0.3;
 const USUAL_PERIODS: f64 = 0.5;
 
-/// Where fits start, in sample periods: at a part of one and, both ways, at a few and further, each so many times the one before.
+/// Where fits start, in sample periods: at a part of one and, both ways, at a few and further, each so many times the one before, up to
+/// this share of the longest that there can be.
 /// Measured: from a few alone, fits of 12 to 25 periods beside a time constant of 12 end in another minimum.
 const NEAR_START_PERIODS: f64 = 0.3;
 const FAR_START_PERIODS: f64 = 3.0;
 const START_RATIO: f64 = 3.0;
+const LAST_START_SHARE: f64 = 0.8;
 
 struct Delay {
     seat: Seat,
     step_s: f64,
-    longest_s: f64,
     faster_s: f64,
 }
 
@@ -48,7 +49,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
     let delay = Parameter::new("delay", "s", variable).as_lateness();
     let seat = Seat::new(Identifier::DELAY, Some(1), vec![delay]);
     let faster_s = context.tau_s[0].min(context.tau_s[1]);
-    vec![Arc::new(Delay { seat, step_s: context.step_s, longest_s, faster_s })]
+    vec![Arc::new(Delay { seat, step_s: context.step_s, faster_s })]
 }
 
 impl Effect for Delay {
@@ -57,10 +58,11 @@ impl Effect for Delay {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        let longest = self.longest_s / self.step_s;
-        let further = |far: &f64| (far * START_RATIO < longest).then_some(far * START_RATIO);
-        let far = successors(Some(FAR_START_PERIODS), further).flat_map(|far| [-far, far]);
-        let starts = [NEAR_START_PERIODS].into_iter().chain(far);
+        let longest = self.seat.parameters[0].variable.upper / self.step_s;
+        let last = LAST_START_SHARE * longest;
+        let further = |far: &f64| Some(far * START_RATIO).filter(|far| *far < last);
+        let far = successors(Some(FAR_START_PERIODS).filter(|far| *far < last), further).chain([last]);
+        let starts = [NEAR_START_PERIODS].into_iter().chain(far.flat_map(|far| [-far, far]));
         starts.map(|periods| inside(&self.seat.parameters, &[periods * self.step_s])).collect()
     }
 

@@ -15,7 +15,8 @@
 //!
 //! which is the gain `1 + ε` with `τ₁'` in place of `τ₁`; a share in channel 1 likewise. Noise of the readings goes the same ways, the
 //! temperature at which a share adds nothing is an offset, and the factors of the discrete model are as linear in `τ`, so that
-//! it is exact there too. `tests/twins.rs` goes through all pairs of effects: there are no other twins.
+//! it is exact there too. `tests/twins.rs` goes through all pairs of effects whose numbers are those of a rig, in time constants that
+//! are the same along the record: there are no other twins.
 
 use super::Identifier;
 use super::crosstalk::MAX_SHARE;

@@ -1,13 +1,13 @@
 //! What a diagnosis says in short: verdict, effects, the record.
 
-use twinlag::diagnosis::{Identifier, Verdict};
-use twinlag::{NamedEffect, SensorEstimate};
+use twinlag::diagnosis::{Identifier, Value, Verdict};
+use twinlag::{NamedEffect, NamedTwin, SensorEstimate};
 use twinlag_report::{Document, Table, rounded};
 
 use super::Page;
 use crate::words::{
-    apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence, with_unit,
-    words,
+    apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence,
+    with_interval, with_unit, words,
 };
 
 impl Page<'_> {
@@ -145,6 +145,15 @@ fn masked(document: Document, found: &NamedEffect) -> Document {
     )))
 }
 
+/// An effect that no record distinguishes, with the numbers if it is the cause.
+fn twin(twin: &NamedTwin) -> String {
+    let number =
+        |number: &Value| format!("{} {}", number.name, with_interval(number.value, number.interval_95, &number.unit));
+    let [one, two] = &twin.time_constants;
+    let what = format!("{} in {}", words(twin.of.effect), place(twin.of.channel.as_ref()));
+    format!("{what}, with {}; {}; {}", number(&twin.parameter), number(one), number(two))
+}
+
 /// What is said of an effect.
 fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
     let about = found.effect.about();
@@ -154,6 +163,8 @@ fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
     facts.push(("What was found", sentence(&seen.collect::<Vec<_>>().join("; "))));
     facts.push(("What to do", sentence(about.advice)));
     facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
+    let twins: Vec<String> = found.exact_twins.iter().map(twin).collect();
+    facts.push(("Would look exactly the same", twins.join("; ")));
     let confusable: Vec<Identifier> =
         found.effect.imitates().filter(|other| !found.alternatives.contains(other)).collect();
     facts.push(("Resembles, if it is small", identifiers(&confusable)));

@@ -154,8 +154,8 @@ pub struct RecordAnswer {
     pub noise_std_k: [f64; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<RecordNumber>,
-    /// Whether it agrees with the others: not so if it contradicts them on a number, or if without it they are explained and with it
-    /// they are not. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
+    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all.
     pub agrees: Option<bool>,
     /// Whether two lags and the effects that were found on them explain the others.
     pub are_others_explained: bool,
