@@ -119,10 +119,10 @@ fn text(plan: &Plan, file: &Path) -> String {
         lines.push(String::new());
         lines.push(format!(
             "expected deviance between {} and what looks like it (deciding: {}; clear: two standard deviations more):",
-            named(&rivals[0].effect, rivals[0].channel.as_deref()),
+            named(rivals[0].effect, rivals[0].channel.as_deref()),
             digits(plan.deciding_deviance, 2)
         ));
-        let rival = |rival: &PlannedRival| named(&rival.rival, rival.rival_channel.as_deref());
+        let rival = |rival: &PlannedRival| named(rival.rival, rival.rival_channel.as_deref());
         let header = std::iter::once("record".to_owned()).chain(rivals.iter().map(rival));
         let row = |record: &PlannedRecord| {
             let cells = record.rivals.get(places.clone()).unwrap_or_default().iter().map(deviance);
@@ -168,7 +168,7 @@ fn over_now(number: &PlannedNumber) -> String {
     }
 }
 
-fn named(effect: &Identifier, channel: Option<&str>) -> String {
+fn named(effect: Identifier, channel: Option<&str>) -> String {
     channel.map_or_else(|| effect.to_string(), |channel| format!("{effect} of {channel}"))
 }
 

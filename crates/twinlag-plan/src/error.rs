@@ -23,7 +23,7 @@ pub enum PlanError {
     ChangingFlow,
     #[error(
         "the model has no time constant of {channel}: expected both, since there is no rig without them. Diagnose a record that \
-         determines both, give one that is known (--known {channel}.time_constant_s=0.5), or describe the rig"
+         determines both, know one of them beforehand, or describe the rig"
     )]
     NoTimeConstant { channel: String },
     #[error(

@@ -73,7 +73,7 @@ impl Expected {
         let observations = Observations::new(vec![Stretch::new(clean.time_s, clean.readings_c)], Some(period_s))?;
         let settings = Settings {
             noise_std_k: Some(noise_std_k),
-            effects: Identifier::ALL.into_iter().filter(can_be_planned).collect(),
+            effects: Identifier::ALL.into_iter().filter(|effect| can_be_planned(*effect)).collect(),
             ..Settings::default()
         };
         let mut prepared = Prepared::new(&observations, &settings)?;
@@ -141,7 +141,7 @@ fn without_held(products: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
 }
 
 /// Whether an effect can be in a plan: defects of data and steady lines are no part of what the sensors do.
-fn can_be_planned(effect: &Identifier) -> bool {
+fn can_be_planned(effect: Identifier) -> bool {
     !effect.about().is_defect && !effect.about().is_narrow
 }
 

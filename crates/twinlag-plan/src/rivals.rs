@@ -53,12 +53,12 @@ impl Rival {
         &self.fitted
     }
 
-    /// The same rival where the levels of the noise are known.
+    /// This rival where the levels of the noise are known.
     pub(crate) fn with_known_noise(&self) -> Self {
         Self { fitted_noise: self.known_noise, ..self.clone() }
     }
 
-    /// The same rival where the record is another one.
+    /// This rival on another record.
     pub(crate) fn on(&self, expected: &Expected) -> Self {
         let own = &expected.fitted;
         let other = &self.fitted.model.effects[self.index];

@@ -175,7 +175,7 @@ impl Stored for Plan {
                 of.map_or("–".into(), |(mean, std, error)| format!("{std:.2} ± {error:.2} ({mean:+.1})"))
             };
             let mean = |place: usize| {
-                let of = moments(place).and_then(|m| m.mean());
+                let of = moments(place).and_then(twinlag_study::Moments::mean);
                 of.map_or("–".into(), |mean| format!("{mean:.1}"))
             };
             let found = |place: usize| {

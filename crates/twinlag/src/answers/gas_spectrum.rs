@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use twinlag_diagnose::Line;
-use twinlag_transform::{Tapered, hann};
+use twinlag_transform::{Complex64, Tapered, hann};
 
 /// Fewest samples of a usable spectrum.
 const MIN_SAMPLES: usize = 64;
@@ -68,7 +68,7 @@ impl GasSpectrum {
         let mean_c = values.iter().sum::<f64>() / n as f64;
         let variance_k2 = values.iter().map(|v| (v - mean_c).powi(2)).sum::<f64>() / n as f64;
         let transform = Tapered::new(hann(n)).transform(values.iter().map(|v| v - mean_c));
-        let power: Vec<f64> = transform.iter().map(|x| x.norm_sqr()).collect();
+        let power: Vec<f64> = transform.iter().map(Complex64::norm_sqr).collect();
         let total: f64 = power[1..].iter().sum();
         if !(variance_k2 > 0.0 && total > 0.0) {
             return None;
