@@ -29,14 +29,17 @@ pub(crate) fn run(command: &Command, console: Console) -> Result<u8, Failure> {
     };
     let plan = match planned {
         Ok(plan) => plan,
-        Err(error @ PlanError::NoTimeConstant { .. }) => {
+        Err(PlanError::NoTimeConstant { channel }) => {
+            // Here the option can be shown as it would be typed to `diagnose`.
+            let example = format!("--known {channel}.time_constant_s=0.5");
+            let error = PlanError::NoTimeConstant { channel };
             if console.json {
                 let because = error.to_string();
                 print::json(
                     &json!({"schema": Plan::SCHEMA, "status": PlanStatus::NotIdentifiable, "because": because}),
                 )?;
             }
-            return Err(Failure::Undetermined(format!("{}: {error}", command.file.display())));
+            return Err(Failure::Undetermined(format!("{}: {error} (for example {example})", command.file.display())));
         }
         Err(error) => return Err(Failure::File(format!("{}: {error}", command.file.display()))),
     };

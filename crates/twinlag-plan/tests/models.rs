@@ -41,7 +41,7 @@ fn a_model_without_what_a_rig_needs_is_refused_with_what_was_expected() {
     let refused = |change: &dyn Fn(&mut Value)| Plan::of_model(&model(change)).expect_err("refused");
     let error = refused(&|m| m["time_constants_s"][1] = Value::Null);
     assert_eq!(error, PlanError::NoTimeConstant { channel: "coarse".into() });
-    assert!(error.to_string().contains("--known coarse.time_constant_s"), "{error}");
+    assert!(error.to_string().contains("no time constant of coarse: expected both"), "{error}");
     assert_eq!(refused(&|m| m["gas_spectrum"] = Value::Null), PlanError::NoSpectrum);
     assert!(matches!(refused(&|m| m["found_in"] = Value::Null), PlanError::NotSaved { .. }));
     assert!(
