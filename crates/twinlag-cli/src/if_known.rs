@@ -3,6 +3,7 @@
 use twinlag::diagnosis::{Held, IfKnown};
 use twinlag_pages::parameter_in_words;
 
+use crate::columns::columns;
 use crate::print::{decimals_of, digits};
 
 /// Rows at most.
@@ -47,12 +48,8 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
         row.extend(of_effects(v).into_iter().map(|(_, value)| value));
         (if v.is_excluded == Some(true) { "x" } else { " " }, row)
     });
-    let rows: Vec<(&str, Vec<String>)> = [(" ", header)].into_iter().chain(rows).collect();
-    let width = |i: usize| rows.iter().filter_map(|(_, row)| row.get(i)).map(|c| c.chars().count()).max().unwrap_or(0);
-    for (mark, row) in &rows {
-        let cells = row.iter().enumerate().map(|(i, cell)| format!("{cell:>0$}", width(i)));
-        lines.push(format!("  {mark} {}", cells.collect::<Vec<_>>().join("  ")));
-    }
+    let (marks, rows): (Vec<&str>, Vec<Vec<String>>) = [(" ", header)].into_iter().chain(rows).unzip();
+    lines.extend(marks.iter().zip(columns(&rows, |_| false)).map(|(mark, row)| format!("  {mark} {row}")));
     lines.push("  a value from a data sheet settles it if its row is not no-go, as with --known T1=0.5s, or --known T1=0.5s+-20%".into());
     lines
 }

@@ -9,6 +9,7 @@
 
 mod arguments;
 mod characterise;
+mod columns;
 mod compensate;
 mod console;
 mod demo;

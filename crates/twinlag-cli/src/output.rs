@@ -1,10 +1,10 @@
 //! Output files: checked before the work begins, and overwritten only if the user asks for it.
 
-use std::fs::{File, OpenOptions, Permissions};
+use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
-use tempfile::Builder;
+use tempfile::{Builder, NamedTempFile};
 use twinlag::Model;
 use twinlag::record::{Decimals, RecordError, write_csv};
 
@@ -106,53 +106,45 @@ pub(crate) fn data<T: ToString>(
 }
 
 /// Writes a file beside the one that it replaces when it is whole: a run that fails leaves the old one, or none; one that is killed
-/// leaves the part beside it, `.twinlag-*.part`. The new file has the permissions of the old one, and no other hard links. What is no
-/// file, a pipe or a device, and a file in a folder that takes no new ones, is written in place.
+/// leaves the part beside it, `.twinlag-*.part`. The new file has the permissions of the old one, and no other hard links.
 fn replace(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
     let failed = |error: std::io::Error| cannot_be_written(path, &error);
-    let is_link = std::fs::symlink_metadata(path).is_ok_and(|there| there.is_symlink());
-    let Ok(target) = path.canonicalize() else {
-        // A link that leads nowhere yet is kept as well.
-        return if is_link {
-            write(&mut File::create(path).map_err(failed)?)
-        } else {
-            replace_in(path, path, None, write)
-        };
+    let Some((mut part, target)) = part_of(path).map_err(failed)? else {
+        return write(&mut File::create(path).map_err(failed)?);
     };
-    // A file that may not be written is not replaced either.
-    let old = OpenOptions::new().write(true).open(&target).and_then(|old| old.metadata()).map_err(failed)?;
-    // Whoever opened the standard streams holds the file itself.
-    if !old.is_file() || path.starts_with("/dev") {
-        return write(&mut OpenOptions::new().write(true).open(path).map_err(failed)?);
-    }
-    replace_in(path, &target, Some(old.permissions()), write)
-}
-
-/// - `path`: the name that messages have
-/// - `target`: the file that it is
-/// - `permissions`: those of the old file, if there is one
-fn replace_in(
-    path: &Path,
-    target: &Path,
-    permissions: Option<Permissions>,
-    write: impl FnOnce(&mut File) -> Result<(), Failure>,
-) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| cannot_be_written(path, &error);
-    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    // Opened by hand, it can be read by whoever may read other new files of the user.
-    let new = |path: &Path| File::options().write(true).create_new(true).open(path);
-    let mut part = match Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new) {
-        Ok(part) => part,
-        Err(_) if permissions.is_some() => return write(&mut File::create(target).map_err(failed)?),
-        Err(error) => return Err(failed(error)),
-    };
-    if let Some(permissions) = permissions {
-        part.as_file().set_permissions(permissions).map_err(failed)?;
-    }
     write(part.as_file_mut())?;
     part.as_file().sync_all().map_err(failed)?;
     part.persist(target).map_err(|error| failed(error.error))?;
     Ok(())
+}
+
+/// A new file beside the one that `path` is, and the path of that; `None` where it is written in place: what is no file, a pipe or a
+/// device, a standard stream, a link that leads nowhere yet, and a file in a folder that takes no new ones.
+fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)>> {
+    let is_link = std::fs::symlink_metadata(path).is_ok_and(|there| there.is_symlink());
+    // Whoever opened a standard stream holds the file that it is.
+    let is_stream = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"].iter().any(|stream| path.starts_with(stream));
+    let (target, old) = match path.canonicalize() {
+        // A file that may not be written is not replaced either.
+        Ok(target) => (target.clone(), Some(File::options().write(true).open(target)?.metadata()?)),
+        Err(_) => (path.to_owned(), None),
+    };
+    if is_stream || (is_link && old.is_none()) || old.as_ref().is_some_and(|old| !old.is_file()) {
+        return Ok(None);
+    }
+    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // Opened by hand, it can be read by whoever may read other new files of the user.
+    let new = |path: &Path| File::options().write(true).create_new(true).open(path);
+    let part = match (Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new), old) {
+        (Ok(part), None) => part,
+        (Ok(part), Some(old)) => {
+            part.as_file().set_permissions(old.permissions())?;
+            part
+        }
+        (Err(_), Some(_)) => return Ok(None),
+        (Err(error), None) => return Err(error),
+    };
+    Ok(Some((part, target)))
 }
 
 /// A table that gets a cell at the end of each row.
@@ -238,6 +230,20 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).expect("is there").count(), 1);
         write(&path, "new").expect("can be written");
         assert_eq!(std::fs::read(&path).expect("is there"), b"new");
+    }
+
+    /// What a link leads to is written, whether it is there yet or not, with nothing of a longer old file left.
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [link, file] = ["link", "file"].map(|name| folder.path().join(name));
+        std::os::unix::fs::symlink(&file, &link).expect("can be linked");
+        for text in ["a longer text", "short"] {
+            write(&link, text).expect("can be written");
+            assert!(std::fs::symlink_metadata(&link).is_ok_and(|link| link.is_symlink()));
+            assert_eq!(std::fs::read(&file).expect("is there"), text.as_bytes());
+        }
     }
 
     /// Text may come in pieces that end anywhere.

@@ -5,13 +5,13 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::json;
-use twinlag::diagnosis::Identifier;
 use twinlag::signal::Rig;
 use twinlag::{Diagnosis, Model};
 use twinlag_pages::parameter_in_words;
 use twinlag_plan::{Plan, PlanError, PlanStatus, PlannedNumber, PlannedRecord, PlannedRival, Source};
 
 use crate::arguments::Plan as Command;
+use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::print::{self, digits};
@@ -58,6 +58,10 @@ enum Subject {
     Model(Box<Model>),
 }
 
+/// What can be planned.
+const EXPECTED: &str =
+    "expected a rig in TOML, a model written by `twinlag diagnose --save`, or the output of `twinlag diagnose --json`";
+
 /// What every JSON of this program begins with.
 #[derive(Deserialize)]
 struct Schema {
@@ -70,13 +74,13 @@ impl Subject {
         let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
         let text = std::fs::read_to_string(file).map_err(|e| wrong(format!("cannot be read: {e}")))?;
         if !text.trim_start().starts_with('{') {
-            return Ok(Self::Rig(Box::new(simulate::read(file)?)));
+            let rig = simulate::read(file).map_err(|failure| match failure {
+                Failure::File(text) => Failure::File(format!("{}\n{EXPECTED}", text.trim_end())),
+                other => other,
+            });
+            return Ok(Self::Rig(Box::new(rig?)));
         }
-        let not_json = |e: serde_json::Error| {
-            wrong(format!(
-                "expected a rig in TOML, a model written by `twinlag diagnose --save`, or the output of `twinlag diagnose --json`: {e}"
-            ))
-        };
+        let not_json = |e: serde_json::Error| wrong(format!("{e}\n{EXPECTED}"));
         let Schema { schema } = serde_json::from_str(&text).map_err(not_json)?;
         let model = match schema.as_str() {
             Model::SCHEMA => serde_json::from_str(&text).map_err(not_json)?,
@@ -122,11 +126,10 @@ fn text(plan: &Plan, file: &Path) -> String {
         lines.push(String::new());
         lines.push(format!(
             "expected deviance between {} and what looks like it (deciding: {}; clear: two standard deviations more):",
-            named(rivals[0].effect, rivals[0].channel.as_deref()),
+            rivals[0].effect_in_words(),
             digits(plan.deciding_deviance, 2)
         ));
-        let rival = |rival: &PlannedRival| named(rival.rival, rival.rival_channel.as_deref());
-        let header = std::iter::once("record".to_owned()).chain(rivals.iter().map(rival));
+        let header = std::iter::once("record".to_owned()).chain(rivals.iter().map(PlannedRival::rival_in_words));
         let row = |record: &PlannedRecord| {
             let cells = record.rivals.get(places.clone()).unwrap_or_default().iter().map(deviance);
             std::iter::once(record.description.clone()).chain(cells).collect::<Vec<_>>()
@@ -171,26 +174,12 @@ fn over_now(number: &PlannedNumber) -> String {
     }
 }
 
-fn named(effect: Identifier, channel: Option<&str>) -> String {
-    channel.map_or_else(|| effect.to_string(), |channel| format!("{effect} of {channel}"))
-}
-
 fn deviance(rival: &PlannedRival) -> String {
     let clear = if rival.is_distinguished { " clear" } else { "" };
     format!("{:.1} ± {:.1}{clear}", rival.deviance, rival.standard_deviation)
 }
 
-/// Rows with cells under each other.
-fn table(rows: &[Vec<String>]) -> Vec<String> {
-    let columns = rows.first().map_or(0, Vec::len);
-    let width = |i: usize| rows.iter().filter_map(|row| Some(row.get(i)?.chars().count())).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, width))| match i {
-            0 => format!("{cell:<width$}"),
-            _ => format!("{cell:>width$}"),
-        });
-        format!("  {}", cells.collect::<Vec<_>>().join("  ")).trim_end().to_owned()
-    };
-    rows.iter().map(line).collect()
+/// A table whose rows are named in the first column.
+fn table(rows: &[Vec<String>]) -> impl Iterator<Item = String> {
+    columns(rows, |column| column == 0).into_iter().map(|line| format!("  {line}"))
 }

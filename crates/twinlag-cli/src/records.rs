@@ -3,6 +3,7 @@
 use twinlag::{Diagnosis, DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer};
 use twinlag_pages::parameter_in_words;
 
+use crate::columns::columns;
 use crate::print::{digits, interval};
 
 /// The table, after an empty line; nothing of a single record.
@@ -16,7 +17,7 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
     ];
     let header = ["record", "two lags", "with effects", "effects that the others show", "agrees"].map(str::to_owned);
     let row = |name: &str, before: f64, after: f64, found: String, agrees: &str| {
-        [name.to_owned(), digits(before, 4), digits(after, 4), found, agrees.to_owned()]
+        vec![name.to_owned(), digits(before, 4), digits(after, 4), found, agrees.to_owned()]
     };
     let of_record = |record: &RecordAnswer| {
         let rms = record.error.held_out_normalised_rms;
@@ -29,15 +30,9 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
     };
     let rms = transfer.error.held_out_normalised_rms;
     let all = row("all", rms.before, rms.after, String::new(), "");
-    let rows: Vec<[String; 5]> =
-        [header].into_iter().chain(answer.records.iter().map(of_record)).chain([all]).collect();
-    let width = |i: usize| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0);
-    let widths = [0, 1, 2, 3].map(width);
-    let [w0, w1, w2, w3] = widths;
-    for [name, before, after, found, agrees] in &rows {
-        let line = format!("  {name:<w0$}  {before:>w1$}  {after:>w2$}  {found:<w3$}  {agrees}");
-        lines.push(line.trim_end().to_owned());
-    }
+    let rows: Vec<Vec<String>> =
+        [header.to_vec()].into_iter().chain(answer.records.iter().map(of_record)).chain([all]).collect();
+    lines.extend(columns(&rows, |column| ![1, 2].contains(&column)).into_iter().map(|line| format!("  {line}")));
     for record in &answer.records {
         lines.extend(own(record));
         lines.extend(record.disagreements.iter().map(|one| disagreement(&record.source, one)));

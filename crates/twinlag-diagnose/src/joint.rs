@@ -152,15 +152,15 @@ fn odd_one(
     settings: &Settings,
     watch: Watch<'_>,
 ) -> Result<Option<usize>, ModelError> {
-    let explained: Vec<usize> = (0..transfer.records.len())
-        .filter(|record| transfer.records[*record].are_others_explained == Some(true))
-        .collect();
+    let left_out = transfer.records.iter().enumerate();
+    let explained = left_out.filter(|(_, left_out)| left_out.are_others_explained == Some(true));
+    let explained: Vec<usize> = explained.map(|(record, _)| record).collect();
     let &[odd] = &explained[..] else { return Ok(None) };
     if transfer.records.len() < FEWEST_TO_HAVE_AN_ODD_ONE {
         return Ok(None);
     }
-    let number = state.prepared.each_record()[odd].number;
-    let (alone, _) = searched(&state.prepared.raw.0.of_member(number), settings, watch)?;
+    let all = &state.prepared.raw.0;
+    let (alone, _) = searched(&all.of_member(all.members()[odd].number), settings, watch)?;
     Ok(is_explained(&alone, settings).then_some(odd))
 }
 

@@ -1,10 +1,12 @@
 //! Exact twins of an effect that was found, in numbers: no record distinguishes them, and each is right with time constants of its own.
 
-use twinlag_cross_relation::{Z_975, log_normal_interval_95};
+use twinlag_cross_relation::Z_975;
 use twinlag_model::{Fitted, Identifier, ModelFit, Twin, Value};
+use twinlag_optimise::Scale;
 
 use crate::grade::{Number, RecordScatter};
 use crate::judge::Circumstances;
+use crate::naming::interval_95;
 use crate::propagate::variance;
 
 /// An exact twin of an effect, and what the numbers are if it is the cause.
@@ -34,24 +36,19 @@ pub(crate) fn exact_twins(index: usize, last: &Fitted, fit: &ModelFit, allowed: 
     let possible = last.model.twins(index, &last.theta);
     let in_numbers = |(place, twin): (usize, Twin)| {
         let number = |name: &str, unit: &str, of: &dyn Fn(&Twin) -> f64| {
-            let value = of(&twin);
             let error = variance(|values| of(&all(values)[place]), &places, &last.theta, covariance).sqrt();
             let standard_error = Some(error).filter(|error| *error > 0.0 && error.is_finite());
-            let interval_95 = standard_error.map(|error| [value - Z_975 * error, value + Z_975 * error]);
-            Value { name: name.into(), value, standard_error, interval_95, unit: unit.into() }
+            Value { name: name.into(), value: of(&twin), standard_error, interval_95: None, unit: unit.into() }
         };
-        let time_constant = |i: usize| {
-            let number = number("time_constant", "s", &|twin| twin.time_constants_s[i]);
-            let interval_95 = number.standard_error.map(|error| log_normal_interval_95(number.value, error));
-            Value { interval_95, ..number }
-        };
-        ExactTwin {
+        let mut out = ExactTwin {
             effect: twin.effect,
             channel: twin.channel,
             parameter: number(twin.parameter, "1", &|twin| twin.value),
-            time_constants: [0, 1].map(time_constant),
+            time_constants: [0, 1].map(|i| number("time_constant", "s", &|twin| twin.time_constants_s[i])),
             difference: number("difference", "s", &|twin| twin.time_constants_s[1] - twin.time_constants_s[0]),
-        }
+        };
+        out.set_intervals(1.0);
+        out
     };
     let twins = all(&here).into_iter().enumerate();
     twins.filter(|(_, twin)| possible.contains(twin) && allowed.contains(&twin.effect)).map(in_numbers).collect()
@@ -66,15 +63,17 @@ impl ExactTwin {
             .into_iter()
             .filter_map(|place| widening(place, last, fit, circumstances))
             .fold(1.0, f64::max);
-        let [one, two] = &mut self.time_constants;
-        for number in [one, two] {
-            number.interval_95 =
-                number.standard_error.map(|error| log_normal_interval_95(number.value, factor * error));
-        }
-        for number in [&mut self.parameter, &mut self.difference] {
-            let half = number.standard_error.map(|error| factor * Z_975 * error);
-            number.interval_95 = half.map(|half| [number.value - half, number.value + half]);
-        }
+        self.set_intervals(factor);
+    }
+
+    /// Intervals of so many times the standard errors' own.
+    fn set_intervals(&mut self, factor: f64) {
+        let set = |number: &mut Value, scale: Scale| {
+            number.interval_95 = number.standard_error.map(|error| interval_95(number.value, factor * error, &scale));
+        };
+        self.time_constants.iter_mut().for_each(|number| set(number, Scale::Logarithmic));
+        set(&mut self.parameter, Scale::Linear { typical: 1.0 });
+        set(&mut self.difference, Scale::Linear { typical: 1.0 });
     }
 }
 

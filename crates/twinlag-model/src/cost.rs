@@ -558,8 +558,8 @@ mod tests {
     /// The derivatives of the residual with respect to every parameter of every effect are those of a derivative
     /// checker, on even, uneven and masked readings, of sensors that move, and in several records. Its central differences
     /// reach 6e-6 of a hundred times a parameter's size, 6e-4 of it: they are wrong by a third derivative times 6e-8. In
-    /// units of the size that is up to
-    /// some thirty times the first (of `x⁻⁴`: 4 · 5 · 6 / 4), so the bound is 2e-6 of the largest derivative. Where
+    /// units of the size that is up to some thirty times the first (of `x⁻⁴`: 4 · 5 · 6 / 4), so the bound is 2e-6 of the
+    /// largest derivative. Where
     /// readings are masked the noise is taken for 5 K, so that a masked one has 1e4 times the variance of the others and
     /// not 1e8: it multiplies the rounding that the differences see.
     #[test]

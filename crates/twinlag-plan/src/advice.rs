@@ -112,11 +112,7 @@ fn best(plan: &Plan) -> Option<String> {
 
 /// What breaks a tie.
 fn tie(plan: &Plan, place: usize, rival: &PlannedRival) -> String {
-    let named = |effect: &dyn std::fmt::Display, channel: &Option<String>| match channel {
-        Some(channel) => format!("{effect} of {channel}"),
-        None => effect.to_string(),
-    };
-    let pair = format!("{} or {}", named(&rival.effect, &rival.channel), named(&rival.rival, &rival.rival_channel));
+    let pair = format!("{} or {}", rival.effect_in_words(), rival.rival_in_words());
     if rival.is_distinguished {
         return format!("{pair}: the record as it is distinguishes them");
     }

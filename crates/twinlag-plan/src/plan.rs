@@ -135,21 +135,6 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Expected::of`].
-    ///
-    /// ```
-    /// use twinlag::signal::{Broadband, Gas, Noise, Record, Rig, Sensor, Signal};
-    /// use twinlag_plan::{Change, Plan};
-    ///
-    /// let mut sensors = [Sensor::new("fine", 0.024), Sensor::new("coarse", 0.117)];
-    /// sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.1)));
-    /// let gas = Gas::new(300.0, Signal::Broadband(Broadband { std_k: 10.0, corner_hz: 3.0 }));
-    /// let plan = Plan::of_rig(&Rig::new(1, Record::new(1500, 0.004), gas, sensors)?)?;
-    /// let louder = plan.changed.iter().find(|r| r.change == Some(Change::Excitation { factor: 2.0 })).expect("tried");
-    /// // Standard errors go with the ratio of noise and gas; frequencies that have little weight add a few per cent to that.
-    /// let over_now = louder.numbers[0].over_now.expect("determined");
-    /// assert!((over_now - 0.5).abs() < 0.05, "{over_now}");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn of_rig(rig: &Rig) -> Result<Self, PlanError> {
         Self::of(rig, Source::Rig, Vec::new())
     }
@@ -199,6 +184,22 @@ impl Plan {
         out.advice = advice(&out);
         Ok(out)
     }
+}
+
+impl PlannedRival {
+    /// The effect that the rig has, with its channel.
+    pub fn effect_in_words(&self) -> String {
+        in_words(self.effect, self.channel.as_deref())
+    }
+
+    /// The effect in its place, with its channel.
+    pub fn rival_in_words(&self) -> String {
+        in_words(self.rival, self.rival_channel.as_deref())
+    }
+}
+
+fn in_words(effect: Identifier, channel: Option<&str>) -> String {
+    channel.map_or_else(|| effect.to_string(), |channel| format!("{effect} of {channel}"))
 }
 
 impl PlannedRecord {

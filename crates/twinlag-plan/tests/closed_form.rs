@@ -4,6 +4,7 @@
 //! that tone the variance `S = s₁²/|H₁|² + s₂²/|H₂|²`, and a model with the responses `G₁`, `G₂` leaves the energy
 //! `Σ N A²/2 · |H₁/G₁ − H₂/G₂|²/S`.
 
+use num_complex::Complex64;
 use twinlag::signal::{Gas, MultiTone, Noise, Record, Rig, Sensor, Signal, Tone};
 use twinlag_plan::{Change, Plan, Rehearsal};
 
@@ -14,27 +15,9 @@ const TAU_S: [f64; 2] = [0.05, 0.16];
 /// Whole periods in the record of 8 s, and in half of it.
 const TONES: [(f64, f64); 4] = [(0.5, 6.0), (1.25, 5.0), (2.75, 4.0), (5.0, 3.0)];
 
-/// A complex number: what these few lines need of one.
-#[derive(Clone, Copy)]
-struct C(f64, f64);
-
-impl C {
-    fn times(self, b: Self) -> Self {
-        Self(self.0 * b.0 - self.1 * b.1, self.0 * b.1 + self.1 * b.0)
-    }
-
-    fn minus(self, b: Self) -> Self {
-        Self(self.0 - b.0, self.1 - b.1)
-    }
-
-    fn square(self) -> f64 {
-        self.0 * self.0 + self.1 * self.1
-    }
-}
-
 /// `1 + j ω τ`.
-fn lag(omega: f64, tau_s: f64) -> C {
-    C(1.0, omega * tau_s)
+fn lag(omega: f64, tau_s: f64) -> Complex64 {
+    Complex64::new(1.0, omega * tau_s)
 }
 
 fn rig(second_lag_s: Option<f64>, samples: usize) -> Rig {
@@ -60,15 +43,13 @@ fn rig(second_lag_s: Option<f64>, samples: usize) -> Rig {
 fn residual([tau_1_s, tau_2_s, delay_s]: [f64; 3], second_lag_s: f64) -> Vec<f64> {
     let each = TONES.iter().flat_map(|(hz, amplitude_k)| {
         let omega = std::f64::consts::TAU * hz;
-        let divided = |a: C, b: C| C((a.0 * b.0 + a.1 * b.1) / b.square(), (a.1 * b.0 - a.0 * b.1) / b.square());
-        let first = divided(lag(omega, tau_1_s), lag(omega, TAU_S[0]).times(lag(omega, second_lag_s)));
-        let later = C((omega * delay_s).cos(), (omega * delay_s).sin());
-        let second = divided(lag(omega, tau_2_s), lag(omega, TAU_S[1])).times(later);
+        let first = lag(omega, tau_1_s) / (lag(omega, TAU_S[0]) * lag(omega, second_lag_s));
+        let second = lag(omega, tau_2_s) / lag(omega, TAU_S[1]) * Complex64::cis(omega * delay_s);
         let variance =
-            NOISE_K[0].powi(2) * lag(omega, tau_1_s).square() + NOISE_K[1].powi(2) * lag(omega, tau_2_s).square();
+            NOISE_K[0].powi(2) * lag(omega, tau_1_s).norm_sqr() + NOISE_K[1].powi(2) * lag(omega, tau_2_s).norm_sqr();
         let scale = amplitude_k * (0.5 * SAMPLES as f64 / variance).sqrt();
-        let left = first.minus(second);
-        [scale * left.0, scale * left.1]
+        let left = scale * (first - second);
+        [left.re, left.im]
     });
     each.collect()
 }

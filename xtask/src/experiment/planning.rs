@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use twinlag::signal::{Record as Sampling, Rig};
 use twinlag_plan::Rehearsal;
-use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
+use twinlag_study::{Failure, Moments, Outcome, Quantity, Results, Study, Values};
 
 use super::pair::{self, Named};
 use super::stored::{Head, Stored};
@@ -168,14 +168,14 @@ impl Stored for Plan {
                         |---|---|---|---|---|---|---|---|---|\n"
                 .to_owned();
         for (cell, tally) in results.cells().iter().enumerate() {
-            let moments = |place: usize| tally.values(QUANTITIES[place]).map(twinlag_study::Values::moments);
+            let moments = |place: usize| tally.values(QUANTITIES[place]).map(Values::moments);
             let scatter = |place: usize| {
                 let of = moments(place)
                     .and_then(|m| Some((m.mean()?, m.standard_deviation()?, m.standard_deviation_error()?)));
                 of.map_or("–".into(), |(mean, std, error)| format!("{std:.2} ± {error:.2} ({mean:+.1})"))
             };
             let mean = |place: usize| {
-                let of = moments(place).and_then(twinlag_study::Moments::mean);
+                let of = moments(place).and_then(Moments::mean);
                 of.map_or("–".into(), |mean| format!("{mean:.1}"))
             };
             let found = |place: usize| {

@@ -29,8 +29,8 @@ const USUAL_SHARE: f64 = 0.3;
 const USUAL_PERIODS: f64 = 0.5;
 
 /// Where fits start, in sample periods: at a part of one and, both ways, at a few and further, each so many times the one before, up to
-/// this share of the longest that there can be.
-/// Measured: from a few alone, fits of 12 to 25 periods beside a time constant of 12 end in another minimum.
+/// this share of the longest that there can be. From a few alone the fit of a delay of 12 beside a time constant of 12 ends in another
+/// minimum (the test of `twinlag-diagnose` on a long delay).
 const NEAR_START_PERIODS: f64 = 0.3;
 const FAR_START_PERIODS: f64 = 3.0;
 const START_RATIO: f64 = 3.0;
@@ -43,9 +43,8 @@ struct Delay {
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
-    let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 };
-    let longest_s = longest * context.step_s;
-    let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest_s, longest_s);
+    let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 } * context.step_s;
+    let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest, longest);
     let delay = Parameter::new("delay", "s", variable).as_lateness();
     let seat = Seat::new(Identifier::DELAY, Some(1), vec![delay]);
     let faster_s = context.tau_s[0].min(context.tau_s[1]);
