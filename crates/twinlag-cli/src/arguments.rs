@@ -4,10 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use twinlag::compensation::Form;
+use twinlag::convection::Flow;
 use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
-use twinlag::record::{ColumnRef, SamplingChoice, Selection, Unit};
-use twinlag::{Estimator, Hold, Intervals, Known, NoiseColour, Options, optimise::Optimiser};
+use twinlag::record::{ColumnRef, Record, SamplingChoice, Selection, Unit};
+use twinlag::{
+    Estimator, Hold, Intervals, Known, NoiseColour, Options, Plausibility, TypicalSensor, optimise::Optimiser,
+};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -99,6 +102,8 @@ Exit codes: 0 status ok and both time constants given, 4 otherwise (with --stric
 pub(crate) struct Characterise {
     #[command(flatten)]
     pub(crate) input: Input,
+    #[command(flatten)]
+    pub(crate) physics: Physics,
     /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time
     /// constants are fitted.
     #[arg(long, value_name = "JSON")]
@@ -132,6 +137,8 @@ not go (with --strict also where a number is conditional), 2 wrong usage, 3 the 
 pub(crate) struct Diagnose {
     #[command(flatten)]
     pub(crate) input: Input,
+    #[command(flatten)]
+    pub(crate) physics: Physics,
     /// More records of the same rig: one model for all of them, each record left out in turn to see what the model is worth on it.
     #[arg(value_name = "MORE")]
     pub(crate) more: Vec<PathBuf>,
@@ -165,6 +172,8 @@ Exit codes: 0 compensated, 4 the record does not determine the time constants, 2
 pub(crate) struct Compensate {
     #[command(flatten)]
     pub(crate) input: Input,
+    #[command(flatten)]
+    pub(crate) physics: Physics,
     /// Write the gas temperature to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
@@ -275,6 +284,32 @@ pub(crate) struct Input {
     pub(crate) columns: Columns,
     #[command(flatten)]
     pub(crate) method: Method,
+}
+
+/// What is known of the sensors' sizes and of the flow.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Plausibility")]
+pub(crate) struct Physics {
+    /// What a sensor is: `T1=thermocouple:0.5mm` or `T1=wire:50um` (a bare wire), `platinum:25um`, `bead:0.8mm`, `sheath:3mm`
+    /// (mineral-insulated), or a range that holds 95 % of such time constants, `T1=0.2..0.6s`. The time constant that it should
+    /// have enters the estimate with its uncertainty, and an estimate outside of it is named with what it would take. May be
+    /// given once for each sensor.
+    #[arg(long, value_name = "T1=KIND:SIZE")]
+    sensor: Vec<TypicalSensor>,
+    /// What flows around sensors of a given size, and how fast: air@20m/s, water@0.5m/s; after commas temperature and pressure
+    /// where they are not those of the readings and one atmosphere (air@20m/s,800C,5bar).
+    #[arg(long, value_name = "FLUID@SPEED", allow_hyphen_values = true)]
+    fluid: Option<Flow>,
+}
+
+impl Physics {
+    /// What is expected of sensors whose readings `records` are.
+    pub(crate) fn plausibility(&self, records: &[Record]) -> Result<Plausibility, Failure> {
+        let readings = records.iter().flat_map(|record| record.t1_c.iter().chain(record.t2_c.iter()));
+        let (sum, count) =
+            readings.filter(|c| c.is_finite()).fold((0.0, 0.0_f64), |(sum, count), c| (sum + c, count + 1.0));
+        Ok(Plausibility::new(&self.sensor, self.fluid.as_ref(), sum / count.max(1.0))?)
+    }
 }
 
 /// Which columns to use and how to read time.

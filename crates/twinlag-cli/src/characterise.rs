@@ -12,6 +12,7 @@ use crate::arguments::Characterise;
 use crate::console::Console;
 use crate::failure::{Failure, explained};
 use crate::grades;
+use crate::plausible;
 use crate::print;
 use crate::progress::Progress;
 
@@ -19,20 +20,23 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
     let options = command.input.method.options()?;
     let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
-    let answer = match &command.model {
-        Some(path) => {
+    let given = command.model.as_deref().map(|path| Ok::<_, Failure>((path, model(path)?))).transpose()?;
+    let run = |options: Options| match &given {
+        Some((path, model)) => {
             let _progress = Progress::start(console, format!("characterising {} samples", record.len()));
-            twinlag::characterise_with(&record, &model(path)?, &options).map_err(|e| match e {
+            twinlag::characterise_with(&record, model, &options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
                 | twinlag::Error::Model(
                     ModelError::Model { .. } | ModelError::Parameter { .. } | ModelError::Absurd,
                 ) => Failure::File(format!("{}: {}", path.display(), explained(&e))),
                 e => Failure::in_file(e, &record.source),
-            })?
+            })
         }
-        None => characterise(&record, &options, console)?,
+        None => characterise(&record, &options, console),
     };
+    let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
+    let answer = plausible::judged(&plausibility, options, run, |answer| answer)?;
     print::characterisation(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
 }

@@ -16,23 +16,27 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let views =
         Views { picture: command.picture.as_deref(), report: command.report.as_deref(), save: command.save.as_deref() };
     let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
+    let asked = command.input.method.options()?;
+    let model = command.model.as_deref().map(model).transpose()?;
+    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
+    print::notes(&record, console);
+    let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
     let options = CompensateOptions {
         diagnose: DiagnoseOptions {
-            characterise: command.input.method.options()?,
+            characterise: plausibility.with(asked)?,
             without: command.without.clone(),
             ..DiagnoseOptions::default()
         },
-        model: command.model.as_deref().map(model).transpose()?,
+        model,
         form: command.form,
         trusted: usize::from(command.trust == Trust::T2),
     };
-    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
-    print::notes(&record, console);
-    let answer = {
+    let mut answer = {
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));
         twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
             .map_err(|error| Failure::in_file(error, &record.source))?
     };
+    answer.last.plausibility = plausibility.judge(&answer.last.sensors);
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =
             [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];

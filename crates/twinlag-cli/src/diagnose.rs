@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use twinlag::diagnosis::{Grade, Verdict};
 use twinlag::record::Record;
-use twinlag::{DiagnoseOptions, Diagnosis, Status};
+use twinlag::{DiagnoseOptions, Diagnosis, Options, Status};
 use twinlag_pages::diagnosis_report;
 
 use crate::arguments::Diagnose;
@@ -14,6 +14,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
 use crate::output;
+use crate::plausible;
 use crate::print;
 use crate::progress::Progress;
 
@@ -22,11 +23,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     let outputs: Vec<_> = outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect();
     let files = files(command)?;
     files.iter().try_for_each(|file| output::check(file, &outputs, command.force))?;
-    let options = DiagnoseOptions {
-        characterise: command.input.method.options()?,
-        without: command.without.clone(),
-        ..DiagnoseOptions::default()
-    };
+    let characterise = command.input.method.options()?;
     let mut records = Vec::new();
     for file in &files {
         let record = read_watched(file, &command.input.columns.selection(), console)?;
@@ -34,9 +31,18 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         records.push(record);
     }
     no_copies(&records)?;
-    let (record, answer) = match &records[..] {
-        [record] => (Cow::Borrowed(record), diagnose(record, &options, console)?),
-        records => (Cow::Owned(twinlag::joined(records)?), diagnose_records(records, &options, console)?),
+    let run = |characterise: Options| {
+        let options = DiagnoseOptions { characterise, without: command.without.clone(), ..DiagnoseOptions::default() };
+        match &records[..] {
+            [record] => diagnose(record, &options, console),
+            records => diagnose_records(records, &options, console),
+        }
+    };
+    let plausibility = command.physics.plausibility(&records)?;
+    let answer = plausible::judged(&plausibility, characterise, run, |answer| &mut answer.last)?;
+    let record = match &records[..] {
+        [record] => Cow::Borrowed(record),
+        records => Cow::Owned(twinlag::joined(records)?),
     };
     if let Some(path) = &command.save {
         output::model(path, &answer.model())?;

@@ -19,8 +19,10 @@ mod failure;
 mod grades;
 mod if_known;
 mod live;
+mod memory;
 mod output;
 mod plan;
+mod plausible;
 mod print;
 mod progress;
 mod records;
@@ -36,6 +38,7 @@ use clap::Parser;
 use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
+    memory::give_back();
     let arguments = Arguments::parse();
     let console = arguments.console();
     let result = match arguments.command {

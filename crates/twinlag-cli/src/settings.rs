@@ -18,6 +18,8 @@ pub(crate) fn options(setting: Setting) -> &'static [&'static str] {
         Setting::Free => &["--free"],
         Setting::SecondOrder => &["--second-order"],
         Setting::Known => &["--known"],
+        Setting::Typical => &["--sensor"],
+        Setting::Fluid => &["--fluid"],
         Setting::Discard => &["--discard"],
         Setting::Intervals => &["--intervals"],
         Setting::Replicates => &["--replicates"],

@@ -7,6 +7,7 @@ mod fitted;
 mod found_in;
 mod gas_spectrum;
 mod model;
+mod plausible;
 mod records;
 mod track;
 
@@ -20,6 +21,7 @@ pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, Name
 pub use found_in::FoundIn;
 pub use gas_spectrum::{GasBand, GasSpectrum};
 pub use model::{Model, ModelEffect, ModelNumber};
+pub use plausible::PlausibleTimeConstant;
 pub use records::{
     DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer, RecordNumber, TransferAnswer, TransferError,
 };

@@ -1,6 +1,7 @@
 use thiserror::Error;
 use twinlag_bias::NoiseError;
 use twinlag_compensate::CompensateError;
+use twinlag_convection::ConvectionError;
 use twinlag_cross_relation::CostError;
 use twinlag_diagnose::ModelError;
 use twinlag_estimate::EstimateError;
@@ -20,6 +21,8 @@ pub enum Error {
     Record(#[from] RecordError),
     #[error(transparent)]
     Compensate(#[from] CompensateError),
+    #[error(transparent)]
+    Convection(#[from] ConvectionError),
     #[error(transparent)]
     Cost(#[from] CostError),
     #[error(transparent)]
@@ -101,6 +104,7 @@ impl Error {
             }
             Self::QuietSegment { .. } => vec![Setting::QuietSegment],
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
+            Self::Convection(_) => vec![Setting::Typical, Setting::Fluid],
             Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
             Self::ModelChannels { .. } | Self::OtherChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
@@ -120,6 +124,7 @@ impl Error {
                     | Self::NotInClosedForm { .. }
                     | Self::QuietSegment { .. }
                     | Self::Optimiser(_)
+                    | Self::Convection(_)
             )
     }
 }

@@ -75,6 +75,7 @@ mod bands;
 mod error;
 mod options;
 mod parallel;
+mod plausibility;
 mod quiet;
 mod reference;
 mod rows;
@@ -85,11 +86,13 @@ mod watch;
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
     ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, IntervalMethod, LeftOutUnit,
-    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, Quality, Ratio, RecordAnswer,
-    RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
+    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, PlausibleTimeConstant, Quality, Ratio,
+    RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer,
+    TransferError,
 };
 pub use error::Error;
 pub use options::Options;
+pub use plausibility::{Plausibility, Typical, TypicalSensor};
 pub use reference::AgainstReference;
 pub use setting::Setting;
 pub use verbs::{
@@ -101,6 +104,7 @@ pub use watch::Watch;
 
 pub use twinlag_bias as bias;
 pub use twinlag_compensate as compensation;
+pub use twinlag_convection as convection;
 pub use twinlag_cross_relation as cross_relation;
 pub use twinlag_diagnose as diagnosis;
 pub use twinlag_estimate as estimate;

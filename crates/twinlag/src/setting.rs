@@ -34,6 +34,10 @@ pub enum Setting {
     SecondOrder,
     /// A parameter that is known beforehand.
     Known,
+    /// What is typical of a sensor.
+    Typical,
+    /// What flows around the sensors.
+    Fluid,
     /// Samples that are left out at the start.
     Discard,
     /// What intervals are made of.
@@ -63,6 +67,8 @@ impl fmt::Display for Setting {
             Self::Free => "free calibration",
             Self::SecondOrder => "second lags",
             Self::Known => "known value",
+            Self::Typical => "typical sensor",
+            Self::Fluid => "fluid",
             Self::Discard => "samples to discard",
             Self::Intervals => "intervals",
             Self::Replicates => "bootstrap replicates",

@@ -7,6 +7,7 @@ use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, Sampling, SamplingKind};
 
+use crate::answers::PlausibleTimeConstant;
 use crate::options::Options;
 use crate::setting::Setting;
 
@@ -251,6 +252,9 @@ pub struct Characterisation {
     /// that are no-go, or was found in other data than these.
     #[serde(default)]
     pub model_remarks: Vec<String>,
+    /// The time constants beside what was expected of them, where that was asked ([`Plausibility`](crate::Plausibility)).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub plausibility: Vec<PlausibleTimeConstant>,
     /// What to know before using the numbers.
     pub warnings: Vec<String>,
     /// Settings that may help where there is no answer, the most likely first.

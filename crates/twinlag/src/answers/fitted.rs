@@ -71,6 +71,7 @@ impl FittedAnswer<'_> {
             status,
             not_identifiable: undetermined.map(|i| Known::NAMES[i].to_owned()).collect(),
             model_remarks: Vec::new(),
+            plausibility: Vec::new(),
             warnings: Vec::new(),
             advice: Vec::new(),
             fit: fit.fit.clone(),

@@ -48,6 +48,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             status,
             not_identifiable: Vec::new(),
             model_remarks: Vec::new(),
+            plausibility: Vec::new(),
             warnings: Vec::new(),
             advice: Vec::new(),
             fit: self.best.clone(),
