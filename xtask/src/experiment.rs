@@ -1,5 +1,6 @@
 //! The experiments: each a plan in a folder of the book, with its table, its pictures and what made them beside it.
 
+mod campaign;
 mod coverage;
 mod grades;
 mod loops;

@@ -16,6 +16,7 @@ use twinlag::{DiagnoseOptions, Options, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
 use super::stored::{Head, Stored};
+pub(super) use tables::set_name;
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

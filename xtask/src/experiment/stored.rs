@@ -10,7 +10,7 @@ use twinlag_study::{Results, Study};
 use super::reconstruction::Reconstruction;
 use super::tracking::Tracking;
 use super::{
-    Run, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking,
+    Run, campaign, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking,
 };
 
 /// What a plan begins with.
@@ -53,6 +53,7 @@ pub(super) fn read(name: &str, text: &str) -> Option<Result<Box<dyn Own>>> {
         Box::new(study)
     }
     Some(match name {
+        campaign::NAME => campaign::Plan::read(text).map(own),
         coverage::NAME => coverage::Plan::read(text).map(own),
         grades::NAME => grades::Plan::read(text).map(own),
         planning::NAME => planning::Plan::read(text).map(own),

@@ -24,7 +24,7 @@ pub(super) fn write(plan: &Plan, results: &Results, out: &Path) -> Result<()> {
     Ok(())
 }
 
-fn set_name(kinds: &[Kind]) -> String {
+pub(in crate::experiment) fn set_name(kinds: &[Kind]) -> String {
     let names: Vec<&str> = kinds.iter().map(|k| k.name()).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(" + ") }
 }

@@ -1,0 +1,215 @@
+//! Several records of one rig against one of them: what is found with one, two or more, whether records are accused falsely, and what
+//! becomes of the time constants.
+//!
+//! The rigs are those of the closed loop's experiments, which integrate physics in continuous time and share no code with the
+//! effects that explain them. Each record has a gas and noise of its own; a campaign of more records begins with those of
+//! the smaller ones.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+use twinlag::diagnosis::Verdict;
+use twinlag::record::Record;
+use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
+use twinlag::signal::{Record as Sampling, SignalError, Simulated};
+use twinlag::{DiagnoseOptions, Diagnosis, NamedEffect, Options, diagnose, diagnose_records};
+use twinlag_study::{Failure, Outcome, Quantity, Rate, Results, Study, Tally};
+
+use super::loops::{set_name, truth_s};
+use super::record_of;
+use super::stored::{Head, Stored};
+
+pub(super) const NAME: &str = "campaign";
+
+/// A plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Plan {
+    name: String,
+    title: String,
+    seed: u64,
+    /// Campaigns in each cell.
+    campaigns: u64,
+    /// Records that a campaign has, from cell to cell.
+    records: Vec<usize>,
+    /// Samples of each record.
+    samples: usize,
+    /// Effects that a rig has together; an empty list is a rig with nothing missing.
+    sets: Vec<Vec<Kind>>,
+    gases: Vec<GasKind>,
+}
+
+/// Quantities of a campaign, in order; those of sensors are two.
+const EVENTS: [&str; 6] = ["right or stated", "wrong name", "explained", "accused", "covered 1", "covered 2"];
+const VALUES: [&str; 5] = [
+    "relative error 1",
+    "relative error 2",
+    "error over its standard error 1",
+    "error over its standard error 2",
+    "left-out rms after",
+];
+
+impl Plan {
+    pub(super) fn read(text: &str) -> Result<Self> {
+        toml::from_str(text).context("the plan of the campaigns")
+    }
+
+    /// The effects and the number of records of a cell.
+    fn place(&self, cell: usize) -> (usize, usize) {
+        (cell / self.records.len(), self.records[cell % self.records.len()])
+    }
+
+    /// The rig of campaign `index`, the same with any number of records.
+    fn rig(&self, set: usize, index: u64) -> Result<Undeclared, SignalError> {
+        let gas = self.gases[index as usize % self.gases.len()];
+        let mut drawn = undeclared(&self.sets[set], 1.0, Some(gas), self.seed + 100_000 * set as u64 + index)?;
+        let sampling = Sampling::new(self.samples, drawn.rig.record().sample_period_s);
+        let mut gas = drawn.rig.gas().clone();
+        gas.per_trial = true;
+        drawn.rig = drawn.rig.with_record(sampling)?.with_gas(gas)?;
+        Ok(drawn)
+    }
+}
+
+/// The answer to one record or several.
+fn answer(records: &[Record]) -> Result<Diagnosis, twinlag::Error> {
+    // What is found counts here, and not what of it is given.
+    let characterise = Options { best_effort: true, ..Options::default() };
+    let options = DiagnoseOptions { characterise, ..DiagnoseOptions::default() };
+    match records {
+        [record] => diagnose(record, &options),
+        records => diagnose_records(records, &options),
+    }
+}
+
+impl Study for Plan {
+    type Scratch = ();
+
+    fn plan(&self) -> String {
+        format!("{} {}", env!("CARGO_PKG_VERSION"), serde_json::to_string(self).unwrap_or_default())
+    }
+
+    fn cells(&self) -> usize {
+        self.sets.len() * self.records.len()
+    }
+
+    fn trials(&self) -> u64 {
+        self.campaigns
+    }
+
+    fn block(&self) -> u64 {
+        1
+    }
+
+    fn quantities(&self, _cell: usize) -> Vec<Quantity> {
+        EVENTS.map(Quantity::event).into_iter().chain(VALUES.map(Quantity::value)).collect()
+    }
+
+    fn scratch(&self, _cell: usize) -> std::result::Result<(), Failure> {
+        Ok(())
+    }
+
+    fn trial(&self, cell: usize, index: u64, (): &mut (), outcome: &mut Outcome) -> std::result::Result<(), Failure> {
+        let (set, count) = self.place(cell);
+        let rig = self.rig(set, index)?;
+        let simulated: Vec<Simulated> =
+            (0..count as u64).map(|k| rig.rig.simulate_trial(k)).collect::<Result<_, SignalError>>()?;
+        let joined = |of: fn(&Simulated) -> &[f64]| simulated.iter().flat_map(of).copied().collect::<Vec<f64>>();
+        let truth_s = truth_s(&rig, &joined(|s| &s.time_s), &joined(|s| &s.gas_c));
+        let named = |(k, one): (usize, Simulated)| {
+            let mut record = record_of(one)?;
+            record.reference_c = None;
+            record.source = format!("record {}", k + 1);
+            Ok(record)
+        };
+        let records: Vec<Record> =
+            simulated.into_iter().enumerate().map(named).collect::<Result<_, twinlag::record::RecordError>>()?;
+        let answer = answer(&records)?;
+
+        let wanted = rig.effects();
+        let is = |e: &NamedEffect, name: &&str| e.effect.name() == *name;
+        let states = |e: &NamedEffect, name: &&str| is(e, name) || e.alternatives.iter().any(|a| a.name() == *name);
+        let first = answer.effects.first();
+        let is_right = match first {
+            None => wanted.is_empty(),
+            Some(e) => wanted.iter().any(|name| states(e, name)),
+        };
+        let is_explained = matches!(answer.verdict, Verdict::Adequate | Verdict::Explained);
+        outcome.event(0, is_right);
+        outcome.event(1, is_explained && !is_right && first.is_some_and(|e| e.alternatives.is_empty()));
+        outcome.event(2, is_explained);
+        outcome.event(3, answer.records.iter().any(|record| record.agrees == Some(false)));
+        for i in 0..2 {
+            let sensor = &answer.last.sensors[i];
+            if let (Some(tau_s), Some([low, high])) = (sensor.time_constant_s, sensor.interval_95_s) {
+                outcome.event(4 + i, low <= truth_s[i] && truth_s[i] <= high);
+                outcome.value(EVENTS.len() + i, (tau_s / truth_s[i] - 1.0).abs());
+                if let Some(se) = sensor.standard_error_s {
+                    outcome.value(EVENTS.len() + 2 + i, (tau_s - truth_s[i]).abs() / se);
+                }
+            }
+        }
+        if let Some(transfer) = &answer.transfer {
+            outcome.value(EVENTS.len() + 4, transfer.error.held_out_normalised_rms.after);
+        }
+        Ok(())
+    }
+}
+
+impl Stored for Plan {
+    fn head(&self) -> Head<'_> {
+        let Plan { name, title, seed, .. } = self;
+        Head { name, title, seed: *seed }
+    }
+
+    fn trials_and_seed(&mut self) -> [&mut u64; 2] {
+        [&mut self.campaigns, &mut self.seed]
+    }
+
+    /// One campaign of one effect, with one record and with two.
+    fn shorten(&mut self) {
+        self.campaigns = 1;
+        self.sets.truncate(1);
+        self.records.truncate(2);
+    }
+
+    fn cell_name(&self, cell: usize) -> String {
+        let (set, count) = self.place(cell);
+        format!("{}, {count} records", set_name(&self.sets[set]))
+    }
+
+    fn tables(&self, results: &Results, out: &Path) -> Result<()> {
+        let mut text = "| effect | records | right or stated (%) | wrong name (%) | explained (%) | a record accused (%) | \
+             covered (%) | median error (%) | median error / standard error | left-out rms |\n|---|---|---|---|---|---|---|---|---|---|\n"
+            .to_owned();
+        let percent = |tally: &Tally, name: &str| {
+            tally.rate(name).and_then(Rate::rate).map_or("–".into(), |rate| format!("{:.0}", 100.0 * rate))
+        };
+        let median = |tally: &Tally, name: &str, scale: f64| {
+            tally.values(name).and_then(|v| v.quantile(0.5)).map_or("–".into(), |q| format!("{:.2}", scale * q))
+        };
+        for (cell, tally) in results.cells().iter().enumerate() {
+            let both = |of: &dyn Fn(&str) -> String, name: &str| {
+                [1, 2].map(|sensor| of(&format!("{name} {sensor}"))).join(" / ")
+            };
+            let (set, count) = self.place(cell);
+            let row = [
+                set_name(&self.sets[set]),
+                count.to_string(),
+                percent(tally, "right or stated"),
+                percent(tally, "wrong name"),
+                percent(tally, "explained"),
+                if count > 1 { percent(tally, "accused") } else { "–".into() },
+                both(&|name| percent(tally, name), "covered"),
+                both(&|name| median(tally, name, 100.0), "relative error"),
+                both(&|name| median(tally, name, 1.0), "error over its standard error"),
+                median(tally, "left-out rms after", 1.0),
+            ];
+            let _ = writeln!(text, "| {} |", row.join(" | "));
+        }
+        Ok(fs::write(out.join("campaign.md"), text)?)
+    }
+}
