@@ -9,16 +9,16 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use twinlag::diagnosis::Verdict;
 use twinlag::record::Record;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::signal::{Record as Sampling, SignalError, Simulated};
-use twinlag::{DiagnoseOptions, Diagnosis, NamedEffect, Options, diagnose, diagnose_records};
+use twinlag::{DiagnoseOptions, Diagnosis, Options, diagnose, diagnose_records};
 use twinlag_study::{Failure, Outcome, Quantity, Rate, Results, Study, Tally};
 
-use super::loops::{set_name, truth_s};
+use super::loops::{Naming, set_name, truth_s};
 use super::record_of;
 use super::stored::{Head, Stored};
 
@@ -54,7 +54,9 @@ const VALUES: [&str; 5] = [
 
 impl Plan {
     pub(super) fn read(text: &str) -> Result<Self> {
-        toml::from_str(text).context("the plan of the campaigns")
+        let plan: Self = toml::from_str(text).context("the plan of the campaigns")?;
+        ensure!(!plan.gases.is_empty(), "the plan of the campaigns: expected one gas or more");
+        Ok(plan)
     }
 
     /// The effects and the number of records of a cell.
@@ -129,18 +131,10 @@ impl Study for Plan {
             simulated.into_iter().enumerate().map(named).collect::<Result<_, twinlag::record::RecordError>>()?;
         let answer = answer(&records)?;
 
-        let wanted = rig.effects();
-        let is = |e: &NamedEffect, name: &&str| e.effect.name() == *name;
-        let states = |e: &NamedEffect, name: &&str| is(e, name) || e.alternatives.iter().any(|a| a.name() == *name);
-        let first = answer.effects.first();
-        let is_right = match first {
-            None => wanted.is_empty(),
-            Some(e) => wanted.iter().any(|name| states(e, name)),
-        };
-        let is_explained = matches!(answer.verdict, Verdict::Adequate | Verdict::Explained);
-        outcome.event(0, is_right);
-        outcome.event(1, is_explained && !is_right && first.is_some_and(|e| e.alternatives.is_empty()));
-        outcome.event(2, is_explained);
+        let named = Naming::of(&answer, &rig.effects());
+        outcome.event(0, named.is_right_or_stated);
+        outcome.event(1, named.is_wrong);
+        outcome.event(2, matches!(answer.verdict, Verdict::Adequate | Verdict::Explained));
         outcome.event(3, answer.records.iter().any(|record| record.agrees == Some(false)));
         for i in 0..2 {
             let sensor = &answer.last.sensors[i];
@@ -178,15 +172,16 @@ impl Stored for Plan {
 
     fn cell_name(&self, cell: usize) -> String {
         let (set, count) = self.place(cell);
-        format!("{}, {count} records", set_name(&self.sets[set]))
+        format!("{}, of {count}", set_name(&self.sets[set]))
     }
 
     fn tables(&self, results: &Results, out: &Path) -> Result<()> {
-        let mut text = "| effect | records | right or stated (%) | wrong name (%) | explained (%) | a record accused (%) | \
-             covered (%) | median error (%) | median error / standard error | left-out rms |\n|---|---|---|---|---|---|---|---|---|---|\n"
+        let mut text = "| effect | records | right or stated | wrong name | explained | a record accused | \
+             covered, of those given | median error (%) | median error / standard error | left-out rms |\n|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
-        let percent = |tally: &Tally, name: &str| {
-            tally.rate(name).and_then(Rate::rate).map_or("–".into(), |rate| format!("{:.0}", 100.0 * rate))
+        // Counts: a cell has so few campaigns that one of them would be many per cent.
+        let count = |tally: &Tally, name: &str| {
+            tally.rate(name).map_or("–".into(), |rate| format!("{} of {}", rate.hits(), rate.count()))
         };
         let median = |tally: &Tally, name: &str, scale: f64| {
             tally.values(name).and_then(|v| v.quantile(0.5)).map_or("–".into(), |q| format!("{:.2}", scale * q))
@@ -195,15 +190,15 @@ impl Stored for Plan {
             let both = |of: &dyn Fn(&str) -> String, name: &str| {
                 [1, 2].map(|sensor| of(&format!("{name} {sensor}"))).join(" / ")
             };
-            let (set, count) = self.place(cell);
+            let (set, records) = self.place(cell);
             let row = [
                 set_name(&self.sets[set]),
-                count.to_string(),
-                percent(tally, "right or stated"),
-                percent(tally, "wrong name"),
-                percent(tally, "explained"),
-                if count > 1 { percent(tally, "accused") } else { "–".into() },
-                both(&|name| percent(tally, name), "covered"),
+                records.to_string(),
+                count(tally, "right or stated"),
+                count(tally, "wrong name"),
+                count(tally, "explained"),
+                if records > 1 { count(tally, "accused") } else { "–".into() },
+                both(&|name| count(tally, name), "covered"),
                 both(&|name| median(tally, name, 100.0), "relative error"),
                 both(&|name| median(tally, name, 1.0), "error over its standard error"),
                 median(tally, "left-out rms after", 1.0),

@@ -12,7 +12,7 @@ use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag::signal::Simulated;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
-use twinlag::{DiagnoseOptions, Options, diagnose};
+use twinlag::{DiagnoseOptions, Diagnosis, NamedEffect, Options, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
 use super::stored::{Head, Stored};
@@ -128,28 +128,16 @@ impl Study for Plan {
         let answer = diagnose(&record, &options(without))?;
 
         let is_alien = kinds.iter().any(|k| k.effect().is_none());
-        let named = |e: &twinlag::NamedEffect, name: &str| e.effect.name() == name;
-        let stated =
-            |e: &twinlag::NamedEffect, name: &str| named(e, name) || e.alternatives.iter().any(|a| a.name() == name);
-        let first = answer.effects.first();
+        let named = Naming::of(&answer, &wanted);
         if !is_alien {
-            let (right, or_stated) = match first {
-                None => (wanted.is_empty(), wanted.is_empty()),
-                Some(e) => (wanted.iter().any(|w| named(e, w)), wanted.iter().any(|w| stated(e, w))),
-            };
-            outcome.event(RIGHT, right);
-            outcome.event(STATED, or_stated);
-            let all = wanted.iter().all(|w| answer.effects.iter().any(|e| stated(e, w)));
-            outcome.event(ALL_FOUND, all && answer.effects.len() >= wanted.len());
+            outcome.event(RIGHT, named.is_right_first);
+            outcome.event(STATED, named.is_right_or_stated);
+            outcome.event(ALL_FOUND, named.is_all_found);
         }
         for (i, (verdict, _)) in VERDICTS.iter().enumerate() {
             outcome.event(VERDICT + i, answer.verdict == *verdict);
         }
-        // With full confidence, and none of those that look like it.
-        let looks_like =
-            |e: &twinlag::NamedEffect| own().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()));
-        let is_confident = answer.verdict == Verdict::Explained;
-        outcome.event(WRONG, is_confident && first.is_some_and(|e| e.alternatives.is_empty() && !looks_like(e)));
+        outcome.event(WRONG, named.is_wrong);
         // The scatter that is due: that of the same estimator where it is told which effects there are.
         let others = || Identifier::ALL.into_iter().filter(|e| !wanted.contains(&e.name())).collect();
         let told = if is_alien { None } else { Some(diagnose(&record, &options(others()))?) };
@@ -168,11 +156,47 @@ impl Study for Plan {
             }
         }
         outcome.value(HELD_OUT, answer.error.budget.held_out_normalised_rms.after);
+        let first = answer.effects.first().map(|e| e.effect);
         for (i, effect) in Identifier::ALL.iter().enumerate() {
-            outcome.event(FIRST + i, first.is_some_and(|e| e.effect == *effect));
+            outcome.event(FIRST + i, first == Some(*effect));
         }
         outcome.event(FIRST + Identifier::ALL.len(), first.is_none());
         Ok(())
+    }
+}
+
+/// Whether a diagnosis names the effects that a rig has.
+pub(super) struct Naming {
+    /// The first effect named is one of them, or there is neither.
+    pub(super) is_right_first: bool,
+    /// One of them is named first or as an alternative to what is, or there is neither.
+    pub(super) is_right_or_stated: bool,
+    /// Each is named or an alternative to what is.
+    pub(super) is_all_found: bool,
+    /// Another is named first with full confidence: no alternative, and none of those that look like one of them.
+    pub(super) is_wrong: bool,
+}
+
+impl Naming {
+    /// - `wanted`: the effects that the rig has
+    pub(super) fn of(answer: &Diagnosis, wanted: &[&str]) -> Self {
+        let is = |e: &NamedEffect, name: &str| e.effect.name() == name;
+        let states = |e: &NamedEffect, name: &str| is(e, name) || e.alternatives.iter().any(|a| a.name() == name);
+        let looks_like = |e: &NamedEffect| {
+            let own = Identifier::ALL.into_iter().filter(|o| wanted.contains(&o.name()));
+            own.into_iter().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()))
+        };
+        let first = answer.effects.first();
+        let first_or_none =
+            |of: &dyn Fn(&NamedEffect) -> bool| first.map_or(wanted.is_empty(), of);
+        let is_confident = answer.verdict == Verdict::Explained;
+        Self {
+            is_right_first: first_or_none(&|e| wanted.iter().any(|name| is(e, name))),
+            is_right_or_stated: first_or_none(&|e| wanted.iter().any(|name| states(e, name))),
+            is_all_found: wanted.iter().all(|name| answer.effects.iter().any(|e| states(e, name)))
+                && answer.effects.len() >= wanted.len(),
+            is_wrong: is_confident && first.is_some_and(|e| e.alternatives.is_empty() && !looks_like(e)),
+        }
     }
 }
 
