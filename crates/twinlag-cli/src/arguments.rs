@@ -291,14 +291,14 @@ pub(crate) struct Input {
 #[command(next_help_heading = "Plausibility")]
 pub(crate) struct Physics {
     /// What a sensor is: `T1=thermocouple:0.5mm` or `T1=wire:50um` (a bare wire), `platinum:25um`, `bead:0.8mm`, `sheath:3mm`
-    /// (mineral-insulated), or a range that holds 95 % of such time constants, `T1=0.2..0.6s`. The time constant that it should
-    /// have enters the estimate with its uncertainty, and an estimate outside of it is named with what it would take. May be
-    /// given once for each sensor.
+    /// (mineral-insulated), or a range that holds 95 % of such time constants, `T1=0.2..0.6s`. A time constant outside of what is
+    /// expected is named with what it would take; one that the record does not determine is taken to be as expected. May be given
+    /// once for each sensor.
     #[arg(long, value_name = "T1=KIND:SIZE")]
     sensor: Vec<TypicalSensor>,
     /// What flows around sensors of a given size, and how fast: air@20m/s, water@0.5m/s; after commas temperature and pressure
     /// where they are not those of the readings and one atmosphere (air@20m/s,800C,5bar).
-    #[arg(long, value_name = "FLUID@SPEED", allow_hyphen_values = true)]
+    #[arg(long, value_name = "FLUID@SPEED")]
     fluid: Option<Flow>,
 }
 

@@ -12,7 +12,6 @@ use crate::arguments::Characterise;
 use crate::console::Console;
 use crate::failure::{Failure, explained};
 use crate::grades;
-use crate::plausible;
 use crate::print;
 use crate::progress::Progress;
 
@@ -36,7 +35,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
         None => characterise(&record, &options, console),
     };
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
-    let answer = plausible::judged(&plausibility, options, run, |answer| answer)?;
+    let answer = plausibility.answer(options, run, |answer| answer)?;
     print::characterisation(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
 }

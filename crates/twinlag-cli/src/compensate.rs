@@ -1,7 +1,7 @@
 //! `twinlag compensate FILE --out OUT.csv`: the gas temperature with its standard deviation.
 
 use twinlag::diagnosis::Verdict;
-use twinlag::{CompensateOptions, DiagnoseOptions, Status};
+use twinlag::{CompensateOptions, DiagnoseOptions, Options, Status};
 
 use crate::arguments::{Compensate, Trust};
 use crate::characterise::{model, read_watched};
@@ -21,22 +21,18 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
     print::notes(&record, console);
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
-    let options = CompensateOptions {
-        diagnose: DiagnoseOptions {
-            characterise: plausibility.with(asked)?,
-            without: command.without.clone(),
-            ..DiagnoseOptions::default()
-        },
-        model,
-        form: command.form,
-        trusted: usize::from(command.trust == Trust::T2),
-    };
-    let mut answer = {
+    let run = |characterise: Options| {
+        let options = CompensateOptions {
+            diagnose: DiagnoseOptions { characterise, without: command.without.clone(), ..DiagnoseOptions::default() },
+            model: model.clone(),
+            form: command.form,
+            trusted: usize::from(command.trust == Trust::T2),
+        };
         let progress = Progress::start(console, format!("compensating {} samples", record.len()));
         twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
-            .map_err(|error| Failure::in_file(error, &record.source))?
+            .map_err(|error| Failure::in_file(error, &record.source))
     };
-    answer.last.plausibility = plausibility.judge(&answer.last.sensors);
+    let answer = plausibility.answer(asked, run, |answer| &mut answer.last)?;
     if answer.status == Status::Ok {
         let columns: [(&str, &[f64]); 3] =
             [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];

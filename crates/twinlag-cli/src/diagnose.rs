@@ -14,7 +14,6 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
 use crate::output;
-use crate::plausible;
 use crate::print;
 use crate::progress::Progress;
 
@@ -39,7 +38,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         }
     };
     let plausibility = command.physics.plausibility(&records)?;
-    let answer = plausible::judged(&plausibility, characterise, run, |answer| &mut answer.last)?;
+    let answer = plausibility.answer(characterise, run, |answer| &mut answer.last)?;
     let record = match &records[..] {
         [record] => Cow::Borrowed(record),
         records => Cow::Owned(twinlag::joined(records)?),

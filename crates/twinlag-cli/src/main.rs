@@ -19,10 +19,8 @@ mod failure;
 mod grades;
 mod if_known;
 mod live;
-mod memory;
 mod output;
 mod plan;
-mod plausible;
 mod print;
 mod progress;
 mod records;
@@ -38,7 +36,7 @@ use clap::Parser;
 use crate::arguments::{Arguments, Command};
 
 fn main() -> ExitCode {
-    memory::give_back();
+    twinlag_memory::give_back_large();
     let arguments = Arguments::parse();
     let console = arguments.console();
     let result = match arguments.command {

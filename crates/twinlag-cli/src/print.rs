@@ -11,13 +11,12 @@ use twinlag::{
     Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NamedTwin, NoiseSource, SecondLag,
     SensorEstimate, Status, Track,
 };
-use twinlag_pages::parameter_in_words;
+use twinlag_pages::{parameter_in_words, plausibility_in_words};
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades::{graded, reasons};
 use crate::if_known;
-use crate::plausible;
 use crate::records;
 use crate::settings::usage;
 
@@ -83,7 +82,7 @@ fn text(answer: &Characterisation) -> String {
         }
     }
     lines.extend(reasons(asked(answer).chain(free(answer)), "  "));
-    lines.extend(plausible::lines(answer));
+    lines.extend(answer.plausibility.iter().map(plausibility_in_words));
     lines.push(String::new());
     let white = if answer.residual.white { "white" } else { "not white" };
     lines.push(match answer.residual.chi2_per_dof {
@@ -201,7 +200,7 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
     for sensor in &answer.last.sensors {
         lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
     }
-    lines.extend(plausible::lines(&answer.last));
+    lines.extend(answer.last.plausibility.iter().map(plausibility_in_words));
     lines.extend(reasons(asked(&answer.last), "  "));
     if let Some(gas) = &answer.gas {
         lines.push(String::new());
@@ -318,7 +317,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     }
     lines.extend(difference_line(&answer.last));
     lines.extend(reasons(asked(&answer.last).chain(of_effects(&answer.effects)), "  "));
-    lines.extend(plausible::lines(&answer.last));
+    lines.extend(answer.last.plausibility.iter().map(plausibility_in_words));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
     lines.extend(records::lines(answer));

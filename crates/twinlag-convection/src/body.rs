@@ -3,14 +3,11 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::ConvectionError;
-use crate::quantity::{Units, positive};
+use crate::quantity::{Units, four_digits, positive};
 
 /// Shape of the part that measures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Shape {
     /// A long cylinder across the flow: a wire, a sheath.
@@ -30,8 +27,7 @@ impl Shape {
 }
 
 /// What a sensor is made of, with mean values of its heat capacity and conductivity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Material {
     /// Thermocouple alloys of types E, J, K, N and T.
@@ -43,26 +39,34 @@ pub enum Material {
 }
 
 impl Material {
-    /// Heat capacity of a volume, J/(m³ K).
+    /// Heat capacity of a volume at room temperature, J/(m³ K); in hot gas that of alloys is some 10 to 20 % larger.
     ///
     /// Base metals: the mean of Chromel (8730 kg/m³ · 448 J/(kg K)), Alumel (8600 · 523), constantan (8920 · 394), iron
-    /// (7870 · 447) and copper (8933 · 385), which are within 15 % of it. Platinum: 21450 · 133. Sheathed: a wall of 0.12 and
+    /// (7870 · 447) and copper (8933 · 385), which are within 20 % of it. Platinum: 21450 · 133. Sheathed: a wall of 0.12 and
     /// two wires of 0.15 diameters, as makers give them, of nickel alloy (8470 · 444) and magnesia (3580 · 940, compacted
     /// to 85 %).
     pub const fn heat_capacity_j_m3_k(self) -> f64 {
         match self {
-            Self::BaseMetal => 3.76e6,
+            Self::BaseMetal => 3.78e6,
             Self::Platinum => 2.85e6,
             Self::Sheathed => 3.28e6,
         }
     }
 
-    /// Thermal conductivity, W/(m K): the lowest of the base metals, and compacted magnesia.
+    /// Thermal conductivity, W/(m K): the lowest of the alloys (Nicrosil, platinum with rhodium), and compacted magnesia.
     const fn conductivity_w_m_k(self) -> f64 {
         match self {
-            Self::BaseMetal => 19.0,
-            Self::Platinum => 71.0,
+            Self::BaseMetal => 13.0,
+            Self::Platinum => 30.0,
             Self::Sheathed => 3.0,
+        }
+    }
+
+    /// Emissivity: of oxidised alloys, and of platinum, which stays bright.
+    pub(crate) const fn emissivity(self) -> f64 {
+        match self {
+            Self::BaseMetal | Self::Sheathed => 0.8,
+            Self::Platinum => 0.2,
         }
     }
 }
@@ -81,7 +85,7 @@ impl Material {
 /// assert!(error.contains("thermocouple, wire, platinum, bead or sheath"), "{error}");
 /// # Ok::<(), twinlag_convection::ConvectionError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Body {
     /// Its shape.
@@ -142,10 +146,11 @@ impl fmt::Display for Body {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match (self.material, self.shape) {
             (Material::Sheathed, _) => "mineral-insulated thermocouple",
-            (_, Shape::Sphere) => "bead of thermocouple alloy",
+            (Material::Platinum, Shape::Sphere) => "platinum bead",
             (Material::Platinum, _) => "platinum wire",
+            (_, Shape::Sphere) => "bead of thermocouple alloy",
             (Material::BaseMetal, _) => "bare thermocouple wire",
         };
-        write!(f, "{what} of {} mm", self.diameter_m * 1e3)
+        write!(f, "{what} of {} mm", four_digits(self.diameter_m * 1e3))
     }
 }

@@ -40,12 +40,12 @@ impl Correlation {
         }
     }
 
-    /// Reynolds numbers that it holds for in a fluid of Prandtl number `prandtl`: of a cylinder those with `Re Pr` of at least
+    /// Reynolds numbers that it was published for, in a fluid of Prandtl number `prandtl`: of a cylinder those with `Re Pr` of at least
     /// 0.2, below which natural convection and the length of the wire matter.
     fn range(self, prandtl: f64) -> [f64; 2] {
         match self {
-            Self::ChurchillBernstein => [0.2 / prandtl, 4e5],
-            Self::Whitaker => [0.0, 7.6e4],
+            Self::ChurchillBernstein => [0.2 / prandtl, 1e7],
+            Self::Whitaker => [3.5, 7.6e4],
         }
     }
 

@@ -17,8 +17,8 @@ pub enum ConvectionError {
     )]
     Reynolds { reynolds: f64, speed_m_s: f64, source_of_it: &'static str, range: [f64; 2] },
     #[error(
-        "a Biot number of {biot:.2}: expected at most {limit}, since inside the sensor heat flows hardly faster than to it. Give the \
-         range of the time constant instead"
+        "a Biot number of {biot:.2}: expected at most {limit}, since heat flows less than ten times as fast inside the sensor as to it. \
+         Give the range of the time constant instead"
     )]
     Biot { biot: f64, limit: f64 },
 }

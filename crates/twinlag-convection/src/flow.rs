@@ -3,11 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::ConvectionError;
 use crate::fluid::{ATMOSPHERE_PA, Fluid, ZERO_CELSIUS_K};
-use crate::quantity::{Units, positive};
+use crate::quantity::{Units, four_digits, positive};
 
 /// A fluid that flows across a sensor.
 ///
@@ -22,7 +20,7 @@ use crate::quantity::{Units, positive};
 /// assert!((flow.temperature_c.expect("given") - 800.0).abs() < 1e-9);
 /// # Ok::<(), twinlag_convection::ConvectionError>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Flow {
     /// What flows.
@@ -69,7 +67,13 @@ impl FromStr for Flow {
         let speed = parts.next().unwrap_or_default();
         let speed_m_s = positive(text, speed, SPEED_UNITS, "a speed above 0 in m/s, cm/s, mm/s or km/h")?;
         let mut flow = Self::new(fluid, speed_m_s)?;
+        let mut pressure_pa = None;
         for part in parts.map(str::trim) {
+            let is_temperature = part.ends_with(['C', 'K']);
+            let is_second = if is_temperature { flow.temperature_c.is_some() } else { pressure_pa.is_some() };
+            if is_second {
+                return Err(wrong("one temperature and one pressure", part));
+            }
             if let Some(celsius) = part.strip_suffix("\u{b0}C").or_else(|| part.strip_suffix('C')) {
                 let c = celsius.trim().parse::<f64>().ok().filter(|c| c.is_finite());
                 flow.temperature_c = Some(c.ok_or_else(|| wrong("a temperature in C or K", part))?);
@@ -77,9 +81,10 @@ impl FromStr for Flow {
                 flow.temperature_c = Some(positive(text, part, KELVIN, "a temperature in C or K")? - ZERO_CELSIUS_K);
             } else {
                 let expected = "a temperature in C or K, or a pressure in bar, mbar, hPa, kPa, MPa or Pa";
-                flow.pressure_pa = positive(text, part, PRESSURE_UNITS, expected)?;
+                pressure_pa = Some(positive(text, part, PRESSURE_UNITS, expected)?);
             }
         }
+        flow.pressure_pa = pressure_pa.unwrap_or(ATMOSPHERE_PA);
         Ok(flow)
     }
 }
@@ -88,8 +93,8 @@ impl fmt::Display for Flow {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} at {} m/s", self.fluid, self.speed_m_s)?;
         if let Some(c) = self.temperature_c {
-            write!(f, " and {c:.0} °C")?;
+            write!(f, ", {c:.0} °C")?;
         }
-        if self.pressure_pa == ATMOSPHERE_PA { Ok(()) } else { write!(f, ", {} bar", self.pressure_pa / 1e5) }
+        if self.pressure_pa == ATMOSPHERE_PA { Ok(()) } else { write!(f, ", {} bar", four_digits(self.pressure_pa / 1e5)) }
     }
 }

@@ -2,8 +2,6 @@
 
 use std::fmt;
 
-use serde::{Deserialize, Serialize};
-
 use crate::error::ConvectionError;
 
 /// 0 °C, K.
@@ -14,8 +12,7 @@ pub(crate) const ATMOSPHERE_PA: f64 = 101_325.0;
 const AIR_GAS_CONSTANT_J_KG_K: f64 = 287.05;
 
 /// What flows around a sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fluid {
     /// Dry air; lean combustion gas is close to it.
@@ -44,10 +41,15 @@ impl Fluid {
         }
     }
 
+    /// Whether heat passes through it by radiation.
+    pub(crate) const fn is_transparent(self) -> bool {
+        matches!(self, Self::Air)
+    }
+
     /// Temperatures between which the properties are known, °C.
     const fn range_c(self) -> [f64; 2] {
         match self {
-            Self::Air => [-100.0, 1700.0],
+            Self::Air => [-100.0, 1000.0],
             Self::Water => [0.0, 100.0],
         }
     }
@@ -55,7 +57,7 @@ impl Fluid {
     /// Properties at `temperature_c` and `pressure_pa`.
     ///
     /// Air: viscosity `1.716·10⁻⁵ (T/273)^1.5 384/(T + 111)` Pa s and conductivity `0.0241 (T/273)^1.5 467/(T + 194)`
-    /// W/(m K) (Sutherland's law with the constants of White, Viscous Fluid Flow, 2006; 2 to 4 % off), an ideal gas with a Prandtl
+    /// W/(m K) (Sutherland's law with the constants of White, Viscous Fluid Flow, 2006; up to 6 % off tables), an ideal gas with a Prandtl
     /// number of 0.70. Water: viscosity `2.414·10⁻⁵ · 10^(247.8/(T − 140))` Pa s (2.5 % off), conductivity
     /// `−0.5752 + 6.397·10⁻³ T − 8.151·10⁻⁶ T²` W/(m K), 4182 J/(kg K) and 1000 kg/m³ less what it has expanded.
     ///

@@ -15,3 +15,8 @@ pub(crate) fn positive(text: &str, part: &str, units: Units, expected: &'static 
     let value = number.trim().parse::<f64>().map_err(|_| wrong())? * worth;
     if value.is_finite() && value > 0.0 { Ok(value) } else { Err(wrong()) }
 }
+
+/// A number as it was meant, where a unit has left dust in its last digits.
+pub(crate) fn four_digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

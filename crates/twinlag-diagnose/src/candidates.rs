@@ -177,11 +177,12 @@ impl<'a> Search<'a> {
     /// leaves over.
     pub(crate) fn beside(mut self, current: &Fitted) -> Self {
         self.context.tau_s = [current.theta[0], current.theta[1]];
+        let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy);
+        self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
+        // After the lines, which take as much memory again, and leave none of it.
         if self.allowed.iter().any(|effect| effect.about().follows_gas) {
             self.context.gas = current.estimated_gas(self.observations);
         }
-        let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy);
-        self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
         self
     }
 

@@ -70,6 +70,26 @@ pub(crate) struct Block<'a> {
     pub(crate) columns: Vec<&'a [f64]>,
 }
 
+impl Block<'_> {
+    /// Appends the derivatives with respect to the parameters from `first` on to `columns`, which all have those of the blocks before.
+    fn append_columns(&self, directions: &Directions, first: usize, columns: &mut [Vec<f64>]) {
+        for (i, all) in columns.iter_mut().enumerate().skip(first) {
+            let (start, end) = (all.len(), all.len() + self.residual.len());
+            match directions.of_parameters.as_ref().filter(|_| !self.is_prior) {
+                None => all.extend_from_slice(self.columns[i]),
+                Some(of_parameters) => {
+                    all.resize(end, 0.0);
+                    for (part, weight) in &of_parameters[i] {
+                        let parts = all[start..].iter_mut().zip(self.columns[*part]);
+                        parts.for_each(|(sum, x)| *sum += weight * x);
+                    }
+                }
+            }
+            all.resize(end, 0.0);
+        }
+    }
+}
+
 /// A column for each direction.
 fn first_columns<'c>(columns: &'c mut Vec<Column>, directions: &Directions) -> &'c mut [Column] {
     columns.resize_with(columns.len().max(directions.all.len()), Column::default);
@@ -310,37 +330,47 @@ impl<'a> ResidualCost<'a> {
         let mut columns: Vec<Vec<f64>> = (0..theta.len()).map(|i| Vec::with_capacity(length(i))).collect();
         let directions = self.directions(theta, first);
         let mut residual = Vec::new();
-        let mut append = |block: &Block<'_>| {
-            let (end, of_directions) = (block.range.end, &block.columns);
-            for (i, all) in columns.iter_mut().enumerate().skip(first) {
-                match directions.of_parameters.as_ref().filter(|_| !block.is_prior) {
-                    None => all.extend_from_slice(of_directions[i]),
-                    Some(of_parameters) => {
-                        all.resize(end, 0.0);
-                        for (part, weight) in &of_parameters[i] {
-                            let parts = all[block.range.start..].iter_mut().zip(of_directions[*part]);
-                            parts.for_each(|(sum, x)| *sum += weight * x);
-                        }
-                    }
-                }
-                all.resize(end, 0.0);
-            }
-        };
         if memory.evaluator.keeps_factors() {
             self.evaluate(theta, memory);
-            self.walk(theta, &directions, memory, |block| append(&block));
+            self.walk(theta, &directions, memory, |block| block.append_columns(&directions, first, &mut columns));
             residual = std::mem::take(&mut memory.residual);
         } else {
             residual.reserve_exact(most);
             let all = self.pass(theta, &directions, memory, |_, block| {
                 residual.extend_from_slice(block.residual);
-                append(&block);
+                block.append_columns(&directions, first, &mut columns);
                 ControlFlow::Continue(())
             });
             debug_assert!(all.is_continue(), "each window is visited");
         }
         columns[first..].iter_mut().for_each(|column| column.resize(residual.len(), 0.0));
         Linearised { columns, samples: self.selection.samples(&memory.evaluator.pieces).collect(), residual }
+    }
+
+    /// Whether the record is short enough for all of it to be in memory.
+    pub(crate) fn is_kept(&self) -> bool {
+        self.memory.borrow().evaluator.keeps_factors()
+    }
+
+    /// What [`Self::into_linearised`] gives, window after window, of which one is in memory, and what is known beforehand last.
+    pub(crate) fn visit_linearised(self, theta: &[f64], mut visit: impl FnMut(&Linearised)) {
+        let directions = self.directions(theta, 0);
+        let mut rows =
+            Linearised { samples: Samples::default(), residual: Vec::new(), columns: vec![Vec::new(); theta.len()] };
+        let (mut samples, mut pieces_seen) = (Samples::default(), 0);
+        let all = self.pass(theta, &directions, &mut self.memory.borrow_mut(), |pieces, block| {
+            samples.append(self.selection.samples(&pieces[pieces_seen..]));
+            pieces_seen = pieces.len();
+            rows.samples = samples.take_first(if block.is_prior { 0 } else { block.residual.len() });
+            debug_assert!(block.is_prior || rows.samples.len() == block.residual.len(), "a residual for each sample");
+            rows.residual.clear();
+            rows.residual.extend_from_slice(block.residual);
+            rows.columns.iter_mut().for_each(Vec::clear);
+            block.append_columns(&directions, 0, &mut rows.columns);
+            visit(&rows);
+            ControlFlow::Continue(())
+        });
+        debug_assert!(all.is_continue(), "each window is visited");
     }
 
     /// The normal equations at a point, without what only [`Model::scored_normal_equations`] has.
@@ -620,17 +650,33 @@ mod tests {
             for effect in effects(&context) {
                 let model = Model::new(&[], [0.05, 0.07]).with(effect.clone());
                 let theta: Vec<f64> = TAU_S.into_iter().chain(effect.starts().remove(0)).collect();
-                let linearised = |window_samples: usize, block_samples: usize| {
+                let cost = |window_samples: usize, block_samples: usize| {
                     let cost = ResidualCost::new(&model, &theta, &observations, &selection);
                     let mut memory = cost.memory.borrow_mut();
                     memory.evaluator.window_samples = window_samples;
                     memory.evaluator.max_kept_samples = window_samples;
                     memory.evaluator.block_samples = block_samples;
                     drop(memory);
-                    cost.into_linearised(&theta, 0)
+                    cost
                 };
-                let whole = linearised(SAMPLES, SAMPLES);
-                for cut in [linearised(37, SAMPLES), linearised(SAMPLES, 16), linearised(64, 5)] {
+                let whole = cost(SAMPLES, SAMPLES).into_linearised(&theta, 0);
+                let visited = {
+                    let mut all = Linearised {
+                        samples: Samples::default(),
+                        residual: Vec::new(),
+                        columns: vec![Vec::new(); theta.len()],
+                    };
+                    cost(37, SAMPLES).visit_linearised(&theta, |rows| {
+                        all.samples.append(rows.samples.iter());
+                        all.residual.extend(&rows.residual);
+                        all.columns.iter_mut().zip(&rows.columns).for_each(|(all, column)| all.extend(column));
+                    });
+                    all.samples = all.samples.iter().collect();
+                    all
+                };
+                let [windows, blocks, both] =
+                    [(37, SAMPLES), (SAMPLES, 16), (64, 5)].map(|(w, b)| cost(w, b).into_linearised(&theta, 0));
+                for cut in [visited, windows, blocks, both] {
                     assert_eq!(whole.samples, cut.samples);
                     let all = |lin: &Linearised| [std::slice::from_ref(&lin.residual), &lin.columns[..]].concat();
                     for (want, got) in all(&whole).iter().zip(&all(&cut)) {

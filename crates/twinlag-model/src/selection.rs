@@ -81,6 +81,31 @@ impl Samples {
         &self.0
     }
 
+    /// Appends `samples`, which come after all of these.
+    pub(crate) fn append(&mut self, samples: impl Iterator<Item = usize>) {
+        self.0.extend(ranges(samples));
+    }
+
+    /// Takes out the first `count`.
+    pub(crate) fn take_first(&mut self, mut count: usize) -> Self {
+        let mut out = Vec::new();
+        let mut whole = 0;
+        for run in &mut self.0 {
+            let taken = count.min(run.len());
+            if taken > 0 {
+                out.push(run.start..run.start + taken);
+            }
+            run.start += taken;
+            count -= taken;
+            whole += usize::from(run.is_empty());
+            if count == 0 {
+                break;
+            }
+        }
+        self.0.drain(..whole);
+        Self(out)
+    }
+
     /// All of them, in order.
     pub fn iter(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         self.0.iter().cloned().flatten()
@@ -167,6 +192,18 @@ impl Sieve {
 mod tests {
     use super::*;
     use crate::observations::{Observations, Stretch};
+
+    /// The first samples and those that are left are all of them, in order, wherever they are cut.
+    #[test]
+    fn what_is_taken_out_is_the_beginning() {
+        let all = [2, 3, 4, 8, 11, 12];
+        for count in 0..=all.len() {
+            let mut left: Samples = all.into_iter().collect();
+            let taken = left.take_first(count);
+            assert_eq!(taken.iter().collect::<Vec<_>>(), all[..count]);
+            assert_eq!(left.iter().collect::<Vec<_>>(), all[count..]);
+        }
+    }
 
     #[test]
     fn neighbours_make_a_range() {

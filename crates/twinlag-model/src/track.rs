@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::cost::{Linearised, ResidualCost};
 use crate::effect::KnownEffect;
 use crate::effect::{Shared, varying};
 use crate::error::ModelError;
@@ -282,7 +283,14 @@ impl Tracker<'_> {
         // Time constants are others all along.
         let changed = constant.model.with(varying::step(f64::NEG_INFINITY));
         let after: Vec<f64> = theta.iter().copied().chain([change]).collect();
-        Scan::of(&before, &changed.linearised(&after, observations, selection), within, limit)
+        let cost = || ResidualCost::new(&changed, &after, observations, selection);
+        // What is in memory as a whole is linearised once.
+        let kept = cost().is_kept().then(|| cost().into_linearised(&after, 0));
+        let visit_after = |visit: &mut dyn FnMut(&Linearised)| match &kept {
+            Some(all) => visit(all),
+            None => cost().visit_linearised(&after, visit),
+        };
+        Scan::of(&before, visit_after, within, limit)
     }
 
     /// - `curve`: the spline of the fit, where its columns are those of [`Local`]

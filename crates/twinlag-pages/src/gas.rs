@@ -6,7 +6,7 @@ use twinlag_report::{Document, Figure, ReportError, Table, between, probability,
 
 use crate::figures::WIDTH_PX;
 use crate::pictures::{spectra, temperature_figure, track_picture};
-use crate::words::{grade, interval_of, listed, seconds, sentence, with_unit, words};
+use crate::words::{grade, interval_of, listed, plausibility_in_words, seconds, sentence, with_unit, words};
 use twinlag::{Characterisation, Compensation, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
@@ -19,7 +19,7 @@ use twinlag::{Characterisation, Compensation, Track};
 /// why, and that is no error.
 pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
     let document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
-    let mut document = cautions(document, &answer.last);
+    let mut document = plausibility(cautions(document, &answer.last), &answer.last);
     document = match &answer.gas {
         None => document.lead(format!("There is no gas temperature to use: {}.", answer.judgement.because)),
         Some(_) if answer.judgement.grade == Grade::NoGo => {
@@ -122,6 +122,14 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
 /// What speaks against the use of the model that was given, before all else.
 fn cautions(document: Document, last: &Characterisation) -> Document {
     last.model_remarks.iter().fold(document, |document, remark| document.warning(sentence(remark)))
+}
+
+/// Whether time constants are what was expected of them.
+pub(crate) fn plausibility(document: Document, last: &Characterisation) -> Document {
+    last.plausibility.iter().fold(document, |document, one| {
+        let text = sentence(&plausibility_in_words(one));
+        if one.is_outside == Some(true) { document.warning(text) } else { document.paragraph(text) }
+    })
 }
 
 fn numbers(document: Document, last: &Characterisation) -> Document {

@@ -2,7 +2,7 @@
 
 use twinlag::cross_relation::TestName;
 use twinlag::diagnosis::{Grade, Identifier, Judgement};
-use twinlag::{Difference, EffectNumber, SensorEstimate};
+use twinlag::{Difference, EffectNumber, PlausibleTimeConstant, SensorEstimate};
 use twinlag_report::{between, rounded};
 
 pub(crate) const ABSENT: &str = "not given";
@@ -48,6 +48,32 @@ pub fn parameter_in_words(name: &str) -> String {
         "curvature_skew" => "third moment of its temperatures over the variance".into(),
         _ => name.replace('_', " "),
     }
+}
+
+/// Whether a time constant is what was expected of it, and what it would take where it is not.
+pub fn plausibility_in_words(one: &PlausibleTimeConstant) -> String {
+    let channel = &one.channel;
+    let range = |[low, high]: [f64; 2], scale: f64| format!("{} to {}", rounded(low * scale, 2), rounded(high * scale, 2));
+    let expected = format!("{} s ({})", range(one.range_95_s, 1.0), one.basis);
+    let Some((found_s, [low, high])) = one.found_s.zip(one.found_interval_95_s) else {
+        let instead =
+            if one.is_taken_as_known { "does not determine it, so that was taken as known" } else { "gives none to compare" };
+        return format!("expected of {channel}: {expected}; the record {instead}");
+    };
+    let found = format!("{} s [{}, {}]", rounded(found_s, 3), rounded(low, 3), rounded(high, 3));
+    if one.is_outside != Some(true) {
+        return format!("plausible: {channel} has {found}, expected are {expected}");
+    }
+    let take = one.would_take.map_or(String::new(), |take| {
+        let diameter = take.diameter_m.map(|ends| format!("a diameter of {} mm", range(ends, 1e3)));
+        let speed = take.speed_m_s.map(|ends| format!("a speed of {} m/s", range(ends, 1.0)));
+        match (diameter, speed) {
+            (Some(diameter), Some(speed)) => format!("; it would take {diameter}, or {speed}"),
+            (Some(one), None) | (None, Some(one)) => format!("; it would take {one}"),
+            (None, None) => "; it would take more than the correlation covers".into(),
+        }
+    });
+    format!("implausible: {channel} has {found}, expected are {expected}{take}")
 }
 
 /// A name that does not fill a legend.

@@ -92,7 +92,7 @@ pub use answers::{
 };
 pub use error::Error;
 pub use options::Options;
-pub use plausibility::{Plausibility, Typical, TypicalSensor};
+pub use plausibility::{Plausibility, TypicalSensor};
 pub use reference::AgainstReference;
 pub use setting::Setting;
 pub use verbs::{

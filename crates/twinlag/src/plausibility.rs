@@ -2,18 +2,20 @@
 
 use std::str::FromStr;
 
-use serde::{Deserialize, Serialize};
 use twinlag_convection::{Body, Expected, Flow};
 use twinlag_cross_relation::Parameter;
-use twinlag_estimate::Known;
+use twinlag_estimate::{Estimator, Known};
 
-use crate::answers::{PlausibleTimeConstant, SensorEstimate};
+use crate::answers::{Characterisation, PlausibleTimeConstant, SensorEstimate, Status};
 use crate::error::Error;
 use crate::options::Options;
 use crate::setting::Setting;
 
 /// Standard deviations to either end of a 95 % range.
 const DEVIATIONS_95: f64 = 1.96;
+/// Standard deviation of the logarithm up to which what is expected of a time constant is taken for knowledge where the record has
+/// none: a normal distribution with it has a fiftieth below zero, and one that is wider says little.
+const MAX_LOG_STD_OF_KNOWN: f64 = 0.5;
 
 /// What is typical of the time constant of one sensor.
 ///
@@ -21,34 +23,25 @@ const DEVIATIONS_95: f64 = 1.96;
 /// `T1=thermocouple:0.5mm`, `T2=0.2..0.6s`.
 ///
 /// ```
-/// use twinlag::{Typical, TypicalSensor};
+/// use twinlag::TypicalSensor;
 ///
-/// let typical: TypicalSensor = "T2=200..600ms".parse()?;
-/// assert_eq!((typical.sensor, typical.typical), (1, Typical::Range { low_s: 0.2, high_s: 0.6 }));
-/// assert!("T2=600..200ms".parse::<TypicalSensor>().is_err());
+/// assert_eq!("T2=200..600ms".parse::<TypicalSensor>()?, "T2 = 0.2..0.6 s".parse()?);
+/// let error = "T2=600..200ms".parse::<TypicalSensor>().expect_err("the wrong way round");
+/// assert!(error.to_string().contains("LOW..HIGH in s or ms"));
 /// # Ok::<(), twinlag::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TypicalSensor {
     /// 0 or 1.
-    pub sensor: usize,
-    /// What is typical of it.
-    pub typical: Typical,
+    sensor: usize,
+    typical: Typical,
 }
 
 /// A range of time constants, or a body that has one in a flow.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum Typical {
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Typical {
     /// From `low_s` to `high_s`, in 95 of 100 such sensors.
-    Range {
-        /// The short end, s.
-        low_s: f64,
-        /// The long end, s.
-        high_s: f64,
-    },
+    Range { low_s: f64, high_s: f64 },
     /// A body, whose time constant follows from the flow.
     Body(Body),
 }
@@ -89,34 +82,37 @@ impl FromStr for TypicalSensor {
 
 /// What time constants are expected to be, before a record says what they are.
 ///
-/// An expected value enters the estimate as something known with a standard deviation ([`Plausibility::with`]), and the answer
-/// is held against it ([`Plausibility::judge`]).
+/// The time constants that the record determines by itself are held against it; of one that the record does not determine, what is
+/// expected is taken for knowledge ([`Plausibility::answer`]).
 ///
 /// ```
 #[doc = include_str!("example.txt")]
 /// use twinlag::Plausibility;
 /// use twinlag::convection::Flow;
 ///
-/// // Sensors of 120 and 450 ms, of which one is said to be a wire of 0.1 mm in air at 5 m/s.
-/// let typical = ["T1=wire:0.1mm".parse()?];
+/// // Sensors of 120 and 450 ms. The first is said to be a wire of 0.25 mm in air of 300 °C at 5 m/s.
 /// let flow: Flow = "air@5m/s".parse()?;
-/// let plausibility = Plausibility::new(&typical, Some(&flow), 300.0)?;
-/// let answer = twinlag::characterise(&record, &plausibility.with(Options::default())?)?;
-/// let [judged] = &plausibility.judge(&answer.sensors)[..] else { panic!("one is judged") };
-/// assert_eq!(judged.is_outside, Some(false), "{judged:?}");
+/// let plausibility = Plausibility::new(&["T1=wire:0.25mm".parse()?], Some(&flow), 300.0)?;
+/// let run = |options: Options| twinlag::characterise(&record, &options);
+/// let answer = plausibility.answer(Options::default(), run, |answer| answer)?;
+/// let [judged] = &answer.plausibility[..] else { panic!("one is judged") };
+/// assert_eq!(judged.is_outside, Some(true), "{judged:?}");
+/// let [thin_m, thick_m] = judged.would_take.expect("outside").diameter_m.expect("within the correlation");
+/// assert!(0.08e-3 < thin_m && thick_m < 0.25e-3, "{thin_m} {thick_m}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plausibility {
-    expected: Vec<OfSensor>,
+    expected: Vec<ExpectedOf>,
 }
 
 /// What is expected of one sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct OfSensor {
+struct ExpectedOf {
     sensor: usize,
     value_s: f64,
-    std_s: f64,
+    /// Standard deviation of the logarithm.
+    log_std: f64,
     /// What it was computed from, where it was not given.
     computed: Option<Expected>,
 }
@@ -142,9 +138,9 @@ impl Plausibility {
             return wrong(Setting::Fluid, expected, flow.to_string(), &[Setting::Typical]);
         }
         let of = |one: &TypicalSensor| {
-            let (value_s, std_s, computed) = match one.typical {
+            let (value_s, log_std, computed) = match one.typical {
                 Typical::Range { low_s, high_s } => {
-                    (0.5 * (low_s + high_s), 0.5 * (high_s - low_s) / DEVIATIONS_95, None)
+                    ((low_s * high_s).sqrt(), 0.5 * (high_s / low_s).ln() / DEVIATIONS_95, None)
                 }
                 Typical::Body(body) => {
                     let Some(flow) = flow else {
@@ -152,66 +148,92 @@ impl Plausibility {
                         return wrong(Setting::Fluid, expected, format!("{body} alone"), &[Setting::Typical]);
                     };
                     let expected = Expected::of(&body, flow, temperature_c)?;
-                    (expected.time_constant_s, expected.std_s, Some(expected))
+                    (expected.time_constant_s, expected.log_std, Some(expected))
                 }
             };
-            Ok(OfSensor { sensor: one.sensor, value_s, std_s, computed })
+            Ok(ExpectedOf { sensor: one.sensor, value_s, log_std, computed })
         };
         Ok(Self { expected: typical.iter().map(of).collect::<Result<_, _>>()? })
     }
 
-    /// `options` that know what is expected.
+    /// The answer of `run`, with the time constants that the record determines by itself held against what is expected of them
+    /// ([`Characterisation::plausibility`]). Where it does not determine one, and something is expected of it, `run` is asked
+    /// again and knows that.
+    ///
+    /// - `last`: what holds the time constants of an answer
     ///
     /// # Errors
-    /// [`Error::Setting`] where they know a time constant already.
-    pub fn with(&self, mut options: Options) -> Result<Options, Error> {
-        for one in &self.expected {
-            let parameter = [Parameter::Tau1, Parameter::Tau2][one.sensor];
-            if let Some(known) = options.known(parameter) {
-                let expected = "a sensor whose time constant is not known besides";
-                return wrong(Setting::Typical, expected, known.to_string(), &[Setting::Known]);
-            }
-            options.known.push(Known { parameter, value: one.value_s, std: Some(one.std_s) });
+    /// Those of `run`; [`Error::Setting`] where `options` know a time constant that something is expected of.
+    pub fn answer<A, E: From<Error>>(
+        &self,
+        options: Options,
+        run: impl Fn(Options) -> Result<A, E>,
+        last: impl Fn(&mut A) -> &mut Characterisation,
+    ) -> Result<A, E> {
+        if let Some(known) = self.expected.iter().find_map(|one| options.known(one.parameter())) {
+            let expected = "a sensor whose time constant is not known besides";
+            return wrong(Setting::Typical, expected, known.to_string(), &[Setting::Known]).map_err(E::from);
         }
-        Ok(options)
-    }
-
-    /// How the time constants of `sensors` compare with what is expected.
-    pub fn judge(&self, sensors: &[SensorEstimate; 2]) -> Vec<PlausibleTimeConstant> {
-        let judged = |one: &OfSensor| {
-            let sensor = &sensors[one.sensor];
-            let range_95_s = [-1.0, 1.0].map(|sign| (one.value_s + sign * DEVIATIONS_95 * one.std_s).max(0.0));
-            let found_s = sensor.time_constant_s;
-            // Both the range and the interval are of 95 %.
-            let is_outside = sensor
-                .interval_95_s
-                .or(found_s.map(|s| [s; 2]))
-                .map(|[low, high]| high < range_95_s[0] || low > range_95_s[1]);
-            let would_take = found_s.zip(one.computed).map(|(s, computed)| computed.would_take(s));
-            PlausibleTimeConstant {
-                channel: sensor.channel.clone(),
-                expected_s: one.value_s,
-                range_95_s,
-                from: from(one),
-                found_s,
-                is_outside,
-                would_take: would_take.filter(|_| is_outside == Some(true)),
+        let mut answer = run(options.clone())?;
+        let own = last(&mut answer);
+        let mut plausibility: Vec<PlausibleTimeConstant> =
+            self.expected.iter().map(|one| one.beside(&own.sensors[one.sensor])).collect();
+        let is_undetermined = matches!(own.status, Status::NotIdentifiable | Status::AtBound);
+        if is_undetermined && options.estimator == Estimator::Whitened {
+            let mut knowing = options;
+            for (one, judged) in self.expected.iter().zip(&mut plausibility) {
+                judged.is_taken_as_known = judged.found_s.is_none() && one.log_std <= MAX_LOG_STD_OF_KNOWN;
+                knowing.known.extend(judged.is_taken_as_known.then(|| one.known()));
             }
-        };
-        self.expected.iter().map(judged).collect()
+            if plausibility.iter().any(|judged| judged.is_taken_as_known) {
+                answer = run(knowing)?;
+            }
+        }
+        last(&mut answer).plausibility = plausibility;
+        Ok(answer)
     }
 }
 
-/// What an expected value follows from, for the reader.
-fn from(one: &OfSensor) -> String {
-    let Some(Expected { body, flow, temperature_c, correlation, numbers, .. }) = &one.computed else {
-        return "the range that was given".into();
-    };
-    format!(
-        "{body} in {flow}, properties at {temperature_c:.0} °C, {} with a Reynolds number of {:.3}",
-        correlation.source(),
-        numbers.reynolds
-    )
+impl ExpectedOf {
+    fn parameter(&self) -> Parameter {
+        [Parameter::Tau1, Parameter::Tau2][self.sensor]
+    }
+
+    fn known(&self) -> Known {
+        Known { parameter: self.parameter(), value: self.value_s, std: Some(self.log_std * self.value_s) }
+    }
+
+    /// This beside what the record says of the sensor.
+    fn beside(&self, sensor: &SensorEstimate) -> PlausibleTimeConstant {
+        let factor = (DEVIATIONS_95 * self.log_std).exp();
+        let range_95_s = [self.value_s / factor, self.value_s * factor];
+        let is_outside = sensor.interval_95_s.map(|[low, high]| high < range_95_s[0] || low > range_95_s[1]);
+        let would_take = sensor.time_constant_s.zip(self.computed).map(|(s, computed)| computed.would_take(s));
+        PlausibleTimeConstant {
+            channel: sensor.channel.clone(),
+            expected_s: self.value_s,
+            range_95_s,
+            basis: self.basis(),
+            found_s: sensor.time_constant_s,
+            found_interval_95_s: sensor.interval_95_s,
+            is_outside,
+            would_take: would_take.filter(|_| is_outside == Some(true)),
+            is_taken_as_known: false,
+        }
+    }
+
+    /// What it follows from, for the reader.
+    fn basis(&self) -> String {
+        let Some(Expected { body, flow, temperature_c, correlation, numbers, .. }) = &self.computed else {
+            return "the range that was given".into();
+        };
+        let properties = match flow.temperature_c {
+            Some(_) => String::new(),
+            None => format!(" of {temperature_c:.0} °C"),
+        };
+        let (source, reynolds) = (correlation.source(), numbers.reynolds);
+        format!("{body} in {flow}{properties}; {source}, Reynolds number {reynolds:.0}")
+    }
 }
 
 fn wrong<T>(setting: Setting, expected: &str, got: String, also: &[Setting]) -> Result<T, Error> {

@@ -29,22 +29,26 @@ impl Scan {
     /// The scan of the instants `within`, samples. `None` where there is none.
     ///
     /// - `before`: linearised with the time constants before the step, without the step's parameter
-    /// - `after`: with those after it, and the step's parameter last
+    /// - `after`: has its argument visit what is linearised with those after it and has the step's parameter last, some samples after
+    ///   the others. It is asked twice, so that it need not be in memory
     /// - `limit`: energies that exceed the least by so much are not kept
-    pub(super) fn of(before: &Linearised, after: &Linearised, within: Range<usize>, limit: f64) -> Option<Self> {
-        let p = after.columns.len();
-        let row_after = |j: usize| after.columns.iter().map(|c| c[j]).chain([after.residual[j]]).collect::<Vec<f64>>();
+    pub(super) fn of(
+        before: &Linearised,
+        after: impl Fn(&mut dyn FnMut(&Linearised)),
+        within: Range<usize>,
+        limit: f64,
+    ) -> Option<Self> {
+        let p = before.columns.len() + 1;
         let row_before =
             |i: usize| before.columns.iter().map(|c| c[i]).chain([0.0, before.residual[i]]).collect::<Vec<f64>>();
-        let common = || common(&before.samples, &after.samples);
         let mut sums = vec![vec![0.0; p + 1]; p + 1];
-        common().for_each(|(_, _, j)| add(&mut sums, &row_after(j), 1.0));
+        each_common(&before.samples, &after, |_, _, row_after| add(&mut sums, row_after, 1.0));
         // What is known beforehand comes after the samples.
         (before.samples.len()..before.residual.len()).for_each(|i| add(&mut sums, &row_before(i), 1.0));
         let mut energies: Vec<(usize, f64)> = Vec::new();
         let mut most_energies = SIFTED_ENERGIES;
         let mut best: Option<(usize, f64, Vec<Vec<f64>>)> = None;
-        for (sample, i, j) in common() {
+        each_common(&before.samples, &after, |sample, i, row_after| {
             if within.contains(&sample) {
                 let energy = least_energy(&sums);
                 if best.as_ref().is_none_or(|(_, least, _)| energy - least < limit) {
@@ -61,8 +65,8 @@ impl Scan {
                 }
             }
             add(&mut sums, &row_before(i), 1.0);
-            add(&mut sums, &row_after(j), -1.0);
-        }
+            add(&mut sums, row_after, -1.0);
+        });
         let (sample, energy, sums) = best?;
         energies.retain(|(_, of_sample)| of_sample - energy < limit);
         let products: Vec<Vec<f64>> = sums[..p].iter().map(|row| row[..p].to_vec()).collect();
@@ -71,14 +75,23 @@ impl Scan {
     }
 }
 
-/// The samples that both have, with their places.
-fn common(a: &Samples, b: &Samples) -> impl Iterator<Item = (usize, usize, usize)> {
-    let mut others = b.iter().enumerate().peekable();
-    a.iter().enumerate().filter_map(move |(i, sample)| {
-        while others.next_if(|(_, other)| *other < sample).is_some() {}
-        let (j, _) = others.peek().filter(|(_, other)| *other == sample)?;
-        Some((sample, i, *j))
-    })
+/// Visits the samples that both have: each with its place among those before, and the row of derivatives and residual after.
+fn each_common(
+    before: &Samples,
+    after: impl Fn(&mut dyn FnMut(&Linearised)),
+    mut visit: impl FnMut(usize, usize, &[f64]),
+) {
+    let mut places = before.iter().enumerate().peekable();
+    let mut row = Vec::new();
+    after(&mut |rows| {
+        for (j, sample) in rows.samples.iter().enumerate() {
+            while places.next_if(|(_, other)| *other < sample).is_some() {}
+            let Some((i, _)) = places.next_if(|(_, other)| *other == sample) else { continue };
+            row.clear();
+            row.extend(rows.columns.iter().map(|c| c[j]).chain([rows.residual[j]]));
+            visit(sample, i, &row);
+        }
+    });
 }
 
 /// Adds `times` the products of a row with itself to the lower half.
@@ -160,11 +173,24 @@ mod tests {
         let columns = vec![with_known(wave(60, 0.37), 0.9), with_known(wave(60, 0.91), -0.4)];
         let before = linearised(samples(20), columns, with_known(wave(60, 1.7), 0.3));
         let after = linearised(samples(50), vec![wave(60, 0.53), wave(60, 1.1), wave(60, 0.7)], wave(60, 1.3));
-        let scan = Scan::of(&before, &after, 30..60, f64::INFINITY).expect("samples within");
+        // In blocks of seven, with an empty one before the last.
+        let blocks = |visit: &mut dyn FnMut(&Linearised)| {
+            let samples: Vec<usize> = after.samples.iter().collect();
+            let mut starts: Vec<usize> = (0..samples.len()).step_by(7).chain([samples.len()]).collect();
+            starts.insert(starts.len() - 2, starts[starts.len() - 2]);
+            for ends in starts.windows(2) {
+                let of = |all: &[f64]| all[ends[0]..ends[1]].to_vec();
+                let columns = after.columns.iter().map(|column| of(column)).collect();
+                visit(&linearised(samples[ends[0]..ends[1]].to_vec(), columns, of(&after.residual)));
+            }
+        };
+        let scan = Scan::of(&before, |visit| visit(&after), 30..60, f64::INFINITY).expect("samples within");
+        let in_blocks = Scan::of(&before, blocks, 30..60, f64::INFINITY).expect("samples within");
+        assert!(in_blocks.energies == scan.energies && in_blocks.best == scan.best);
         assert_eq!(scan.energies.len(), 29, "one of 30 is lacking");
         let limit =
             0.5 * (scan.energies.iter().map(|(_, energy)| energy).fold(0.0, |a: f64, b| a.max(*b)) - scan.best.1);
-        let near = Scan::of(&before, &after, 30..60, limit).expect("samples within");
+        let near = Scan::of(&before, |visit| visit(&after), 30..60, limit).expect("samples within");
         let is_near = |(_, energy): &&(usize, f64)| energy - scan.best.1 < limit;
         assert_eq!(near.energies, scan.energies.iter().filter(is_near).copied().collect::<Vec<(usize, f64)>>());
         assert!(near.energies.len() < 29 && near.best == scan.best);

@@ -5,6 +5,7 @@ use twinlag::{NamedEffect, NamedTwin, SensorEstimate};
 use twinlag_report::{Document, Table, rounded};
 
 use super::Page;
+use crate::gas::plausibility;
 use crate::words::{
     apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence,
     with_interval, with_unit, words,
@@ -21,6 +22,7 @@ impl Page<'_> {
         for remark in &answer.remarks {
             document = document.warning(sentence(remark));
         }
+        document = plausibility(document, &answer.last);
         if answer.verdict == Verdict::Unexplained {
             document = document.paragraph(
                 "What to do: see below where in frequency and in time most of it lies, and look for what happens at the \

@@ -14,11 +14,16 @@ pub struct PlausibleTimeConstant {
     /// The range that holds 95 % of such sensors, s.
     pub range_95_s: [f64; 2],
     /// What that follows from.
-    pub from: String,
-    /// The time constant that the record gives, s; `None` where it gives none.
+    pub basis: String,
+    /// The time constant that the record gives by itself, s; `None` where it gives none.
     pub found_s: Option<f64>,
-    /// Whether the whole of its 95 % interval is outside of the range; `None` where the record gives no time constant.
+    /// Its 95 % interval, s.
+    pub found_interval_95_s: Option<[f64; 2]>,
+    /// Whether the whole of that interval is outside of the range; `None` where there is no interval.
     pub is_outside: Option<bool>,
     /// What the time constant would take physically, where it is outside and the sensor's size was given.
     pub would_take: Option<WouldTake>,
+    /// Whether what is expected was taken for knowledge, as the record by itself does not determine the time constant: the answer
+    /// rests on it.
+    pub is_taken_as_known: bool,
 }
