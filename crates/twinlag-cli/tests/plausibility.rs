@@ -44,7 +44,7 @@ fn a_wire_of_the_right_size_is_plausible() {
         let answer = bench.run(&asked).json();
         let last = if verb[0] == "characterise" { &answer } else { &answer["final"] };
         let one = &last["plausibility"][0];
-        assert_eq!((&one["channel"], &one["is_outside"]), (&"fine".into(), &false.into()), "{one:#}");
+        assert_eq!((&one["channel"], &one["is_outside"]), (&"T1".into(), &false.into()), "{one:#}");
         assert!((number(&one["expected_s"]) / EXPECTED_S - 1.0).abs() < BY_HAND, "{one:#}");
         assert!(one["would_take"].is_null() && one["is_taken_as_known"] == false, "{one:#}");
     }
@@ -65,7 +65,7 @@ fn a_wire_of_another_size_is_not_and_moves_nothing() {
             assert!((number(got) / want - 1.0).abs() < BY_HAND, "{one:#}");
         }
         let text = bench.run(&[&["characterise", "run.csv", "--quiet"], &asked[..]].concat()).stdout;
-        assert!(text.contains("implausible: fine has 0.02") && text.contains("it would take a diameter of"), "{text}");
+        assert!(text.contains("implausible: T1 has 0.02") && text.contains("it would take a diameter of"), "{text}");
     }
 }
 
@@ -82,7 +82,8 @@ fn what_the_record_does_not_determine_is_taken_to_be_as_expected() {
     assert!(one["is_taken_as_known"] == true && one["is_outside"].is_null(), "{one:#}");
     let sensor = &answer["sensors"][1];
     assert_eq!(sensor["grade"], "conditional", "{sensor:#}");
-    assert!((number(&sensor["time_constant_s"]) / EXPECTED_S - 1.0).abs() < BY_HAND, "{sensor:#}");
+    // What little the record says moves it within the standard deviation of what is expected.
+    assert!((number(&sensor["time_constant_s"]) / EXPECTED_S - 1.0).abs() < 0.3, "{sensor:#}");
 }
 
 /// A known value for the same sensor would count twice; a size says nothing without a flow.

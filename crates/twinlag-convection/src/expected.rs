@@ -131,12 +131,7 @@ impl Expected {
 /// The argument at which `time_constant` is `wanted_s`; `None` where it is not `within` these, or `time_constant` not known there.
 ///
 /// - `start`: an argument at which it is known
-fn solved(
-    wanted_s: f64,
-    within: [f64; 2],
-    start: f64,
-    time_constant: &dyn Fn(f64) -> Option<f64>,
-) -> Option<f64> {
+fn solved(wanted_s: f64, within: [f64; 2], start: f64, time_constant: &dyn Fn(f64) -> Option<f64>) -> Option<f64> {
     // The time constant rises or falls with the argument all along, so the farthest known argument to each side bounds it.
     let ends = within.map(|end| {
         let step = (end / start).powf(1.0 / f64::from(REACH_STEPS));

@@ -95,6 +95,10 @@ impl fmt::Display for Flow {
         if let Some(c) = self.temperature_c {
             write!(f, ", {c:.0} °C")?;
         }
-        if self.pressure_pa == ATMOSPHERE_PA { Ok(()) } else { write!(f, ", {} bar", four_digits(self.pressure_pa / 1e5)) }
+        if self.pressure_pa == ATMOSPHERE_PA {
+            Ok(())
+        } else {
+            write!(f, ", {} bar", four_digits(self.pressure_pa / 1e5))
+        }
     }
 }

@@ -11,7 +11,9 @@ fn expected(body: &str, flow: &str) -> Result<Expected, ConvectionError> {
 /// the time constant goes with a power of two at most.
 #[test]
 fn what_it_would_take_gives_what_was_asked() {
-    for (body, flow) in [("wire:0.1mm", "air@5m/s"), ("bead:0.8mm", "air@20m/s,400C,5bar"), ("wire:0.1mm", "water@0.1m/s")] {
+    for (body, flow) in
+        [("wire:0.1mm", "air@5m/s"), ("bead:0.8mm", "air@20m/s,400C,5bar"), ("wire:0.1mm", "water@0.1m/s")]
+    {
         let (body, flow): (Body, Flow) = (body.parse().expect("a body"), flow.parse().expect("a flow"));
         let as_given = Expected::of(&body, &flow, 20.0).expect("within the correlation");
         let factor = as_given.range_95_s()[1] / as_given.time_constant_s;
@@ -61,7 +63,8 @@ fn radiation_takes_part_in_hot_gas() {
 /// the same Nusselt number their ratio is 2/3.
 #[test]
 fn a_bead_has_two_thirds_of_the_volume_over_surface_of_a_wire() {
-    let [wire, bead] = ["wire:0.7mm", "bead:0.7mm"].map(|b| expected(b, "water@0.01m/s").expect("within the correlation"));
+    let [wire, bead] =
+        ["wire:0.7mm", "bead:0.7mm"].map(|b| expected(b, "water@0.01m/s").expect("within the correlation"));
     let ratio = bead.time_constant_s * bead.numbers.nusselt / (wire.time_constant_s * wire.numbers.nusselt);
     assert!((ratio - 2.0 / 3.0).abs() < 1e-12, "{ratio}");
 }

@@ -97,7 +97,7 @@ impl Samples {
             }
             run.start += taken;
             count -= taken;
-            whole += usize::from(run.is_empty());
+            whole += usize::from(run.start == run.end);
             if count == 0 {
                 break;
             }

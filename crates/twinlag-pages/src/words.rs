@@ -53,11 +53,15 @@ pub fn parameter_in_words(name: &str) -> String {
 /// Whether a time constant is what was expected of it, and what it would take where it is not.
 pub fn plausibility_in_words(one: &PlausibleTimeConstant) -> String {
     let channel = &one.channel;
-    let range = |[low, high]: [f64; 2], scale: f64| format!("{} to {}", rounded(low * scale, 2), rounded(high * scale, 2));
+    let range =
+        |[low, high]: [f64; 2], scale: f64| format!("{} to {}", rounded(low * scale, 2), rounded(high * scale, 2));
     let expected = format!("{} s ({})", range(one.range_95_s, 1.0), one.basis);
     let Some((found_s, [low, high])) = one.found_s.zip(one.found_interval_95_s) else {
-        let instead =
-            if one.is_taken_as_known { "does not determine it, so that was taken as known" } else { "gives none to compare" };
+        let instead = if one.is_taken_as_known {
+            "does not determine it, so that was taken as known"
+        } else {
+            "gives none to compare"
+        };
         return format!("expected of {channel}: {expected}; the record {instead}");
     };
     let found = format!("{} s [{}, {}]", rounded(found_s, 3), rounded(low, 3), rounded(high, 3));

@@ -200,7 +200,10 @@ impl ExpectedOf {
     }
 
     fn known(&self) -> Known {
-        Known { parameter: self.parameter(), value: self.value_s, std: Some(self.log_std * self.value_s) }
+        // Reports print it as it is, and no more of it is meant.
+        let three_digits = |value: f64| format!("{value:.2e}").parse().unwrap_or(value);
+        let std_s = three_digits(self.log_std * self.value_s);
+        Known { parameter: self.parameter(), value: three_digits(self.value_s), std: Some(std_s) }
     }
 
     /// This beside what the record says of the sensor.

@@ -16,7 +16,7 @@ use twinlag::record::Record;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::signal::{Record as Sampling, SignalError, Simulated};
 use twinlag::{DiagnoseOptions, Diagnosis, Options, diagnose, diagnose_records};
-use twinlag_study::{Failure, Outcome, Quantity, Rate, Results, Study, Tally};
+use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 
 use super::loops::{Naming, set_name, truth_s};
 use super::record_of;

@@ -187,8 +187,7 @@ impl Naming {
             own.into_iter().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()))
         };
         let first = answer.effects.first();
-        let first_or_none =
-            |of: &dyn Fn(&NamedEffect) -> bool| first.map_or(wanted.is_empty(), of);
+        let first_or_none = |of: &dyn Fn(&NamedEffect) -> bool| first.map_or(wanted.is_empty(), of);
         let is_confident = answer.verdict == Verdict::Explained;
         Self {
             is_right_first: first_or_none(&|e| wanted.iter().any(|name| is(e, name))),

@@ -10,7 +10,8 @@ use twinlag_study::{Results, Study};
 use super::reconstruction::Reconstruction;
 use super::tracking::Tracking;
 use super::{
-    Run, campaign, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction, tracking,
+    Run, campaign, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction,
+    tracking,
 };
 
 /// What a plan begins with.
