@@ -5,13 +5,11 @@
 //! another kind takes that instead. The one crate of the workspace with `unsafe` in it.
 //!
 //! ```
-//! fn main() {
-//!     twinlag_memory::give_back_large();
-//!     let record = vec![0.5; 1_000_000];
-//!     assert_eq!(record.iter().sum::<f64>(), 500_000.0);
-//!     // From here on its 8 MB are not this process's any more.
-//!     drop(record);
-//! }
+//! twinlag_memory::give_back_large();
+//! let record = vec![0.5; 1_000_000];
+//! assert_eq!(record.iter().sum::<f64>(), 500_000.0);
+//! // From here on its 8 MB are not this process's any more.
+//! drop(record);
 //! ```
 
 /// Bytes from which on a vector has a mapping of its own, which goes back to the system when the vector is dropped.

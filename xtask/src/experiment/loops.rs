@@ -166,6 +166,7 @@ impl Study for Plan {
 }
 
 /// Whether a diagnosis names the effects that a rig has.
+#[expect(clippy::struct_excessive_bools, reason = "four questions, each answered with yes or no")]
 pub(super) struct Naming {
     /// The first effect named is one of them, or there is neither.
     pub(super) is_right_first: bool,
