@@ -2,7 +2,7 @@
 
 use twinlag_convection::{Body, Expected, Flow};
 
-/// Times that sheathed thermocouples take in air of 2 m/s, s, by diameter in mm: to half of a step as electronic-sensor GmbH lists
+/// Times that sheathed thermocouples take in air of 2 m/s, s, by diameter in mm: to half of a step as the firm electronic-sensor lists
 /// them ("Technische Daten für Mantelthermoelemente"; insulated and welded junctions have the same), and to nine tenths as
 /// Toine Hendriks quotes another maker ("Exhaust temperature").
 const HALF_S: [(f64, f64); 4] = [(0.5, 1.80), (1.0, 3.00), (1.5, 8.00), (3.0, 23.0)];
