@@ -94,7 +94,7 @@ impl FromStr for TypicalSensor {
 /// let flow: Flow = "air@5m/s".parse()?;
 /// let plausibility = Plausibility::new(&["T1=wire:0.25mm".parse()?], Some(&flow), 300.0)?;
 /// let run = |options: Options| twinlag::characterise(&record, &options);
-/// let answer = plausibility.answer(Options::default(), run, |answer| answer)?;
+/// let answer = plausibility.answer(Options::default().free("offset")?, run, |answer| answer)?;
 /// let [judged] = &answer.plausibility[..] else { panic!("one is judged") };
 /// assert_eq!(judged.is_outside, Some(true), "{judged:?}");
 /// let [thin_m, thick_m] = judged.would_take.expect("outside").diameter_m.expect("within the correlation");
