@@ -3,30 +3,8 @@
 
 mod common;
 
-use common::{Bench, Trace, number};
+use common::{Bench, FAST_RIG, Trace, number};
 use serde_json::Value;
-
-/// Two sensors, one with a second lag.
-const RIG: &str = r#"
-seed = 1
-[record]
-samples = 1500
-sample_period_s = 0.004
-[gas]
-kind = "broadband"
-mean_c = 300.0
-std_k = 10.0
-corner_hz = 3.0
-[[sensors]]
-channel = "fine"
-time_constant_s = 0.024
-second_time_constant_s = 0.008
-noise = { std_k = 0.1 }
-[[sensors]]
-channel = "coarse"
-time_constant_s = 0.117
-noise = { std_k = 0.1 }
-"#;
 
 fn plan(bench: &Bench, file: &str, code: i32) -> Value {
     let answer = bench.run(&["plan", file, "--json"]);
@@ -38,7 +16,9 @@ fn plan(bench: &Bench, file: &str, code: i32) -> Value {
 /// The numbers are those of the rig, each with an expected error, and each record has the rivals of the record as it is.
 #[test]
 fn a_rig_is_planned_with_every_field_of_the_schema() {
-    let plan = plan(&Bench::with("plan-rig", "rig.toml", RIG), "rig.toml", 0);
+    let lag = "time_constant_s = 0.024\nsecond_time_constant_s = 0.008\n";
+    let rig = FAST_RIG.replacen("time_constant_s = 0.024\n", lag, 1);
+    let plan = plan(&Bench::with("plan-rig", "rig.toml", rig), "rig.toml", 0);
     for (name, want) in [("schema", "twinlag.plan/1"), ("source", "rig"), ("status", "ok")] {
         assert_eq!(plan[name], want, "{name}");
     }
@@ -73,7 +53,7 @@ fn a_diagnosis_is_planned_from_its_model_and_from_its_json() {
 /// Two equal sensors: the answer is that nothing is determined, not small errors.
 #[test]
 fn equal_sensors_end_with_4_and_no_standard_error() {
-    let rig = RIG.replace("second_time_constant_s = 0.008\n", "").replace("0.117", "0.024");
+    let rig = FAST_RIG.replace("0.117", "0.024");
     let plan = plan(&Bench::with("plan-equal", "rig.toml", rig), "rig.toml", 4);
     assert_eq!(plan["status"], "not-identifiable");
     for place in 0..2 {
@@ -83,7 +63,7 @@ fn equal_sensors_end_with_4_and_no_standard_error() {
 
 #[test]
 fn what_cannot_be_planned_is_refused() {
-    let bench = Bench::with("plan-refused", "silent.toml", RIG.replacen("noise = { std_k = 0.1 }\n", "", 1));
+    let bench = Bench::with("plan-refused", "silent.toml", FAST_RIG.replacen("noise = { std_k = 0.1 }\n", "", 1));
     bench.write("empty.toml", "");
     bench.write("broken.json", "{ \"schema\": ");
     bench.write("other.json", r#"{ "schema": "twinlag.track/1" }"#);

@@ -2,30 +2,9 @@
 
 mod common;
 
-use common::{Bench, number};
+use common::{Bench, FAST_RIG, number};
 
-/// The fine sensor lags as a wire of some 0.05 mm does in air of 300 °C at 20 m/s.
-const RIG: &str = r#"
-seed = 1
-[record]
-samples = 1500
-sample_period_s = 0.004
-[gas]
-kind = "broadband"
-mean_c = 300.0
-std_k = 10.0
-corner_hz = 3.0
-[[sensors]]
-channel = "fine"
-time_constant_s = 0.024
-noise = { std_k = 0.1 }
-[[sensors]]
-channel = "coarse"
-time_constant_s = 0.117
-noise = { std_k = 0.1 }
-"#;
-
-/// By hand, with air of 300 °C (0.0446 W/(m K), 47.5·10⁻⁶ m²/s): 50 µm have a Reynolds number of 21, a Nusselt number of 2.5 and with 1.5 %
+/// The time constant of a wire of 50 µm in air at 20 m/s, s. By hand, with air of 300 °C (0.0446 W/(m K), 47.5·10⁻⁶ m²/s): 50 µm have a Reynolds number of 21, a Nusselt number of 2.5 and with 1.5 %
 /// of radiation a time constant of 0.0207 s, which goes with the diameter to the power of 1.56 there.
 const EXPECTED_S: f64 = 0.0207;
 /// Diameters of 24 ms over and times the factor of 95 %, `exp(1.96 · 0.3)` = 1.8.
@@ -37,7 +16,7 @@ const AIR: [&str; 2] = ["--fluid", "air@20m/s"];
 
 #[test]
 fn a_wire_of_the_right_size_is_plausible() {
-    let bench = Bench::simulated("plausible", RIG);
+    let bench = Bench::simulated("plausible", FAST_RIG);
     let verbs: [&[&str]; 3] = [&["characterise"], &["diagnose"], &["compensate", "--out", "gas.csv"]];
     for verb in verbs {
         let asked = [verb, &["run.csv", "--json", "--sensor", "T1=wire:50um"], &AIR].concat();
@@ -53,7 +32,7 @@ fn a_wire_of_the_right_size_is_plausible() {
 /// What the record determines by itself stays as it is, whatever was expected.
 #[test]
 fn a_wire_of_another_size_is_not_and_moves_nothing() {
-    let bench = Bench::simulated("implausible", RIG);
+    let bench = Bench::simulated("implausible", FAST_RIG);
     let alone = bench.characterise("run.csv", &[]).json();
     for size in ["T1=wire:0.5mm", "T1=wire:7um"] {
         let asked = [&["--sensor", size], &AIR[..]].concat();
@@ -72,7 +51,7 @@ fn a_wire_of_another_size_is_not_and_moves_nothing() {
 /// Of two sensors that are alike a record determines nothing; what is expected of one is then taken as known.
 #[test]
 fn what_the_record_does_not_determine_is_taken_to_be_as_expected() {
-    let bench = Bench::simulated("plausible-alike", &RIG.replace("0.117", "0.024"));
+    let bench = Bench::simulated("plausible-alike", &FAST_RIG.replace("0.117", "0.024"));
     let alone = bench.characterise("run.csv", &[]);
     assert_eq!(alone.code, 4, "{alone:#?}");
     let answer = bench.characterise("run.csv", &[&["--sensor", "T1=wire:50um"], &AIR[..]].concat());
@@ -89,7 +68,7 @@ fn what_the_record_does_not_determine_is_taken_to_be_as_expected() {
 /// A known value for the same sensor would count twice; a size says nothing without a flow.
 #[test]
 fn what_does_not_go_together_is_refused() {
-    let bench = Bench::simulated("plausible-refused", RIG);
+    let bench = Bench::simulated("plausible-refused", FAST_RIG);
     let refuses = |further: &[&str], words: &[&str]| {
         bench.refuses(2, &[&["characterise", "run.csv"], further].concat(), words);
     };

@@ -107,16 +107,20 @@ impl Expected {
 
     /// The range that holds 95 % of such time constants, s.
     pub fn range_95_s(&self) -> [f64; 2] {
+        self.around(self.time_constant_s)
+    }
+
+    /// What 95 % of such sensors are within if `time_constant_s` is expected, s.
+    fn around(&self, time_constant_s: f64) -> [f64; 2] {
         let factor = (DEVIATIONS_95 * self.log_std).exp();
-        [self.time_constant_s / factor, self.time_constant_s * factor]
+        [time_constant_s / factor, time_constant_s * factor]
     }
 
     /// What a time constant of `time_constant_s` would take.
     pub fn would_take(&self, time_constant_s: f64) -> WouldTake {
         let of = |body: Body, flow: Flow| Self::of(&body, &flow, self.temperature_c).ok().map(|e| e.time_constant_s);
         let (body, flow) = (self.body, self.flow);
-        let factor = (DEVIATIONS_95 * self.log_std).exp();
-        let ends_s = [time_constant_s / factor, time_constant_s * factor];
+        let ends_s = self.around(time_constant_s);
         let range = |within, start, time_constant: &dyn Fn(f64) -> Option<f64>| {
             let [one, other] = ends_s.map(|end_s| solved(end_s, within, start, time_constant));
             one.zip(other).map(|(one, other)| [one.min(other), one.max(other)])

@@ -671,7 +671,6 @@ mod tests {
                         all.residual.extend(&rows.residual);
                         all.columns.iter_mut().zip(&rows.columns).for_each(|(all, column)| all.extend(column));
                     });
-                    all.samples = all.samples.iter().collect();
                     all
                 };
                 let [windows, blocks, both] =

@@ -83,7 +83,12 @@ impl Samples {
 
     /// Appends `samples`, which come after all of these.
     pub(crate) fn append(&mut self, samples: impl Iterator<Item = usize>) {
-        self.0.extend(ranges(samples));
+        for run in ranges(samples) {
+            match self.0.last_mut() {
+                Some(last) if last.end == run.start => last.end = run.end,
+                _ => self.0.push(run),
+            }
+        }
     }
 
     /// Takes out the first `count`.
@@ -202,6 +207,9 @@ mod tests {
             let taken = left.take_first(count);
             assert_eq!(taken.iter().collect::<Vec<_>>(), all[..count]);
             assert_eq!(left.iter().collect::<Vec<_>>(), all[count..]);
+            let mut again = taken;
+            again.append(left.iter());
+            assert_eq!(again, all.into_iter().collect());
         }
     }
 

@@ -110,9 +110,8 @@ pub struct Plausibility {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ExpectedOf {
     sensor: usize,
-    value_s: f64,
-    /// Standard deviation of the logarithm.
-    log_std: f64,
+    /// The range that holds 95 % of such sensors, s.
+    range_95_s: [f64; 2],
     /// What it was computed from, where it was not given.
     computed: Option<Expected>,
 }
@@ -138,20 +137,18 @@ impl Plausibility {
             return wrong(Setting::Fluid, expected, flow.to_string(), &[Setting::Typical]);
         }
         let of = |one: &TypicalSensor| {
-            let (value_s, log_std, computed) = match one.typical {
-                Typical::Range { low_s, high_s } => {
-                    ((low_s * high_s).sqrt(), 0.5 * (high_s / low_s).ln() / DEVIATIONS_95, None)
-                }
+            let (range_95_s, computed) = match one.typical {
+                Typical::Range { low_s, high_s } => ([low_s, high_s], None),
                 Typical::Body(body) => {
                     let Some(flow) = flow else {
                         let expected = "what flows around it and how fast, as in air@20m/s";
                         return wrong(Setting::Fluid, expected, format!("{body} alone"), &[Setting::Typical]);
                     };
                     let expected = Expected::of(&body, flow, temperature_c)?;
-                    (expected.time_constant_s, expected.log_std, Some(expected))
+                    (expected.range_95_s(), Some(expected))
                 }
             };
-            Ok(ExpectedOf { sensor: one.sensor, value_s, log_std, computed })
+            Ok(ExpectedOf { sensor: one.sensor, range_95_s, computed })
         };
         Ok(Self { expected: typical.iter().map(of).collect::<Result<_, _>>()? })
     }
@@ -182,7 +179,7 @@ impl Plausibility {
         if is_undetermined && options.estimator == Estimator::Whitened {
             let mut knowing = options;
             for (one, judged) in self.expected.iter().zip(&mut plausibility) {
-                judged.is_taken_as_known = judged.found_s.is_none() && one.log_std <= MAX_LOG_STD_OF_KNOWN;
+                judged.is_taken_as_known = judged.found_s.is_none() && one.log_std() <= MAX_LOG_STD_OF_KNOWN;
                 knowing.known.extend(judged.is_taken_as_known.then(|| one.known()));
             }
             if plausibility.iter().any(|judged| judged.is_taken_as_known) {
@@ -199,23 +196,34 @@ impl ExpectedOf {
         [Parameter::Tau1, Parameter::Tau2][self.sensor]
     }
 
+    /// The middle of the range, in the logarithm, s.
+    fn value_s(&self) -> f64 {
+        let [low_s, high_s] = self.range_95_s;
+        (low_s * high_s).sqrt()
+    }
+
+    /// Standard deviation of the logarithm.
+    fn log_std(&self) -> f64 {
+        let [low_s, high_s] = self.range_95_s;
+        0.5 * (high_s / low_s).ln() / DEVIATIONS_95
+    }
+
     fn known(&self) -> Known {
         // Reports print it as it is, and no more of it is meant.
         let three_digits = |value: f64| format!("{value:.2e}").parse().unwrap_or(value);
-        let std_s = three_digits(self.log_std * self.value_s);
-        Known { parameter: self.parameter(), value: three_digits(self.value_s), std: Some(std_s) }
+        let std_s = three_digits(self.log_std() * self.value_s());
+        Known { parameter: self.parameter(), value: three_digits(self.value_s()), std: Some(std_s) }
     }
 
     /// This beside what the record says of the sensor.
     fn beside(&self, sensor: &SensorEstimate) -> PlausibleTimeConstant {
-        let factor = (DEVIATIONS_95 * self.log_std).exp();
-        let range_95_s = [self.value_s / factor, self.value_s * factor];
-        let is_outside = sensor.interval_95_s.map(|[low, high]| high < range_95_s[0] || low > range_95_s[1]);
+        let [shortest_s, longest_s] = self.range_95_s;
+        let is_outside = sensor.interval_95_s.map(|[low, high]| high < shortest_s || low > longest_s);
         let would_take = sensor.time_constant_s.zip(self.computed).map(|(s, computed)| computed.would_take(s));
         PlausibleTimeConstant {
             channel: sensor.channel.clone(),
-            expected_s: self.value_s,
-            range_95_s,
+            expected_s: self.value_s(),
+            range_95_s: self.range_95_s,
             basis: self.basis(),
             found_s: sensor.time_constant_s,
             found_interval_95_s: sensor.interval_95_s,
