@@ -60,6 +60,9 @@ struct Subject {
     channels: Option<[&'static str; 2]>,
 }
 
+/// Times that a verb is begun: its stack is followed from within a signal, and the unwinder crashes there now and then.
+const ATTEMPTS: usize = 8;
+
 /// The profile of a verb on one record.
 struct Profiled {
     subject: String,
@@ -127,11 +130,12 @@ fn profiles(verb: Verb, subjects: &[Subject], arguments: &Profile, left_out: &mu
 
 fn child(verb: Verb, subject: &Subject, seconds: f64) -> Result<Sampled> {
     let step = subject.channels.map_or(verb.name().to_owned(), |[one, two]| format!("{}:{one}:{two}", verb.name()));
-    let output = Command::new(std::env::current_exe()?)
-        .args(["profile", "--step", &step, "--seconds", &seconds.to_string()])
-        .arg(&subject.file)
-        .output()
-        .context("the profile could not start itself")?;
+    let mut command = Command::new(std::env::current_exe()?);
+    command.args(["profile", "--step", &step, "--seconds", &seconds.to_string()]).arg(&subject.file);
+    let mut outputs = (0..ATTEMPTS).map(|_| command.output().context("the profile could not start itself"));
+    // Without a code it was ended by a signal.
+    let last = outputs.find(|output| output.as_ref().map_or(true, |output| output.status.code().is_some()));
+    let output = last.with_context(|| format!("crashed {ATTEMPTS} times in the library that follows the stack"))??;
     let error = String::from_utf8_lossy(&output.stderr);
     let last = error.lines().last().unwrap_or("no message").trim_start_matches("xtask: ");
     ensure!(output.status.success(), "{last}");
