@@ -10,6 +10,7 @@ mod policy;
 mod reconstruction;
 mod stored;
 mod surface;
+mod ties;
 mod tracking;
 
 use std::fs;

@@ -71,8 +71,9 @@ pub(crate) fn read(spec: &Path) -> Result<Rig, Failure> {
 }
 
 fn write(out: &mut impl Write, record: &Simulated) -> Result<(), Failure> {
-    let columns: [(&str, &[f64]); 4] =
-        [("time_s", &record.time_s), ("T1", &record.t1_c), ("T2", &record.t2_c), ("Tref", &record.gas_c)];
+    let mut columns: Vec<(&str, &[f64])> =
+        vec![("time_s", &record.time_s), ("T1", &record.t1_c), ("T2", &record.t2_c), ("Tref", &record.gas_c)];
+    columns.extend(record.velocity_m_per_s.as_deref().map(|velocity| ("velocity_m_s", velocity)));
     write_csv(out, &columns, Decimals::Shortest).map_err(twinlag::Error::from)?;
     Ok(())
 }

@@ -83,6 +83,14 @@ impl Flow {
         Number::from(from + share * (to - from)) + (time_s - time_s.re) * slope
     }
 
+    /// Rate of change of `v_mean/v` at an instant, 1/s, over the samples on either side and their neighbours.
+    pub(crate) fn inverse_ratio_rate_at(&self, time_s: f64) -> f64 {
+        let (before, after, _) = self.place(time_s);
+        let (first, last) = (before.saturating_sub(1), (after + 1).min(self.time_s.len() - 1));
+        let length_s = self.time_s[last] - self.time_s[first];
+        if length_s > 0.0 { (self.inverse_ratio[last] - self.inverse_ratio[first]) / length_s } else { 0.0 }
+    }
+
     /// The least and the largest `v_mean/v`.
     pub(crate) fn inverse_ratios(&self) -> [f64; 2] {
         let bounds = [f64::INFINITY, f64::NEG_INFINITY];

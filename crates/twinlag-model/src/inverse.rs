@@ -81,7 +81,7 @@ impl<T: Real> Inverse<T> {
             }
         }
         for i in (0..2).filter(|i| has[*i]) {
-            lag(&mut chains[i], &plant.sensors[i], tau_s);
+            lag(&mut chains[i], plant, i, tau_s);
         }
         pass(T::from(0.0));
         for i in 0..2 {
@@ -199,14 +199,15 @@ impl Plant {
 }
 
 /// The first-order factor of a sensor.
-fn lag<T: Real>(chain: &mut Chain<T>, sensor: &Sensor, along: &mut Vec<T>) {
+fn lag<T: Real>(chain: &mut Chain<T>, plant: &Plant, channel: usize, along: &mut Vec<T>) {
+    let sensor = &plant.sensors[channel];
     let curves = Curves { value: sensor.rest.as_ref(), slope: sensor.heat.as_ref() };
-    if sensor.changes.is_empty() {
+    if !plant.changes_tau(channel) {
         return chain.factor(Along::Same(T::of(sensor.tau_s)), curves);
     }
     along.clear();
     along.extend((0..chain.after_factor()).map(|k| {
-        let factor = sensor.tau_factor_at(chain.time_after_factor_s(k));
+        let factor = plant.tau_factor_at(channel, chain.time_after_factor_s(k));
         T::of(sensor.tau_s * factor)
     }));
     chain.factor(Along::Each(along), curves);

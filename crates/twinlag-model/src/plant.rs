@@ -199,6 +199,26 @@ impl Plant {
         delay_s
     }
 
+    /// What the time constant of a sensor is multiplied with at an instant of channel 1.
+    ///
+    /// A delay that changes squeezes the time of channel 2: at `t + d(t)` its reading changes `1 + d'` times as fast as the sensor, so
+    /// that the time constant counts `1/(1 + d') = 1 − r'` times, with `r = L/v` at `t + d`.
+    pub(crate) fn tau_factor_at(&self, channel: usize, time_s: f64) -> Number {
+        let factor = self.sensors[channel].tau_factor_at(time_s);
+        match self.separation.as_ref().filter(|_| channel == 1) {
+            Some(apart) => {
+                let rate = apart.flow.inverse_ratio_rate_at(time_s + self.delay_at(time_s).re);
+                factor * (-apart.delay_s * rate + 1.0)
+            }
+            None => factor,
+        }
+    }
+
+    /// Whether the time constant of a sensor changes along a record.
+    pub(crate) fn changes_tau(&self, channel: usize) -> bool {
+        !self.sensors[channel].changes.is_empty() || (channel == 1 && self.separation.is_some())
+    }
+
     /// The least and the largest delay along the record, s.
     pub(crate) fn delays_s(&self) -> [f64; 2] {
         let delay_s = self.delay_s.map_or(0.0, |delay_s| delay_s.re);

@@ -13,7 +13,8 @@
 
 use crate::effects::Play;
 use crate::gas::GasPath;
-use crate::{Flow, Hold, Sensor};
+use crate::surroundings::Surroundings;
+use crate::{Hold, Sensor};
 
 /// Temperatures of the sensor's bodies, °C: first pole, second pole, slow body. Bodies that a
 /// sensor lacks stay put.
@@ -21,12 +22,9 @@ pub(crate) type State = [f64; 3];
 
 impl Sensor {
     /// Rate of change of the state, K/s, at `time_s` in gas of `gas_c`.
-    fn derivative(&self, flow: Option<&Flow>, time_s: f64, gas_c: f64, state: &State) -> State {
+    fn derivative(&self, surroundings: Surroundings, time_s: f64, gas_c: f64, state: &State) -> State {
         let [first_c, second_c, slow_c] = *state;
-        let mut tau_s = self.time_constant_s;
-        if let Some(flow) = flow {
-            tau_s *= flow.factor(time_s);
-        }
+        let mut tau_s = self.time_constant_s * surroundings.factor(self, time_s);
         if let Some(dependence) = &self.temperature_dependence {
             tau_s *= dependence.factor(first_c, gas_c);
         }
@@ -78,9 +76,9 @@ impl Sensor {
     /// Readings at the sample instants from time zero on, °C. Starts in equilibrium with the gas at
     /// the grid's start, radiation aside.
     ///
-    /// - `flow`: what the flow does to the first time constant
+    /// - `surroundings`: what changes the first time constant
     /// - `oversampling`: integration steps per sample period, the number with which `gas` was made
-    pub(crate) fn follow(&self, gas: &GasPath, flow: Option<&Flow>, oversampling: usize) -> Vec<f64> {
+    pub(crate) fn follow(&self, gas: &GasPath, surroundings: Surroundings, oversampling: usize) -> Vec<f64> {
         let grid = gas.grid;
         let step_s = grid.sample_period_s() / oversampling as f64;
         let samples = grid.samples();
@@ -105,7 +103,7 @@ impl Sensor {
                     }
                 };
                 let time_s = grid.time_s(start) + step as f64 * step_s;
-                let derivative = |t: f64, x: f64, s: &State| self.derivative(flow, t, x, s);
+                let derivative = |t: f64, x: f64, s: &State| self.derivative(surroundings, t, x, s);
                 let next = runge_kutta_4(&state, time_s, step_s, during_c, derivative);
                 let now = (sample * oversampling + step) as f64;
                 while let Some(reading) = pending.next_if(|&reading| read_at[reading] < now + 1.0) {

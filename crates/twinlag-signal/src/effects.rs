@@ -11,6 +11,7 @@ mod mismatch;
 mod radiation;
 mod replaced;
 mod spikes;
+mod stream;
 mod temperature_dependence;
 
 pub use clock_slip::ClockSlip;
@@ -23,6 +24,7 @@ pub use mismatch::Mismatch;
 pub use radiation::Radiation;
 pub use replaced::Replaced;
 pub use spikes::Spikes;
+pub use stream::Stream;
 pub use temperature_dependence::TemperatureDependence;
 
 pub(crate) use hysteresis::Play;

@@ -52,6 +52,8 @@ pub enum SignalError {
          which they are meant"
     )]
     Diverged { channel: String, time_s: f64 },
+    #[error("{field} needs a [stream] past the sensors: add one, or leave {field} out")]
+    NeedsStream { field: String },
     #[error("gas of kind \"series\" needs either path, or values_c and period_s")]
     SeriesSource,
     #[error("the gas series ends at {end_s} s, the record at {needed_s} s")]

@@ -56,8 +56,9 @@
 //! Two first-order lags in white noise are where a rig starts. A [`Sensor`] may have more: further
 //! poles, radiation, a time constant that depends on temperature, a curved calibration, delay,
 //! drift, mains pick-up, crosstalk, noise with a memory, spikes, and some defects; the two share a
-//! [`Flow`] that changes, or meet slightly different gas ([`Mismatch`]). Each is off if left out,
-//! and its documentation says the formula. [`undeclared`] draws rigs with one of them at random,
+//! [`Flow`] that changes, meet slightly different gas ([`Mismatch`]), or stand in a [`Stream`] with a
+//! recorded velocity, one downstream of the other. Each is off if left out, and its documentation
+//! says the formula. [`undeclared`] draws rigs with one of them at random,
 //! for the trial of a diagnosis.
 //!
 //! # What the numbers mean
@@ -82,12 +83,13 @@ mod rig;
 mod sensor;
 mod simulated;
 mod streams;
+mod surroundings;
 pub mod undeclared;
 
 pub use adc::Adc;
 pub use effects::{
     ClockSlip, ColouredNoise, Flow, FlowSine, FlowStep, Hysteresis, IntermittentContact, Mains, Mismatch, Radiation,
-    Replaced, Spikes, TemperatureDependence,
+    Replaced, Spikes, Stream, TemperatureDependence,
 };
 pub use error::SignalError;
 pub use gas::{Broadband, Engine, Gas, Hold, MultiTone, Plunge, Series, Signal, Tone, Turbulence};

@@ -9,7 +9,8 @@ use crate::disturbance::cross_talk;
 use crate::gas::{GasPath, Resolution};
 use crate::grid::Grid;
 use crate::streams::{Purpose, stream};
-use crate::{Clean, Flow, Gas, Mismatch, Record, Sensor, SignalError, Simulated};
+use crate::surroundings::Surroundings;
+use crate::{Clean, Flow, Gas, Mismatch, Record, Sensor, SignalError, Simulated, Stream};
 
 const WITHIN: [&str; 2] = ["sensors[0]", "sensors[1]"];
 
@@ -27,6 +28,8 @@ pub struct Rig {
     #[serde(skip_serializing_if = "Option::is_none")]
     flow: Option<Flow>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    stream: Option<Stream>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     mismatch: Option<Mismatch>,
     #[serde(skip)]
     base_dir: PathBuf,
@@ -42,6 +45,8 @@ struct Unchecked {
     #[serde(default)]
     flow: Option<Flow>,
     #[serde(default)]
+    stream: Option<Stream>,
+    #[serde(default)]
     mismatch: Option<Mismatch>,
 }
 
@@ -52,8 +57,8 @@ impl TryFrom<Unchecked> for Rig {
         let sensors =
             file.sensors.try_into().map_err(|got: Vec<Sensor>| SignalError::SensorCount { got: got.len() })?;
         let (seed, record, gas) = (file.seed, file.record, file.gas);
-        Self { seed, record, gas, sensors, flow: file.flow, mismatch: file.mismatch, base_dir: PathBuf::new() }
-            .checked()
+        let Unchecked { flow, stream, mismatch, .. } = file;
+        Self { seed, record, gas, sensors, flow, stream, mismatch, base_dir: PathBuf::new() }.checked()
     }
 }
 
@@ -78,7 +83,8 @@ impl Rig {
     /// long for the gas ([`SignalError::NotResolved`]); more than 2e8 integration steps
     /// ([`SignalError::TooLarge`]).
     pub fn new(seed: u64, record: Record, gas: Gas, sensors: [Sensor; 2]) -> Result<Self, SignalError> {
-        Self { seed, record, gas, sensors, flow: None, mismatch: None, base_dir: PathBuf::new() }.checked()
+        let (flow, stream, mismatch) = (None, None, None);
+        Self { seed, record, gas, sensors, flow, stream, mismatch, base_dir: PathBuf::new() }.checked()
     }
 
     /// This rig in a flow that changes both time constants.
@@ -104,6 +110,29 @@ impl Rig {
     /// As [`Rig::new`].
     pub fn with_flow(self, flow: Flow) -> Result<Self, SignalError> {
         Self { flow: Some(flow), ..self }.checked()
+    }
+
+    /// This rig in a stream whose velocity is recorded.
+    ///
+    /// ```
+    /// use twinlag_signal::{Gas, Plunge, Record, Rig, Sensor, Signal, Stream};
+    ///
+    /// let signal = Signal::Plunge(Plunge { amplitude_k: 20.0, dwell_s: 0.3, rise_s: 0.02 });
+    /// let sensors = [Sensor::new("upstream", 0.024), Sensor::new("downstream", 0.024)];
+    /// let rig = Rig::new(1, Record::new(400, 0.005), Gas::new(300.0, signal), sensors)?;
+    /// let mut sensors = rig.sensors().clone();
+    /// sensors[1].downstream_m = 0.1;
+    /// // In a steady stream of 2 m/s the gas is on its way for ten samples.
+    /// let rig = rig.with_stream(Stream::new(2.0, 0.0, 1.0, 0.0))?.with_sensors(sensors)?;
+    /// let [first_c, second_c] = rig.clean(0)?.readings_c;
+    /// assert!((10..400).all(|k| (second_c[k] - first_c[k - 10]).abs() < 1e-3)); // K
+    /// # Ok::<(), twinlag_signal::SignalError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Rig::new`].
+    pub fn with_stream(self, stream: Stream) -> Result<Self, SignalError> {
+        Self { stream: Some(stream), ..self }.checked()
     }
 
     /// This rig, recorded with other numbers: how long, how often.
@@ -154,7 +183,7 @@ impl Rig {
     }
 
     fn checked(self) -> Result<Self, SignalError> {
-        let Self { record, gas, sensors, flow, mismatch, .. } = &self;
+        let Self { record, gas, sensors, flow, stream, mismatch, .. } = &self;
         for (sensor, within) in sensors.iter().zip(WITHIN) {
             sensor.check(within, record)?;
         }
@@ -164,9 +193,13 @@ impl Rig {
         if let Some(flow) = flow {
             flow.check()?;
         }
+        match stream {
+            Some(stream) => stream.check()?,
+            None => sensors.iter().zip(WITHIN).try_for_each(|(sensor, within)| sensor.check_still(within))?,
+        }
         record.check(self.run_in_s())?;
         for (sensor, within) in sensors.iter().zip(WITHIN) {
-            sensor.check_step(within, record, flow.as_ref(), gas.mean_c)?;
+            sensor.check_step(within, record, self.surroundings(), gas.mean_c)?;
         }
         gas.check(record)?;
         if let Some(mismatch) = mismatch {
@@ -214,6 +247,11 @@ impl Rig {
     /// What the flow does to the time constants, if it changes.
     pub fn flow(&self) -> Option<&Flow> {
         self.flow.as_ref()
+    }
+
+    /// The stream past the sensors, if its velocity is recorded.
+    pub fn stream(&self) -> Option<&Stream> {
+        self.stream.as_ref()
     }
 
     /// What the gas of one sensor differs by, if it does.
@@ -269,6 +307,8 @@ impl Rig {
         let gas = GasPath::new(&self.gas, grid, &self.base_dir, &mut stream(self.seed, gas_trial, Purpose::Gas))?;
         let time_s: Vec<f64> = (0..self.record.samples).map(|k| k as f64 * self.record.sample_period_s).collect();
 
+        let of_stream = |stream: &Stream| time_s.iter().map(|t| stream.velocity_m_per_s(*t)).collect();
+        let velocity_m_per_s = self.stream.as_ref().map(of_stream);
         let mut readings_c = [self.follow(0, &gas), self.follow(1, &gas)];
         if let Some(mismatch) = &self.mismatch {
             let sensor = mismatch.sensor(self.channels())?;
@@ -286,6 +326,7 @@ impl Rig {
         Ok(Clean {
             time_s,
             gas_c: gas.at_samples().collect(),
+            velocity_m_per_s,
             readings_c,
             sensors: self.sensors.clone(),
             sample_period_s: self.record.sample_period_s,
@@ -295,7 +336,10 @@ impl Rig {
     /// Readings of one channel in `gas`, replacement included, °C.
     fn follow(&self, sensor: usize, gas: &GasPath) -> Vec<f64> {
         let sensor = &self.sensors[sensor];
-        let follow = |sensor: &Sensor| sensor.follow(gas, self.flow.as_ref(), self.record.oversampling);
+        let downstream = self.stream.as_ref().filter(|_| sensor.downstream_m > 0.0);
+        let carried = downstream.map(|stream| gas.carried(stream, sensor.downstream_m));
+        let gas = carried.as_ref().unwrap_or(gas);
+        let follow = |sensor: &Sensor| sensor.follow(gas, self.surroundings(), self.record.oversampling);
         let mut readings_c = follow(sensor);
         if let Some((at_s, successor)) = sensor.successor() {
             let first = (0..readings_c.len()).find(|&k| k as f64 * self.record.sample_period_s >= at_s);
@@ -305,13 +349,17 @@ impl Rig {
         readings_c
     }
 
+    fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings { flow: self.flow.as_ref(), stream: self.stream.as_ref() }
+    }
+
     fn channels(&self) -> [&str; 2] {
         self.sensors.each_ref().map(|sensor| sensor.channel.as_str())
     }
 
     /// The run-in that the sensors need to forget their start, s.
     fn run_in_s(&self) -> f64 {
-        let [first_s, second_s] = self.sensors.each_ref().map(|sensor| sensor.run_in_s(self.flow.as_ref()));
+        let [first_s, second_s] = self.sensors.each_ref().map(|sensor| sensor.run_in_s(self.surroundings()));
         first_s.max(second_s)
     }
 

@@ -3,8 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::check::{between, finite, not_negative, path, positive};
+use crate::surroundings::Surroundings;
 use crate::{
-    Adc, ClockSlip, ColouredNoise, Flow, Hysteresis, IntermittentContact, Mains, Noise, Radiation, Record, Replaced,
+    Adc, ClockSlip, ColouredNoise, Hysteresis, IntermittentContact, Mains, Noise, Radiation, Record, Replaced,
     SignalError, Spikes, TemperatureDependence,
 };
 
@@ -57,6 +58,15 @@ pub struct Sensor {
     /// out. Between −1 and 1.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub crosstalk: f64,
+    /// How far the sensor stands downstream of the place whose gas temperature is recorded, m; 0 if
+    /// left out. It meets the gas that passed there when the [`Stream`](crate::Stream) had so far to
+    /// carry it. Held gas comes late by whole sample periods.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub downstream_m: f64,
+    /// Power of the [`Stream`](crate::Stream)'s velocity over its mean with which τ goes; 0 if left
+    /// out. A wire across a stream has about −0.5.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub stream_exponent: f64,
     /// Time constant τ₂ of a second pole in series, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub second_time_constant_s: Option<f64>,
@@ -131,6 +141,8 @@ impl Sensor {
             delay_s: 0.0,
             drift_k_per_s: 0.0,
             crosstalk: 0.0,
+            downstream_m: 0.0,
+            stream_exponent: 0.0,
             second_time_constant_s: None,
             slow_mode: None,
             radiation: None,
@@ -160,14 +172,15 @@ impl Sensor {
     }
 
     /// Run-in after which the sensor has forgotten its start: ten times its longest time constant,
-    /// and its delay, s.
-    pub(crate) fn run_in_s(&self, flow: Option<&Flow>) -> f64 {
-        let longest = flow.map_or(1.0, |flow| flow.range()[1]);
+    /// its delay, and the way of the gas to it, s.
+    pub(crate) fn run_in_s(&self, surroundings: Surroundings) -> f64 {
+        let [_, longest] = surroundings.range(self);
         let slowest_s = self
             .time_constants_s()
             .map(|(_, tau_s, flows)| if flows { longest * tau_s } else { tau_s })
             .fold(0.0, f64::max);
-        10.0 * slowest_s + self.delay_s + self.clock_slip.map_or(0.0, |slip| slip.by_s)
+        let carried_s = surroundings.stream.map_or(0.0, |stream| stream.longest_s(self.downstream_m));
+        10.0 * slowest_s + carried_s + self.delay_s + self.clock_slip.map_or(0.0, |slip| slip.by_s)
     }
 
     /// The sensor that takes over, if this one is replaced, and when.
@@ -190,6 +203,8 @@ impl Sensor {
         not_negative(within, "delay_s", self.delay_s)?;
         finite(within, "drift_k_per_s", self.drift_k_per_s)?;
         between(within, "crosstalk", self.crosstalk, -1.0, 1.0)?;
+        not_negative(within, "downstream_m", self.downstream_m)?;
+        finite(within, "stream_exponent", self.stream_exponent)?;
         if let Some(mode) = self.slow_mode {
             between(within, "slow_mode.fraction", mode.fraction, 0.0, 1.0)?;
         }
@@ -229,6 +244,15 @@ impl Sensor {
         Ok(())
     }
 
+    /// Refuses what only a stream past the sensor gives a meaning.
+    pub(crate) fn check_still(&self, within: &str) -> Result<(), SignalError> {
+        let of_stream = [("downstream_m", self.downstream_m), ("stream_exponent", self.stream_exponent)];
+        match of_stream.iter().find(|(_, value)| *value != 0.0) {
+            Some((name, _)) => Err(SignalError::NeedsStream { field: path(within, name) }),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses a step as long as a time constant, long before the rule's limit of stability at
     /// 2.785.
     ///
@@ -238,7 +262,7 @@ impl Sensor {
         &self,
         within: &str,
         record: &Record,
-        flow: Option<&Flow>,
+        surroundings: Surroundings,
         mean_c: f64,
     ) -> Result<(), SignalError> {
         let step_s = record.step_s();
@@ -246,8 +270,9 @@ impl Sensor {
             let mut shortest_s = tau_s;
             let mut field = path(within, name);
             if flows {
-                if let Some(flow) = flow {
-                    shortest_s *= flow.range()[0];
+                let [least, _] = surroundings.range(self);
+                if least < 1.0 {
+                    shortest_s *= least;
                     field = format!("{field} (shortened by the flow)");
                 }
                 if let Some(radiation) = &self.radiation {

@@ -14,6 +14,8 @@ pub struct Clean {
     /// True gas temperature at the sample instants, °C, `[n]`. For a held gas it is the value that
     /// holds from then on.
     pub gas_c: Vec<f64>,
+    /// Velocity of the stream at the sample instants, m/s, `[n]`, if the rig has one.
+    pub velocity_m_per_s: Option<Vec<f64>>,
     /// Both sensors' readings with calibration and disturbances, before noise, spikes and ADC, °C,
     /// `[n]` each.
     pub readings_c: [Vec<f64>; 2],
@@ -34,6 +36,9 @@ pub struct Simulated {
     /// True gas temperature at the sample instants, °C, `[n]`. For a held gas it is the value that
     /// holds from then on.
     pub gas_c: Vec<f64>,
+    /// Velocity of the stream at the sample instants, m/s, `[n]`, if the rig has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity_m_per_s: Option<Vec<f64>>,
     /// Names of the two channels.
     pub channels: [String; 2],
 }
@@ -53,6 +58,7 @@ impl Clean {
             t1_c: self.read(0, first),
             t2_c: self.read(1, second),
             gas_c: self.gas_c.clone(),
+            velocity_m_per_s: self.velocity_m_per_s.clone(),
             channels: [self.sensors[0].channel.clone(), self.sensors[1].channel.clone()],
         }
     }

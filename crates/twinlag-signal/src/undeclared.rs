@@ -40,10 +40,16 @@
 //! | [`Quantisation`](Kind::Quantisation) | step, K | 2 to 6 noise |
 //! | [`Saturation`](Kind::Saturation) | part of the record beyond the limit | 0.03 to 0.1, hottest or coldest |
 //! | [`Crosstalk`](Kind::Crosstalk) | part of the other channel | 0.02 to 0.06 |
+//! | [`FilmTemperature`](Kind::FilmTemperature) | exponent | as of one sensor's own temperature, for both |
+//! | [`Separation`](Kind::Separation) | distance, m | 0.1 to 0.3 fast time constants of the mean stream |
+//! | [`OneSidedFlow`](Kind::OneSidedFlow) | exponent of the velocity | −0.7 to −0.2 |
 //! | [`Hysteresis`](Kind::Hysteresis) | width, K | 3 to 10 % of the scale |
 //! | [`IntermittentContact`](Kind::IntermittentContact) | part lost of the reading above 25 °C | 0.03 to 0.1, in 5 to 20 episodes of 0.3 to 1.5 % of the record |
 //! | [`ClockSlip`](Kind::ClockSlip) | slip, s | 0.2 to 0.6 fast time constants, at 30 to 70 % of the record |
 //! | [`Replaced`](Kind::Replaced) | new time constant over the old | 1.4 to 2 or the inverse (the excess over 1 is multiplied), at 30 to 70 % of the record |
+//!
+//! The [stream](crate::Stream) of `IdleStream`, `Separation` and `OneSidedFlow` has a mean velocity of
+//! 0.3 to 30 m/s, changing by 20 to 50 % in a period of 0.1 to 1 records.
 //!
 //! # Example
 //!
@@ -152,7 +158,7 @@ pub fn undeclared(
     let rig_seed = seed & (u64::MAX >> 1);
     let base = Base::draw(gas, rig_seed, &mut stream(rig_seed, 0, Purpose::RandomRig))?;
     let (gas, scale_k, frequency_hz) = (base.gas_kind, base.scale_k, base.frequency_hz);
-    let mut draft = Draft { base, flow: None, mismatch: None, rig_seed };
+    let mut draft = Draft { base, flow: None, stream: None, mismatch: None, rig_seed };
 
     let mut wanted: Vec<Kind> = Vec::new();
     for &kind in kinds {

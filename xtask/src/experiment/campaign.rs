@@ -1,5 +1,5 @@
 //! Several records of one rig against one of them: what is found with one, two or more, whether records are accused falsely, and what
-//! becomes of the time constants.
+//! becomes of the time constants. And what is named where the library is without the cause.
 //!
 //! The rigs are those of the closed loop's experiments, which integrate physics in continuous time and share no code with the
 //! effects that explain them. Each record has a gas and noise of its own; a campaign of more records begins with those of
@@ -11,18 +11,19 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
-use twinlag::diagnosis::Verdict;
+use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::Record;
 use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::signal::{Record as Sampling, SignalError, Simulated};
 use twinlag::{DiagnoseOptions, Diagnosis, Options, diagnose, diagnose_records};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 
-use super::loops::{Naming, set_name, truth_s};
+use super::loops::{Naming, hits_of_count, own_effects, set_name, truth_s};
 use super::record_of;
 use super::stored::{Head, Stored};
 
-pub(super) const NAME: &str = "campaign";
+/// The experiment with the whole library, and that without the effects that the records have.
+pub(super) const NAMES: [&str; 2] = ["campaign", "transfer"];
 
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,15 +41,19 @@ pub(super) struct Plan {
     /// Effects that a rig has together; an empty list is a rig with nothing missing.
     sets: Vec<Vec<Kind>>,
     gases: Vec<GasKind>,
+    /// Whether the library is to be without the effects that a rig has.
+    #[serde(default)]
+    without_own: bool,
 }
 
 /// Quantities of a campaign, in order; those of sensors are two.
 const EVENTS: [&str; 6] = ["right or stated", "wrong name", "explained", "accused", "covered 1", "covered 2"];
-const VALUES: [&str; 5] = [
+const VALUES: [&str; 6] = [
     "relative error 1",
     "relative error 2",
     "error over its standard error 1",
     "error over its standard error 2",
+    "left-out rms before",
     "left-out rms after",
 ];
 
@@ -77,10 +82,10 @@ impl Plan {
 }
 
 /// The answer to one record or several.
-fn answer(records: &[Record]) -> Result<Diagnosis, twinlag::Error> {
+fn answer(records: &[Record], without: Vec<Identifier>) -> Result<Diagnosis, twinlag::Error> {
     // What is found counts here, and not what of it is given.
     let characterise = Options { best_effort: true, ..Options::default() };
-    let options = DiagnoseOptions { characterise, ..DiagnoseOptions::default() };
+    let options = DiagnoseOptions { characterise, without, ..DiagnoseOptions::default() };
     match records {
         [record] => diagnose(record, &options),
         records => diagnose_records(records, &options),
@@ -129,10 +134,13 @@ impl Study for Plan {
         };
         let records: Vec<Record> =
             simulated.into_iter().enumerate().map(named).collect::<Result<_, twinlag::record::RecordError>>()?;
-        let answer = answer(&records)?;
+        let wanted = rig.effects();
+        let answer = answer(&records, if self.without_own { own_effects(&wanted) } else { Vec::new() })?;
 
-        let named = Naming::of(&answer, &rig.effects());
-        outcome.event(0, named.is_right_or_stated);
+        let named = Naming::of(&answer, &wanted);
+        if !self.without_own {
+            outcome.event(0, named.is_right_or_stated);
+        }
         outcome.event(1, named.is_wrong);
         outcome.event(2, matches!(answer.verdict, Verdict::Adequate | Verdict::Explained));
         outcome.event(3, answer.records.iter().any(|record| record.agrees == Some(false)));
@@ -147,7 +155,9 @@ impl Study for Plan {
             }
         }
         if let Some(transfer) = &answer.transfer {
-            outcome.value(EVENTS.len() + 4, transfer.error.held_out_normalised_rms.after);
+            let rms = transfer.error.held_out_normalised_rms;
+            outcome.value(EVENTS.len() + 4, rms.before);
+            outcome.value(EVENTS.len() + 5, rms.after);
         }
         Ok(())
     }
@@ -177,12 +187,8 @@ impl Stored for Plan {
 
     fn tables(&self, results: &Results, out: &Path) -> Result<()> {
         let mut text = "| effect | records | right or stated | wrong name | explained | a record accused | \
-             covered, of those given | median error (%) | median error / standard error | left-out rms |\n|---|---|---|---|---|---|---|---|---|---|\n"
+             covered, of those given | median error (%) | median error / standard error | left-out rms before / after |\n|---|---|---|---|---|---|---|---|---|---|\n"
             .to_owned();
-        // Counts: a cell has so few campaigns that one of them would be many per cent.
-        let count = |tally: &Tally, name: &str| {
-            tally.rate(name).map_or("–".into(), |rate| format!("{} of {}", rate.hits(), rate.count()))
-        };
         let median = |tally: &Tally, name: &str, scale: f64| {
             tally.values(name).and_then(|v| v.quantile(0.5)).map_or("–".into(), |q| format!("{:.2}", scale * q))
         };
@@ -194,17 +200,17 @@ impl Stored for Plan {
             let row = [
                 set_name(&self.sets[set]),
                 records.to_string(),
-                count(tally, "right or stated"),
-                count(tally, "wrong name"),
-                count(tally, "explained"),
-                if records > 1 { count(tally, "accused") } else { "–".into() },
-                both(&|name| count(tally, name), "covered"),
+                hits_of_count(tally, "right or stated"),
+                hits_of_count(tally, "wrong name"),
+                hits_of_count(tally, "explained"),
+                if records > 1 { hits_of_count(tally, "accused") } else { "–".into() },
+                both(&|name| hits_of_count(tally, name), "covered"),
                 both(&|name| median(tally, name, 100.0), "relative error"),
                 both(&|name| median(tally, name, 1.0), "error over its standard error"),
-                median(tally, "left-out rms after", 1.0),
+                ["before", "after"].map(|when| median(tally, &format!("left-out rms {when}"), 1.0)).join(" / "),
             ];
             let _ = writeln!(text, "| {} |", row.join(" | "));
         }
-        Ok(fs::write(out.join("campaign.md"), text)?)
+        Ok(fs::write(out.join(format!("{}.md", self.name)), text)?)
     }
 }

@@ -17,10 +17,11 @@ use twinlag::{Characterisation, DiagnoseOptions, NamedEffect, Options, character
 use twinlag_report::{Axis, Chart, Figure, Reference, Series};
 use twinlag_study::{Failure, Merge, Outcome, Quantity, Rate, Results, Study, Tally};
 
-use super::loops::{record_of, truth_s};
+use super::loops::{own_effects, record_of, truth_s};
 use super::stored::{Head, Stored};
 
-pub(super) const NAME: &str = "grades";
+/// The experiment of all kinds of records, and that of effects which are not in the library.
+pub(super) const NAMES: [&str; 2] = ["grades", "stretches"];
 
 /// A plan.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -50,6 +51,14 @@ struct Group {
     /// Records of each set, in place of the plan's: fewer where they are long.
     #[serde(default)]
     records: Option<u64>,
+    /// Whether the library is to be without the effects that a record has.
+    #[serde(default, skip_serializing_if = "is_not")]
+    without_own: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_not(flag: &bool) -> bool {
+    !flag
 }
 
 /// Numbers of a record: both time constants and the difference by both verbs, and the first few parameters of effects.
@@ -168,8 +177,10 @@ impl Study for Plan {
         let mut record = record_of(simulated)?;
         record.reference_c = None;
         let options = Options { best_effort: true, ..Options::default() };
+        let without = if group.without_own { own_effects(&drawn.effects()) } else { Vec::new() };
+        let options = DiagnoseOptions { characterise: options, without, ..DiagnoseOptions::default() };
         of_diagnosis(&drawn, &record, &options, truth_s, outcome)?;
-        of_every_answer(&characterise(&record, &options)?, FIRST_OF_CHARACTERISE, truth_s, outcome);
+        of_every_answer(&characterise(&record, &options.characterise)?, FIRST_OF_CHARACTERISE, truth_s, outcome);
         Ok(())
     }
 }
@@ -177,12 +188,11 @@ impl Study for Plan {
 fn of_diagnosis(
     drawn: &Undeclared,
     record: &Record,
-    options: &Options,
+    options: &DiagnoseOptions,
     truth_s: [f64; 2],
     outcome: &mut Outcome,
 ) -> Result<(), Failure> {
-    let options = DiagnoseOptions { characterise: options.clone(), ..DiagnoseOptions::default() };
-    let answer = diagnose(record, &options)?;
+    let answer = diagnose(record, options)?;
     of_every_answer(&answer.last, 0, truth_s, outcome);
     let parameters = answer.effects.iter().flat_map(|effect| {
         let known = effect.parameters.iter().filter_map(move |p| Some((p, truth_of(drawn, effect, &p.name)?)));
@@ -265,8 +275,8 @@ impl Stored for Plan {
         groups.iter().for_each(|(_, tally)| add(&mut all, tally));
         let mut text = String::from(
             "| records | numbers | go (%) | of these inside the interval (%) | beyond five standard errors (%) | conditional (%) | \
-             of these inside (%) | withheld (%) | of these outside (%) | both time constants go (%) |\n\
-             |---|---|---|---|---|---|---|---|---|---|\n",
+             of these inside (%) | withheld (%) | of these outside (%) | inside or withheld (%) | both time constants go (%) |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|\n",
         );
         let sums = groups.iter().map(|(name, tally)| ((*name).to_owned(), tally));
         let sums = sums.chain(nothing_missing.iter().map(|tally| ("**all with nothing missing**".to_owned(), tally)));
@@ -286,8 +296,8 @@ impl Stored for Plan {
                 let _ = writeln!(text, "| all: {name} | {} |", row(all, numbers).join(" | "));
             }
         }
-        fs::write(out.join("grades.md"), text)?;
-        fs::write(out.join("grades.svg"), picture(&self.title, &groups)?)?;
+        fs::write(out.join(format!("{}.md", self.name)), text)?;
+        fs::write(out.join(format!("{}.svg", self.name)), picture(&self.title, &groups)?)?;
         Ok(())
     }
 }
@@ -312,6 +322,7 @@ fn percent([hits, count]: [u64; 2]) -> String {
 fn row(tally: &Tally, numbers: std::ops::Range<usize>) -> Vec<String> {
     let of = |event| over(tally, numbers.clone(), event);
     let ([go, count], [conditional, _]) = (of(0), of(3));
+    let withheld = count - go - conditional;
     let keeps = tally.rate("keeps go").and_then(Rate::rate);
     vec![
         count.to_string(),
@@ -320,8 +331,9 @@ fn row(tally: &Tally, numbers: std::ops::Range<usize>) -> Vec<String> {
         percent(of(2)),
         percent([conditional, count]),
         percent(of(4)),
-        percent([count - go - conditional, count]),
+        percent([withheld, count]),
         percent(of(5)),
+        percent([of(1)[0] + of(4)[0] + withheld, count]),
         keeps.map_or("–".into(), |share| format!("{:.0}", 100.0 * share)),
     ]
 }

@@ -16,7 +16,7 @@ use twinlag::{DiagnoseOptions, Diagnosis, NamedEffect, Options, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
 use super::stored::{Head, Stored};
-pub(super) use tables::set_name;
+pub(super) use tables::{hits_of_count, set_name};
 
 /// A plan: which effects, how large, in which gas, how many records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -116,7 +116,7 @@ impl Study for Plan {
         let mut record = record_of(simulated)?;
         record.reference_c = None;
         let wanted = rig.effects();
-        let own = || Identifier::ALL.into_iter().filter(|e| wanted.contains(&e.name()));
+        let own = own_effects(&wanted);
         // What is found counts here, and not what of it is given: the experiment of the grades asks that.
         let characterise = Options { best_effort: true, ..Options::default() };
         let options = |without: Vec<Identifier>| DiagnoseOptions {
@@ -124,10 +124,10 @@ impl Study for Plan {
             characterise: characterise.clone(),
             ..DiagnoseOptions::default()
         };
-        let without = if self.without_own { own().collect() } else { Vec::new() };
+        let without = if self.without_own { own.clone() } else { Vec::new() };
         let answer = diagnose(&record, &options(without))?;
 
-        let is_alien = kinds.iter().any(|k| k.effect().is_none());
+        let is_alien = kinds.iter().any(|k| Kind::UNMODELLED.contains(k));
         let named = Naming::of(&answer, &wanted);
         if !is_alien {
             outcome.event(RIGHT, named.is_right_first);
@@ -141,7 +141,7 @@ impl Study for Plan {
         // The scatter that is due: that of the same estimator where it is told which effects there are.
         let others = || Identifier::ALL.into_iter().filter(|e| !wanted.contains(&e.name())).collect();
         let told = if is_alien { None } else { Some(diagnose(&record, &options(others()))?) };
-        let told = told.filter(|t| own().all(|o| t.effects.iter().any(|e| e.effect == o)));
+        let told = told.filter(|t| own.iter().all(|o| t.effects.iter().any(|e| e.effect == *o)));
         for i in 0..2 {
             let sensor = &answer.last.sensors[i];
             if let (Some(tau_s), Some([low, high])) = (sensor.time_constant_s, sensor.interval_95_s) {
@@ -165,6 +165,11 @@ impl Study for Plan {
     }
 }
 
+/// The library's effects of these names.
+pub(super) fn own_effects(names: &[&str]) -> Vec<Identifier> {
+    Identifier::ALL.into_iter().filter(|effect| names.contains(&effect.name())).collect()
+}
+
 /// Whether a diagnosis names the effects that a rig has.
 #[expect(clippy::struct_excessive_bools, reason = "four questions, each answered with yes or no")]
 pub(super) struct Naming {
@@ -184,8 +189,7 @@ impl Naming {
         let is = |e: &NamedEffect, name: &str| e.effect.name() == name;
         let states = |e: &NamedEffect, name: &str| is(e, name) || e.alternatives.iter().any(|a| a.name() == name);
         let looks_like = |e: &NamedEffect| {
-            let own = Identifier::ALL.into_iter().filter(|o| wanted.contains(&o.name()));
-            own.into_iter().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()))
+            own_effects(wanted).into_iter().any(|o| o == e.effect || o.about().imitates.contains(&e.effect.name()))
         };
         let first = answer.effects.first();
         let first_or_none = |of: &dyn Fn(&NamedEffect) -> bool| first.map_or(wanted.is_empty(), of);
@@ -202,14 +206,18 @@ impl Naming {
 
 /// What a logger would have of it.
 pub(crate) fn record_of(simulated: Simulated) -> Result<Record, twinlag::record::RecordError> {
-    let Simulated { channels, time_s, t1_c, t2_c, gas_c, .. } = simulated;
+    let Simulated { channels, time_s, t1_c, t2_c, gas_c, velocity_m_per_s, .. } = simulated;
     let source = "a rig".into();
     let channels = Channels { source, names: channels, time_s, t1_c, t2_c, reference_c: Some(gas_c) };
-    Record::from_channels(channels, SamplingChoice::Auto)
+    let record = Record::from_channels(channels, SamplingChoice::Auto)?;
+    match velocity_m_per_s {
+        Some(velocity_m_per_s) => record.with_flow(velocity_m_per_s),
+        None => Ok(record),
+    }
 }
 
-/// Both time constants as an answer means them: means over the record where the flow changes, those at the record's mean
-/// temperature where they change with it, the larger one of two.
+/// Both time constants as an answer means them: means over the record where the flow changes, those at the geometric mean of a recorded
+/// velocity, those at the record's mean temperature where they change with it, the larger one of two.
 pub(super) fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 2] {
     let mean = |values: &mut dyn Iterator<Item = f64>| -> f64 {
         let (sum, n) = values.fold((0.0, 0.0_f64), |(sum, n), v| (sum + v, n + 1.0));
@@ -223,7 +231,11 @@ pub(super) fn truth_s(rig: &Undeclared, time_s: &[f64], gas_c: &[f64]) -> [f64; 
             .temperature_dependence
             .as_ref()
             .map_or(1.0, |d| (mean_k / (d.reference_c + 273.15)).powf(d.exponent));
-        sensor.time_constant_s * flow * warm
+        let in_stream = rig.rig.stream().map_or(1.0, |stream| {
+            let log_ratio = |t: &f64| (stream.velocity_m_per_s(*t) / stream.mean_m_per_s).ln();
+            (sensor.stream_exponent * mean(&mut time_s.iter().map(log_ratio))).exp()
+        });
+        sensor.time_constant_s * flow * in_stream * warm
     })
 }
 

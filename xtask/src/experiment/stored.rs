@@ -11,7 +11,7 @@ use super::reconstruction::Reconstruction;
 use super::tracking::Tracking;
 use super::{
     Run, campaign, coverage, grades, loops, observed, options, place, planning, policy, provenance, reconstruction,
-    tracking,
+    ties, tracking,
 };
 
 /// What a plan begins with.
@@ -54,12 +54,13 @@ pub(super) fn read(name: &str, text: &str) -> Option<Result<Box<dyn Own>>> {
         Box::new(study)
     }
     Some(match name {
-        campaign::NAME => campaign::Plan::read(text).map(own),
+        name if campaign::NAMES.contains(&name) => campaign::Plan::read(text).map(own),
         coverage::NAME => coverage::Plan::read(text).map(own),
-        grades::NAME => grades::Plan::read(text).map(own),
+        name if grades::NAMES.contains(&name) => grades::Plan::read(text).map(own),
         planning::NAME => planning::Plan::read(text).map(own),
         policy::NAME => policy::Plan::read(text).map(own),
         reconstruction::NAME => reconstruction::Plan::read(text).map(Reconstruction::new).map(own),
+        ties::NAME => ties::Plan::read(text).map(own),
         tracking::NAME => tracking::Plan::read(text).map(Tracking::new).map(own),
         _ => loops::Plan::read(text)?.map(own),
     })

@@ -53,12 +53,19 @@ pub enum Kind {
     ClockSlip,
     /// A sensor that is replaced in mid-record. No library of effects knows it.
     Replaced,
+    /// A stream whose velocity is recorded, on which nothing depends.
+    IdleStream,
+    /// One sensor stands downstream of the other, in a stream whose velocity is recorded.
+    Separation,
+    /// One time constant goes with the recorded velocity of a stream, as where the other sensor is pumped.
+    OneSidedFlow,
 }
 
 impl Kind {
     /// Every kind, none first, the aliens last.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 26] = [
         Self::None,
+        Self::IdleStream,
         Self::Gain,
         Self::Offset,
         Self::Curvature,
@@ -77,6 +84,8 @@ impl Kind {
         Self::Saturation,
         Self::Crosstalk,
         Self::FilmTemperature,
+        Self::Separation,
+        Self::OneSidedFlow,
         Self::Hysteresis,
         Self::IntermittentContact,
         Self::ClockSlip,
@@ -84,7 +93,7 @@ impl Kind {
     ];
 
     /// The kinds that have an [`effect`](Kind::effect).
-    pub const EFFECTS: [Self; 18] = [
+    pub const EFFECTS: [Self; 20] = [
         Self::Gain,
         Self::Offset,
         Self::Curvature,
@@ -103,6 +112,8 @@ impl Kind {
         Self::Saturation,
         Self::Crosstalk,
         Self::FilmTemperature,
+        Self::Separation,
+        Self::OneSidedFlow,
     ];
 
     /// The kinds that no library of effects knows: here a diagnosis ought to say that it does not
@@ -135,16 +146,25 @@ impl Kind {
             Self::IntermittentContact => "intermittent-contact",
             Self::ClockSlip => "clock-slip",
             Self::Replaced => "replaced",
+            Self::IdleStream => "idle-stream",
+            Self::Separation => "separation",
+            Self::OneSidedFlow => "one-sided-flow",
         }
     }
 
     /// The name of this effect in a library of effects. Gain, offset and curvature share the name
     /// `"calibration"`, because they are hard to distinguish from the readings alone.
-    /// [`Kind::None`] and the [aliens](Kind::UNMODELLED) have no name.
+    /// [`Kind::None`], [`Kind::IdleStream`] and the [aliens](Kind::UNMODELLED) have no name.
     pub fn effect(self) -> Option<&'static str> {
         match self {
-            Self::None | Self::Hysteresis | Self::IntermittentContact | Self::ClockSlip | Self::Replaced => None,
+            Self::None
+            | Self::IdleStream
+            | Self::Hysteresis
+            | Self::IntermittentContact
+            | Self::ClockSlip
+            | Self::Replaced => None,
             Self::Gain | Self::Offset | Self::Curvature => Some("calibration"),
+            Self::OneSidedFlow => Some(Self::VaryingTimeConstant.name()),
             Self::FilmTemperature => Some(Self::TemperatureDependentTimeConstant.name()),
             known => Some(known.name()),
         }
@@ -163,11 +183,14 @@ impl Kind {
             | Self::Hysteresis => "K",
             Self::Curvature => "1/K",
             Self::SecondOrder | Self::Delay | Self::ClockSlip => "s",
+            Self::Separation => "m",
             Self::Radiation => "1/K^3",
             Self::Drift => "K/s",
             Self::None
+            | Self::IdleStream
             | Self::SlowMode
             | Self::VaryingTimeConstant
+            | Self::OneSidedFlow
             | Self::TemperatureDependentTimeConstant
             | Self::FilmTemperature
             | Self::Saturation

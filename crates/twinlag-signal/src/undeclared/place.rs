@@ -8,9 +8,10 @@ use super::base::Base;
 use super::draw::{log_uniform, one_of, sign};
 use super::{Kind, Placed};
 use crate::effects::ZERO_CELSIUS_K;
+use crate::streams::{Purpose, stream};
 use crate::{
     Adc, ClockSlip, ColouredNoise, Flow, FlowSine, Hysteresis, IntermittentContact, Mains, Mismatch, Radiation,
-    Replaced, Rig, SignalError, SlowMode, Spikes, TemperatureDependence,
+    Replaced, Rig, Sensor, SignalError, SlowMode, Spikes, Stream, TemperatureDependence,
 };
 
 /// Cold junction, towards which an open contact lets the reading fall, °C.
@@ -20,6 +21,7 @@ const AMBIENT_C: f64 = 25.0;
 pub(super) struct Draft {
     pub(super) base: Base,
     pub(super) flow: Option<Flow>,
+    pub(super) stream: Option<Stream>,
     pub(super) mismatch: Option<Mismatch>,
     pub(super) rig_seed: u64,
 }
@@ -27,10 +29,16 @@ pub(super) struct Draft {
 impl Draft {
     pub(super) fn rig(&self) -> Result<Rig, SignalError> {
         let Base { record, gas, sensors, .. } = &self.base;
-        let mut rig = Rig::new(self.rig_seed, record.clone(), gas.clone(), sensors.clone())?;
+        // Some sensors need the stream: they come after it.
+        let bare = sensors.each_ref().map(|sensor| Sensor::new(&sensor.channel, sensor.time_constant_s));
+        let mut rig = Rig::new(self.rig_seed, record.clone(), gas.clone(), bare)?;
         if let Some(flow) = self.flow {
             rig = rig.with_flow(flow)?;
         }
+        if let Some(stream) = self.stream {
+            rig = rig.with_stream(stream)?;
+        }
+        rig = rig.with_sensors(sensors.clone())?;
         if let Some(mismatch) = &self.mismatch {
             rig = rig.with_mismatch(mismatch.clone())?;
         }
@@ -43,8 +51,13 @@ impl Draft {
         let channel = usize::from(rng.random::<bool>());
         let (size, channel) = match kind {
             Kind::None => (0.0, None),
+            Kind::IdleStream => {
+                self.flow_past();
+                (0.0, None)
+            }
             Kind::VaryingTimeConstant => (self.vary(by, rng), None),
             Kind::FilmTemperature => (self.follow_film(by, rng), None),
+            Kind::Separation | Kind::OneSidedFlow => (self.stand_in_stream(kind, channel, by, rng), Some(channel)),
             Kind::InputMismatch => (self.mislead(channel, by, rng), Some(channel)),
             Kind::Saturation => (self.saturate(channel, by, rng)?, Some(channel)),
             Kind::Gain
@@ -74,6 +87,29 @@ impl Draft {
         let period_s = self.base.length_s() * rng.random_range(0.4..1.2);
         self.flow = Some(Flow::Sine(FlowSine::new(depth, period_s, rng.random_range(0.0..TAU))));
         depth
+    }
+
+    /// Puts the stream past the sensors, the same whatever depends on it.
+    fn flow_past(&mut self) -> Stream {
+        let rng = &mut stream(self.rig_seed, 1 + Kind::IdleStream as u64, Purpose::RandomRig);
+        let (mean_m_per_s, depth) = (log_uniform(0.3, 30.0, rng), log_uniform(0.2, 0.5, rng));
+        let period_s = self.base.length_s() * rng.random_range(0.1..1.0);
+        let stream = Stream::new(mean_m_per_s, depth, period_s, rng.random_range(0.0..TAU));
+        self.stream = Some(stream);
+        stream
+    }
+
+    /// What depends on the velocity of the stream.
+    fn stand_in_stream(&mut self, kind: Kind, channel: usize, by: f64, rng: &mut impl Rng) -> f64 {
+        let (stream, fast_s) = (self.flow_past(), self.base.fast_s());
+        let sensor = &mut self.base.sensors[channel];
+        if kind == Kind::Separation {
+            sensor.downstream_m = by * stream.mean_m_per_s * fast_s * log_uniform(0.1, 0.3, rng);
+            sensor.downstream_m
+        } else {
+            sensor.stream_exponent = -by * log_uniform(0.2, 0.7, rng);
+            sensor.stream_exponent
+        }
     }
 
     fn follow_film(&mut self, by: f64, rng: &mut impl Rng) -> f64 {

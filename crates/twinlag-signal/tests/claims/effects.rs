@@ -4,7 +4,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use twinlag_signal::{
     Clean, ClockSlip, ColouredNoise, Flow, FlowSine, FlowStep, Gas, Hysteresis, IntermittentContact, Mains, Mismatch,
-    Noise, Radiation, Record, Replaced, Rig, Sensor, Series, Signal, SignalError, Spikes, TemperatureDependence, Tone,
+    Noise, Radiation, Record, Replaced, Rig, Sensor, Series, Signal, SignalError, Spikes, Stream,
+    TemperatureDependence, Tone,
 };
 use twinlag_transform::Complex64;
 
@@ -73,6 +74,40 @@ fn delayed_sine_has_the_closed_form() {
             assert_close("reading", *y, want, tol);
         }
     }
+}
+
+/// The reading of a sine that arrives `L/v̄` later. The cubic's error is `3 (ωh)⁴/128` of the swing with half a step `h`, less than the
+/// rule's.
+#[test]
+fn gas_carried_by_a_steady_stream_comes_late_by_distance_over_velocity() {
+    let omega = TAU * 5.0;
+    let tol = 20.0 * ((STEP_S / TAU_S).powi(4) + 2.0 * (omega * STEP_S).powi(4)) + 1e-9;
+    let response = 20.0 * (Complex64::ONE + Complex64::I * omega * TAU_S).inv();
+    for downstream_m in [0.0005, 0.0101, 0.07] {
+        let rig = reference(sine(20.0, 5.0), with(|_| ())).with_stream(Stream::new(2.0, 0.0, 1.0, 0.0));
+        let mut sensors = rig.as_ref().expect("a stream").sensors().clone();
+        sensors[0].downstream_m = downstream_m;
+        let got = clean(&rig.and_then(|rig| rig.with_sensors(sensors)).expect("valid"));
+        assert_eq!(got.velocity_m_per_s, Some(vec![2.0; 2500]));
+        for (t, y) in got.time_s.iter().zip(&got.readings_c[0]) {
+            let want = MEAN_C + (response * Complex64::cis(omega * (t - downstream_m / 2.0) + 0.3)).im;
+            assert_close("reading", *y, want, tol);
+        }
+    }
+}
+
+/// With the power 1 the stream is a flow of the same depth, for one sensor alone: the same arithmetic.
+#[test]
+fn a_time_constant_goes_with_a_power_of_the_velocity() {
+    let flow = Flow::Sine(FlowSine::new(0.3, 1.7, 0.4));
+    let alike = clean(&reference(sine(20.0, 5.0), with(|_| ())).with_flow(flow).expect("valid"));
+    let steady = reference(sine(20.0, 5.0), with(|_| ()));
+    let rig = steady.clone().with_stream(Stream::new(12.0, 0.3, 1.7, 0.4)).expect("valid");
+    let mut sensors = rig.sensors().clone();
+    sensors[0].stream_exponent = 1.0;
+    let got = clean(&rig.with_sensors(sensors).expect("valid"));
+    assert_eq!(got.readings_c[0], alike.readings_c[0]);
+    assert_eq!(got.readings_c[1], clean(&steady).readings_c[1]);
 }
 
 /// `y = 100 (1 − exp(−(t − D − Ts)/τ))` from the step on, in held gas too: the cubic's error is `(h/τ)⁴/384` of 100 K,

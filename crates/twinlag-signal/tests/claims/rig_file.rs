@@ -1,6 +1,6 @@
 //! Rig files: what is read, what is written, what is refused.
 
-use twinlag_signal::{Flow, FlowStep, Hold, Rig, Series, Signal};
+use twinlag_signal::{Flow, FlowStep, Hold, Rig, Series, Signal, Stream};
 
 const RIGS: [(&str, &str); 9] = [
     ("sine", include_str!("../rigs/sine.toml")),
@@ -220,6 +220,31 @@ fn stepping_flow_is_read_and_refused() {
         ("over_s = 0.5", "over = 0.5", "over"),
     ] {
         assert_refused("effects", sine, &step.replacen(from, to, 1), wanted);
+    }
+}
+
+#[test]
+fn a_stream_is_read_and_refused() {
+    let stream = "[stream]\nmean_m_per_s = 12.0\ndepth = 0.4\nperiod_s = 3.0\n";
+    let in_it = "time_constant_s = 0.0238\ndownstream_m = 0.02\nstream_exponent = -0.5";
+    let text = RIGS[0].1.replacen("time_constant_s = 0.0238", in_it, 1);
+    let missing = read(&text).unwrap_err().to_string();
+    assert!(missing.contains("sensors[0].downstream_m needs a [stream]"), "{missing}");
+    let text = text.replacen("[record]", &format!("{stream}[record]"), 1);
+    let rig = read(&text).unwrap();
+    assert_eq!(rig.stream(), Some(&Stream::new(12.0, 0.4, 3.0, 0.0)));
+    assert_eq!(read(&toml::to_string(&rig).unwrap()).unwrap(), rig);
+    for (from, to, wanted) in [
+        ("mean_m_per_s = 12.0", "mean_m_per_s = 0.0", "stream.mean_m_per_s must be finite and positive"),
+        ("depth = 0.4", "depth = 1.0", "stream.depth must lie between -1 and 1"),
+        ("period_s = 3.0", "period_s = nan", "stream.period_s must be finite and positive"),
+        ("period_s = 3.0", "period_s = 3.0\nphase_rad = inf", "stream.phase_rad must be finite"),
+        ("period_s = 3.0", "period_s = 3.0\nphase = 1.0", "phase"),
+        ("downstream_m = 0.02", "downstream_m = -0.02", "sensors[0].downstream_m must be finite and not negative"),
+        ("stream_exponent = -0.5", "stream_exponent = nan", "sensors[0].stream_exponent must be finite"),
+    ] {
+        let refused = read(&text.replacen(from, to, 1)).unwrap_err().to_string();
+        assert!(refused.contains(wanted), "{to}: {refused}");
     }
 }
 

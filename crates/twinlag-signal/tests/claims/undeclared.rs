@@ -27,9 +27,9 @@ fn every_kind_builds_for_twenty_seeds_within_its_ranges() {
                 let noise_k = sensor.noise.expect("every channel has noise").std_k;
                 assert!((0.002..=0.03).contains(&(noise_k / drawn.scale_k)), "{what}");
             }
-            let both = [Kind::None, Kind::VaryingTimeConstant, Kind::FilmTemperature].contains(&kind);
+            let both = [Kind::None, Kind::IdleStream, Kind::VaryingTimeConstant, Kind::FilmTemperature].contains(&kind);
             assert_eq!(drawn.channel.is_none(), both, "{what}");
-            assert_eq!(drawn.size == 0.0, kind == Kind::None, "{what}");
+            assert_eq!(drawn.size == 0.0, [Kind::None, Kind::IdleStream].contains(&kind), "{what}");
             assert_eq!(drawn.effects(), Vec::from_iter(kind.effect()), "{what}");
             let text = toml::to_string(rig).unwrap_or_else(|error| panic!("{what}: {error}"));
             assert_eq!(toml::from_str::<Rig>(&text).unwrap_or_else(|error| panic!("{what}: {error}")), *rig);
@@ -47,7 +47,7 @@ fn every_kind_changes_its_channel_alone() {
         assert_eq!(record.gas_c, without.gas_c, "{kind:?}");
         let changed = [record.t1_c != without.t1_c, record.t2_c != without.t2_c];
         let want = match (kind, drawn.channel) {
-            (Kind::None, _) => [false; 2],
+            (Kind::None | Kind::IdleStream, _) => [false; 2],
             (_, None) => [true; 2],
             (_, Some(channel)) => [channel == 0, channel == 1],
         };
@@ -136,7 +136,7 @@ fn kinds_combine() {
 
 #[test]
 fn kinds_are_listed_once_and_named_as_in_files() {
-    let split = [&[Kind::None][..], &Kind::EFFECTS, &Kind::UNMODELLED].concat();
+    let split = [&[Kind::None, Kind::IdleStream][..], &Kind::EFFECTS, &Kind::UNMODELLED].concat();
     assert_eq!(split, Kind::ALL);
     for kind in Kind::ALL {
         assert_eq!(serde_json::to_string(&kind).unwrap(), format!("{:?}", kind.name()));

@@ -33,6 +33,12 @@ pub(super) fn cell_name(kinds: &[Kind], size: f64, sizes: usize) -> String {
     if sizes > 1 { format!("{}, × {size}", set_name(kinds)) } else { set_name(kinds) }
 }
 
+/// A rate as counts: a cell may have so few records that one of them would be many per cent.
+pub(in crate::experiment) fn hits_of_count(tally: &Tally, name: &str) -> String {
+    let rate = tally.rate(name).filter(|rate| rate.count() > 0);
+    rate.map_or("–".into(), |rate| format!("{} of {}", rate.hits(), rate.count()))
+}
+
 fn percent(tally: &Tally, name: &str) -> String {
     tally.rate(name).and_then(Rate::rate).map_or("-".into(), |r| format!("{:.0}", 100.0 * r))
 }
