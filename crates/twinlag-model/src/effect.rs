@@ -105,6 +105,11 @@ pub trait Effect: Send + Sync {
         })
     }
 
+    /// In which of the sensors its parameters change functions of time or temperature: by default where it sits.
+    fn has_functions_in(&self) -> [bool; 2] {
+        [0, 1].map(|i| self.channel().is_none_or(|channel| channel == i))
+    }
+
     /// Forms of this effect with more or fewer parameters, tried once it is chosen.
     fn sizes(&self) -> Vec<Shared> {
         Vec::new()

@@ -272,14 +272,13 @@ impl Model {
         Plant::new(observations, [theta[0], theta[1]], self.noise_std_k)
     }
 
-    /// In which of the sensors a parameter may change functions of time or temperature: those of the effect's seat.
+    /// In which of the sensors a parameter may change functions of time or temperature.
     pub(crate) fn sensors_of_functions(&self, parameter: usize) -> [bool; 2] {
         if parameter < 2 {
             return [false; 2];
         }
         let effect = (0..self.effects.len()).find(|index| self.range(*index).contains(&parameter));
-        let channel = effect.and_then(|index| self.effects[index].channel());
-        [0, 1].map(|i| channel.is_none_or(|channel| channel == i))
+        effect.map_or([true; 2], |index| self.effects[index].has_functions_in())
     }
 
     /// The readings without the disturbances of the model.

@@ -43,6 +43,7 @@ pub(crate) fn sentence(text: &str) -> String {
 /// A parameter's name as words.
 pub fn parameter_in_words(name: &str) -> String {
     match name {
+        "curvature_of_first" => "curvature of the first channel".into(),
         "curvature_about" => "mean temperature of the record".into(),
         "curvature_variance" => "variance of its temperatures".into(),
         "curvature_skew" => "third moment of its temperatures over the variance".into(),

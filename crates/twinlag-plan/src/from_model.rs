@@ -153,13 +153,15 @@ impl Made {
 
     /// `g (T + κ (d² − c d − v)) + o`, `d = T − m`: the curvature adds nothing to mean and slope over the record's temperatures.
     fn calibrate(&mut self, gain: f64, offset_k: f64, value: &dyn Fn(&str) -> Option<f64>) {
-        let curvature = value("curvature").unwrap_or(0.0);
         let [mean_c, variance_k2, skew_k] =
             ["curvature_about", "curvature_variance", "curvature_skew"].map(|name| value(name).unwrap_or(0.0));
-        let sensor = &mut self.sensors[1];
-        sensor.gain = gain * (1.0 - curvature * skew_k);
-        sensor.offset_k += offset_k + gain * curvature * (skew_k * mean_c - variance_k2);
-        (sensor.curvature_per_k, sensor.curvature_about_c) = (gain * curvature, mean_c);
+        let channels = [("curvature_of_first", 1.0, 0.0), ("curvature", gain, offset_k)];
+        for (sensor, (name, gain, offset_k)) in self.sensors.iter_mut().zip(channels) {
+            let curvature = value(name).unwrap_or(0.0);
+            sensor.gain = gain * (1.0 - curvature * skew_k);
+            sensor.offset_k += offset_k + gain * curvature * (skew_k * mean_c - variance_k2);
+            (sensor.curvature_per_k, sensor.curvature_about_c) = (gain * curvature, mean_c);
+        }
     }
 
     /// The rig picks up deviations from the mean, the model those from a neutral temperature.

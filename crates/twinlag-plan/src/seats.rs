@@ -109,7 +109,10 @@ fn calibration([first, second]: &[Sensor; 2]) -> Option<Seat> {
         values.push(("offset", offset_k));
     }
     if is_curved && !has_radiation {
-        values.push(("curvature", second.curvature_per_k - first.curvature_per_k));
+        values.push(match [first.curvature_per_k, second.curvature_per_k] {
+            [of_first, 0.0] => ("curvature_of_first", of_first),
+            [of_first, of_second] => ("curvature", of_second - of_first),
+        });
     }
     (!values.is_empty()).then_some(Seat { effect: Identifier::CALIBRATION, channel: Some(1), values })
 }

@@ -1,5 +1,5 @@
-//! Relative calibration: `y₂ = g T + o` in units of channel 1, and a static curvature beside the straight line, with as many of the
-//! three as the data support.
+//! Relative calibration: `y₂ = g T + o` in units of channel 1, and a static curvature of either channel beside the straight line, with
+//! as many of the three as the data support.
 
 use std::sync::Arc;
 
@@ -35,8 +35,13 @@ enum Kind {
     Offset,
     Gain,
     Both,
-    Curved,
+    /// All three, the curvature in this channel.
+    Curved(usize),
 }
+
+/// Names of the curvature, by the channel that has it: the one that is out of line with the other cannot be told at rest, but while the
+/// gas changes, since a sensor's reading is bent after its lag.
+const CURVATURES: [&str; 2] = ["curvature_of_first", "curvature"];
 
 struct Calibration {
     kind: Kind,
@@ -45,7 +50,8 @@ struct Calibration {
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
-    [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved].into_iter().map(|kind| of_kind(kind, context)).collect()
+    let kinds = [Kind::Offset, Kind::Gain, Kind::Both, Kind::Curved(1), Kind::Curved(0)];
+    kinds.into_iter().map(|kind| of_kind(kind, context)).collect()
 }
 
 /// Gain and offset of the second channel relative to the first.
@@ -64,12 +70,12 @@ fn of_kind(kind: Kind, context: &Context) -> Shared {
         .within(Domain::NotZero)
         .determining(Freedom::Gain);
     let bend = 0.3 / (4.0 * context.swing_k);
-    let curvature = Parameter::new("curvature", "1/K", Variable::linear("curvature", 1e-2 * bend, -bend, bend));
+    let curvature = |name| Parameter::new(name, "1/K", Variable::linear(name, 1e-2 * bend, -bend, bend));
     let parameters = match kind {
         Kind::Offset => vec![offset],
         Kind::Gain => vec![gain],
         Kind::Both => vec![gain, offset],
-        Kind::Curved => vec![gain, offset, curvature],
+        Kind::Curved(channel) => vec![gain, offset, curvature(CURVATURES[channel])],
     };
     let seat = Seat::new(Identifier::CALIBRATION, Some(1), parameters);
     Arc::new(Calibration { kind, seat, context: context.clone() })
@@ -95,7 +101,7 @@ impl Effect for Calibration {
             Kind::Offset => vec![vec![m2 - m1]],
             Kind::Gain => vec![vec![ratio]],
             Kind::Both => vec![vec![1.0, m2 - m1]],
-            Kind::Curved => vec![vec![1.0, m2 - m1, 0.0]],
+            Kind::Curved(_) => vec![vec![1.0, m2 - m1, 0.0]],
         }
     }
 
@@ -103,8 +109,8 @@ impl Effect for Calibration {
         let (kind, start) = match self.kind {
             Kind::Offset => (Kind::Both, vec![1.0, values[0]]),
             Kind::Gain => (Kind::Both, vec![values[0], 0.0]),
-            Kind::Both => (Kind::Curved, vec![values[0], values[1], 0.0]),
-            Kind::Curved => return None,
+            Kind::Both => (Kind::Curved(1), vec![values[0], values[1], 0.0]),
+            Kind::Curved(_) => return None,
         };
         Some((of_kind(kind, &self.context), start))
     }
@@ -112,7 +118,7 @@ impl Effect for Calibration {
     fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
         match self.kind {
             Kind::Gain | Kind::Both => (0..2).map(|channel| Twin::crosstalk(channel, values[0], tau_s)).collect(),
-            Kind::Offset | Kind::Curved => Vec::new(),
+            Kind::Offset | Kind::Curved(_) => Vec::new(),
         }
     }
 
@@ -121,20 +127,24 @@ impl Effect for Calibration {
         match self.kind {
             Kind::Offset => reading.offset_k += values[0],
             Kind::Gain => reading.gain = values[0],
-            Kind::Both | Kind::Curved => {
+            Kind::Both | Kind::Curved(_) => {
                 reading.gain = values[0];
                 reading.offset_k += values[1];
             }
         }
-        if self.kind == Kind::Curved {
-            reading.straighten = Some(straighten(values[2], self.context.moments));
+        if let Kind::Curved(channel) = self.kind {
+            plant.sensors[channel].reading.straighten = Some(straighten(values[2], self.context.moments));
         }
+    }
+
+    fn has_functions_in(&self) -> [bool; 2] {
+        [0, 1].map(|channel| self.kind == Kind::Curved(channel))
     }
 
     fn derived(&self) -> Vec<Derived> {
         let [mean_c, variance_k2, skew_k] = self.context.moments;
         match self.kind {
-            Kind::Curved => vec![
+            Kind::Curved(_) => vec![
                 Derived::constant("curvature_about", "°C", mean_c),
                 Derived::constant("curvature_variance", "K²", variance_k2),
                 Derived::constant("curvature_skew", "K", skew_k),
