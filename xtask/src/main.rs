@@ -32,6 +32,9 @@ enum Task {
     Measured {
         /// The folder. It is no part of the repository.
         dir: PathBuf,
+        /// A folder with several records of each instrument, which are diagnosed together.
+        #[arg(long, value_name = "DIR")]
+        campaigns: Option<PathBuf>,
         /// Writes the table and the pictures of the book's chapter on them as well.
         #[arg(long)]
         write: bool,
@@ -59,7 +62,7 @@ fn main() -> ExitCode {
     twinlag_memory::give_back_large();
     let result = match Arguments::parse().task {
         Task::Ci { tested } => ci::run(tested),
-        Task::Measured { dir, write } => measured::run(&dir, write),
+        Task::Measured { dir, campaigns, write } => measured::run(&dir, campaigns.as_deref(), write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),

@@ -2,6 +2,7 @@
 //!
 //! The data are not part of the repository. What is known of them rests on plateaus and data sheets, not on lag fits.
 
+mod campaigns;
 mod diagnosed;
 mod page;
 
@@ -103,7 +104,7 @@ fn contains(name: &str, interval: Option<[f64; 2]>, truth: f64) -> Result<()> {
 }
 
 /// Runs all cases, then every other file with guessed columns.
-pub(crate) fn run(dir: &Path, write: bool) -> Result<()> {
+pub(crate) fn run(dir: &Path, of_campaigns: Option<&Path>, write: bool) -> Result<()> {
     ensure!(dir.is_dir(), "{}: no such folder: name the folder of the measured data", dir.display());
     let mut failures = Vec::new();
     println!("{:38} {:24} {:12} {:16} answer", "file", "channels", "free", "status");
@@ -129,13 +130,19 @@ pub(crate) fn run(dir: &Path, write: bool) -> Result<()> {
             Err(error) => println!("{name}, guessed columns: refused: {error:#}"),
         }
     }
-    let diagnosed = diagnosed::run(dir);
+    let mut diagnosed = diagnosed::run(dir);
+    if let Some(dir) = of_campaigns {
+        campaigns::run(dir, &mut diagnosed.page)?;
+    }
     failures.extend(diagnosed.failures);
     let questions = CASES.len() + diagnosed.questions;
     if write {
         let book = root()?.join("docs/src");
         fs::write(book.join("measured-table.md"), &diagnosed.page.table)?;
         fs::write(book.join("measured-records.md"), &diagnosed.page.sections)?;
+        if of_campaigns.is_some() {
+            campaigns::write(&book, &diagnosed.page)?;
+        }
         let images = book.join("images/measured");
         fs::create_dir_all(&images)?;
         for (name, svg) in &diagnosed.page.pictures {

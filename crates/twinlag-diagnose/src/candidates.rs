@@ -80,6 +80,7 @@ impl Candidate {
             seat: (self.effect.identifier(), self.effect.channel()),
             kind: kind(&self.effect),
             prevalence: self.effect.about().rank,
+            yields: self.effect.yields_to_other_forms(),
             is_sound: self.is_sound(current, policy),
             added: self.added,
             count: self.fitted.count,

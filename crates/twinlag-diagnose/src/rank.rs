@@ -26,6 +26,8 @@ pub(crate) struct Score {
     pub(crate) kind: Kind,
     /// Place in the order of how often effects occur, the most frequent first.
     pub(crate) prevalence: u8,
+    /// Whether another form of the effect is taken where the record does not distinguish them.
+    pub(crate) yields: bool,
     /// Whether its fit has ended well, its parameters inside their bounds, with enough residuals
     /// left.
     pub(crate) is_sound: bool,
@@ -88,6 +90,7 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
 ///    they hardly differ, the one that occurs more often.
 /// 3. A static disagreement before its imitators, and where no effect explains the record. Noise
 ///    comes first there if there is no static disagreement.
+/// 4. Of forms of one effect that the record does not distinguish the usual one.
 ///
 /// - `considered`: candidates of the round, those among them that were not worth a fit as well: any of them may have
 ///   been the one that chance favours
@@ -131,6 +134,13 @@ pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<
             order.retain(|i| *i != before);
             order.insert(0, before);
         }
+    }
+    let first = &scores[order[0]];
+    let is_usual = |s: &Score| {
+        (s.seat, s.added) == (first.seat, first.added) && !s.yields && first.white() - s.white() < policy.tie_deviance
+    };
+    if let Some(at) = order.iter().position(|i| is_usual(&scores[*i])).filter(|_| first.yields) {
+        order.swap(0, at);
     }
     order
 }

@@ -110,6 +110,11 @@ pub trait Effect: Send + Sync {
         [0, 1].map(|i| self.channel().is_none_or(|channel| channel == i))
     }
 
+    /// Whether another form of the effect is taken where the record hardly distinguishes them: what is relative is the second channel's.
+    fn yields_to_other_forms(&self) -> bool {
+        false
+    }
+
     /// Forms of this effect with more or fewer parameters, tried once it is chosen.
     fn sizes(&self) -> Vec<Shared> {
         Vec::new()

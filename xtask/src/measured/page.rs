@@ -12,6 +12,8 @@ use twinlag_pages::residual_picture;
 pub(super) struct Page {
     pub(super) table: String,
     pub(super) sections: String,
+    /// Instruments, with several records each; empty where none were asked for.
+    pub(super) campaigns: String,
     /// Names of files, and SVG.
     pub(super) pictures: Vec<(String, String)>,
 }
@@ -112,7 +114,7 @@ impl Page {
 }
 
 /// An effect with its first parameters, `whole` with all and their intervals.
-fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
+pub(super) fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
     let parameter = |p: &EffectNumber| {
         let name = p.name.replace('_', " ");
         let Some(value) = p.value.filter(|_| p.judgement.grade != Grade::NoGo) else {

@@ -17,6 +17,7 @@ fn score(effect: Identifier, kind: Kind, gain: f64) -> Score {
         seat: (effect, Some(0)),
         kind,
         prevalence: 5,
+        yields: false,
         is_sound: true,
         added: 1,
         count: COUNT,
@@ -135,6 +136,16 @@ fn of_the_same_model_in_two_guises_the_more_common_comes_first() {
     let common = |behind: f64| Score { prevalence: 1, ..delay(MUCH - behind) };
     assert_eq!(ranked(&[second_lag(MUCH), common(same - EPSILON)]), [1, 0]);
     assert_eq!(ranked(&[second_lag(MUCH), common(same + EPSILON)]), [0, 1]);
+}
+
+#[test]
+fn of_two_forms_that_are_not_distinguished_the_usual_one_comes_first() {
+    let tie = Policy::default().tie_deviance;
+    let unusual = Score { yields: true, ..delay(MUCH) };
+    assert_eq!(ranked(&[unusual, delay(MUCH - tie + EPSILON)]), [1, 0]);
+    assert_eq!(ranked(&[unusual, delay(MUCH - tie - EPSILON)]), [0, 1]);
+    // Another effect is no form of it.
+    assert_eq!(ranked(&[unusual, second_lag(MUCH - tie + EPSILON)]), [0, 1]);
 }
 
 #[test]

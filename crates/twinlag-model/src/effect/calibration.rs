@@ -137,6 +137,10 @@ impl Effect for Calibration {
         }
     }
 
+    fn yields_to_other_forms(&self) -> bool {
+        self.kind == Kind::Curved(0)
+    }
+
     fn has_functions_in(&self) -> [bool; 2] {
         [0, 1].map(|channel| self.kind == Kind::Curved(channel))
     }
