@@ -158,6 +158,25 @@ pub struct Separation {
     pub flow: Arc<Flow>,
 }
 
+impl Separation {
+    /// How long the gas that passes the first sensor at an instant takes to the second one, s: `d` with `∫ v dt = L` from `t` to `t + d`.
+    /// The velocity is taken in the middle, `d = L/v(t + d/2)`, which is wrong by the share `v'' d²/(24 v)`.
+    fn way_s(&self, time_s: f64) -> Number {
+        let mut way_s = Number::from(0.0);
+        for _ in 0..DELAY_ROUNDS {
+            way_s = self.delay_s * self.flow.inverse_ratio_at(way_s * 0.5 + time_s);
+        }
+        way_s
+    }
+
+    /// `1/(1 + d') = (1 − r'/2)/(1 + r'/2)`, with `r = L/v` at `t + d/2`.
+    fn slowing_at(&self, time_s: f64) -> Number {
+        let middle_s = time_s + 0.5 * self.way_s(time_s).re;
+        let half = self.delay_s * (0.5 * self.flow.inverse_ratio_rate_at(middle_s));
+        (-half + 1.0) / (half + 1.0)
+    }
+}
+
 /// The rig: two sensors, the delay between them, their noise.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -188,30 +207,22 @@ impl Plant {
         }
     }
 
-    /// How much later channel 2 shows what channel 1 shows at an instant, s: `d = L/v(t + d)`, beside a delay that is always there.
+    /// How much later channel 2 shows what channel 1 shows at an instant, s: what the gas takes from one to the other, beside a delay
+    /// that is always there.
     pub(crate) fn delay_at(&self, time_s: f64) -> Number {
         let steady_s = self.delay_s.unwrap_or(Number::from(0.0));
-        let Some(apart) = &self.separation else { return steady_s };
-        let mut delay_s = steady_s;
-        for _ in 0..DELAY_ROUNDS {
-            delay_s = steady_s + apart.delay_s * apart.flow.inverse_ratio_at(delay_s + time_s);
-        }
-        delay_s
+        self.separation.as_ref().map_or(steady_s, |apart| steady_s + apart.way_s(time_s))
     }
 
     /// What the time constant of a sensor is multiplied with at an instant of channel 1.
     ///
     /// A delay that changes squeezes the time of channel 2: at `t + d(t)` its reading changes `1 + d'` times as fast as the sensor, so
-    /// that the time constant counts `1/(1 + d') = 1 − r'` times, with `r = L/v` at `t + d`.
+    /// that the time constant counts `1/(1 + d')` times.
     pub(crate) fn tau_factor_at(&self, channel: usize, time_s: f64) -> Number {
-        let factor = self.sensors[channel].tau_factor_at(time_s);
-        match self.separation.as_ref().filter(|_| channel == 1) {
-            Some(apart) => {
-                let rate = apart.flow.inverse_ratio_rate_at(time_s + self.delay_at(time_s).re);
-                factor * (-apart.delay_s * rate + 1.0)
-            }
-            None => factor,
-        }
+        let later_s = if channel == 1 { self.delay_at(time_s).re } else { 0.0 };
+        let factor = self.sensors[channel].tau_factor_at(time_s + later_s);
+        let apart = self.separation.as_ref().filter(|_| channel == 1);
+        apart.map_or(factor, |apart| factor * apart.slowing_at(time_s))
     }
 
     /// Whether the time constant of a sensor changes along a record.
