@@ -547,6 +547,7 @@ SPEC is a TOML file such as:
   noise = { std_k = 0.5 }
 
 The record has the columns time_s,T1,T2,Tref; Tref is the true gas temperature, for scoring.
+With a [stream] its velocity is the column velocity_m_s, for --flow.
 
 Exit codes: 0 written, 2 wrong usage, 3 the rig cannot be used, 1 any other error.")]
 pub(crate) struct Simulate {

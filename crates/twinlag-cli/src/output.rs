@@ -34,7 +34,7 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
             return usage(format!("standard output is reserved for the answer: name a file for {option}"));
         }
         let whole = folder.join(name);
-        if record.canonicalize().is_ok_and(|record| whole.canonicalize().is_ok_and(|out| out == record)) {
+        if is_same(record, &whole) {
             return usage(format!("{} is the record itself: choose another name", path.display()));
         }
         if let Some((other, _)) = seen.iter().find(|s| s.1 == whole) {
@@ -46,6 +46,11 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
         }
     }
     Ok(())
+}
+
+/// Whether two paths lead to one file.
+pub(crate) fn is_same(one: &Path, other: &Path) -> bool {
+    one.canonicalize().is_ok_and(|one| other.canonicalize().is_ok_and(|other| one == other))
 }
 
 /// The picture, the report and the model that go with a table of numbers.
@@ -107,7 +112,7 @@ pub(crate) fn data<T: ToString>(
 
 /// Writes a file beside the one that it replaces when it is whole: a run that fails leaves the old one, or none; one that is killed
 /// leaves the part beside it, `.twinlag-*.part`. The new file has the permissions of the old one, and no other hard links.
-fn replace(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
+pub(crate) fn replace(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
     let failed = |error: std::io::Error| cannot_be_written(path, &error);
     let Some((mut part, target)) = part_of(path).map_err(failed)? else {
         return write(&mut File::create(path).map_err(failed)?);
@@ -125,11 +130,13 @@ fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)
     // Whoever opened a standard stream holds the file that it is.
     let is_stream = ["/dev/stdout", "/dev/stderr", "/dev/fd", "/proc"].iter().any(|stream| path.starts_with(stream));
     let (target, old) = match path.canonicalize() {
+        // Whoever reads a pipe would take an opening for all that is written.
+        Ok(target) if !target.metadata()?.is_file() => return Ok(None),
         // A file that may not be written is not replaced either.
         Ok(target) => (target.clone(), Some(File::options().write(true).open(target)?.metadata()?)),
         Err(_) => (path.to_owned(), None),
     };
-    if is_stream || (is_link && old.is_none()) || old.as_ref().is_some_and(|old| !old.is_file()) {
+    if is_stream || (is_link && old.is_none()) {
         return Ok(None);
     }
     let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -1,6 +1,5 @@
 //! `twinlag simulate SPEC.toml --out OUT.csv`.
 
-use std::fs::File;
 use std::io::{BufWriter, Write, stdout};
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use twinlag::signal::{Rig, Simulated};
 use crate::arguments::Simulate;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::output;
 use crate::print;
 use crate::progress::Progress;
 
@@ -18,6 +18,14 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
     let to_stdout = command.out == Path::new("-");
     if to_stdout && console.json {
         return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
+    }
+    let out = command.out.display();
+    if output::is_same(&command.spec, &command.out) {
+        return Err(Failure::Usage(format!("{out} is the rig itself: choose another name")));
+    }
+    if !to_stdout && !command.force && command.out.exists() {
+        let text = format!("{out}: exists already; name another file, or overwrite it with --force");
+        return Err(Failure::Usage(text));
     }
     let mut rig = read(&command.spec)?;
     if let Some(seed) = command.seed {
@@ -30,16 +38,7 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
     if to_stdout {
         write(&mut stdout().lock(), &record)?;
     } else {
-        let mut open = File::options();
-        let open = if command.force { open.create(true).truncate(true) } else { open.create_new(true) };
-        let out = command.out.display();
-        let file = open.write(true).open(&command.out).map_err(|error| match error.kind() {
-            std::io::ErrorKind::AlreadyExists => {
-                Failure::Usage(format!("{out}: exists already; name another file, or overwrite it with --force"))
-            }
-            _ => Failure::Other(format!("{out}: cannot be written: {error}")),
-        })?;
-        write(&mut BufWriter::new(file), &record)?;
+        output::replace(&command.out, |file| write(&mut BufWriter::new(file), &record))?;
     }
     if console.json {
         print::json(&json!({

@@ -898,6 +898,16 @@ fn an_existing_file_is_not_overwritten_unless_forced() {
     let answer = bench.run(&[&arguments[..], &["--force"]].concat());
     assert_eq!((answer.code, answer.stdout.as_str()), (0, ""), "{answer:#?}");
     assert!(bench.read("out.csv").starts_with(b"time_s,T1,T2,Tref\n"));
+    let onto_itself = ["simulate", "rig.toml", "--out", "./rig.toml", "--force"];
+    bench.refuses(2, &onto_itself, &["./rig.toml", "is the rig itself", "another name"]);
+    assert_eq!(bench.read("rig.toml"), RIG.as_bytes());
+}
+
+#[test]
+fn what_depends_on_a_stream_is_not_planned() {
+    let stream = "[stream]\nmean_m_per_s = 2.0\ndepth = 0.3\nperiod_s = 0.5\n[[sensors]]\ndownstream_m = 0.01";
+    let bench = Bench::with("plan_stream", "rig.toml", RIG.replacen("[[sensors]]", stream, 1));
+    bench.refuses(3, &["plan", "rig.toml"], &["sensors[0]", "velocity of the stream", "Take downstream_m"]);
 }
 
 #[test]

@@ -136,11 +136,10 @@ pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<
         }
     }
     let first = &scores[order[0]];
-    // Where model error dominates, the white gain says nothing between forms of one effect.
-    let worth = if first.energy > policy.incomplete_energy { Score::robust } else { Score::white };
-    let is_usual = |s: &Score| {
-        (s.seat, s.added) == (first.seat, first.added) && !s.yields && worth(first) - worth(s) < policy.tie_deviance
-    };
+    // Where model error dominates, gains do not distinguish forms of one effect.
+    let is_open =
+        |s: &Score| first.energy > policy.incomplete_energy || first.white() - s.white() < policy.tie_deviance;
+    let is_usual = |s: &Score| (s.seat, s.added) == (first.seat, first.added) && !s.yields && is_open(s);
     if let Some(at) = order.iter().position(|i| is_usual(&scores[*i])).filter(|_| first.yields) {
         order.swap(0, at);
     }

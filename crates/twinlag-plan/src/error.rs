@@ -22,6 +22,11 @@ pub enum PlanError {
     )]
     ChangingFlow,
     #[error(
+        "sensors[{sensor}] ({channel}) depends on the velocity of the stream: expected sensors that do not, since a plan takes delays and time \
+         constants to be constant. Take downstream_m and stream_exponent out of the rig"
+    )]
+    InStream { sensor: usize, channel: String },
+    #[error(
         "the model has no time constant of {channel}: expected both, since there is no rig without them. Diagnose a record that \
          determines both, know one of them beforehand, or describe the rig"
     )]

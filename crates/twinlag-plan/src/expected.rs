@@ -11,7 +11,7 @@
 
 use twinlag::diagnosis::{Observations, Settings, Stretch};
 use twinlag::model::{Effort, Fitted, Identifier, Model, Prepared, covariance, dense};
-use twinlag::signal::Rig;
+use twinlag::signal::{Rig, Sensor};
 
 use crate::error::PlanError;
 use crate::seats;
@@ -42,7 +42,7 @@ impl Expected {
     /// What a record of `rig` determines.
     ///
     /// # Errors
-    /// [`PlanError::NoNoise`] for a sensor without noise, [`PlanError::ChangingFlow`]; [`PlanError::Signal`] and [`PlanError::Model`] for a
+    /// [`PlanError::NoNoise`] for a sensor without noise, [`PlanError::ChangingFlow`], [`PlanError::InStream`]; [`PlanError::Signal`] and [`PlanError::Model`] for a
     /// rig that cannot be simulated, and for a record that is too short or never changes.
     ///
     /// ```
@@ -62,6 +62,10 @@ impl Expected {
         let noise_std_k = noise_std_k(rig)?;
         if rig.flow().is_some() {
             return Err(PlanError::ChangingFlow);
+        }
+        let in_stream = |s: &Sensor| s.downstream_m != 0.0 || s.stream_exponent != 0.0;
+        if let Some(sensor) = rig.sensors().iter().position(in_stream) {
+            return Err(PlanError::InStream { sensor, channel: rig.sensors()[sensor].channel.clone() });
         }
         let mut record = rig.record().clone();
         let all = record.samples;
