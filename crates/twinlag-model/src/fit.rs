@@ -132,7 +132,8 @@ impl Model {
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
         let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
-        let count = cost.count() as f64 * selection.weighting.mean();
+        // A masked reading takes one residual away: the whitened one that would say it is zero.
+        let count = cost.count().saturating_sub(selection.masked(observations)) as f64 * selection.weighting.mean();
         Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
     }
 

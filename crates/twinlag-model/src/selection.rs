@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::disagreement::Piece;
+use crate::observations::Observations;
 use crate::weighting::Weighting;
 
 /// The residuals that count, by the sample in the middle of their reach.
@@ -34,6 +35,15 @@ impl Selection {
     /// How many samples count.
     pub(crate) fn counted(&self) -> usize {
         self.counts.iter().filter(|counts| **counts).count()
+    }
+
+    /// Readings of both channels, among the samples that count, that are masked.
+    pub(crate) fn masked(&self, observations: &Observations) -> usize {
+        let of_channel = |channel: usize| {
+            let masked = observations.stretches.iter().flat_map(move |stretch| &stretch.masked[channel]);
+            masked.zip(&self.counts).filter(|(is_masked, counts)| **is_masked && **counts).count()
+        };
+        of_channel(0) + of_channel(1)
     }
 
     /// Samples of the residuals of `pieces` that count.
@@ -196,7 +206,7 @@ impl Sieve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observations::{Observations, Stretch};
+    use crate::observations::Stretch;
 
     /// The first samples and those that are left are all of them, in order, wherever they are cut.
     #[test]
