@@ -75,7 +75,7 @@ fn one_in_ten_may_be_missing_at_random_places() {
     let missing: Vec<bool> = (0..4000)
         .map(|_| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) % 10 == 0
+            (state >> 33).is_multiple_of(10)
         })
         .collect();
     let answer = found(&without(&rig(11, "", ""), |k| missing[k]));
