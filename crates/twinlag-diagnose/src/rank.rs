@@ -90,7 +90,7 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
 ///    they hardly differ, the one that occurs more often.
 /// 3. A static disagreement before its imitators, and where no effect explains the record. Noise
 ///    comes first there if there is no static disagreement.
-/// 4. Of forms of one effect that the record does not distinguish the usual one.
+/// 4. Of the forms of one effect that the record does not distinguish, the usual one.
 ///
 /// - `considered`: candidates of the round, those among them that were not worth a fit as well: any of them may have
 ///   been the one that chance favours
@@ -140,8 +140,10 @@ pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<
     let is_open =
         |s: &Score| first.energy > policy.incomplete_energy || first.white() - s.white() < policy.tie_deviance;
     let is_usual = |s: &Score| (s.seat, s.added) == (first.seat, first.added) && !s.yields && is_open(s);
-    if let Some(at) = order.iter().position(|i| is_usual(&scores[*i])).filter(|_| first.yields) {
-        order.swap(0, at);
+    let usual = order.iter().chain(&effects).copied().find(|i| first.yields && is_usual(&scores[*i]));
+    if let Some(usual) = usual {
+        order.retain(|i| *i != usual);
+        order.insert(0, usual);
     }
     order
 }

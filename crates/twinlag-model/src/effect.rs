@@ -105,12 +105,14 @@ pub trait Effect: Send + Sync {
         })
     }
 
-    /// In which of the sensors its parameters change functions of time or temperature: by default where it sits.
+    /// Whether its parameters enter functions of time or temperature of each sensor. By default those of the channel it sits in, or of
+    /// both.
     fn has_functions_in(&self) -> [bool; 2] {
         [0, 1].map(|i| self.channel().is_none_or(|channel| channel == i))
     }
 
-    /// Whether another form of the effect is taken where the record hardly distinguishes them: what is relative is the second channel's.
+    /// Whether this form gives way to another form of the same effect where the record hardly distinguishes them. A curvature of the
+    /// first channel does: calibration is relative, and named of the second.
     fn yields_to_other_forms(&self) -> bool {
         false
     }

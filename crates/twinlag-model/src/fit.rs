@@ -70,7 +70,7 @@ pub struct Fitted {
     pub theta: Vec<f64>,
     /// Energy of the residuals that count, as the fit weighs frequencies.
     pub chi2: f64,
-    /// Their number, as the fit weighs frequencies.
+    /// Their degrees of freedom, as the fit weighs frequencies: masked readings take some away.
     pub count: f64,
     /// How the fit ended.
     pub end: End,
@@ -132,9 +132,20 @@ impl Model {
     pub fn fit(&self, start: &[f64], observations: &Observations, selection: &Selection, effort: Effort) -> Fitted {
         let cost = ResidualCost::new(self, start, observations, selection);
         let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
-        // A masked reading takes one residual away: the whitened one that would say it is zero.
-        let count = cost.count().saturating_sub(selection.masked(observations)) as f64 * selection.weighting.mean();
+        let count = self.degrees_of_freedom(cost.count(), &fit.x, observations, selection);
         Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
+    }
+
+    /// Degrees of freedom of `residuals` that count, as the fit weighs frequencies.
+    pub(crate) fn degrees_of_freedom(
+        &self,
+        residuals: usize,
+        theta: &[f64],
+        observations: &Observations,
+        selection: &Selection,
+    ) -> f64 {
+        let consumed = self.plant(theta, observations).consumed(observations.period_s.is_some());
+        residuals.saturating_sub(selection.taken_by_masks(observations, consumed)) as f64 * selection.weighting.mean()
     }
 
     /// The energy at a point.

@@ -14,8 +14,8 @@ use crate::observations::{Observations, Stretch};
 
 /// 0 °C, K.
 pub const ZERO_CELSIUS_K: f64 = 273.15;
-/// Rounds in which a delay is computed from the flow at the instant that it leads to. Each leaves of the error before as much as the
-/// delay changes from one of these instants to the other.
+/// Rounds in which a transit time is computed from the flow halfway through it. Each leaves of the error before it half of the rate at
+/// which the transit time changes.
 const DELAY_ROUNDS: usize = 3;
 /// Smallest factor by which a time constant changes: less would make a lag vanish, or turn it round.
 pub(crate) const MIN_TAU_FACTOR: f64 = 0.02;
@@ -149,7 +149,8 @@ impl Extra {
     }
 }
 
-/// Sensors that stand apart along a flow, or along their own motion: what one sees the other sees `L/v(t)` later.
+/// Sensors that stand apart along a flow, or along their own motion: gas that passes the first one at `t` reaches the second one
+/// `d = L/v(t + d/2)` later.
 #[derive(Clone, Debug)]
 pub struct Separation {
     /// How much later the second one is at the mean flow, s: the distance over it.
@@ -159,20 +160,24 @@ pub struct Separation {
 }
 
 impl Separation {
-    /// How long the gas that passes the first sensor at an instant takes to the second one, s: `d` with `∫ v dt = L` from `t` to `t + d`.
-    /// The velocity is taken in the middle, `d = L/v(t + d/2)`, which is wrong by the share `v'' d²/(24 v)`.
-    fn way_s(&self, time_s: f64) -> Number {
-        let mut way_s = Number::from(0.0);
+    /// Transit time, s, of the gas that passes the first sensor at `t`: `d` with `∫ v dt = L` from `t` to `t + d`. Taken as
+    /// `d = L/v(t + d/2)`, which is wrong by the share `v'' d²/(24 v)`.
+    fn transit_s(&self, time_s: f64) -> Number {
+        let mut transit_s = Number::from(0.0);
         for _ in 0..DELAY_ROUNDS {
-            way_s = self.delay_s * self.flow.inverse_ratio_at(way_s * 0.5 + time_s);
+            transit_s = self.delay_s * self.flow.inverse_ratio_at(transit_s * 0.5 + time_s);
         }
-        way_s
+        transit_s
     }
 
-    /// `1/(1 + d') = (1 − r'/2)/(1 + r'/2)`, with `r = L/v` at `t + d/2`.
+    /// Factor of the second sensor's time constant: `1/(1 + d') = (1 − r'/2)/(1 + r'/2)`, `r = L/v` at `t + d/2`. At least
+    /// [`MIN_TAU_FACTOR`] and at most its inverse: where sensors turn, `r` jumps, and the formula has no meaning. Derivatives leave out
+    /// that a longer transit shifts the instant at which the flow counts.
     fn slowing_at(&self, time_s: f64) -> Number {
-        let middle_s = time_s + 0.5 * self.way_s(time_s).re;
+        let middle_s = time_s + 0.5 * self.transit_s(time_s).re;
         let half = self.delay_s * (0.5 * self.flow.inverse_ratio_rate_at(middle_s));
+        let most = (1.0 - MIN_TAU_FACTOR) / (1.0 + MIN_TAU_FACTOR);
+        let half = if half.re.abs() > most { Number::from(most.copysign(half.re)) } else { half };
         (-half + 1.0) / (half + 1.0)
     }
 }
@@ -207,22 +212,23 @@ impl Plant {
         }
     }
 
-    /// How much later channel 2 shows what channel 1 shows at an instant, s: what the gas takes from one to the other, beside a delay
-    /// that is always there.
+    /// How much later channel 2 shows what channel 1 shows at an instant, s: the transit time of the gas, and a delay that is always
+    /// there.
     pub(crate) fn delay_at(&self, time_s: f64) -> Number {
         let steady_s = self.delay_s.unwrap_or(Number::from(0.0));
-        self.separation.as_ref().map_or(steady_s, |apart| steady_s + apart.way_s(time_s))
+        self.separation.as_ref().map_or(steady_s, |apart| steady_s + apart.transit_s(time_s))
     }
 
     /// What the time constant of a sensor is multiplied with at an instant of channel 1.
     ///
-    /// A delay that changes squeezes the time of channel 2: at `t + d(t)` its reading changes `1 + d'` times as fast as the sensor, so
-    /// that the time constant counts `1/(1 + d')` times.
+    /// A transit time that changes squeezes the time of channel 2: at `t + d(t)` its reading changes `1 + d'` times as fast as the sensor,
+    /// so that the time constant counts `1/(1 + d')` times. A second lag and a slow path, which are corrections, are left as they are.
     pub(crate) fn tau_factor_at(&self, channel: usize, time_s: f64) -> Number {
-        let later_s = if channel == 1 { self.delay_at(time_s).re } else { 0.0 };
-        let factor = self.sensors[channel].tau_factor_at(time_s + later_s);
-        let apart = self.separation.as_ref().filter(|_| channel == 1);
-        apart.map_or(factor, |apart| factor * apart.slowing_at(time_s))
+        let sensor = &self.sensors[channel];
+        match self.separation.as_ref().filter(|_| channel == 1) {
+            Some(apart) => sensor.tau_factor_at(time_s + apart.transit_s(time_s).re) * apart.slowing_at(time_s),
+            None => sensor.tau_factor_at(time_s),
+        }
     }
 
     /// Whether the time constant of a sensor changes along a record.

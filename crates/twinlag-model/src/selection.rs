@@ -37,13 +37,25 @@ impl Selection {
         self.counts.iter().filter(|counts| **counts).count()
     }
 
-    /// Readings of both channels, among the samples that count, that are masked.
-    pub(crate) fn masked(&self, observations: &Observations) -> usize {
-        let of_channel = |channel: usize| {
-            let masked = observations.stretches.iter().flat_map(move |stretch| &stretch.masked[channel]);
-            masked.zip(&self.counts).filter(|(is_masked, counts)| **is_masked && **counts).count()
-        };
-        of_channel(0) + of_channel(1)
+    /// Degrees of freedom that masked readings take away: one each, but where both channels are masked for `m` samples in a row no more
+    /// than the `m + consumed` residuals that these readings enter.
+    ///
+    /// - `consumed`: by how many samples a residual reaches beyond its own
+    pub(crate) fn taken_by_masks(&self, observations: &Observations, consumed: usize) -> usize {
+        let mut taken = 0;
+        let mut counts = self.counts.iter();
+        for stretch in &observations.stretches {
+            let mut in_a_row = 0;
+            for ((first, second), counts) in stretch.masked[0].iter().zip(&stretch.masked[1]).zip(&mut counts) {
+                let both = *first && *second && *counts;
+                in_a_row = if both { in_a_row + 1 } else { 0 };
+                taken += match (both, (*first || *second) && *counts) {
+                    (true, _) if in_a_row <= consumed => 2,
+                    (_, is_one) => usize::from(is_one),
+                };
+            }
+        }
+        taken
     }
 
     /// Samples of the residuals of `pieces` that count.

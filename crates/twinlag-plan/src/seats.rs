@@ -109,10 +109,10 @@ fn calibration([first, second]: &[Sensor; 2]) -> Option<Seat> {
         values.push(("offset", offset_k));
     }
     if is_curved && !has_radiation {
-        values.push(match [first.curvature_per_k, second.curvature_per_k] {
-            [of_first, 0.0] => ("curvature_of_first", of_first),
-            [of_first, of_second] => ("curvature", of_second - of_first),
-        });
+        // The model's curvature is per unit of gain, and of one channel: of two the difference counts.
+        let [of_first, of_second] = [first, second].map(|sensor| sensor.curvature_per_k / sensor.gain);
+        let is_second = of_second != 0.0;
+        values.push(if is_second { ("curvature", of_second - of_first) } else { ("curvature_of_first", of_first) });
     }
     (!values.is_empty()).then_some(Seat { effect: Identifier::CALIBRATION, channel: Some(1), values })
 }

@@ -214,7 +214,8 @@ impl GasPath {
         let departures = stream.departures(self.grid, distance_m);
         let values_c = departures.map(|departure| match self.hold {
             Hold::Continuous => self.between_c(departure),
-            Hold::ZeroOrder => self.values_c[departure as usize],
+            // Rounding must not make a delay of whole periods one period longer.
+            Hold::ZeroOrder => self.values_c[(departure + 1e-6) as usize],
         });
         Self { grid: self.grid, hold: self.hold, values_c: values_c.collect() }
     }

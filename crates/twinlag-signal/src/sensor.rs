@@ -60,7 +60,7 @@ pub struct Sensor {
     pub crosstalk: f64,
     /// How far the sensor stands downstream of the place whose gas temperature is recorded, m; 0 if
     /// left out. It meets the gas that passed there when the [`Stream`](crate::Stream) had so far to
-    /// carry it. Held gas comes late by whole sample periods.
+    /// carry it. Held gas comes late by whole sample periods, rounded up.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub downstream_m: f64,
     /// Power of the [`Stream`](crate::Stream)'s velocity over its mean with which τ goes; 0 if left
@@ -179,7 +179,7 @@ impl Sensor {
             .time_constants_s()
             .map(|(_, tau_s, flows)| if flows { longest * tau_s } else { tau_s })
             .fold(0.0, f64::max);
-        let carried_s = surroundings.stream.map_or(0.0, |stream| stream.longest_s(self.downstream_m));
+        let carried_s = surroundings.stream.map_or(0.0, |stream| stream.longest_transit_s(self.downstream_m));
         10.0 * slowest_s + carried_s + self.delay_s + self.clock_slip.map_or(0.0, |slip| slip.by_s)
     }
 
@@ -273,7 +273,7 @@ impl Sensor {
                 let [least, _] = surroundings.range(self);
                 if least < 1.0 {
                     shortest_s *= least;
-                    field = format!("{field} (shortened by the flow)");
+                    field = format!("{field} (shortened by the flow or the stream)");
                 }
                 if let Some(radiation) = &self.radiation {
                     shortest_s /= 1.0 + radiation.slope(mean_c).max(0.0);

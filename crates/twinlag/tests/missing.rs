@@ -66,9 +66,8 @@ fn every_twentieth_reading_may_be_missing() {
     recovers(&answer.last, TAU_S, 4.0);
 }
 
-/// Stamps that are even say so whatever is asked of them.
-/// One in ten at random places: the residuals that they take away are no sign of less noise. That was taken for noise levels that are
-/// too high, and the record for unexplained.
+/// One reading in ten is missing at random places. That no residuals come from them was taken for noise levels that are too high, and the
+/// record for unexplained.
 #[test]
 fn one_in_ten_may_be_missing_at_random_places() {
     let mut state = 5_u64;
@@ -83,6 +82,7 @@ fn one_in_ten_may_be_missing_at_random_places() {
     recovers(&answer.last, TAU_S, 4.0);
 }
 
+/// Stamps that are even say so whatever is asked of them.
 #[test]
 fn even_stamps_taken_as_stamped_give_the_same() {
     let whole = rig(11, "", &format!("delay_s = {DELAY_S}"));

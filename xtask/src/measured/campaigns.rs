@@ -167,7 +167,7 @@ fn picture(campaign: &Campaign, answer: &Diagnosis, records: &[Record], paths: &
     let rate_at = |fit: &ModelFit, t: f64| {
         let gas = &fit.trace.gas_c;
         let k = after(&gas.time_s, t);
-        let (before, next) = (k.saturating_sub(1), (k + 1).min(gas.time_s.len() - 1));
+        let (before, next) = (k.saturating_sub(1), (k + 1).min(gas.time_s.len().saturating_sub(1)));
         ((gas.value[next] - gas.value[before]) / (gas.time_s[next] - gas.time_s[before])).abs()
     };
     let panel = |label: Axis, of: &dyn Fn(&ModelFit, f64) -> f64| {

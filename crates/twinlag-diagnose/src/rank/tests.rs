@@ -144,6 +144,8 @@ fn of_two_forms_that_are_not_distinguished_the_usual_one_comes_first() {
     let unusual = Score { yields: true, ..delay(MUCH) };
     assert_eq!(ranked(&[unusual, delay(MUCH - tie + EPSILON)]), [1, 0]);
     assert_eq!(ranked(&[unusual, delay(MUCH - tie - EPSILON)]), [0, 1]);
+    let poor = |s: Score| Score { energy: 2.0 * Policy::default().incomplete_energy, ..s };
+    assert_eq!(ranked(&[poor(unusual), poor(delay(MUCH - 2.0 * tie))]), [1, 0]);
     // Another effect is no form of it.
     assert_eq!(ranked(&[unusual, second_lag(MUCH - tie + EPSILON)]), [0, 1]);
 }

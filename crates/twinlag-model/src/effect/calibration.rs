@@ -39,8 +39,8 @@ enum Kind {
     Curved(usize),
 }
 
-/// Names of the curvature, by the channel that has it: the one that is out of line with the other cannot be told at rest, but while the
-/// gas changes, since a sensor's reading is bent after its lag.
+/// Names of the curvature, by the channel that has it. At rest only their difference shows; which channel is curved shows while the gas
+/// changes, since a reading is bent after its lag.
 const CURVATURES: [&str; 2] = ["curvature_of_first", "curvature"];
 
 struct Calibration {

@@ -1,4 +1,4 @@
-//! Sensors that stand apart along a flow, or along their own motion: the second one sees the gas `L/v(t)` later, where the flow `v` is
+//! Sensors that stand apart along a flow, or along their own motion: the second one sees the gas `L/v` later, where the flow `v` is
 //! measured. Of sensors that move back and forth the sign of `v` changes, and which of them comes first.
 
 use std::sync::Arc;

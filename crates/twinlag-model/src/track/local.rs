@@ -163,7 +163,7 @@ impl Local<'_> {
     pub(super) fn fit(&self, start: &[f64]) -> Fitted {
         let variables = self.model.variables(start, self.observations);
         let fit = minimised(self, variables, start, self.selection.counted(), Effort::Finish);
-        let count = self.count(&fit.x) as f64 * self.selection.weighting.mean();
+        let count = self.model.degrees_of_freedom(self.count(&fit.x), &fit.x, self.observations, self.selection);
         Fitted {
             model: self.model.clone(),
             theta: fit.x.clone(),

@@ -256,8 +256,7 @@ fn steps_too_long_for_a_shortened_time_constant_are_refused() {
     let flow = "[flow]\nkind = \"step\"\nfactor = 0.5\nat_s = 1.0\nover_s = 1.0\n[record]";
     let message =
         read(&RIGS[0].1.replacen("0.0238", "0.0001", 1).replacen("[record]", flow, 1)).unwrap_err().to_string();
-    let wanted =
-        "sensors[0].time_constant_s (shortened by the flow) = 0.00005 s: raise record.oversampling to at least 41";
+    let wanted = "sensors[0].time_constant_s (shortened by the flow or the stream) = 0.00005 s: raise record.oversampling to at least 41";
     assert!(message.contains(wanted), "{message}");
     let hot = short("radiation = { coefficient_per_k3 = 5e-10, wall_c = 300.0 }");
     assert_refused("sine", "time_constant_s = 0.0238", &hot, "sensors[0].time_constant_s (shortened by radiation)");
