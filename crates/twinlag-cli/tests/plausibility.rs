@@ -4,8 +4,8 @@ mod common;
 
 use common::{Bench, FAST_RIG, number};
 
-/// The time constant of a wire of 50 µm in air at 20 m/s, s. By hand, with air of 300 °C (0.0446 W/(m K), 47.5·10⁻⁶ m²/s): 50 µm have a Reynolds number of 21, a Nusselt number of 2.5 and with 1.5 %
-/// of radiation a time constant of 0.0207 s, which goes with the diameter to the power of 1.56 there.
+/// The time constant of a wire of 50 µm in air at 20 m/s, s. By hand, with air of 300 °C (0.0446 W/(m K), 47.5·10⁻⁶ m²/s): a Reynolds
+/// number of 21, a Nusselt number of 2.5 and with 1.5 % of radiation 0.0207 s, which goes with the diameter to the power of 1.56 there.
 const EXPECTED_S: f64 = 0.0207;
 /// Diameters of 24 ms over and times the factor of 95 %, `exp(1.96 · 0.3)` = 1.8.
 const DIAMETERS_M: [f64; 2] = [37.7e-6, 80.0e-6];

@@ -220,6 +220,29 @@ mod tests {
     use super::*;
     use crate::observations::Stretch;
 
+    /// Of `m` samples in a row without either reading `m + consumed` residuals know nothing, but no more than there are readings.
+    #[test]
+    fn masked_readings_take_no_more_than_the_residuals_they_enter() {
+        const SAMPLES: usize = 100;
+        let taken = |masked: [&[usize]; 2], counts: &dyn Fn(usize) -> bool| {
+            let time_s: Vec<f64> = (0..SAMPLES).map(|k| k as f64).collect();
+            let is_masked = masked.map(|masked| (0..SAMPLES).map(|k| masked.contains(&k)).collect());
+            let stretch = Stretch::new(time_s.clone(), [time_s.clone(), time_s]).with_missing(is_masked);
+            let observations = Observations::new(vec![stretch], Some(1.0)).expect("long enough");
+            let counts = (0..SAMPLES).map(counts).collect();
+            Selection { counts, weighting: Weighting::default() }.taken_by_masks(&observations, 2)
+        };
+        let all = |_| true;
+        assert_eq!(taken([&[], &[]], &all), 0);
+        assert_eq!(taken([&[5, 6, 7, 8], &[]], &all), 4);
+        assert_eq!(taken([&[5, 20], &[6, 30]], &all), 4);
+        for m in 1..6 {
+            let row: Vec<usize> = (10..10 + m).collect();
+            assert_eq!(taken([&row, &row], &all), (2 * m).min(m + 2), "{m} samples");
+        }
+        assert_eq!(taken([&[5, 25], &[5, 25]], &|k| k < 20), 2);
+    }
+
     /// The first samples and those that are left are all of them, in order, wherever they are cut.
     #[test]
     fn what_is_taken_out_is_the_beginning() {

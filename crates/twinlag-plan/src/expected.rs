@@ -42,8 +42,9 @@ impl Expected {
     /// What a record of `rig` determines.
     ///
     /// # Errors
-    /// [`PlanError::NoNoise`] for a sensor without noise, [`PlanError::ChangingFlow`], [`PlanError::InStream`]; [`PlanError::Signal`] and [`PlanError::Model`] for a
-    /// rig that cannot be simulated, and for a record that is too short or never changes.
+    /// [`PlanError::NoNoise`] for a sensor without noise, [`PlanError::ChangingFlow`], [`PlanError::InStream`];
+    /// [`PlanError::Signal`] and [`PlanError::Model`] for a rig that cannot be simulated, and for a record that is too short or never
+    /// changes.
     ///
     /// ```
     /// use twinlag::signal::{Broadband, Gas, Noise, Record, Rig, Sensor, Signal};

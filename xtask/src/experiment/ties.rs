@@ -35,9 +35,14 @@ pub(super) struct Plan {
 }
 
 /// What an answer may be: of these each record has one.
-const ANSWERS: [&str; 5] = ["right alone", "right, tied to others", "another, tied to the right", "another", "nothing"];
+const ANSWERS: [&str; 5] = [RIGHT_ALONE, RIGHT_TIED, TIED_TO_RIGHT, ANOTHER, NOTHING];
+const RIGHT_ALONE: &str = "right alone";
+const RIGHT_TIED: &str = "right, tied to others";
+const TIED_TO_RIGHT: &str = "another, tied to the right";
+const ANOTHER: &str = "another";
+const NOTHING: &str = "nothing";
 /// A gain with the crosstalk that is the same for any record, or the other way round.
-const TWIN: usize = ANSWERS.len();
+const TWIN: &str = "exact twin stated";
 
 impl Plan {
     pub(super) fn read(text: &str) -> Result<Self> {
@@ -51,14 +56,14 @@ impl Plan {
 }
 
 /// Which of the answers it is that names `first` first.
-fn answer(first: Option<&NamedEffect>, wanted: &[&str]) -> usize {
-    let Some(first) = first else { return 4 };
+fn answer(first: Option<&NamedEffect>, wanted: &[&str]) -> &'static str {
+    let Some(first) = first else { return NOTHING };
     let is_right = |effect: &Identifier| wanted.contains(&effect.name());
     match (is_right(&first.effect), first.alternatives.is_empty()) {
-        (true, true) => 0,
-        (true, false) => 1,
-        (false, _) if first.alternatives.iter().any(is_right) => 2,
-        (false, _) => 3,
+        (true, true) => RIGHT_ALONE,
+        (true, false) => RIGHT_TIED,
+        (false, _) if first.alternatives.iter().any(is_right) => TIED_TO_RIGHT,
+        (false, _) => ANOTHER,
     }
 }
 
@@ -82,7 +87,7 @@ impl Study for Plan {
     }
 
     fn quantities(&self, _cell: usize) -> Vec<Quantity> {
-        ANSWERS.iter().copied().chain(["exact twin stated"]).map(Quantity::event).collect()
+        ANSWERS.into_iter().chain([TWIN]).map(Quantity::event).collect()
     }
 
     fn scratch(&self, _cell: usize) -> std::result::Result<(), Failure> {
@@ -103,9 +108,9 @@ impl Study for Plan {
         let found = diagnose(&record, &DiagnoseOptions::default())?;
         let first = found.effects.first();
         let given = answer(first, &drawn.effects());
-        (0..ANSWERS.len()).for_each(|k| outcome.event(k, k == given));
+        ANSWERS.iter().enumerate().for_each(|(k, answer)| outcome.event(k, *answer == given));
         if matches!(kind, Kind::Gain | Kind::Crosstalk) {
-            outcome.event(TWIN, first.is_some_and(|first| !first.exact_twins.is_empty()));
+            outcome.event(ANSWERS.len(), first.is_some_and(|first| !first.exact_twins.is_empty()));
         }
         Ok(())
     }
@@ -134,14 +139,11 @@ impl Stored for Plan {
     }
 
     fn tables(&self, results: &Results, out: &Path) -> Result<()> {
-        let mut text = format!(
-            "| effect | noise | {} | exact twin stated |\n|---|---|---|---|---|---|---|---|\n",
-            ANSWERS.join(" | ")
-        );
+        let mut text =
+            format!("| effect | noise | {} | {TWIN} |\n|---|---|---|---|---|---|---|---|\n", ANSWERS.join(" | "));
         for (cell, tally) in results.cells().iter().enumerate() {
             let (kind, noise_factor) = self.place(cell);
-            let counts = ANSWERS.iter().chain(&["exact twin stated"]).map(|name| hits_of_count(tally, name));
-            let row: Vec<String> = counts.collect();
+            let row: Vec<String> = ANSWERS.iter().chain(&[TWIN]).map(|name| hits_of_count(tally, name)).collect();
             let _ = writeln!(text, "| {} | × {noise_factor} | {} |", kind.name(), row.join(" | "));
         }
         Ok(fs::write(out.join("ties.md"), text)?)

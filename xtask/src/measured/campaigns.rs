@@ -14,13 +14,15 @@ use twinlag_report::{Axis, Chart, Colour, Figure, Reference, Series};
 use super::files;
 use super::page::{Page, named};
 
-/// An instrument: its folder, its channels, what is known of it, and the column of its position.
+/// Several records of one instrument.
 struct Campaign {
     folder: &'static str,
     channels: [&'static str; 2],
-    known: &'static str,
+    /// A time constant from a data sheet, as `--known` takes it.
+    known: Option<&'static str>,
+    /// Column of the position.
     position: &'static str,
-    /// Name of the position on an axis.
+    /// Its name on an axis.
     axis: &'static str,
 }
 
@@ -28,21 +30,21 @@ const CAMPAIGNS: [Campaign; 3] = [
     Campaign {
         folder: "seaglider_sg542",
         channels: ["T1_ct_raw_C", "T2_aa4330_C"],
-        known: "T1=0.55s",
+        known: Some("T1=0.55s"),
         position: "depth_m",
         axis: "depth (m)",
     },
     Campaign {
         folder: "seaexplorer_sea046",
         channels: ["T1_gpctd_C", "T2_arod_C"],
-        known: "T1=0.5s+-0.1s",
+        known: Some("T1=0.5s+-0.1s"),
         position: "pressure_dbar",
         axis: "pressure (dbar)",
     },
     Campaign {
         folder: "ctd911",
         channels: ["T1_t090_C", "T2_t190_C"],
-        known: "",
+        known: None,
         position: "pressure_dbar",
         axis: "pressure (dbar)",
     },
@@ -59,7 +61,7 @@ impl Campaign {
     }
 
     fn command(&self) -> String {
-        let known = if self.known.is_empty() { String::new() } else { format!(" --known {}", self.known) };
+        let known = self.known.map_or(String::new(), |known| format!(" --known {known}"));
         format!("twinlag diagnose *.csv --position {}{known}", self.position)
     }
 }
@@ -72,8 +74,8 @@ pub(super) fn run(dir: &Path, page: &mut Page) -> Result<()> {
         let read = |path: &PathBuf| Ok(Record::read(path, &campaign.selection())?);
         let records: Vec<Record> = paths.iter().map(read).collect::<Result<_>>()?;
         let mut characterise = Options::default();
-        if !campaign.known.is_empty() {
-            characterise.known.push(campaign.known.parse()?);
+        if let Some(known) = campaign.known {
+            characterise.known.push(known.parse()?);
         }
         let options = DiagnoseOptions { characterise, ..DiagnoseOptions::default() };
         let answer = diagnose_records(&records, &options)?;
@@ -167,7 +169,7 @@ fn picture(campaign: &Campaign, answer: &Diagnosis, records: &[Record], paths: &
     let rate_at = |fit: &ModelFit, t: f64| {
         let gas = &fit.trace.gas_c;
         let k = after(&gas.time_s, t);
-        let (before, next) = (k.saturating_sub(1), (k + 1).min(gas.time_s.len().saturating_sub(1)));
+        let (before, next) = (k.saturating_sub(1), (k + 1).min(gas.time_s.len() - 1));
         ((gas.value[next] - gas.value[before]) / (gas.time_s[next] - gas.time_s[before])).abs()
     };
     let panel = |label: Axis, of: &dyn Fn(&ModelFit, f64) -> f64| {
