@@ -210,8 +210,8 @@ pub(crate) struct Compensate {
 /// Follow both time constants along a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The output has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s and tau2_high_s: each time constant
-with its pointwise 95 % band. Both time constants are assumed to change by the same factor, as they do when the flow
+The output has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s, tau2_high_s and grade: each time
+constant with its pointwise 95 % band. Both time constants are assumed to change by the same factor, as they do when the flow
 changes. Schwarz's criterion (BIC) chooses among a smooth change with as many coefficients as the record supports, a single
 step, and no change. Whether the ratio of the two stays constant is tested.
 

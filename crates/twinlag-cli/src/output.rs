@@ -63,8 +63,11 @@ pub(crate) struct Views<'a> {
 
 /// Checks the outputs of a table of numbers, its picture and its report. Returns whether the table
 /// goes to standard output, `-`.
+///
+/// - `model`: what `--model` reads, which only another model may replace
 pub(crate) fn check_data(
     record: &Path,
+    model: Option<&Path>,
     out: &Path,
     views: &Views<'_>,
     force: bool,
@@ -77,7 +80,12 @@ pub(crate) fn check_data(
     let table = (!to_stdout).then_some(("--out", out));
     let views = [("--picture", views.picture), ("--report", views.report), ("--save", views.save)];
     let views = views.into_iter().filter_map(|(option, path)| Some((option, path?)));
-    check(record, &table.into_iter().chain(views).collect::<Vec<_>>(), force)?;
+    let outputs: Vec<Output<'_>> = table.into_iter().chain(views).collect();
+    check(record, &outputs, force)?;
+    let is_model = |path: &Path| model.is_some_and(|model| is_same(model, path));
+    if let Some((_, path)) = outputs.iter().find(|(option, path)| *option != "--save" && is_model(path)) {
+        return Err(Failure::Usage(format!("{} is the model that --model reads: choose another name", path.display())));
+    }
     Ok(to_stdout)
 }
 

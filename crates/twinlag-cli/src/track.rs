@@ -14,13 +14,15 @@ use crate::progress::Progress;
 
 pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref(), ..Views::default() };
-    let to_stdout = output::check_data(&command.input.file, &command.out, &views, command.force, console)?;
+    let model_file = command.model.as_deref();
+    let to_stdout =
+        output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
     if let Some(rows) = command.live {
         return live::run(command, rows as usize, to_stdout, console);
     }
     let options = TrackOptions {
         characterise: command.input.method.options()?,
-        model: command.model.as_deref().map(model).transpose()?,
+        model: model_file.map(model).transpose()?,
         window_s: command.window,
     };
     let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;

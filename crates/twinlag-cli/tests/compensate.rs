@@ -107,6 +107,12 @@ fn outputs_are_never_lost_and_never_mixed() {
     bench.write("gas.csv", "precious");
     bench.refuses(2, &["compensate", "run.csv", "--out", "gas.csv"], &["gas.csv exists", "--force"]);
     bench.refuses(2, &["track", "run.csv", "--out", "run.csv"], &["the record itself"]);
+    bench.write("model.json", "precious too");
+    for verb in ["compensate", "track"] {
+        let onto_its_model = [verb, "run.csv", "--model", "model.json", "--out", "./model.json", "--force"];
+        bench.refuses(2, &onto_its_model, &["./model.json", "the model that --model reads"]);
+    }
+    assert_eq!(bench.read("model.json"), b"precious too");
     let both = bench.run(&["compensate", "run.csv", "--out", "-", "--json"]);
     assert_eq!(both.code, 2, "{both:#?}");
     both.says(&["standard output"]);

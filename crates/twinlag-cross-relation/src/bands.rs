@@ -1,12 +1,13 @@
 //! Bins of a spectrum gathered into bands, in which a function that is smooth in `cos w` is
-//! interpolated.
+//! interpolated. Segments of several lengths share the bands of the longest.
 
 /// Points in each band.
 pub(crate) const NODES_PER_BAND: usize = 6;
 /// Width of a band in `1 − cos w`.
 const BAND_RATIO: f64 = 2.0;
 
-/// How the bins of a segment are gathered. Depends on its length alone.
+/// How the bins of a segment are gathered. Depends on its length alone, and on that of the longest where bands are shared.
+#[derive(Debug)]
 pub(crate) struct Bands {
     pub(crate) bands: Vec<Band>,
     /// `cos w` at the points of all bands.
@@ -32,6 +33,10 @@ impl Nodes {
         let angle = |q: usize| std::f64::consts::PI * (q as f64 + 0.5) / NODES_PER_BAND as f64;
         let unit = std::array::from_fn(|q| angle(q).cos());
         Self { unit, middle: 0.5 * (high + low), half_width: 0.5 * (high - low) }
+    }
+
+    const fn lowest(&self) -> f64 {
+        self.middle - self.half_width
     }
 
     fn places(&self) -> [f64; NODES_PER_BAND] {
@@ -81,7 +86,28 @@ pub(crate) fn points_of_long(samples: usize) -> Vec<(f64, f64)> {
     out
 }
 
-#[derive(Clone, Copy)]
+/// Bands for the bins of every segment that is no longer than the longest, each interpolated, however few bins it has.
+pub(crate) struct Shared {
+    /// From slow to fast.
+    bands: Vec<Nodes>,
+}
+
+impl Shared {
+    /// - `cosines`: `cos w` of the longest segment's bins, falling
+    pub(crate) fn among(cosines: &[f64]) -> Self {
+        let below_one = |x: &f64| 1.0 - x;
+        let (mut low, end) = (cosines.first().map_or(0.0, below_one), cosines.last().map_or(0.0, below_one));
+        let mut bands = Vec::new();
+        while low < end {
+            let high = (BAND_RATIO * low).min(end);
+            bands.push(Nodes::between(1.0 - high, 1.0 - low));
+            low = high;
+        }
+        Self { bands }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Band {
     pub(crate) first_bin: usize,
     pub(crate) bins: usize,
@@ -119,6 +145,29 @@ impl Bands {
             }
             out.counts.extend(counts);
             first_bin += bins;
+        }
+        out
+    }
+
+    /// Gathers the bins of one segment in `shared` bands.
+    ///
+    /// - `cosines`: `cos w` of the bins, falling
+    pub(crate) fn sharing(shared: &Shared, cosines: &[f64]) -> Self {
+        let nodes: Vec<f64> = shared.bands.iter().flat_map(Nodes::places).collect();
+        let counts = vec![0.0; nodes.len()];
+        let mut out = Self { bands: Vec::new(), nodes, lagrange: Vec::with_capacity(cosines.len()), counts };
+        let mut first_bin = 0;
+        for (place, nodes) in shared.bands.iter().enumerate() {
+            let is_last = place + 1 == shared.bands.len();
+            let inside = cosines[first_bin..].partition_point(|x| is_last || *x >= nodes.lowest());
+            let (first_node, half_width) = (place * NODES_PER_BAND, nodes.half_width);
+            for x in &cosines[first_bin..first_bin + inside] {
+                let lagrange = nodes.lagrange(*x);
+                (0..NODES_PER_BAND).for_each(|q| out.counts[first_node + q] += lagrange[q]);
+                out.lagrange.push(lagrange);
+            }
+            out.bands.push(Band { first_bin, bins: inside, first_node, half_width });
+            first_bin += inside;
         }
         out
     }

@@ -14,16 +14,17 @@
 //! and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a
 //! bound on what the minimum can move.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use num_dual::DualSVec64;
 
-use crate::bands::NODES_PER_BAND;
+use crate::bands::{Bands, NODES_PER_BAND, Shared};
 use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
 use crate::readings::{Segment, Steps};
 use crate::spectral::{Sloped, Sums, Weights};
-use crate::transform::{Plan, Transformed};
+use crate::transform::Transformed;
 
 /// Samples of the pieces that a long segment is gathered from. A cut takes one whitened residual away and what the noise on its
 /// two sides has in common; the transform of a piece stays in fast memory. Chosen.
@@ -34,23 +35,45 @@ const fn pairs(series: usize) -> usize {
     series * (series + 1) / 2
 }
 
-/// One segment, or pieces of one length, compressed: for each product of two series, its sums at the points.
+/// One segment compressed, or several in the same bands: for each product of two series, its sums at the points.
 #[derive(Clone, Debug)]
 pub(crate) struct Compressed {
     period_s: f64,
-    plan: Arc<Plan>,
+    bands: Arc<Bands>,
     /// `[pair][node]`, pairs in the order `(0,0), (0,1), (1,1), (0,2), …`.
     gram: Vec<Vec<f64>>,
 }
 
 impl Compressed {
+    /// All `segments` in the bands of the longest, if they have one sample period and more than one bin; otherwise each for itself.
+    ///
+    /// A record with many gaps has thousands of short segments, each of which has as many points as bins.
+    pub(crate) fn of_all(segments: &[Transformed], series: usize) -> Vec<Self> {
+        let Some(longest) = segments.iter().max_by_key(|segment| segment.len()) else { return Vec::new() };
+        let have_one_period = segments.iter().all(|segment| segment.period_s == longest.period_s);
+        if segments.len() == 1 || longest.len() == 1 || !have_one_period {
+            return segments.iter().map(|segment| Self::new(segment, segment.plan.bands(), series)).collect();
+        }
+        let shared = Shared::among(&longest.plan.cosines);
+        let mut of_length: HashMap<usize, Arc<Bands>> = HashMap::new();
+        let compressed = segments.iter().map(|segment| {
+            let new = || Arc::new(Bands::sharing(&shared, &segment.plan.cosines));
+            Self::new(segment, of_length.entry(segment.len()).or_insert_with(new), series)
+        });
+        let joined = compressed.reduce(|mut all, segment| {
+            all.add(&segment);
+            all
+        });
+        joined.into_iter().collect()
+    }
+
     /// The products of the first three series, or of all five.
-    pub(crate) fn new(segment: &Transformed, series: usize) -> Self {
+    fn new(segment: &Transformed, bands: &Arc<Bands>, series: usize) -> Self {
         let gram = match series {
-            3 => gather::<3, { pairs(3) }>(segment),
-            _ => gather::<5, { pairs(5) }>(segment),
+            3 => gather::<3, { pairs(3) }>(segment, bands),
+            _ => gather::<5, { pairs(5) }>(segment, bands),
         };
-        Self { period_s: segment.period_s, plan: segment.plan.clone(), gram }
+        Self { period_s: segment.period_s, bands: bands.clone(), gram }
     }
 
     /// The products of a long segment, gathered piece by piece without keeping any bin: pieces of one length, and what is left
@@ -62,16 +85,20 @@ impl Compressed {
         let mut out: Vec<Self> = Vec::new();
         let channels = segment.y1().chunks(PIECE_SAMPLES).zip(segment.y2().chunks(PIECE_SAMPLES));
         for (y1, y2) in channels.filter(|(y1, _)| y1.len() > 1) {
-            let piece = Self::new(&Transformed::of(y1, y2, period_s), series);
-            match out.last_mut().filter(|last| Arc::ptr_eq(&last.plan, &piece.plan)) {
-                Some(last) => {
-                    let sums = last.gram.iter_mut().flatten();
-                    sums.zip(piece.gram.iter().flatten()).for_each(|(sum, value)| *sum += value);
-                }
+            let piece = Transformed::of(y1, y2, period_s);
+            let piece = Self::new(&piece, piece.plan.bands(), series);
+            match out.last_mut().filter(|last| Arc::ptr_eq(&last.bands, &piece.bands)) {
+                Some(last) => last.add(&piece),
                 None => out.push(piece),
             }
         }
         Some(out)
+    }
+
+    /// Adds the sums of another segment at the same points.
+    fn add(&mut self, other: &Self) {
+        let sums = self.gram.iter_mut().flatten();
+        sums.zip(other.gram.iter().flatten()).for_each(|(sum, value)| *sum += value);
     }
 
     /// Whether gain and offset are served as well.
@@ -94,7 +121,7 @@ impl Compressed {
     }
 
     fn accumulate_pairs<const P: usize, const G: usize>(&self, weights: &Weights<P>, sums: &mut Sums<P>) {
-        let nodes = &self.plan.bands().nodes[..];
+        let nodes = &self.bands.nodes[..];
         let gram: [&[f64]; G] = std::array::from_fn(|g| &self.gram[g][..nodes.len()]);
         let forms = Forms::<P, G>::new(&weights.parts);
         for (j, &x) in nodes.iter().enumerate() {
@@ -128,7 +155,7 @@ impl Compressed {
     /// inequality for the first over a band, and `∂ ln ε = Σ_q ∂ ln(β/λ_q)`, the same for all its
     /// bins.
     fn gradient_error_of_pairs<const P: usize, const G: usize>(&self, weights: &Weights<P>, out: &mut [f64; P]) {
-        let bands = self.plan.bands();
+        let bands = &self.bands;
         let forms = Forms::<P, G>::new(&weights.parts);
         let beta = &weights.beta;
         for band in bands.bands.iter().filter(|b| b.half_width > 0.0) {
@@ -156,8 +183,7 @@ impl Compressed {
 }
 
 /// `G` sums over the bins at each point, for the products of `T` series.
-fn gather<const T: usize, const G: usize>(segment: &Transformed) -> Vec<Vec<f64>> {
-    let bands = segment.plan.bands();
+fn gather<const T: usize, const G: usize>(segment: &Transformed, bands: &Bands) -> Vec<Vec<f64>> {
     let all = segment.parts();
     let n = segment.len();
     let series: [&[f64]; T] = std::array::from_fn(|i| &all[i][..n]);

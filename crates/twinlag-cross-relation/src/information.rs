@@ -200,17 +200,15 @@ impl Whitened<'_> {
         let row = row(self.model(), &pair, self.readings().mean_step_s());
         let variance = self.model().white_variance();
         let (mut first, mut all) = (0.0, 0.0);
-        for segment in self.readings().segments() {
-            for (cosine, bins) in points(segment.len()) {
-                let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
-                let power = |i: usize| {
-                    let taps = row.noise[i].as_slice().iter().rev();
-                    variance[i] * taps.fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c.re).norm_sqr()
-                };
-                let (p, q) = (power(0), power(1));
-                first += bins * p / (p + q);
-                all += bins;
-            }
+        for (cosine, bins) in self.points() {
+            let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
+            let power = |i: usize| {
+                let taps = row.noise[i].as_slice().iter().rev();
+                variance[i] * taps.fold(Complex::new(0.0, 0.0), |sum, c| sum * turn + c.re).norm_sqr()
+            };
+            let (p, q) = (power(0), power(1));
+            first += bins * p / (p + q);
+            all += bins;
         }
         [first / all, 1.0 - first / all]
     }
@@ -222,34 +220,45 @@ impl Whitened<'_> {
         let [c1, c2]: [Vec<(f64, [f64; P])>; 2] = row.noise.map(|c| c.as_slice().iter().copied().map(parts).collect());
         let [v1, v2] = self.model().white_variance();
         let mut out = [[0.0; P]; P];
-        for segment in self.readings().segments() {
-            for (cosine, bins) in points(segment.len()) {
-                let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
-                let at = |c: &[(f64, [f64; P])]| {
-                    let mut power = Complex::new(1.0, 0.0);
-                    let mut value = Complex::new(0.0, 0.0);
-                    let mut slopes = [value; P];
-                    for (coefficient, by) in c {
-                        value += power * coefficient;
-                        for i in 0..P {
-                            slopes[i] += power * by[i];
-                        }
-                        power *= turn;
+        for (cosine, bins) in self.points() {
+            let turn = Complex::new(cosine, (1.0 - cosine * cosine).max(0.0).sqrt());
+            let at = |c: &[(f64, [f64; P])]| {
+                let mut power = Complex::new(1.0, 0.0);
+                let mut value = Complex::new(0.0, 0.0);
+                let mut slopes = [value; P];
+                for (coefficient, by) in c {
+                    value += power * coefficient;
+                    for i in 0..P {
+                        slopes[i] += power * by[i];
                     }
-                    (value, slopes)
-                };
-                let ((p, dp), (q, dq)) = (at(&c1), at(&c2));
-                let lambda = v1 * p.norm_sqr() + v2 * q.norm_sqr();
-                let d: [Complex<f64>; P] = std::array::from_fn(|i| dp[i] * q - dq[i] * p);
-                let weight = bins * v1 * v2 / (lambda * lambda);
-                for i in 0..P {
-                    for j in 0..P {
-                        out[i][j] += weight * (d[i] * d[j].conj()).re;
-                    }
+                    power *= turn;
+                }
+                (value, slopes)
+            };
+            let ((p, dp), (q, dq)) = (at(&c1), at(&c2));
+            let lambda = v1 * p.norm_sqr() + v2 * q.norm_sqr();
+            let d: [Complex<f64>; P] = std::array::from_fn(|i| dp[i] * q - dq[i] * p);
+            let weight = bins * v1 * v2 / (lambda * lambda);
+            for i in 0..P {
+                for j in 0..P {
+                    out[i][j] += weight * (d[i] * d[j].conj()).re;
                 }
             }
         }
         out
+    }
+
+    /// Points `x = cos w` for the bins of all segments, and how many bins each stands for. Segments of one length have the same.
+    fn points(&self) -> impl Iterator<Item = (f64, f64)> {
+        let of_length = |(samples, segments): (usize, usize)| {
+            let of_one: Vec<(f64, f64)> = if samples > MAX_KEPT_BINS {
+                points_of_long(samples)
+            } else {
+                Plan::of(samples).bands().points().collect()
+            };
+            of_one.into_iter().map(move |(cosine, bins)| (cosine, segments as f64 * bins))
+        };
+        self.readings().lengths().into_iter().flat_map(of_length)
     }
 
     /// `Σ_w S_w d_w d_w'` over the sine transform of the residual in time and of its derivatives.
@@ -276,11 +285,6 @@ impl Whitened<'_> {
         }
         out
     }
-}
-
-/// Points `x = cos w` for the bins of a segment, and how many bins each stands for.
-fn points(samples: usize) -> Vec<(f64, f64)> {
-    if samples > MAX_KEPT_BINS { points_of_long(samples) } else { Plan::of(samples).bands().points().collect() }
 }
 
 /// Mean square of `bins` in windows that widen with frequency: from 0.7 to 1.4 times it, a few bins

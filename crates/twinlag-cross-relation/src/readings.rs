@@ -1,6 +1,8 @@
 //! The two channels as the costs take them: cut where samples are missing, with a common level
 //! taken off.
 
+use std::collections::BTreeMap;
+
 use crate::error::CostError;
 
 /// Times between the samples of one segment, s.
@@ -167,6 +169,15 @@ impl Readings {
     /// The unbroken stretches, common level taken off.
     pub fn segments(&self) -> &[Segment] {
         &self.segments
+    }
+
+    /// How many segments there are of each length, from short to long.
+    pub(crate) fn lengths(&self) -> BTreeMap<usize, usize> {
+        let mut out = BTreeMap::new();
+        for segment in &self.segments {
+            *out.entry(segment.len()).or_default() += 1;
+        }
+        out
     }
 
     /// What was taken off: the mean of all samples of both channels, unless something else was

@@ -12,6 +12,7 @@
 //! the last since `sin(w_j N) = 0`. Two real transforms serve both channels.
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use twinlag_transform::{Complex64, Forward};
@@ -32,7 +33,7 @@ pub(crate) struct Plan {
     /// The transform of ones.
     ones: OnceLock<Vec<f64>>,
     /// How bins are gathered into bands.
-    bands: OnceLock<Bands>,
+    bands: OnceLock<Arc<Bands>>,
 }
 
 impl std::fmt::Debug for Plan {
@@ -66,8 +67,8 @@ impl Plan {
     }
 
     /// How the bins are gathered into bands.
-    pub(crate) fn bands(&self) -> &Bands {
-        self.bands.get_or_init(|| Bands::new(&self.cosines))
+    pub(crate) fn bands(&self) -> &Arc<Bands> {
+        self.bands.get_or_init(|| Arc::new(Bands::new(&self.cosines)))
     }
 
     fn scale(&self) -> f64 {
@@ -104,15 +105,23 @@ pub(crate) struct Transformed {
 }
 
 impl Transformed {
-    /// `None` if the segment is unevenly sampled.
-    pub(crate) fn new(segment: &Segment) -> Option<Self> {
-        let Steps::Even(period_s) = *segment.steps() else { return None };
-        Some(Self::of(segment.y1(), segment.y2(), period_s))
+    /// All `segments`, in order; `None` if one is unevenly sampled. Those of one length have one plan.
+    pub(crate) fn all(segments: &[Segment]) -> Option<Vec<Self>> {
+        let mut plans: HashMap<usize, Arc<Plan>> = HashMap::new();
+        let each = segments.iter().map(|segment| {
+            let Steps::Even(period_s) = *segment.steps() else { return None };
+            let plan = plans.entry(segment.len()).or_insert_with(|| Plan::of(segment.len()));
+            Some(Self::with_plan(plan.clone(), segment.y1(), segment.y2(), period_s))
+        });
+        each.collect()
     }
 
     /// Readings `y1`, `y2` `[n]`, `period_s` between samples.
     pub(crate) fn of(y1: &[f64], y2: &[f64], period_s: f64) -> Self {
-        let plan = Plan::of(y1.len());
+        Self::with_plan(Plan::of(y1.len()), y1, y2, period_s)
+    }
+
+    fn with_plan(plan: Arc<Plan>, y1: &[f64], y2: &[f64], period_s: f64) -> Self {
         let mut padded = vec![0.0; plan.fourier.samples()];
         let mut spectrum = vec![Complex64::ZERO; plan.fourier.bins()];
         let mut scratch = Vec::new();

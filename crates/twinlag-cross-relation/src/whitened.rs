@@ -94,8 +94,7 @@ impl<'a> Whitened<'a> {
             Form::Spectral | Form::Compressed if needed > 2 => return Err(CostError::NoSpectralForm),
             Form::Compressed if readings.len() > MAX_KEPT_BINS && readings.even_period_s().is_some() => None,
             Form::Spectral | Form::Compressed => {
-                let each = readings.segments().iter().map(Transformed::new).collect::<Option<_>>();
-                Some(Arc::new(each.ok_or(CostError::NoSpectralForm)?))
+                Some(Arc::new(Transformed::all(readings.segments()).ok_or(CostError::NoSpectralForm)?))
             }
         };
         let model = HoldAndNoise::white(hold, noise_std);
@@ -119,7 +118,7 @@ impl<'a> Whitened<'a> {
         if is_possible && !self.bands.as_ref().is_some_and(serves) {
             let series = if calibration { 5 } else { 3 };
             let all = match &self.transformed {
-                Some(all) => Some(all.iter().map(|s| Compressed::new(s, series)).collect()),
+                Some(all) => Some(Compressed::of_all(all, series)),
                 None => self
                     .readings
                     .segments()

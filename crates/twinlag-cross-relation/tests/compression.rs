@@ -54,20 +54,43 @@ fn the_compressed_cost_is_within_its_bound_of_the_full_one() {
     }
 }
 
-/// A gap makes two segments, each with bands of its own.
+/// Gaps make segments of many lengths, which share the bands of the longest: within the same bounds as those of one segment.
 #[test]
-fn segments_are_compressed_one_by_one() {
-    let whole = readings(1300, [0.5, 0.9]);
+fn segments_of_many_lengths_share_bands() {
+    let noise_std = [0.5, 0.9];
+    let whole = readings(3000, noise_std);
     let segment = &whole.segments()[0];
     let cut = |range: std::ops::Range<usize>| {
         let steps = twinlag_cross_relation::Steps::Even(PERIOD_S);
         twinlag_cross_relation::Segment::new(segment.y1()[range.clone()].to_vec(), segment.y2()[range].to_vec(), steps)
             .expect("valid")
     };
-    let readings = Readings::new(vec![cut(0..700), cut(720..1300)]).expect("valid");
-    let full = Whitened::new(&readings, Discretisation::Bilinear, [0.5, 0.9]).expect("valid");
-    let (got, want) = (full.clone().compressed(false).evaluate(&TRUTH), full.evaluate(&TRUTH));
-    assert!((got.value / want.value - 1.0).abs() < 5.1e-5, "{} and {}", got.value, want.value);
+    let of_lengths = |lengths: &[usize]| {
+        let mut first = 0;
+        let mut segments = Vec::new();
+        for length in lengths {
+            segments.push(cut(first..first + length));
+            first += length + 1;
+        }
+        Readings::new(segments).expect("valid")
+    };
+    for lengths in [&[700, 580][..], &[2, 2, 2], &[2, 3, 2, 5], &[50, 7, 2, 120, 3, 50, 31, 1500, 8]] {
+        let readings = of_lengths(lengths);
+        for hold in [Discretisation::ZeroOrderHold, Discretisation::Bilinear] {
+            let full = Whitened::new(&readings, hold, noise_std).expect("valid");
+            let compressed = full.clone().compressed(true);
+            for theta in [[0.0238, 0.1168, 1.0, 0.0], [0.001, 2.0, 1.1, 3.0], [0.3, 0.01, 0.9, -1.0]] {
+                let (got, want) = (compressed.evaluate(&theta), full.evaluate(&theta));
+                let off = (got.value / want.value - 1.0).abs();
+                assert!(off <= 5.1e-5, "{lengths:?}, {theta:?}: off by {off:e}");
+                for i in 0..4 {
+                    let size = 2.0 * (0.5 * want.hessian[i][i] * want.value).sqrt();
+                    let off = (got.gradient[i] - want.gradient[i]).abs();
+                    assert!(off <= 1e-3 * size, "{lengths:?}, {theta:?}, {i}: off by {off:e} of {size:e}");
+                }
+            }
+        }
+    }
 }
 
 /// Newton's iteration to the minimum of either form: they lie no further apart than the bound says, and the bound is small
