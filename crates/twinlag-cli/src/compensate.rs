@@ -16,8 +16,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let views =
         Views { picture: command.picture.as_deref(), report: command.report.as_deref(), save: command.save.as_deref() };
     let model_file = command.model.as_deref();
-    let to_stdout =
-        output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
+    let to_stdout = output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
     let asked = command.input.method.options()?;
     let model = model_file.map(model).transpose()?;
     let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;

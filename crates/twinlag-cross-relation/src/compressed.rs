@@ -14,7 +14,8 @@
 //! and far less where noise is white in the band. [`crate::Whitened::shift_bound`] turns it into a
 //! bound on what the minimum can move.
 
-use std::collections::HashMap;
+use std::borrow::Borrow;
+use std::cmp::Reverse;
 use std::sync::Arc;
 
 use num_dual::DualSVec64;
@@ -45,29 +46,65 @@ pub(crate) struct Compressed {
 }
 
 impl Compressed {
-    /// All `segments` in the bands of the longest, if they have one sample period and more than one bin; otherwise each for itself.
-    ///
-    /// A record with many gaps has thousands of short segments, each of which has as many points as bins.
+    /// The products of the first three series of all `segments`, or of all five.
     pub(crate) fn of_all(segments: &[Transformed], series: usize) -> Vec<Self> {
-        let Some(longest) = segments.iter().max_by_key(|segment| segment.len()) else { return Vec::new() };
-        let have_one_period = segments.iter().all(|segment| segment.period_s == longest.period_s);
-        if segments.len() == 1 || longest.len() == 1 || !have_one_period {
-            return segments.iter().map(|segment| Self::new(segment, segment.plan.bands(), series)).collect();
-        }
-        let shared = Shared::among(&longest.plan.cosines);
-        let mut of_length: HashMap<usize, Arc<Bands>> = HashMap::new();
-        let compressed = segments.iter().map(|segment| {
-            let new = || Arc::new(Bands::sharing(&shared, &segment.plan.cosines));
-            Self::new(segment, of_length.entry(segment.len()).or_insert_with(new), series)
-        });
-        let joined = compressed.reduce(|mut all, segment| {
-            all.add(&segment);
-            all
-        });
-        joined.into_iter().collect()
+        let mut longest_first: Vec<&Transformed> = segments.iter().collect();
+        longest_first.sort_by_key(|segment| Reverse(segment.len()));
+        let have_bands = longest_first.first().is_some_and(|longest| longest.len() > 1);
+        let have_one_period = segments.windows(2).all(|pair| pair[0].period_s == pair[1].period_s);
+        let is_shared = segments.len() > 1 && have_bands && have_one_period;
+        Self::joined(longest_first.into_iter(), is_shared, series)
     }
 
-    /// The products of the first three series, or of all five.
+    /// The products of long `segments` of one sample period, gathered piece by piece without keeping any bin. `None` if one is
+    /// unevenly sampled.
+    ///
+    /// The sums are those of the pieces: [`PIECE_SAMPLES`] is so long that next to nothing is lost between them.
+    pub(crate) fn of_pieces(segments: &[Segment], series: usize) -> Option<Vec<Self>> {
+        let mut longest_first = Vec::new();
+        for segment in segments {
+            let Steps::Even(period_s) = *segment.steps() else { return None };
+            let channels = segment.y1().chunks(PIECE_SAMPLES).zip(segment.y2().chunks(PIECE_SAMPLES));
+            longest_first.extend(channels.filter(|(y1, _)| y1.len() > 1).map(|(y1, y2)| (y1, y2, period_s)));
+        }
+        longest_first.sort_by_key(|(y1, ..)| Reverse(y1.len()));
+        let transformed = longest_first.into_iter().map(|(y1, y2, period_s)| Transformed::of(y1, y2, period_s));
+        Some(Self::joined(transformed, segments.len() > 1, series))
+    }
+
+    /// Segments at the same points together.
+    ///
+    /// A record with many gaps has thousands of short segments, each of which has as many points as bins. Shared bands, those of
+    /// the longest, make all of them one sum.
+    fn joined(
+        longest_first: impl Iterator<Item = impl Borrow<Transformed>>,
+        is_shared: bool,
+        series: usize,
+    ) -> Vec<Self> {
+        let mut shared: Option<Shared> = None;
+        let mut before: Option<(usize, Arc<Bands>)> = None;
+        let mut out: Vec<Self> = Vec::new();
+        for segment in longest_first {
+            let segment = segment.borrow();
+            let cosines = &segment.plan.cosines;
+            let bands = match before.take().filter(|(length, _)| *length == segment.len()) {
+                Some((_, bands)) => bands,
+                None if is_shared => {
+                    let shared = shared.get_or_insert_with(|| Shared::among(cosines));
+                    Arc::new(Bands::sharing(shared, cosines))
+                }
+                None => segment.plan.bands().clone(),
+            };
+            let one = Self::new(segment, &bands, series);
+            before = Some((segment.len(), bands));
+            match out.last_mut().filter(|last| last.has_points_of(&one)) {
+                Some(last) => last.add(&one),
+                None => out.push(one),
+            }
+        }
+        out
+    }
+
     fn new(segment: &Transformed, bands: &Arc<Bands>, series: usize) -> Self {
         let gram = match series {
             3 => gather::<3, { pairs(3) }>(segment, bands),
@@ -76,23 +113,8 @@ impl Compressed {
         Self { period_s: segment.period_s, bands: bands.clone(), gram }
     }
 
-    /// The products of a long segment, gathered piece by piece without keeping any bin: pieces of one length, and what is left
-    /// over. `None` if the segment is unevenly sampled.
-    ///
-    /// The sums are those of the pieces: [`PIECE_SAMPLES`] is so long that next to nothing is lost between them.
-    pub(crate) fn of_pieces(segment: &Segment, series: usize) -> Option<Vec<Self>> {
-        let Steps::Even(period_s) = *segment.steps() else { return None };
-        let mut out: Vec<Self> = Vec::new();
-        let channels = segment.y1().chunks(PIECE_SAMPLES).zip(segment.y2().chunks(PIECE_SAMPLES));
-        for (y1, y2) in channels.filter(|(y1, _)| y1.len() > 1) {
-            let piece = Transformed::of(y1, y2, period_s);
-            let piece = Self::new(&piece, piece.plan.bands(), series);
-            match out.last_mut().filter(|last| Arc::ptr_eq(&last.bands, &piece.bands)) {
-                Some(last) => last.add(&piece),
-                None => out.push(piece),
-            }
-        }
-        Some(out)
+    fn has_points_of(&self, other: &Self) -> bool {
+        self.period_s == other.period_s && self.bands.nodes == other.bands.nodes
     }
 
     /// Adds the sums of another segment at the same points.

@@ -119,13 +119,7 @@ impl<'a> Whitened<'a> {
             let series = if calibration { 5 } else { 3 };
             let all = match &self.transformed {
                 Some(all) => Some(Compressed::of_all(all, series)),
-                None => self
-                    .readings
-                    .segments()
-                    .iter()
-                    .map(|s| Compressed::of_pieces(s, series))
-                    .collect::<Option<Vec<_>>>()
-                    .map(|all| all.concat()),
+                None => Compressed::of_pieces(self.readings.segments(), series),
             };
             self.bands = all.map(Arc::new);
         }
