@@ -81,11 +81,11 @@ pub(crate) fn check_data(
     let views = [("--picture", views.picture), ("--report", views.report), ("--save", views.save)];
     let views = views.into_iter().filter_map(|(option, path)| Some((option, path?)));
     let outputs: Vec<Output<'_>> = table.into_iter().chain(views).collect();
-    check(record, &outputs, force)?;
     let is_model = |path: &Path| model.is_some_and(|model| is_same(model, path));
     if let Some((_, path)) = outputs.iter().find(|(option, path)| *option != "--save" && is_model(path)) {
         return Err(Failure::Usage(format!("{} is the model that --model reads: choose another name", path.display())));
     }
+    check(record, &outputs, force)?;
     Ok(to_stdout)
 }
 

@@ -6,7 +6,7 @@ pub(crate) const NODES_PER_BAND: usize = 6;
 /// Width of a band in `1 − cos w`.
 const BAND_RATIO: f64 = 2.0;
 
-/// How the bins of a segment are gathered. Depends on its length alone, and on that of the longest where bands are shared.
+/// How the bins of a segment are gathered. Depends on its length and, where bands are shared, on that of the longest.
 #[derive(Debug)]
 pub(crate) struct Bands {
     pub(crate) bands: Vec<Band>,
@@ -87,16 +87,16 @@ pub(crate) fn points_of_long(samples: usize) -> Vec<(f64, f64)> {
 }
 
 /// Bands for the bins of every segment that is no longer than the longest, each interpolated, however few bins it has.
-pub(crate) struct Shared {
+pub(crate) struct SharedBands {
     /// From slow to fast.
     bands: Vec<Nodes>,
 }
 
-impl Shared {
-    /// - `cosines`: `cos w` of the longest segment's bins, falling
-    pub(crate) fn among(cosines: &[f64]) -> Self {
-        let below_one = |x: &f64| 1.0 - x;
-        let (mut low, end) = (cosines.first().map_or(0.0, below_one), cosines.last().map_or(0.0, below_one));
+impl SharedBands {
+    /// - `cosines`: `cos w` of the longest segment's bins, falling, two at least
+    pub(crate) fn of_longest(cosines: &[f64]) -> Self {
+        let (mut low, end) = (1.0 - cosines[0], 1.0 - cosines[cosines.len() - 1]);
+        debug_assert!(low < end, "one bin is no band");
         let mut bands = Vec::new();
         while low < end {
             let high = (BAND_RATIO * low).min(end);
@@ -152,17 +152,18 @@ impl Bands {
     /// Gathers the bins of one segment in `shared` bands.
     ///
     /// - `cosines`: `cos w` of the bins, falling
-    pub(crate) fn sharing(shared: &Shared, cosines: &[f64]) -> Self {
+    pub(crate) fn sharing(shared: &SharedBands, cosines: &[f64]) -> Self {
         let nodes: Vec<f64> = shared.bands.iter().flat_map(Nodes::places).collect();
         let counts = vec![0.0; nodes.len()];
         let mut out = Self { bands: Vec::new(), nodes, lagrange: Vec::with_capacity(cosines.len()), counts };
         let mut first_bin = 0;
-        for (place, nodes) in shared.bands.iter().enumerate() {
-            let is_last = place + 1 == shared.bands.len();
-            let inside = cosines[first_bin..].partition_point(|x| is_last || *x >= nodes.lowest());
-            let (first_node, half_width) = (place * NODES_PER_BAND, nodes.half_width);
+        for (index, band) in shared.bands.iter().enumerate() {
+            // The last takes what is left: rounding must not lose a bin.
+            let is_last = index + 1 == shared.bands.len();
+            let inside = cosines[first_bin..].partition_point(|x| is_last || *x >= band.lowest());
+            let (first_node, half_width) = (index * NODES_PER_BAND, band.half_width);
             for x in &cosines[first_bin..first_bin + inside] {
-                let lagrange = nodes.lagrange(*x);
+                let lagrange = band.lagrange(*x);
                 (0..NODES_PER_BAND).for_each(|q| out.counts[first_node + q] += lagrange[q]);
                 out.lagrange.push(lagrange);
             }

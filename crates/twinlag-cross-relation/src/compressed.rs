@@ -6,7 +6,8 @@
 //! the function `1/λ(x)`, `λ = α + β x`, is interpolated at [`NODES_PER_BAND`] Chebyshev points `x_q`: with
 //! `L_q` Lagrange's polynomials, `Σ_j (D_i D_k)_j/λ_j ≈ Σ_q G_ik,q/λ(x_q)`,
 //! `G_ik,q = Σ_j L_q(x_j) (D_i D_k)_j`. The same sum over points, of which there are about a
-//! hundred whatever the length of the record. Bands with no more bins than points keep their bins.
+//! hundred whatever the length of the record. Bands with no more bins than points keep their bins, except where segments of several
+//! lengths share bands: there each is interpolated, and all segments are one sum.
 //!
 //! The error is known exactly: interpolating `1/λ` leaves the relative error
 //! `Π_q β (x − x_q)/λ(x_q)`, at most `ε = 2 (|β| h/2)^Q / Π_q λ(x_q)` in a band of half width `h`.
@@ -20,7 +21,7 @@ use std::sync::Arc;
 
 use num_dual::DualSVec64;
 
-use crate::bands::{Bands, NODES_PER_BAND, Shared};
+use crate::bands::{Bands, NODES_PER_BAND, SharedBands};
 use crate::noise_model::HoldAndNoise;
 use crate::parameters::Pair;
 use crate::readings::{Segment, Steps};
@@ -40,6 +41,7 @@ const fn pairs(series: usize) -> usize {
 #[derive(Clone, Debug)]
 pub(crate) struct Compressed {
     period_s: f64,
+    /// Of the first segment that was added: points and widths are those of all, bins are not.
     bands: Arc<Bands>,
     /// `[pair][node]`, pairs in the order `(0,0), (0,1), (1,1), (0,2), …`.
     gram: Vec<Vec<f64>>,
@@ -50,9 +52,8 @@ impl Compressed {
     pub(crate) fn of_all(segments: &[Transformed], series: usize) -> Vec<Self> {
         let mut longest_first: Vec<&Transformed> = segments.iter().collect();
         longest_first.sort_by_key(|segment| Reverse(segment.len()));
-        let have_bands = longest_first.first().is_some_and(|longest| longest.len() > 1);
         let have_one_period = segments.windows(2).all(|pair| pair[0].period_s == pair[1].period_s);
-        let is_shared = segments.len() > 1 && have_bands && have_one_period;
+        let is_shared = have_one_period && differ(segments.iter().map(Transformed::len));
         Self::joined(longest_first.into_iter(), is_shared, series)
     }
 
@@ -68,20 +69,23 @@ impl Compressed {
             longest_first.extend(channels.filter(|(y1, _)| y1.len() > 1).map(|(y1, y2)| (y1, y2, period_s)));
         }
         longest_first.sort_by_key(|(y1, ..)| Reverse(y1.len()));
+        let is_shared = segments.len() > 1 && differ(longest_first.iter().map(|(y1, ..)| y1.len()));
         let transformed = longest_first.into_iter().map(|(y1, y2, period_s)| Transformed::of(y1, y2, period_s));
-        Some(Self::joined(transformed, segments.len() > 1, series))
+        Some(Self::joined(transformed, is_shared, series))
     }
 
-    /// Segments at the same points together.
+    /// Compresses one segment after the other and adds up those at the same points.
     ///
     /// A record with many gaps has thousands of short segments, each of which has as many points as bins. Shared bands, those of
     /// the longest, make all of them one sum.
+    ///
+    /// - `is_shared`: whether all are gathered in the bands of the first, which has two bins at least
     fn joined(
         longest_first: impl Iterator<Item = impl Borrow<Transformed>>,
         is_shared: bool,
         series: usize,
     ) -> Vec<Self> {
-        let mut shared: Option<Shared> = None;
+        let mut shared: Option<SharedBands> = None;
         let mut before: Option<(usize, Arc<Bands>)> = None;
         let mut out: Vec<Self> = Vec::new();
         for segment in longest_first {
@@ -90,7 +94,7 @@ impl Compressed {
             let bands = match before.take().filter(|(length, _)| *length == segment.len()) {
                 Some((_, bands)) => bands,
                 None if is_shared => {
-                    let shared = shared.get_or_insert_with(|| Shared::among(cosines));
+                    let shared = shared.get_or_insert_with(|| SharedBands::of_longest(cosines));
                     Arc::new(Bands::sharing(shared, cosines))
                 }
                 None => segment.plan.bands().clone(),
@@ -202,6 +206,13 @@ impl Compressed {
             }
         }
     }
+}
+
+/// Whether segments have several lengths: those of one length have bands in common as they are, and of several the longest has two
+/// bins at least.
+fn differ(mut lengths: impl Iterator<Item = usize>) -> bool {
+    let first = lengths.next();
+    lengths.any(|length| Some(length) != first)
 }
 
 /// `G` sums over the bins at each point, for the products of `T` series.

@@ -248,7 +248,8 @@ impl Whitened<'_> {
         out
     }
 
-    /// Points `x = cos w` for the bins of all segments, and how many bins each stands for. Segments of one length have the same.
+    /// Points `x = cos w` for the bins of all segments, and how many bins each stands for. Segments of one length have the same
+    /// points, which are made once.
     fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         let of_length = |(samples, segments): (usize, usize)| {
             let of_one: Vec<(f64, f64)> = if samples > MAX_KEPT_BINS {

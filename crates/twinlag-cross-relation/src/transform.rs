@@ -105,7 +105,8 @@ pub(crate) struct Transformed {
 }
 
 impl Transformed {
-    /// All `segments`, in order; `None` if one is unevenly sampled. Those of one length have one plan.
+    /// All `segments`, in order; `None` if one is unevenly sampled. Those of one length share a plan, however many
+    /// lengths there are.
     pub(crate) fn all(segments: &[Segment]) -> Option<Vec<Self>> {
         let mut plans: HashMap<usize, Arc<Plan>> = HashMap::new();
         let each = segments.iter().map(|segment| {

@@ -220,7 +220,7 @@ mod tests {
     use super::*;
     use crate::observations::Stretch;
 
-    /// Of `m` samples in a row without either reading `m + consumed` residuals know nothing, but no more than there are readings.
+    /// `m` samples in a row without either reading take `m + consumed` residuals, and at most one for each reading.
     #[test]
     fn masked_readings_take_no_more_than_the_residuals_they_enter() {
         const SAMPLES: usize = 100;
