@@ -1,6 +1,8 @@
 //! Bins of a spectrum gathered into bands, in which a function that is smooth in `cos w` is
 //! interpolated. Segments of several lengths share the bands of the longest.
 
+use std::ops::Range;
+
 /// Points in each band.
 pub(crate) const NODES_PER_BAND: usize = 6;
 /// Width of a band in `1 − cos w`.
@@ -14,8 +16,6 @@ pub(crate) struct Bands {
     pub(crate) nodes: Vec<f64>,
     /// Lagrange's polynomials at the bins of the bands that are interpolated, in order.
     pub(crate) lagrange: Vec<[f64; NODES_PER_BAND]>,
-    /// How many bins each point stands for: Lagrange's polynomials summed.
-    counts: Vec<f64>,
 }
 
 /// Where a function is interpolated in a band.
@@ -117,33 +117,23 @@ pub(crate) struct Band {
 }
 
 impl Bands {
+    const NONE: Self = Self { bands: Vec::new(), nodes: Vec::new(), lagrange: Vec::new() };
+
     /// - `cosines`: `cos w` of the bins, falling
     pub(crate) fn new(cosines: &[f64]) -> Self {
-        let mut out = Self { bands: Vec::new(), nodes: Vec::new(), lagrange: Vec::new(), counts: Vec::new() };
+        let mut out = Self::NONE;
         let mut first_bin = 0;
         while first_bin < cosines.len() {
             let edge = BAND_RATIO * (1.0 - cosines[first_bin]);
             let bins = cosines[first_bin..].partition_point(|x| 1.0 - x <= edge).max(1);
-            let first_node = out.nodes.len();
             if bins <= NODES_PER_BAND {
-                out.bands.push(Band { first_bin, bins: 1, first_node, half_width: 0.0 });
+                out.bands.push(Band { first_bin, bins: 1, first_node: out.nodes.len(), half_width: 0.0 });
                 out.nodes.push(cosines[first_bin]);
-                out.counts.push(1.0);
                 first_bin += 1;
                 continue;
             }
             let (high, low) = (cosines[first_bin], cosines[first_bin + bins - 1]);
-            let nodes = Nodes::between(low, high);
-            let half_width = nodes.half_width;
-            out.nodes.extend(nodes.places());
-            out.bands.push(Band { first_bin, bins, first_node, half_width });
-            let mut counts = [0.0; NODES_PER_BAND];
-            for x in &cosines[first_bin..first_bin + bins] {
-                let lagrange = nodes.lagrange(*x);
-                (0..NODES_PER_BAND).for_each(|q| counts[q] += lagrange[q]);
-                out.lagrange.push(lagrange);
-            }
-            out.counts.extend(counts);
+            out.interpolate(&Nodes::between(low, high), cosines, first_bin..first_bin + bins);
             first_bin += bins;
         }
         out
@@ -153,30 +143,41 @@ impl Bands {
     ///
     /// - `cosines`: `cos w` of the bins, falling
     pub(crate) fn sharing(shared: &SharedBands, cosines: &[f64]) -> Self {
-        let nodes: Vec<f64> = shared.bands.iter().flat_map(Nodes::places).collect();
-        let counts = vec![0.0; nodes.len()];
-        let mut out = Self { bands: Vec::new(), nodes, lagrange: Vec::with_capacity(cosines.len()), counts };
+        let mut out = Self::NONE;
         let mut first_bin = 0;
         for (index, band) in shared.bands.iter().enumerate() {
             // The last takes what is left: rounding must not lose a bin.
             let is_last = index + 1 == shared.bands.len();
-            let inside = cosines[first_bin..].partition_point(|x| is_last || *x >= band.lowest());
-            let (first_node, half_width) = (index * NODES_PER_BAND, band.half_width);
-            for x in &cosines[first_bin..first_bin + inside] {
-                let lagrange = band.lagrange(*x);
-                (0..NODES_PER_BAND).for_each(|q| out.counts[first_node + q] += lagrange[q]);
-                out.lagrange.push(lagrange);
-            }
-            out.bands.push(Band { first_bin, bins: inside, first_node, half_width });
-            first_bin += inside;
+            let bins = cosines[first_bin..].partition_point(|x| is_last || *x >= band.lowest());
+            out.interpolate(band, cosines, first_bin..first_bin + bins);
+            first_bin += bins;
         }
         out
     }
 
+    /// Adds a band in which the `bins` of `cosines` are interpolated.
+    fn interpolate(&mut self, nodes: &Nodes, cosines: &[f64], bins: Range<usize>) {
+        let (first_node, half_width) = (self.nodes.len(), nodes.half_width);
+        self.bands.push(Band { first_bin: bins.start, bins: bins.len(), first_node, half_width });
+        self.nodes.extend(nodes.places());
+        self.lagrange.extend(cosines[bins].iter().map(|x| nodes.lagrange(*x)));
+    }
+
     /// Points `x = cos w` and how many bins each stands for: `Σ_j f(x_j)` over all bins, for an `f`
     /// that is smooth in `x`.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.nodes.iter().copied().zip(self.counts.iter().copied())
+    pub(crate) fn points(&self) -> Vec<(f64, f64)> {
+        let mut out: Vec<(f64, f64)> = self.nodes.iter().map(|x| (*x, 0.0)).collect();
+        let mut lagrange = self.lagrange.iter();
+        for band in &self.bands {
+            if band.half_width == 0.0 {
+                out[band.first_node].1 = 1.0;
+                continue;
+            }
+            for weights in lagrange.by_ref().take(band.bins) {
+                out[band.first_node..].iter_mut().zip(weights).for_each(|((_, bins), weight)| *bins += weight);
+            }
+        }
+        out
     }
 }
 
@@ -193,7 +194,7 @@ mod tests {
             (1..samples).map(|j| (std::f64::consts::PI * j as f64 / samples as f64).cos()).collect();
         let falls = |x: f64| 1.0 / (1.0 + 2e5 * (1.0 - x));
         let exact: f64 = cosines.iter().map(|x| falls(*x)).sum();
-        let of_bins: f64 = Bands::new(&cosines).points().map(|(x, bins)| bins * falls(x)).sum();
+        let of_bins: f64 = Bands::new(&cosines).points().into_iter().map(|(x, bins)| bins * falls(x)).sum();
         let of_long: f64 = points_of_long(samples).into_iter().map(|(x, bins)| bins * falls(x)).sum();
         assert!(
             (of_bins / exact - 1.0).abs() < 5e-5 && (of_long / of_bins - 1.0).abs() < 1e-6,

@@ -69,6 +69,7 @@ impl Compressed {
             longest_first.extend(channels.filter(|(y1, _)| y1.len() > 1).map(|(y1, y2)| (y1, y2, period_s)));
         }
         longest_first.sort_by_key(|(y1, ..)| Reverse(y1.len()));
+        // Pieces of one segment have two lengths at most: nothing is won by sharing, and their slowest bins stay as they are.
         let is_shared = segments.len() > 1 && differ(longest_first.iter().map(|(y1, ..)| y1.len()));
         let transformed = longest_first.into_iter().map(|(y1, y2, period_s)| Transformed::of(y1, y2, period_s));
         Some(Self::joined(transformed, is_shared, series))

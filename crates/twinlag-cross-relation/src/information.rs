@@ -252,11 +252,8 @@ impl Whitened<'_> {
     /// points, which are made once.
     fn points(&self) -> impl Iterator<Item = (f64, f64)> {
         let of_length = |(samples, segments): (usize, usize)| {
-            let of_one: Vec<(f64, f64)> = if samples > MAX_KEPT_BINS {
-                points_of_long(samples)
-            } else {
-                Plan::of(samples).bands().points().collect()
-            };
+            let of_one =
+                if samples > MAX_KEPT_BINS { points_of_long(samples) } else { Plan::of(samples).bands().points() };
             of_one.into_iter().map(move |(cosine, bins)| (cosine, segments as f64 * bins))
         };
         self.readings().lengths().into_iter().flat_map(of_length)
