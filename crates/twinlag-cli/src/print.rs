@@ -394,6 +394,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         lines.push(format!("    equally well explained by: {}", names.join(", ")));
     }
     lines.extend(effect.exact_twins.iter().map(twin_line));
+    lines.extend(effect.first_state.iter().map(|first_state| format!("    {first_state}")));
     lines.push(format!("    at the rig: {}", about.advice));
     lines
 }

@@ -90,6 +90,9 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         // What they would be under another cause follows from both.
         effects.iter_mut().for_each(|found| found.exact_twins.clear());
     }
+    if !is_whole {
+        effects.iter_mut().for_each(|found| found.first_state = None);
+    }
     let if_known = if is_refused || (is_whole && is_given) {
         None
     } else {

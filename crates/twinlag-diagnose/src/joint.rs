@@ -5,7 +5,7 @@ use twinlag_model::{
 };
 
 use crate::conclude::{conclude, is_explained, to_the_end};
-use crate::diagnose::searched;
+use crate::diagnose::{choose_first_states, searched};
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
@@ -112,6 +112,7 @@ pub fn diagnose_records(
     }
     let (mut state, tones) = searched(&Observations::joined(records)?, settings, watch)?;
     withdraw_what_does_not_transfer(&mut state, watch)?;
+    choose_first_states(&mut state, settings);
     let transfer = transfer(&state, settings, watch)?;
     let last = to_the_end(&state.current, &state);
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);

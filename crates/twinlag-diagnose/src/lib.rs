@@ -63,7 +63,7 @@ mod twins;
 
 pub use candidates::accepts;
 pub use diagnose::diagnose;
-pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
+pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, FirstState, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;
 pub use excitation::{is_single_tone, is_single_tone_in};
 pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
@@ -72,7 +72,7 @@ pub use if_known::{Held, HeldEffect, IfKnown};
 pub use joint::{Disagreement, JointDiagnosis, OfRecord, OwnNumber, diagnose_records};
 pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
-pub use moves::Move;
+pub use moves::{FirstStateChoice, Move};
 pub use remark::Remark;
 pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{

@@ -7,20 +7,20 @@ use twinlag_model::{Defect, Derived, Fitted, Identifier, ModelFit, Parameter, Pr
 use twinlag_optimise::{End, Scale};
 
 use crate::candidates::is_inside_bounds;
-use crate::diagnosis::{Found, Masked};
+use crate::diagnosis::{FirstState, Found, Masked};
 use crate::evidence::Evidence;
 use crate::grade::{Judgement, Number, Reason, RecordScatter};
 use crate::joint::OwnNumber;
 use crate::judge::Circumstances;
-use crate::moves::Taken;
+use crate::moves::{FirstStates, Taken};
 use crate::propagate::variance;
 use crate::rapid::RapidVariation;
 use crate::remark::to_digits_of;
 use crate::twins::ExactTwin;
 
-/// Numbers of an effect whose values are in `range`, and those that follow from them, whose uncertainty is that of `fit`.
-fn numbers(effect: &Shared, range: Range<usize>, last: &Fitted, fit: &ModelFit) -> Vec<Value> {
-    let covariance = fit.covariance.as_ref().filter(|_| !effect.is_noise());
+/// Numbers of an effect whose values are in `range`, and those that follow from them.
+fn numbers(effect: &Shared, range: Range<usize>, last: &Fitted, covariance: Option<&Vec<Vec<f64>>>) -> Vec<Value> {
+    let covariance = covariance.filter(|_| !effect.is_noise());
     let pairs = effect.parameters().iter().zip(range.clone());
     let mut out: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
     out.extend(effect.derived().into_iter().map(|d| derived(&d, &last.theta, range.clone(), covariance)));
@@ -33,7 +33,7 @@ pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<O
         let effect = &last.model.effects[index];
         let own = effect.in_record(record).map(|(own, places)| {
             let first = last.model.range(index).start;
-            numbers(&own, first + places.start..first + places.end, last, fit)
+            numbers(&own, first + places.start..first + places.end, last, fit.covariance.as_ref())
         });
         let seat = (effect.identifier(), effect.channel());
         own.unwrap_or_default().into_iter().map(move |number| OwnNumber { effect: seat, number })
@@ -48,7 +48,11 @@ pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<O
 pub(crate) fn name(index: usize, taken: &Taken, exact_twins: Vec<ExactTwin>, last: &Fitted, fit: &ModelFit) -> Found {
     let effect = &taken.candidate.effect;
     let is_of_records = effect.record_of(0).is_some();
-    let parameters = if is_of_records { Vec::new() } else { numbers(effect, last.model.range(index), last, fit) };
+    let parameters = if is_of_records {
+        Vec::new()
+    } else {
+        numbers(effect, last.model.range(index), last, fit.covariance.as_ref())
+    };
     let ties = taken.ties.iter().map(|t| t.effect.identifier());
     let mut alternatives: Vec<Identifier> = ties.chain(exact_twins.iter().map(|twin| twin.effect)).collect();
     let is_of_either = alternatives.contains(&effect.identifier());
@@ -64,11 +68,19 @@ pub(crate) fn name(index: usize, taken: &Taken, exact_twins: Vec<ExactTwin>, las
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
         exact_twins,
+        first_state: taken.first_states.as_ref().map(|both| first_state(both, index)),
         seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
         masked: Vec::new(),
         is_of_each_record: is_of_records,
         is_in_the_model: true,
     }
+}
+
+/// Both cases of a first state, with the numbers of effect `index` in the one that was not kept.
+fn first_state(both: &FirstStates, index: usize) -> FirstState {
+    let FirstStates { choice, equilibrium_log_odds_nats, other, covariance } = both;
+    let otherwise = numbers(&other.model.effects[index], other.model.range(index), other, covariance.as_ref());
+    FirstState { choice: *choice, equilibrium_log_odds_nats: *equilibrium_log_odds_nats, otherwise }
 }
 
 fn value(parameter: &Parameter, value: f64, variance: Option<f64>) -> Value {
@@ -125,6 +137,7 @@ pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives: Vec::new(),
         exact_twins: Vec::new(),
+        first_state: None,
         seen: Some(seen),
         masked: Vec::new(),
         is_of_each_record: false,
@@ -147,6 +160,7 @@ pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -
         evidence: None,
         alternatives: Vec::new(),
         exact_twins: Vec::new(),
+        first_state: None,
         seen: Some(seen),
         masked: Masked::runs(&defect.masked, &prepared.observations),
         is_of_each_record: false,

@@ -142,7 +142,7 @@ impl<'a> ResidualCost<'a> {
     pub(crate) fn energy(&self, theta: &[f64]) -> f64 {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        let known = self.model.knowledge(&constants(theta)).count();
+        let known = self.model.knowledge(&constants(theta), self.observations).count();
         let residuals = &memory.residual[..memory.residual.len() - known];
         let sum = dense::dot(residuals, residuals);
         if sum.is_finite() { sum } else { f64::INFINITY }
@@ -166,7 +166,7 @@ impl<'a> ResidualCost<'a> {
             sieve.pick(values, evaluator.span(index), self.selection, residual);
             ends.push(residual.len());
         }
-        residual.extend(self.model.knowledge(&numbers).map(|k| k.re));
+        residual.extend(self.model.knowledge(&numbers, self.observations).map(|k| k.re));
     }
 
     /// The directions of the parameters from `first` on that are not held.
@@ -216,7 +216,7 @@ impl<'a> ResidualCost<'a> {
             let columns = columns.iter().map(|column| &column.picked[..]).collect();
             visit(&evaluator.pieces, Block { residual, range, is_prior: false, columns })
         })?;
-        let known: Vec<f64> = self.model.knowledge(&numbers).map(|k| k.re).collect();
+        let known: Vec<f64> = self.model.knowledge(&numbers, self.observations).map(|k| k.re).collect();
         let mut goes_on = ControlFlow::Continue(());
         self.visit_knowledge(theta, directions.first, done, &known, |block| goes_on = visit(&evaluator.pieces, block));
         goes_on
@@ -265,7 +265,11 @@ impl<'a> ResidualCost<'a> {
     ) {
         let known = |i: usize| -> Vec<f64> {
             let is_computed = i >= first && !self.is_held(i);
-            if is_computed { self.model.knowledge(&moved(theta, i)).map(|k| k.eps).collect() } else { Vec::new() }
+            if is_computed {
+                self.model.knowledge(&moved(theta, i), self.observations).map(|k| k.eps).collect()
+            } else {
+                Vec::new()
+            }
         };
         let known: Vec<Vec<f64>> = (0..theta.len()).map(known).collect();
         let columns = known.iter().map(Vec::as_slice).collect();
@@ -299,7 +303,11 @@ impl<'a> ResidualCost<'a> {
         }
         let mut slope = directions.along_parameters(slopes);
         for (i, slope) in slope.iter_mut().enumerate().filter(|(i, _)| !self.is_held(*i)) {
-            *slope += self.model.knowledge(&moved(theta, i)).map(|known| known.re * known.eps).sum::<f64>();
+            *slope += self
+                .model
+                .knowledge(&moved(theta, i), self.observations)
+                .map(|known| known.re * known.eps)
+                .sum::<f64>();
         }
         slope
     }

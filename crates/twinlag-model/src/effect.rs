@@ -44,8 +44,10 @@ pub use twin::Twin;
 
 use crate::directions::Parts;
 use crate::error::ModelError;
+use crate::first_state::FirstState;
 use crate::gas::Gas;
 use crate::number::Number;
+use crate::observations::Observations;
 use crate::plant::Plant;
 
 /// Where an effect sits, and the numbers that describe it.
@@ -156,6 +158,16 @@ pub trait Effect: Send + Sync {
     /// Prior knowledge of the parameters: functions of `values` that have zero mean and unit variance beforehand.
     fn prior(&self, _values: &[Number]) -> Vec<Number> {
         Vec::new()
+    }
+
+    /// This effect with the body that it holds in equilibrium with the gas as each record began. `None` of one that holds none.
+    fn in_equilibrium(&self, _plant: &Plant, _observations: &Observations) -> Option<Shared> {
+        None
+    }
+
+    /// What the records say of the first temperature of the body that it holds, where that counts.
+    fn first_states(&self) -> &[FirstState] {
+        &[]
     }
 
     /// This effect with another estimate of the gas temperature. `None` of one that does not depend on it.

@@ -13,6 +13,7 @@ mod disagreement;
 mod effect;
 mod error;
 mod extended;
+mod first_state;
 mod fit;
 mod fitted;
 mod flow;
@@ -55,6 +56,7 @@ pub use effect::{
 };
 pub use error::ModelError;
 pub use extended::Extended;
+pub use first_state::FirstState;
 pub use fit::{Effort, Fitted};
 pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Value};
 pub use flow::{Flow, FlowKind};

@@ -7,6 +7,7 @@ use twinlag_cross_relation::Z_975;
 use twinlag_optimise::Variable;
 
 use crate::effect::{Identifier, Parameter, Shared, Twin};
+use crate::first_state::FirstState;
 use crate::implied::{Details, Evaluation};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
@@ -229,11 +230,26 @@ impl Model {
         self.effects.iter().enumerate().flat_map(|(index, e)| e.prior(&theta[self.range(index)])).collect()
     }
 
-    /// What is known beforehand of time constants and effects, over its uncertainty.
-    pub(crate) fn knowledge<'a>(&'a self, theta: &'a [Number]) -> impl Iterator<Item = Number> + 'a {
+    /// How far slow bodies that were in equilibrium as the records began were from it.
+    fn departures(&self, theta: &[Number], observations: &Observations) -> Vec<Number> {
+        let is_there = |state: &&FirstState| observations.stretches.iter().any(|s| s.member == state.record());
+        let states: Vec<&FirstState> = self.effects.iter().flat_map(|e| e.first_states()).filter(is_there).collect();
+        if states.is_empty() {
+            return Vec::new();
+        }
+        let plant = self.plant_of(theta, observations);
+        states.iter().map(|state| state.departure(&plant)).collect()
+    }
+
+    /// What is known beforehand of time constants, effects and first states, over its uncertainty.
+    pub(crate) fn knowledge<'a>(
+        &'a self,
+        theta: &'a [Number],
+        observations: &Observations,
+    ) -> impl Iterator<Item = Number> + 'a {
         let of_tau = self.known.iter().filter_map(|known| Some((known, known.std_s?)));
         let of_tau = of_tau.map(|(known, std_s)| (theta[known.sensor] - known.value_s) / std_s);
-        of_tau.chain(self.prior(theta))
+        of_tau.chain(self.prior(theta)).chain(self.departures(theta, observations))
     }
 
     /// The energy of prior knowledge of the effects' parameters.

@@ -102,6 +102,10 @@ policy! {
     /// Raftery 1995).
     same_deviance: f64 = 2.0,
 
+    /// Odds from which on a slow body is taken to have had the temperature of the gas as the record began: strong evidence (Kass
+    /// and Raftery 1995). With less it may have had any, which leaves the numbers right in either case.
+    first_state_odds: f64 = 20.0,
+
     /// Part of what noise of another colour explains that an effect must explain whatever the
     /// noise, to come before it: chosen.
     beside_noise_share: f64 = 0.03,

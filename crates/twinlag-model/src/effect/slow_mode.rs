@@ -6,7 +6,9 @@ use std::sync::Arc;
 use twinlag_optimise::Variable;
 
 use crate::effect::{About, Context, Domain, Effect, Identifier, Parameter, Seat, Shared};
+use crate::first_state::FirstState;
 use crate::number::Number;
+use crate::observations::Observations;
 use crate::plant::{Plant, SlowPath};
 
 pub(crate) static ABOUT: About = About::new("slow-mode", 7, candidates)
@@ -29,6 +31,8 @@ struct SlowMode {
     seat: Seat,
     tau_s: f64,
     span_s: f64,
+    /// Where the slow body was in equilibrium as each record began: none where it may have begun anywhere.
+    first_states: Vec<FirstState>,
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
@@ -42,7 +46,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
             let parameters = vec![share, Parameter::new("slow_time_constant", "s", slow)];
             let seat = Seat::new(Identifier::SLOW_MODE, Some(sensor), parameters);
             let tau_s = context.tau_s[0].max(context.tau_s[1]).clamp(context.step_s, 0.03 * context.span_s());
-            Arc::new(SlowMode { sensor, seat, tau_s, span_s: context.span_s() }) as Shared
+            Arc::new(SlowMode { sensor, seat, tau_s, span_s: context.span_s(), first_states: Vec::new() }) as Shared
         })
         .collect()
 }
@@ -61,5 +65,15 @@ impl Effect for SlowMode {
 
     fn install(&self, values: &[Number], plant: &mut Plant) {
         plant.sensors[self.sensor].slow = Some(SlowPath { share: values[0], tau_s: values[1] });
+    }
+
+    fn in_equilibrium(&self, plant: &Plant, observations: &Observations) -> Option<Shared> {
+        let first_states = FirstState::of_records(plant, self.sensor, observations);
+        let is_known = !first_states.is_empty();
+        is_known.then(|| Arc::new(Self { first_states, seat: self.seat.clone(), ..*self }) as Shared)
+    }
+
+    fn first_states(&self) -> &[FirstState] {
+        &self.first_states
     }
 }

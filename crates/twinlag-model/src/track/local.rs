@@ -328,7 +328,7 @@ fn with_both(model: &Model, middle_s: f64, of_ratio: bool) -> Model {
 impl Cost for Local<'_> {
     fn value(&self, theta: &[f64]) -> f64 {
         let numbers: Vec<Number> = theta.iter().copied().map(Number::from).collect();
-        let known: f64 = self.model.knowledge(&numbers).map(|k| k.re * k.re).sum();
+        let known: f64 = self.model.knowledge(&numbers, self.observations).map(|k| k.re * k.re).sum();
         self.model.energy(theta, self.observations, self.selection) + known
     }
 

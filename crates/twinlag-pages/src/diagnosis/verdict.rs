@@ -167,6 +167,10 @@ fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
     facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
     let twins: Vec<String> = found.exact_twins.iter().map(twin).collect();
     facts.push(("Would look exactly the same", twins.join("; ")));
+    facts.push((
+        "How it began",
+        found.first_state.as_ref().map(|state| sentence(&state.to_string())).unwrap_or_default(),
+    ));
     let confusable: Vec<Identifier> =
         found.effect.imitates().filter(|other| !found.alternatives.contains(other)).collect();
     facts.push(("Resembles, if it is small", identifiers(&confusable)));

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
-    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, ExactTwin, Found, Grade, Identifier, IfKnown, Judgement,
-    Limit, Masked, Move, Policy, Unexplained, Value, Verdict,
+    BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, ExactTwin, FirstState, Found, Grade, Identifier, IfKnown,
+    Judgement, Limit, Masked, Move, Policy, Unexplained, Value, Verdict,
 };
 
 use crate::answers::{
@@ -51,6 +51,9 @@ pub struct NamedEffect {
     /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     #[serde(default)]
     pub exact_twins: Vec<NamedTwin>,
+    /// Both cases of the first state of the slow body that it holds; `None` where it holds none, or more than noise is left over.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub first_state: Option<FirstState>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
     /// Readings of the channel that are left out of the fit, in order, by their lines in the file.
@@ -83,6 +86,7 @@ impl NamedEffect {
             evidence: found.evidence,
             alternatives: found.alternatives.clone(),
             exact_twins: found.exact_twins.iter().map(|twin| NamedTwin::of(twin, channels)).collect(),
+            first_state: found.first_state.clone(),
             seen: found.seen.clone(),
             masked: found.masked.clone(),
         }
