@@ -186,9 +186,19 @@ impl Stored for Plan {
     }
 
     fn tables(&self, results: &Results, out: &Path) -> Result<()> {
-        let mut text = "| effect | records | right or stated | wrong name | explained | a record accused | \
-             covered, of those given | median error (%) | median error / standard error | left-out rms before / after |\n|---|---|---|---|---|---|---|---|---|---|\n"
-            .to_owned();
+        // Without the effects of the rigs none is right.
+        let right: &[&str] = if self.without_own { &[] } else { &["right or stated"] };
+        let heads = ["effect", "records"].iter().chain(right).chain(&[
+            "wrong name",
+            "explained",
+            "a record accused",
+            "covered, of those given",
+            "median error (%)",
+            "median error / standard error",
+            "left-out rms before / after",
+        ]);
+        let heads: Vec<&str> = heads.copied().collect();
+        let mut text = format!("| {} |\n|{}\n", heads.join(" | "), "---|".repeat(heads.len()));
         let median = |tally: &Tally, name: &str, scale: f64| {
             tally.values(name).and_then(|v| v.quantile(0.5)).map_or("–".into(), |q| format!("{:.2}", scale * q))
         };
@@ -197,10 +207,9 @@ impl Stored for Plan {
                 [1, 2].map(|sensor| of(&format!("{name} {sensor}"))).join(" / ")
             };
             let (set, records) = self.place(cell);
-            let row = [
-                set_name(&self.sets[set]),
-                records.to_string(),
-                hits_of_count(tally, "right or stated"),
+            let mut row = vec![set_name(&self.sets[set]), records.to_string()];
+            row.extend(right.iter().map(|name| hits_of_count(tally, name)));
+            row.extend([
                 hits_of_count(tally, "wrong name"),
                 hits_of_count(tally, "explained"),
                 if records > 1 { hits_of_count(tally, "accused") } else { "–".into() },
@@ -208,7 +217,7 @@ impl Stored for Plan {
                 both(&|name| median(tally, name, 100.0), "relative error"),
                 both(&|name| median(tally, name, 1.0), "error over its standard error"),
                 ["before", "after"].map(|when| median(tally, &format!("left-out rms {when}"), 1.0)).join(" / "),
-            ];
+            ]);
             let _ = writeln!(text, "| {} |", row.join(" | "));
         }
         Ok(fs::write(out.join(format!("{}.md", self.name)), text)?)
