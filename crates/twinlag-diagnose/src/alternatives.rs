@@ -77,6 +77,31 @@ impl Search<'_> {
         })
     }
 
+    /// Effect `index` of `current` without the parameter that is worth least, where the data do not support that one any more.
+    pub(crate) fn reduced(&self, current: &Fitted, index: usize, taken: &Candidate) -> Option<Candidate> {
+        let range = current.model.range(index);
+        let without_one = |(effect, start): (Shared, Vec<f64>)| {
+            let mut theta = current.theta.clone();
+            let dropped = range.len() - start.len();
+            theta.splice(range.clone(), start);
+            let model = current.model.replaced(index, effect.clone());
+            let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
+            let white_loss = -white_gain(current, &fitted);
+            let robust_loss = self.robust(&fitted) - self.robust(current);
+            let is_needless = white_loss.max(robust_loss) < worth(dropped, fitted.count, self.policy);
+            (is_needless && fitted.end.is_usable()).then(|| Candidate {
+                white_gain: taken.white_gain - white_loss,
+                robust_gain: taken.robust_gain - robust_loss,
+                added: taken.added - dropped,
+                effect,
+                fitted,
+                ..taken.clone()
+            })
+        };
+        let fewer = taken.effect.reduced(&current.theta[range.clone()]).into_iter().filter_map(without_one);
+        fewer.max_by(|a, b| a.white_gain.total_cmp(&b.white_gain))
+    }
+
     /// Effects that look like effect `index` of `current`, in its place, best first.
     pub(crate) fn look_alikes(
         &self,

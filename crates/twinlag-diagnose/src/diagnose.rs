@@ -139,6 +139,7 @@ fn review(state: &mut State<'_>) -> Result<(), ModelError> {
 /// Takes out what has become needless, and extends what the data support.
 fn tidy(state: &mut State<'_>) {
     at_each(state, State::remove_needless);
+    at_each(state, State::reduce);
     at_each(state, State::extend);
 }
 
@@ -203,7 +204,11 @@ mod tests {
                     let place = at(&taken, effect, channel);
                     taken.remove(place);
                 }
-                Move::Extend { .. } | Move::FirstState { .. } | Move::LowerNoise { .. } | Move::Reweigh { .. } => {}
+                Move::Extend { .. }
+                | Move::Reduce { .. }
+                | Move::FirstState { .. }
+                | Move::LowerNoise { .. }
+                | Move::Reweigh { .. } => {}
             }
         }
         taken

@@ -36,6 +36,15 @@ pub enum Move {
         /// What the effect has gained in all.
         evidence: Evidence,
     },
+    /// An effect lost a parameter that effects which came later have made needless.
+    Reduce {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both, or relative.
+        channel: Option<usize>,
+        /// What the effect has gained in all.
+        evidence: Evidence,
+    },
     /// A look-alike took the place of an effect.
     Exchange {
         /// The effect that went.
@@ -111,6 +120,7 @@ impl Move {
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
             Self::Add { .. }
             | Self::Extend { .. }
+            | Self::Reduce { .. }
             | Self::Keep { .. }
             | Self::FirstState { .. }
             | Self::Reweigh { .. } => None,
@@ -338,6 +348,23 @@ impl<'a> State<'a> {
         let Taken { candidate, ties, .. } = &self.taken[index];
         let candidate = self.search().extended(&self.current, index, candidate)?;
         let entry = Move::Extend {
+            effect: candidate.effect.identifier(),
+            channel: candidate.effect.channel(),
+            evidence: Evidence::of(&candidate),
+        };
+        let taken = Taken::new(candidate, ties.clone());
+        Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
+    }
+
+    /// Takes from effect `index` a parameter that the later ones have made needless. The last one has none after it, and noise in the
+    /// model hides, as in [`Self::remove_needless`].
+    pub(crate) fn reduce(&self, index: usize) -> Option<Proposal> {
+        if index + 1 == self.taken.len() || self.has_noise() {
+            return None;
+        }
+        let Taken { candidate, ties, .. } = &self.taken[index];
+        let candidate = self.search().reduced(&self.current, index, candidate)?;
+        let entry = Move::Reduce {
             effect: candidate.effect.identifier(),
             channel: candidate.effect.channel(),
             evidence: Evidence::of(&candidate),

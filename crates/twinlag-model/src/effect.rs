@@ -130,6 +130,12 @@ pub trait Effect: Send + Sync {
         None
     }
 
+    /// This effect without one of its parameters, each with where its fit starts from `values` of this one. Tried whenever another effect
+    /// has been added, which may be what such a parameter stood in for. By default there are none.
+    fn reduced(&self, _values: &[f64]) -> Vec<(Shared, Vec<f64>)> {
+        Vec::new()
+    }
+
     /// Whether parameters belong to a record and not to the rig: the phase of a line, a function of time. They are
     /// fitted again where the effect is known from another record, and of several records each has its own. Such an effect
     /// installs functions of time and offsets, nothing else.

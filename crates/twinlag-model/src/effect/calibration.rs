@@ -115,6 +115,15 @@ impl Effect for Calibration {
         Some((of_kind(kind, &self.context), start))
     }
 
+    fn reduced(&self, values: &[f64]) -> Vec<(Shared, Vec<f64>)> {
+        let fewer: &[(Kind, &[f64])] = match self.kind {
+            Kind::Offset | Kind::Gain => &[],
+            Kind::Both => &[(Kind::Gain, &values[..1]), (Kind::Offset, &values[1..])],
+            Kind::Curved(_) => &[(Kind::Both, &values[..2])],
+        };
+        fewer.iter().map(|(kind, start)| (of_kind(*kind, &self.context), start.to_vec())).collect()
+    }
+
     fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
         match self.kind {
             Kind::Gain | Kind::Both => (0..2).map(|channel| Twin::crosstalk(channel, values[0], tau_s)).collect(),
