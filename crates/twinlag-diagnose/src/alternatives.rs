@@ -92,6 +92,8 @@ impl Search<'_> {
             (is_needless && fitted.end.is_usable()).then(|| Candidate {
                 white_gain: taken.white_gain - white_loss,
                 robust_gain: taken.robust_gain - robust_loss,
+                held_out_nats: taken.held_out_nats
+                    - held_out_gain(self.observations, self.selection, &fitted, current, self.policy),
                 added: taken.added - dropped,
                 effect,
                 fitted,

@@ -7,6 +7,7 @@ use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::errors::Squares;
 use crate::excitation::SINGLE;
+use crate::first_state::{FirstState, FirstStateChoice, choose};
 use crate::grade::{Basis, Excess, Grade, Judgement, Reason, excess};
 use crate::if_known::{IfKnown, if_known};
 use crate::judge::{Circumstances, Judgements};
@@ -19,18 +20,26 @@ use crate::remark::Remark;
 use crate::ties::{Tie, widen};
 use crate::twins::{ExactTwin, exact_twins};
 
-/// The answer, its numbers fitted once more to the whole record.
+/// The answer, its numbers fitted once more to the whole record, and that fit.
 ///
 /// - `tones`: of the gas, where its power is in tones
 ///
 /// # Errors
 /// [`ModelError::Cancelled`] if the watch says so.
-pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usize>) -> Result<Diagnosis, ModelError> {
+pub(crate) fn conclude(
+    state: State<'_>,
+    settings: &Settings,
+    tones: Option<usize>,
+) -> Result<(Diagnosis, Fitted), ModelError> {
     let policy = &settings.policy;
     // Before is before everything: with the defects of the data in it.
     let unmasked = state.prepared.unmasked(&state.base);
-    let with_effects = to_the_end(&state.current, &state);
-    let mut last = summary(&with_effects, &state, policy);
+    let free = to_the_end(&state.current, &state);
+    let last_free = summary(&free, &state, policy);
+    let is_noise_left = what_is_left(&last_free, policy).is_none() && state.rapid.is_none();
+    let (with_effects, first_states) = choose(free, &state.prepared, is_noise_left);
+    let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
+    let mut last = if is_any_kept { summary(&with_effects, &state, policy) } else { last_free };
     let is_base = unmasked.is_none() && state.taken.is_empty() && state.base.theta == state.current.theta;
     let mut base = if is_base { last.clone() } else { base_fit(&state, unmasked.as_ref(), policy) };
     let mut remarks = remarks_of(&state.moves);
@@ -43,7 +52,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
     let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, &last, &settings.effects)).collect();
     let (remark, causes) = widen(&mut last, &whole_ties(&state, &twins), policy);
     remarks.extend(remark);
-    let mut found = found(&state, twins, &with_effects, &last);
+    let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
@@ -90,8 +99,10 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         // What they would be under another cause follows from both.
         effects.iter_mut().for_each(|found| found.exact_twins.clear());
     }
-    if !is_whole {
-        effects.iter_mut().for_each(|found| found.first_state = None);
+    // Numbers of the other case are given where those of this one are.
+    let is_withheld = |found: &Found| !is_whole || found.judgements.iter().any(|j| j.grade == Grade::NoGo);
+    for found in effects.iter_mut().filter(|found| is_withheld(found)) {
+        found.first_state.iter_mut().for_each(|first| first.otherwise.clear());
     }
     let if_known = if is_refused || (is_whole && is_given) {
         None
@@ -107,7 +118,7 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         remarks.push(Remark::BiasUnknown { is_one_known: !settings.known.is_empty() });
     }
     remarks.sort_by_key(Remark::importance);
-    Ok(Diagnosis {
+    let diagnosis = Diagnosis {
         verdict,
         effects,
         error: errors(&state, unmasked.as_ref(), [&base, &last]),
@@ -124,7 +135,8 @@ pub(crate) fn conclude(state: State<'_>, settings: &Settings, tones: Option<usiz
         transfer: None,
         moves: state.moves,
         policy: policy.clone(),
-    })
+    };
+    Ok((diagnosis, with_effects))
 }
 
 /// What is left over beside the noise, where intervals can cover it.
@@ -212,12 +224,18 @@ fn remarks_of(moves: &[Move]) -> Vec<Remark> {
 
 /// Defects and effects, each with its place in the model `last`, if it is in there.
 ///
-/// - `twins`: of each effect
-fn found(state: &State<'_>, twins: Vec<Vec<ExactTwin>>, last: &Fitted, fit: &ModelFit) -> Vec<(Option<usize>, Found)> {
+/// - `said`: twins of each effect, and the first state of its slow body
+fn found(
+    state: &State<'_>,
+    said: impl Iterator<Item = (Vec<ExactTwin>, Option<FirstState>)>,
+    (last, fit): (&Fitted, &ModelFit),
+) -> Vec<(Option<usize>, Found)> {
     let defects = state.prepared.found.iter().map(|d| (None, of_defect(d, &state.prepared, fit)));
     let rapid = state.rapid.iter().map(|variation| (None, of_rapid(variation)));
-    let named = state.taken.iter().zip(twins).enumerate();
-    let named = named.map(|(index, (taken, twins))| (Some(index), name(index, taken, twins, last, fit)));
+    let named = state.taken.iter().zip(said).enumerate();
+    let named = named.map(|(index, (taken, (twins, first_state)))| {
+        (Some(index), name(index, taken, twins, first_state, (last, fit)))
+    });
     defects.chain(rapid).chain(named).collect()
 }
 

@@ -1,7 +1,7 @@
 //! The closed loop: fit, look at what is left over, add what explains it, look again, and judge by
 //! what has seen none of it.
 
-use twinlag_model::{Fitted, ModelError, Observations, Prepared, Settings, Watch, is_unresolved, report};
+use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unresolved, report};
 
 use crate::conclude::{conclude, leaves_more_than_noise};
 use crate::diagnosis::Diagnosis;
@@ -32,11 +32,11 @@ use crate::transfer::over_blocks;
 /// [`ModelError`] for a record that is too short, or in which a channel never changes, for a
 /// policy that means nothing, and for a run that `watch` cancels.
 pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'_>) -> Result<Diagnosis, ModelError> {
-    let (mut state, tones) = searched(observations, settings, watch)?;
-    choose_first_states(&mut state, settings);
+    let (state, tones) = searched(observations, settings, watch)?;
     let is_of_all = state.rapid.is_none() && tones != Some(SINGLE);
     let transfer = if is_of_all { Some(over_blocks(&state, watch)?) } else { None };
-    Ok(Diagnosis { transfer, ..conclude(state, settings, tones)? })
+    let (diagnosis, _) = conclude(state, settings, tones)?;
+    Ok(Diagnosis { transfer, ..diagnosis })
 }
 
 /// The loop at its end, and how many separate tones the gas has, where it has few.
@@ -132,6 +132,7 @@ fn review(state: &mut State<'_>) -> Result<(), ModelError> {
     if let Some(removal) = state.remove_explained_noise() {
         state.apply(removal);
         at_each(state, State::remove_needless);
+        at_each(state, State::reduce);
     }
     Ok(())
 }
@@ -141,23 +142,6 @@ fn tidy(state: &mut State<'_>) {
     at_each(state, State::remove_needless);
     at_each(state, State::reduce);
     at_each(state, State::extend);
-}
-
-/// Chooses between both first states of each slow body in the model, where only noise is left over: what else is left may decay as
-/// slowly as the body does.
-pub(crate) fn choose_first_states(state: &mut State<'_>, settings: &Settings) {
-    let Fitted { model, theta, .. } = &state.current;
-    let observations = &state.prepared.observations;
-    let plant = model.plant(theta, observations);
-    let has_body = model.effects.iter().any(|effect| effect.in_equilibrium(&plant, observations).is_some());
-    if !has_body || state.rapid.is_some() || leaves_more_than_noise(state, settings) {
-        return;
-    }
-    for index in 0..state.taken.len() {
-        if let Some(choice) = state.first_state(index) {
-            state.apply(choice);
-        }
-    }
 }
 
 /// Makes a move at each effect as long as there is one.
@@ -204,11 +188,7 @@ mod tests {
                     let place = at(&taken, effect, channel);
                     taken.remove(place);
                 }
-                Move::Extend { .. }
-                | Move::Reduce { .. }
-                | Move::FirstState { .. }
-                | Move::LowerNoise { .. }
-                | Move::Reweigh { .. } => {}
+                Move::Extend { .. } | Move::Reduce { .. } | Move::LowerNoise { .. } | Move::Reweigh { .. } => {}
             }
         }
         taken

@@ -1,16 +1,15 @@
 //! The result of a diagnosis.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 use twinlag_model::{Identifier, ModelFit, Observations, Policy, Value};
 
 use crate::evidence::Evidence;
+use crate::first_state::FirstState;
 use crate::grade::Judgement;
 use crate::if_known::IfKnown;
 use crate::judge::Judgements;
-use crate::moves::{FirstStateChoice, Move};
-use crate::remark::{Remark, to_digits_of};
+use crate::moves::Move;
+use crate::remark::Remark;
 use crate::transfer::Transfer;
 use crate::twins::ExactTwin;
 
@@ -53,7 +52,8 @@ pub struct Found {
     pub alternatives: Vec<Identifier>,
     /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     pub exact_twins: Vec<ExactTwin>,
-    /// Both cases of the first state of the slow body that it holds; `None` where it holds none, or more than noise is left over.
+    /// The first state of the slow body that it holds, of which both cases were tried; `None` of an effect that holds none, and where
+    /// more than noise is left over.
     pub first_state: Option<FirstState>,
     /// What was seen in the data, for an effect without parameters: a count, a step.
     pub seen: Option<String>,
@@ -64,40 +64,6 @@ pub struct Found {
     /// Whether the model accounts for it: not so for one that a stretch of the record shows, and that no number of the whole
     /// holds.
     pub is_in_the_model: bool,
-}
-
-/// The first state of a slow body, such as a sensor's support: the temperature that it had as a record began. Both cases were tried.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct FirstState {
-    /// What the numbers of the effect rest on.
-    pub choice: FirstStateChoice,
-    /// Logarithm of the odds for equilibrium with the gas against any other first temperature that the gas has.
-    pub equilibrium_log_odds_nats: f64,
-    /// Numbers of the effect in the other case.
-    pub otherwise: Vec<Value>,
-}
-
-/// In words, with the numbers of the other case.
-impl fmt::Display for FirstState {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (taken, other) = match self.choice {
-            FirstStateChoice::Equilibrium => ("had the temperature of the gas", "if it may have had any"),
-            FirstStateChoice::Free => ("may have had any temperature", "if it had that of the gas"),
-        };
-        let log_10 = self.equilibrium_log_odds_nats / std::f64::consts::LN_10;
-        write!(f, "the slow body {taken} as the record began (odds 10^{log_10:.1} to 1 that it had that of the gas)")?;
-        let numbers: Vec<String> = self.otherwise.iter().filter_map(of_interval).collect();
-        if numbers.is_empty() { Ok(()) } else { write!(f, "; {other}: {}", numbers.join(", ")) }
-    }
-}
-
-/// A number with its interval, in words; `None` of one without.
-fn of_interval(number: &Value) -> Option<String> {
-    let [low, high] = number.interval_95?;
-    let [value, low, high] = [number.value, low, high].map(|x| to_digits_of(high - low, x));
-    let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
-    Some(format!("{} {value}{unit} [{low}, {high}]", number.name.replace('_', " ")))
 }
 
 /// Neighbouring readings of one channel that are left out of the fit.

@@ -210,7 +210,7 @@ fn held(tau_s: f64, fitted: &Fitted, state: &State<'_>, policy: &Policy) -> Held
         fit.difference = TimeConstant::default();
     }
     let of_effect = |(index, taken): (usize, &Taken)| {
-        let found = name(index, taken, Vec::new(), fitted, &fit);
+        let found = name(index, taken, Vec::new(), None, (fitted, &fit));
         HeldEffect { effect: found.effect, channel: found.fitted_in, parameters: found.parameters }
     };
     Held {

@@ -4,8 +4,8 @@ use twinlag_model::{
     Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Policy, Settings, Value, Watch,
 };
 
-use crate::conclude::{conclude, is_explained, to_the_end};
-use crate::diagnose::{choose_first_states, searched};
+use crate::conclude::{conclude, is_explained};
+use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
@@ -112,12 +112,10 @@ pub fn diagnose_records(
     }
     let (mut state, tones) = searched(&Observations::joined(records)?, settings, watch)?;
     withdraw_what_does_not_transfer(&mut state, watch)?;
-    choose_first_states(&mut state, settings);
     let transfer = transfer(&state, settings, watch)?;
-    let last = to_the_end(&state.current, &state);
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
     let odd = odd_one(&state, &transfer, settings, watch)?;
-    let diagnosis = conclude(state, settings, tones)?;
+    let (diagnosis, last) = conclude(state, settings, tones)?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
     let odd = odd.filter(|_| !is_whole);
     let between = diagnosis.last.between.as_ref();

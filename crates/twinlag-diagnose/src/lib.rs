@@ -42,6 +42,7 @@ mod diagnosis;
 mod errors;
 mod evidence;
 mod excitation;
+mod first_state;
 mod grade;
 mod hidden;
 mod if_known;
@@ -63,16 +64,17 @@ mod twins;
 
 pub use candidates::accepts;
 pub use diagnose::diagnose;
-pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, FirstState, Found, Limit, Masked, Unexplained, Verdict};
+pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, Unexplained, Verdict};
 pub use evidence::Evidence;
 pub use excitation::{is_single_tone, is_single_tone_in};
+pub use first_state::{FirstState, FirstStateChoice};
 pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
 pub use hidden::{pieces_of_long, unseen};
 pub use if_known::{Held, HeldEffect, IfKnown};
 pub use joint::{Disagreement, JointDiagnosis, OfRecord, OwnNumber, diagnose_records};
 pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
-pub use moves::{FirstStateChoice, Move};
+pub use moves::Move;
 pub use remark::Remark;
 pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{

@@ -99,7 +99,7 @@ impl<'a> State<'a> {
             let fitted = self.carried_fit(&with_levels_of(&self.current, &tie.fitted));
             Candidate { fitted, ..tie }
         };
-        Taken::new(candidate, taken.ties.into_iter().map(in_whole).collect())
+        Taken { candidate, ties: taken.ties.into_iter().map(in_whole).collect() }
     }
 }
 

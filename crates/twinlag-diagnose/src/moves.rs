@@ -2,7 +2,7 @@
 //! place ([`State::apply`]), and kept in the answer.
 
 use serde::{Deserialize, Serialize};
-use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, Watch, covariance};
+use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, Watch};
 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
@@ -86,17 +86,6 @@ pub enum Move {
         /// Deviance that it saves there, not above 0.
         gain: f64,
     },
-    /// The slow body that an effect holds was taken to begin in equilibrium with the gas, and anywhere, and one of both kept.
-    FirstState {
-        /// The effect.
-        effect: Identifier,
-        /// Its channel, 0 or 1.
-        channel: Option<usize>,
-        /// What was kept.
-        choice: FirstStateChoice,
-        /// Logarithm of the odds for equilibrium.
-        equilibrium_log_odds_nats: f64,
-    },
     /// Noise levels were lowered to what is left over.
     LowerNoise {
         /// Energy of the residual per residual beforehand.
@@ -118,12 +107,9 @@ impl Move {
             Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
             Self::Withdraw { effect, .. } => Some(Remark::DoesNotTransfer { effect: *effect }),
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
-            Self::Add { .. }
-            | Self::Extend { .. }
-            | Self::Reduce { .. }
-            | Self::Keep { .. }
-            | Self::FirstState { .. }
-            | Self::Reweigh { .. } => None,
+            Self::Add { .. } | Self::Extend { .. } | Self::Reduce { .. } | Self::Keep { .. } | Self::Reweigh { .. } => {
+                None
+            }
         }
     }
 }
@@ -158,15 +144,9 @@ enum Change {
 pub(crate) struct Taken {
     pub(crate) candidate: Candidate,
     pub(crate) ties: Vec<Candidate>,
-    /// Both cases of the first state of the slow body that it holds, once they were tried.
-    pub(crate) first_states: Option<FirstStates>,
 }
 
 impl Taken {
-    pub(crate) fn new(candidate: Candidate, ties: Vec<Candidate>) -> Self {
-        Self { candidate, ties, first_states: None }
-    }
-
     fn effect(&self) -> Identifier {
         self.candidate.effect.identifier()
     }
@@ -174,26 +154,6 @@ impl Taken {
     fn is_noise(&self) -> bool {
         self.candidate.effect.is_noise()
     }
-}
-
-/// What was taken of the first state of a slow body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FirstStateChoice {
-    /// It may have begun at any temperature.
-    Free,
-    /// It had the temperature of the gas as each record began.
-    Equilibrium,
-}
-
-/// Both cases of the first state of a slow body.
-#[derive(Clone)]
-pub(crate) struct FirstStates {
-    pub(crate) choice: FirstStateChoice,
-    pub(crate) equilibrium_log_odds_nats: f64,
-    /// The model with the case that was not kept, and the covariance of its parameters.
-    pub(crate) other: Fitted,
-    pub(crate) covariance: Option<Vec<Vec<f64>>>,
 }
 
 fn identifiers(candidates: &[Candidate]) -> Vec<Identifier> {
@@ -331,7 +291,7 @@ impl<'a> State<'a> {
             evidence: Evidence::of(&candidate),
             ties: identifiers(&ties),
         };
-        Some(Proposal { entry, change: Change::Append(Box::new(Taken::new(candidate, ties))) })
+        Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
     }
 
     /// Takes effect `index` out of the model, and gives it; what was compared with it beside it is forgotten.
@@ -345,39 +305,42 @@ impl<'a> State<'a> {
 
     /// Gives effect `index` a parameter more, now that more is known.
     pub(crate) fn extend(&self, index: usize) -> Option<Proposal> {
-        let Taken { candidate, ties, .. } = &self.taken[index];
+        let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().extended(&self.current, index, candidate)?;
         let entry = Move::Extend {
             effect: candidate.effect.identifier(),
             channel: candidate.effect.channel(),
             evidence: Evidence::of(&candidate),
         };
-        let taken = Taken::new(candidate, ties.clone());
+        let taken = Taken { candidate, ties: ties.clone() };
         Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
     }
 
-    /// Takes from effect `index` a parameter that the later ones have made needless. The last one has none after it, and noise in the
-    /// model hides, as in [`Self::remove_needless`].
+    /// Takes from effect `index` a parameter that later effects have made needless.
     pub(crate) fn reduce(&self, index: usize) -> Option<Proposal> {
-        if index + 1 == self.taken.len() || self.has_noise() {
+        if !self.may_be_needless(index) {
             return None;
         }
-        let Taken { candidate, ties, .. } = &self.taken[index];
+        let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().reduced(&self.current, index, candidate)?;
         let entry = Move::Reduce {
             effect: candidate.effect.identifier(),
             channel: candidate.effect.channel(),
             evidence: Evidence::of(&candidate),
         };
-        let taken = Taken::new(candidate, ties.clone());
+        let taken = Taken { candidate, ties: ties.clone() };
         Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
     }
 
-    /// Takes effect `index` out if the later ones have made it needless. The last one has none
-    /// after it; and while there is noise in the model, weights that are those of the residual hide
-    /// what made them.
+    /// Whether later effects can have made effect `index`, or a part of it, needless: there are some, and no noise, whose weights hide what
+    /// made them.
+    fn may_be_needless(&self, index: usize) -> bool {
+        index + 1 < self.taken.len() && !self.has_noise()
+    }
+
+    /// Takes out effect `index` if later effects have made it needless.
     pub(crate) fn remove_needless(&self, index: usize) -> Option<Proposal> {
-        if index + 1 == self.taken.len() || self.has_noise() {
+        if !self.may_be_needless(index) {
             return None;
         }
         let (model, theta) = self.current.without(index);
@@ -416,32 +379,6 @@ impl<'a> State<'a> {
         Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
-    /// Tries both cases of the first state of the slow body that effect `index` holds, where it holds one, and keeps equilibrium if
-    /// the odds for it are clear.
-    pub(crate) fn first_state(&self, index: usize) -> Option<Proposal> {
-        let search = self.search();
-        let taken = &self.taken[index];
-        let free = &self.current;
-        let (effect, log_odds) = free.in_equilibrium(index, search.observations, search.selection)?;
-        let model = free.model.replaced(index, effect.clone());
-        let in_equilibrium = model.fit(&free.theta, search.observations, search.selection, Effort::Finish);
-        let is_kept = in_equilibrium.end.is_usable() && log_odds > search.policy.first_state_odds.ln();
-        let choice = if is_kept { FirstStateChoice::Equilibrium } else { FirstStateChoice::Free };
-        let (kept, other) = if is_kept { (in_equilibrium, free.clone()) } else { (free.clone(), in_equilibrium) };
-        let entry = Move::FirstState {
-            effect: taken.effect(),
-            channel: taken.candidate.effect.channel(),
-            choice,
-            equilibrium_log_odds_nats: log_odds,
-        };
-        let covariance = covariance(&other, search.observations, search.selection, false);
-        let first_states = FirstStates { choice, equilibrium_log_odds_nats: log_odds, other, covariance };
-        let candidate =
-            Candidate { effect: kept.model.effects[index].clone(), fitted: kept, ..taken.candidate.clone() };
-        let taken = Taken { candidate, ties: taken.ties.clone(), first_states: Some(first_states) };
-        Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
-    }
-
     /// Proposes a look-alike in the place of effect `index`, now that more is known, if one is better;
     /// otherwise the ties that the effect now has, if it has or had any. `None` of a noise.
     pub(crate) fn compare(&self, index: usize) -> Result<Option<Proposal>, ModelError> {
@@ -476,7 +413,7 @@ impl<'a> State<'a> {
             channel: replacement.candidate.effect.channel(),
             advantage: replacement.advantage,
         };
-        let taken = Taken::new(replacement.candidate, Vec::new());
+        let taken = Taken { candidate: replacement.candidate, ties: Vec::new() };
         Ok(Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) }))
     }
 

@@ -7,19 +7,26 @@ use twinlag_model::{Defect, Derived, Fitted, Identifier, ModelFit, Parameter, Pr
 use twinlag_optimise::{End, Scale};
 
 use crate::candidates::is_inside_bounds;
-use crate::diagnosis::{FirstState, Found, Masked};
+use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
+use crate::first_state::FirstState;
 use crate::grade::{Judgement, Number, Reason, RecordScatter};
 use crate::joint::OwnNumber;
 use crate::judge::Circumstances;
-use crate::moves::{FirstStates, Taken};
+use crate::moves::Taken;
 use crate::propagate::variance;
 use crate::rapid::RapidVariation;
 use crate::remark::to_digits_of;
 use crate::twins::ExactTwin;
 
-/// Numbers of an effect whose values are in `range`, and those that follow from them.
-fn numbers(effect: &Shared, range: Range<usize>, last: &Fitted, covariance: Option<&Vec<Vec<f64>>>) -> Vec<Value> {
+/// Numbers of an effect whose values are in `range`, and those that follow from them, with the uncertainty that `covariance` gives;
+/// `None` gives none.
+pub(crate) fn numbers(
+    effect: &Shared,
+    range: Range<usize>,
+    last: &Fitted,
+    covariance: Option<&[Vec<f64>]>,
+) -> Vec<Value> {
     let covariance = covariance.filter(|_| !effect.is_noise());
     let pairs = effect.parameters().iter().zip(range.clone());
     let mut out: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
@@ -33,7 +40,7 @@ pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<O
         let effect = &last.model.effects[index];
         let own = effect.in_record(record).map(|(own, places)| {
             let first = last.model.range(index).start;
-            numbers(&own, first + places.start..first + places.end, last, fit.covariance.as_ref())
+            numbers(&own, first + places.start..first + places.end, last, fit.covariance.as_deref())
         });
         let seat = (effect.identifier(), effect.channel());
         own.unwrap_or_default().into_iter().map(move |number| OwnNumber { effect: seat, number })
@@ -44,14 +51,20 @@ pub(crate) fn own_numbers(record: usize, last: &Fitted, fit: &ModelFit) -> Vec<O
 /// Effect `index` of the model `last` with its numbers, whose uncertainty is that of `fit`; without those that belong to one of
 /// several records.
 ///
-/// - `exact_twins`: of the effect
-pub(crate) fn name(index: usize, taken: &Taken, exact_twins: Vec<ExactTwin>, last: &Fitted, fit: &ModelFit) -> Found {
+/// - `exact_twins`, `first_state`: of the effect
+pub(crate) fn name(
+    index: usize,
+    taken: &Taken,
+    exact_twins: Vec<ExactTwin>,
+    first_state: Option<FirstState>,
+    (last, fit): (&Fitted, &ModelFit),
+) -> Found {
     let effect = &taken.candidate.effect;
     let is_of_records = effect.record_of(0).is_some();
     let parameters = if is_of_records {
         Vec::new()
     } else {
-        numbers(effect, last.model.range(index), last, fit.covariance.as_ref())
+        numbers(effect, last.model.range(index), last, fit.covariance.as_deref())
     };
     let ties = taken.ties.iter().map(|t| t.effect.identifier());
     let mut alternatives: Vec<Identifier> = ties.chain(exact_twins.iter().map(|twin| twin.effect)).collect();
@@ -68,19 +81,12 @@ pub(crate) fn name(index: usize, taken: &Taken, exact_twins: Vec<ExactTwin>, las
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
         exact_twins,
-        first_state: taken.first_states.as_ref().map(|both| first_state(both, index)),
+        first_state,
         seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
         masked: Vec::new(),
         is_of_each_record: is_of_records,
         is_in_the_model: true,
     }
-}
-
-/// Both cases of a first state, with the numbers of effect `index` in the one that was not kept.
-fn first_state(both: &FirstStates, index: usize) -> FirstState {
-    let FirstStates { choice, equilibrium_log_odds_nats, other, covariance } = both;
-    let otherwise = numbers(&other.model.effects[index], other.model.range(index), other, covariance.as_ref());
-    FirstState { choice: *choice, equilibrium_log_odds_nats: *equilibrium_log_odds_nats, otherwise }
 }
 
 fn value(parameter: &Parameter, value: f64, variance: Option<f64>) -> Value {
@@ -104,7 +110,7 @@ pub(crate) fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
 }
 
 /// A number that follows from the parameters in `range`, its error to first order.
-fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Option<&Vec<Vec<f64>>>) -> Value {
+fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Option<&[Vec<f64>]>) -> Value {
     let at = &theta[range.clone()];
     let places: Vec<usize> = range.collect();
     let variance = covariance.map(|c| variance(derived.of.as_ref(), &places, theta, c));

@@ -27,7 +27,7 @@ fn record(seed: u64, settled_s: f64) -> Observations {
     Observations::new(vec![stretch], Some(0.01)).expect("a record")
 }
 
-fn found(observations: &Observations) -> Diagnosis {
+fn diagnosed(observations: &Observations) -> Diagnosis {
     let watch = |_: &str, _, _| ControlFlow::Continue(());
     diagnose(observations, &Settings::default(), &watch).expect("a record that can be diagnosed")
 }
@@ -49,25 +49,35 @@ fn slow_mode(diagnosis: &Diagnosis) -> &Found {
 #[test]
 fn a_body_that_has_followed_the_gas_may_have_begun_anywhere() {
     for seed in 1..4 {
-        let diagnosis = found(&record(seed, 4.0 * SLOW_S));
-        let first = slow_mode(&diagnosis).first_state.as_ref().expect("both were tried");
+        let diagnosis = diagnosed(&record(seed, 4.0 * SLOW_S));
+        let slow = slow_mode(&diagnosis);
+        let first = slow.first_state.as_ref().expect("both were tried");
         assert_eq!(first.choice, FirstStateChoice::Free, "{first}");
-        assert_eq!(first.otherwise.len(), 2, "{first}");
+        assert!(first.equilibrium_log_odds_nats < -(20.0_f64).ln(), "{first}");
+        let far = |i: usize| {
+            let (kept, other) = (&slow.parameters[i], &first.otherwise[i]);
+            (kept.value - other.value).abs() > 2.0 * kept.standard_error.expect("a fitted number has one")
+        };
+        assert!(far(0) || far(1), "{first}");
     }
 }
 
-/// What is known of where the body began makes its time constant more certain than without.
+/// Most bodies that began in equilibrium are seen to. What is known more makes no number less certain: the second derivatives that errors
+/// come from are those at another point, which differ by about the inverse root of 3000 residuals, two per cent.
 #[test]
 fn a_body_in_equilibrium_is_seen_to_be() {
     let seen: Vec<bool> = (1..5)
         .map(|seed| {
-            let diagnosis = found(&record(seed, 0.0));
+            let diagnosis = diagnosed(&record(seed, 0.0));
             let slow = slow_mode(&diagnosis);
             let first = slow.first_state.as_ref().expect("both were tried");
             let is_seen = first.choice == FirstStateChoice::Equilibrium;
             if is_seen {
                 let error = |number: &twinlag_diagnose::Value| number.standard_error.expect("a fitted number has one");
-                assert!(error(&slow.parameters[1]) < error(&first.otherwise[1]), "{first}");
+                for (kept, other) in slow.parameters.iter().zip(&first.otherwise) {
+                    assert!(error(kept) < 1.02 * error(other), "{first}");
+                    assert!((kept.value - other.value).abs() < 3.0 * error(other), "{first}");
+                }
             }
             is_seen
         })
@@ -83,7 +93,9 @@ fn of_several_records_each_began_somewhere() {
     let choice = |settled_s: [f64; 2]| {
         let records = [record(11, settled_s[0]), record(12, settled_s[1])];
         let joint = diagnose_records(&records, &Settings::default(), &watch).expect("two records");
-        slow_mode(&joint.diagnosis).first_state.as_ref().expect("both were tried").choice
+        let first = slow_mode(&joint.diagnosis).first_state.as_ref().expect("both were tried");
+        assert_eq!(first.otherwise.len(), 2, "{first}");
+        first.choice
     };
     assert_eq!(choice([0.0, 0.0]), FirstStateChoice::Equilibrium);
     assert_eq!(choice([0.0, 4.0 * SLOW_S]), FirstStateChoice::Free);

@@ -142,8 +142,8 @@ impl<'a> ResidualCost<'a> {
     pub(crate) fn energy(&self, theta: &[f64]) -> f64 {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        let known = self.model.knowledge(&constants(theta), self.observations).count();
-        let residuals = &memory.residual[..memory.residual.len() - known];
+        // What is known beforehand comes after the residuals.
+        let residuals = &memory.residual[..memory.ends.last().copied().unwrap_or(0)];
         let sum = dense::dot(residuals, residuals);
         if sum.is_finite() { sum } else { f64::INFINITY }
     }

@@ -42,9 +42,9 @@ pub use known::KnownEffect;
 pub use parameter::{Derived, Domain, Freedom, OfParameters, Parameter};
 pub use twin::Twin;
 
+use crate::departure::Departure;
 use crate::directions::Parts;
 use crate::error::ModelError;
-use crate::first_state::FirstState;
 use crate::gas::Gas;
 use crate::number::Number;
 use crate::observations::Observations;
@@ -130,8 +130,8 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// This effect without one of its parameters, each with where its fit starts from `values` of this one. Tried whenever another effect
-    /// has been added, which may be what such a parameter stood in for. By default there are none.
+    /// Forms of this effect with one parameter less, each with the values that its fit starts from; `values` are those of this form.
+    /// They are tried whenever another effect has been added: a parameter may have stood in for it. By default there are none.
     fn reduced(&self, _values: &[f64]) -> Vec<(Shared, Vec<f64>)> {
         Vec::new()
     }
@@ -171,8 +171,9 @@ pub trait Effect: Send + Sync {
         None
     }
 
-    /// What the records say of the first temperature of the body that it holds, where that counts.
-    fn first_states(&self) -> &[FirstState] {
+    /// How far from equilibrium the body that it holds began, as each record says, where it is taken to have begun there. Of an effect
+    /// that [`Self::in_equilibrium`] did not make there are none.
+    fn departures(&self) -> &[Departure] {
         &[]
     }
 

@@ -8,12 +8,12 @@ mod correlation;
 mod cost;
 mod defects;
 pub mod dense;
+mod departure;
 mod directions;
 mod disagreement;
 mod effect;
 mod error;
 mod extended;
-mod first_state;
 mod fit;
 mod fitted;
 mod flow;
@@ -49,6 +49,7 @@ mod whitening;
 pub use between::{Between, BetweenRecords, Contradicted, OwnValue};
 pub use cost::Linearised;
 pub use defects::{ChannelNoise, levels, line_channel, lines};
+pub use departure::Departure;
 pub use directions::{Install, Part, Parts};
 pub use effect::{
     About, Context, Derived, Domain, Effect, Freedom, Identifier, KnownEffect, OfParameters, Parameter, Seat, Shared,
@@ -56,7 +57,6 @@ pub use effect::{
 };
 pub use error::ModelError;
 pub use extended::Extended;
-pub use first_state::FirstState;
 pub use fit::{Effort, Fitted};
 pub use fitted::{Defect, KnownFit, ModelFit, TimeConstant, Value};
 pub use flow::{Flow, FlowKind};

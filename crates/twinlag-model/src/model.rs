@@ -7,7 +7,6 @@ use twinlag_cross_relation::Z_975;
 use twinlag_optimise::Variable;
 
 use crate::effect::{Identifier, Parameter, Shared, Twin};
-use crate::first_state::FirstState;
 use crate::implied::{Details, Evaluation};
 use crate::number::Number;
 use crate::observations::{Observations, Stretch};
@@ -230,15 +229,16 @@ impl Model {
         self.effects.iter().enumerate().flat_map(|(index, e)| e.prior(&theta[self.range(index)])).collect()
     }
 
-    /// How far slow bodies that were in equilibrium as the records began were from it.
+    /// How far slow bodies that are taken to have begun in equilibrium were from it.
     fn departures(&self, theta: &[Number], observations: &Observations) -> Vec<Number> {
-        let is_there = |state: &&FirstState| observations.stretches.iter().any(|s| s.member == state.record());
-        let states: Vec<&FirstState> = self.effects.iter().flat_map(|e| e.first_states()).filter(is_there).collect();
-        if states.is_empty() {
+        let mut all = self.effects.iter().flat_map(|effect| effect.departures()).peekable();
+        if all.peek().is_none() {
             return Vec::new();
         }
         let plant = self.plant_of(theta, observations);
-        states.iter().map(|state| state.departure(&plant)).collect()
+        all.filter(|departure| departure.counts_in(observations, &plant))
+            .map(|departure| departure.value(&plant))
+            .collect()
     }
 
     /// What is known beforehand of time constants, effects and first states, over its uncertainty.

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use twinlag_optimise::Variable;
 
+use crate::departure::Departure;
 use crate::effect::{About, Context, Domain, Effect, Identifier, Parameter, Seat, Shared};
-use crate::first_state::FirstState;
 use crate::number::Number;
 use crate::observations::Observations;
 use crate::plant::{Plant, SlowPath};
@@ -31,8 +31,8 @@ struct SlowMode {
     seat: Seat,
     tau_s: f64,
     span_s: f64,
-    /// Where the slow body was in equilibrium as each record began: none where it may have begun anywhere.
-    first_states: Vec<FirstState>,
+    /// How far from equilibrium the slow body began; none where it may have begun anywhere.
+    departures: Vec<Departure>,
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
@@ -46,7 +46,7 @@ fn candidates(context: &Context) -> Vec<Shared> {
             let parameters = vec![share, Parameter::new("slow_time_constant", "s", slow)];
             let seat = Seat::new(Identifier::SLOW_MODE, Some(sensor), parameters);
             let tau_s = context.tau_s[0].max(context.tau_s[1]).clamp(context.step_s, 0.03 * context.span_s());
-            Arc::new(SlowMode { sensor, seat, tau_s, span_s: context.span_s(), first_states: Vec::new() }) as Shared
+            Arc::new(SlowMode { sensor, seat, tau_s, span_s: context.span_s(), departures: Vec::new() }) as Shared
         })
         .collect()
 }
@@ -68,12 +68,12 @@ impl Effect for SlowMode {
     }
 
     fn in_equilibrium(&self, plant: &Plant, observations: &Observations) -> Option<Shared> {
-        let first_states = FirstState::of_records(plant, self.sensor, observations);
-        let is_known = !first_states.is_empty();
-        is_known.then(|| Arc::new(Self { first_states, seat: self.seat.clone(), ..*self }) as Shared)
+        let departures = Departure::of_records(plant, self.sensor, observations);
+        let is_known = !departures.is_empty();
+        is_known.then(|| Arc::new(Self { departures, seat: self.seat.clone(), ..*self }) as Shared)
     }
 
-    fn first_states(&self) -> &[FirstState] {
-        &self.first_states
+    fn departures(&self) -> &[Departure] {
+        &self.departures
     }
 }

@@ -21,8 +21,8 @@ pub(crate) static ABOUT: About = About::new("temperature-dependent-time-constant
         "take records over a smaller range of temperature, or use the exponent that was found",
         "a dependence of both on the gas temperature that does not affect their disagreement",
     )
-    // With `τ (1 + β (T − T̄))` a reading lacks `τ β/2 · d(T − T̄)²/dt`, and with a curvature `c` it has `c (1 + τ d/dt) (T − T̄)²` too
-    // much: the same where the gas is fast.
+    // With `τ (1 + β (T − T̄))` the gas temperature that a constant `τ` gives lacks `τ β/2 · d(T − T̄)²/dt`, and with a curvature `c` it
+    // lacks `c (1 + τ d/dt) (T − T̄)²`: the same, with `c = β/2`, where the gas is fast.
     .imitating(&["varying-time-constant", "radiation", "calibration"])
     .following_gas()
     .restored_by(restore);
