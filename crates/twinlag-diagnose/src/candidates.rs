@@ -230,11 +230,21 @@ impl<'a> Search<'a> {
         white_deviance(&plant, self.observations, &self.bands(fitted), self.context.is_coarse)
     }
 
-    /// Both gains of a candidate, white and robust. A line has its own frequency, and is judged
-    /// there: with no weight over frequency, and no free level in a band that is wider than it.
-    fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> [f64; 2] {
+    /// The part of all residuals that an effect is judged by: a line has its own frequency, and is judged there, with no weight over
+    /// frequency, and any other by what the weights leave of them.
+    fn share(&self, effect: &Shared) -> f64 {
+        if effect.about().is_narrow { self.selection.weighting.mean() } else { 1.0 }
+    }
+
+    /// As many residuals as an effect is judged by.
+    pub(crate) fn residuals(&self, fitted: &Fitted, effect: &Shared) -> f64 {
+        fitted.count / self.share(effect)
+    }
+
+    /// Deviance that an effect saves if the noise is white.
+    pub(crate) fn white_gain(&self, before: &Fitted, after: &Fitted, effect: &Shared) -> f64 {
         if !effect.about().is_narrow {
-            return [white_gain(before, after), robust];
+            return white_gain(before, after);
         }
         let energy = |fitted: &Fitted| {
             let evaluation = fitted.model.evaluate(&fitted.theta, self.observations);
@@ -243,7 +253,13 @@ impl<'a> Search<'a> {
             held.fold((0.0, 0.0), |(sum, n), (r, _)| (sum + r * r, n + 1.0))
         };
         let ((b, n), (a, _)) = (energy(before), energy(after));
-        [n * (b / a.max(1e-300)).ln(); 2]
+        n * (b / a.max(1e-300)).ln()
+    }
+
+    /// Both gains of a candidate, white and robust: those of a line are one, since no band with a free level is as narrow.
+    fn gains(&self, before: &Fitted, after: &Fitted, effect: &Shared, robust: f64) -> [f64; 2] {
+        let white = self.white_gain(before, after, effect);
+        [white, if effect.about().is_narrow { white } else { robust }]
     }
 
     /// Every candidate that may be added to `current`: those that may explain something are fitted,
@@ -423,7 +439,6 @@ impl<'a> Search<'a> {
     }
 
     fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
-        let share = if effect.about().is_narrow { self.selection.weighting.mean() } else { 1.0 };
         let added = effect.parameters().len();
         Candidate {
             effect: effect.clone(),
@@ -433,7 +448,7 @@ impl<'a> Search<'a> {
             robust_gain,
             free_level_gain: None,
             held_out_nats: 0.0,
-            share,
+            share: self.share(effect),
         }
     }
 

@@ -346,9 +346,10 @@ impl<'a> State<'a> {
         let (model, theta) = self.current.without(index);
         let search = self.search();
         let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
-        let (n, parameters) = (self.current.count, self.current.model.range(index).len());
-        let loss = n * (without.mean_energy() / self.current.mean_energy()).ln();
-        (loss < worth(parameters, n, search.policy)).then(|| self.removal(index, without, Some(loss)))
+        let (effect, parameters) = (&self.current.model.effects[index], self.current.model.range(index).len());
+        let loss = search.white_gain(&without, &self.current, effect);
+        let is_needless = loss < worth(parameters, search.residuals(&self.current, effect), search.policy);
+        is_needless.then(|| self.removal(index, without, Some(loss)))
     }
 
     /// Takes noise out that came before the effects that explain it: model error, seen from afar,

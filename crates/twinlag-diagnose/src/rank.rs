@@ -60,6 +60,12 @@ impl Score {
         self.share * self.white_gain - self.penalty()
     }
 
+    /// Deviance saved beyond the penalty for as many residuals as it was found in. A line that no other candidate is held against need not
+    /// stand out from frequencies that count for less.
+    fn alone(&self) -> f64 {
+        self.white_gain - self.added as f64 * (self.count / self.share).max(2.0).ln()
+    }
+
     /// Deviance saved beyond the penalty, whatever the noise.
     fn robust(&self) -> f64 {
         self.share * self.robust_gain - self.penalty()
@@ -96,7 +102,7 @@ pub(crate) fn worth(added: usize, count: f64, policy: &Policy) -> f64 {
 ///   been the one that chance favours
 pub(crate) fn rank(scores: &[Score], considered: usize, policy: &Policy) -> Vec<usize> {
     let probability = policy.round_false_alarm_probability / considered.max(scores.len()).max(1) as f64;
-    let is_worth = |s: &Score, gain: f64| gain > threshold(s.added, probability) && s.white() > 0.0;
+    let is_worth = |s: &Score, gain: f64| gain > threshold(s.added, probability) && s.alone() > 0.0;
     let noise = best_first(scores, Score::white, |s| s.is_noise() && is_worth(s, s.white_gain));
     // Fitted with wrong weights, an effect absorbs a little of any noise.
     let loudest = noise.first().map_or(0.0, |i| scores[*i].white_gain);

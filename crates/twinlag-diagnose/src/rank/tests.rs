@@ -189,6 +189,17 @@ fn a_share_scales_gains_and_not_the_penalty() {
     assert_eq!(ranked(&[line, second_lag(0.6 * MUCH)])[0], 1);
 }
 
+/// Failed: a line that saves far more than chance was not named where the gas has no power, since it counted by its share alone.
+#[test]
+fn a_line_that_counts_little_is_worth_what_it_saves() {
+    let line = Score { share: 0.05, ..delay(30.0) };
+    assert!(line.white() < 0.0 && line.alone() > 0.0);
+    assert_eq!(ranked(&[line]), [0]);
+    // What chance saves among twenty times as many residuals is no line.
+    let chance = Score { share: 0.05, ..delay(1.0) };
+    assert_eq!(ranked(&[chance]), Vec::<usize>::new());
+}
+
 #[test]
 fn ties_are_other_effects_that_explain_as_much() {
     let policy = Policy::default();
