@@ -9,6 +9,9 @@ use twinlag_optimise::End;
 use crate::naming::numbers;
 use crate::remark::to_digits_of;
 
+/// Power of ten of the odds beyond which they are beyond doubt: what they are there says nothing more.
+const BEYOND_DOUBT_LOG_10: f64 = 9.0;
+
 /// What was taken of the first state of a slow body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -78,10 +81,14 @@ impl fmt::Display for FirstState {
             FirstStateChoice::Free => ("may have had another temperature than the gas", "if it had that of the gas"),
         };
         let log_10 = self.equilibrium_log_odds_nats / std::f64::consts::LN_10;
-        write!(
-            f,
-            "as a record began, the slow body {taken} (odds of 10^{log_10:.1} to 1 that it had that of the gas)"
-        )?;
+        let odds = if log_10 < -BEYOND_DOUBT_LOG_10 {
+            format!("less than 10^-{BEYOND_DOUBT_LOG_10:.0} to 1")
+        } else if log_10 > 0.0 && self.choice == FirstStateChoice::Free {
+            format!("10^{log_10:.1} to 1, too low to count on")
+        } else {
+            format!("10^{log_10:.1} to 1")
+        };
+        write!(f, "as a record began, the slow body {taken} (odds that it had that of the gas: {odds})")?;
         let numbers: Vec<String> = self.otherwise.iter().filter_map(with_interval).collect();
         if numbers.is_empty() { Ok(()) } else { write!(f, "; {other}: {}", numbers.join(", ")) }
     }
@@ -114,12 +121,15 @@ mod tests {
         };
         assert_eq!(
             said(FirstStateChoice::Free, -2.0, std::slice::from_ref(&share)),
-            "as a record began, the slow body may have had another temperature than the gas (odds of 10^-2.0 to 1 that it had \
-             that of the gas); if it had that of the gas: share 0.06130 [0.05930, 0.06330]"
+            "as a record began, the slow body may have had another temperature than the gas (odds that it had that of the \
+             gas: 10^-2.0 to 1); if it had that of the gas: share 0.06130 [0.05930, 0.06330]"
         );
+        let is_said = |log_10, odds: &str| said(FirstStateChoice::Free, log_10, &[]).ends_with(odds);
+        assert!(is_said(1.2, "(odds that it had that of the gas: 10^1.2 to 1, too low to count on)"));
+        assert!(is_said(-991.4, "(odds that it had that of the gas: less than 10^-9 to 1)"));
         assert_eq!(
             said(FirstStateChoice::Equilibrium, 1.5, &[]),
-            "as a record began, the slow body had the temperature of the gas (odds of 10^1.5 to 1 that it had that of the gas)"
+            "as a record began, the slow body had the temperature of the gas (odds that it had that of the gas: 10^1.5 to 1)"
         );
     }
 }
