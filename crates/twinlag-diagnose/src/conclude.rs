@@ -34,12 +34,7 @@ pub(crate) fn conclude(
     let policy = &settings.policy;
     // Before is before everything: with the defects of the data in it.
     let unmasked = state.prepared.unmasked(&state.base);
-    let free = to_the_end(&state.current, &state);
-    let last_free = summary(&free, &state, policy);
-    let is_noise_left = what_is_left(&last_free, policy).is_none() && state.rapid.is_none();
-    let (with_effects, first_states) = choose(free, &state.prepared, is_noise_left);
-    let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
-    let mut last = if is_any_kept { summary(&with_effects, &state, policy) } else { last_free };
+    let (with_effects, mut last, first_states) = last_fit(&state, policy);
     let is_base = unmasked.is_none() && state.taken.is_empty() && state.base.theta == state.current.theta;
     let mut base = if is_base { last.clone() } else { base_fit(&state, unmasked.as_ref(), policy) };
     let mut remarks = remarks_of(&state.moves);
@@ -137,6 +132,17 @@ pub(crate) fn conclude(
         policy: policy.clone(),
     };
     Ok((diagnosis, with_effects))
+}
+
+/// The fit of all effects to the whole record, in numbers as well, and the first state of the slow body of each effect.
+fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit, Vec<Option<FirstState>>) {
+    let free = to_the_end(&state.current, state);
+    let fit = summary(&free, state, policy);
+    let is_noise_left = what_is_left(&fit, policy).is_none() && state.rapid.is_none();
+    let (fitted, first_states) = choose(free, &state.prepared, is_noise_left);
+    let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
+    let fit = if is_any_kept { summary(&fitted, state, policy) } else { fit };
+    (fitted, fit, first_states)
 }
 
 /// What is left over beside the noise, where intervals can cover it.
