@@ -121,6 +121,11 @@ pub(crate) struct Proposal {
 }
 
 impl Proposal {
+    /// Another form of effect `index`, tied as it was.
+    fn of_form(entry: Move, index: usize, candidate: Candidate, ties: &[Candidate]) -> Self {
+        Self { entry, change: Change::Put(index, Box::new(Taken { candidate, ties: ties.to_vec() })) }
+    }
+
     /// Whether one effect takes the place of another.
     pub(crate) fn is_exchange(&self) -> bool {
         matches!(self.entry, Move::Exchange { .. })
@@ -307,13 +312,9 @@ impl<'a> State<'a> {
     pub(crate) fn extend(&self, index: usize) -> Option<Proposal> {
         let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().extended(&self.current, index, candidate)?;
-        let entry = Move::Extend {
-            effect: candidate.effect.identifier(),
-            channel: candidate.effect.channel(),
-            evidence: Evidence::of(&candidate),
-        };
-        let taken = Taken { candidate, ties: ties.clone() };
-        Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
+        let (effect, channel) = (candidate.effect.identifier(), candidate.effect.channel());
+        let entry = Move::Extend { effect, channel, evidence: Evidence::of(&candidate) };
+        Some(Proposal::of_form(entry, index, candidate, ties))
     }
 
     /// Takes from effect `index` a parameter that later effects have made needless.
@@ -323,13 +324,9 @@ impl<'a> State<'a> {
         }
         let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().reduced(&self.current, index, candidate)?;
-        let entry = Move::Reduce {
-            effect: candidate.effect.identifier(),
-            channel: candidate.effect.channel(),
-            evidence: Evidence::of(&candidate),
-        };
-        let taken = Taken { candidate, ties: ties.clone() };
-        Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) })
+        let (effect, channel) = (candidate.effect.identifier(), candidate.effect.channel());
+        let entry = Move::Reduce { effect, channel, evidence: Evidence::of(&candidate) };
+        Some(Proposal::of_form(entry, index, candidate, ties))
     }
 
     /// Whether later effects can have made effect `index`, or a part of it, needless: there are some, and no noise, whose weights hide what

@@ -60,8 +60,8 @@ impl Score {
         self.share * self.white_gain - self.penalty()
     }
 
-    /// Deviance saved beyond the penalty for as many residuals as it was found in. A line that no other candidate is held against need not
-    /// stand out from frequencies that count for less.
+    /// Deviance saved beyond the penalty for as many residuals as it was found in: what a candidate is worth by itself. A line counts by
+    /// its share only against others.
     fn alone(&self) -> f64 {
         self.white_gain - self.added as f64 * (self.count / self.share).max(2.0).ln()
     }

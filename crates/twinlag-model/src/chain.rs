@@ -344,14 +344,19 @@ impl<T: Real> Chain<T> {
 
     /// `v[k+1] − ρ v[k]`.
     pub(crate) fn difference(&mut self, rho: f64) {
-        let count = self.len() - 1;
-        for k in 0..count {
-            self.value[k] = self.value[k + 1] - self.value[k] * rho;
-        }
-        self.value.truncate(count);
-        self.rows.difference(rho, count);
+        difference(&mut self.value, rho);
+        self.rows.difference(rho, self.value.len());
         self.skipped += 1;
     }
+}
+
+/// `v[k+1] − ρ v[k]`, one value less.
+pub(crate) fn difference<T: Real>(values: &mut Vec<T>, rho: f64) {
+    let count = values.len() - 1;
+    for k in 0..count {
+        values[k] = values[k + 1] - values[k] * rho;
+    }
+    values.truncate(count);
 }
 
 fn through<T: Real>(curve: &Curve, v: T) -> (T, T) {

@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 use num_dual::DualNum;
 
-use crate::chain::Chain;
+use crate::chain::{Chain, difference};
 use crate::dense;
 use crate::directions::{constants, moved};
 use crate::disagreement::{Disagreement, is_long_enough, reading_variances};
 use crate::effect::Shared;
 use crate::fit::Fitted;
 use crate::inverse::Inverse;
-use crate::number::{Number, Real};
+use crate::number::Number;
 use crate::observations::{Observations, Stretch};
 use crate::plant::{Place, Plant, SlowPath};
 use crate::selection::Selection;
@@ -211,15 +211,6 @@ impl Body {
         self.temperature_c = self.temperature_c * keep + (self.gas_c + gas_c) * 0.5 * (-keep + 1.0);
         (self.at_s, self.gas_c) = (time_s, gas_c);
     }
-}
-
-/// `v[k+1] − ρ v[k]`.
-fn difference<T: Real>(values: &mut Vec<T>, rho: f64) {
-    let count = values.len().saturating_sub(1);
-    for k in 0..count {
-        values[k] = values[k + 1] - values[k] * rho;
-    }
-    values.truncate(count);
 }
 
 impl Fitted {
