@@ -104,6 +104,9 @@ pub(crate) struct Characterise {
     pub(crate) input: Input,
     #[command(flatten)]
     pub(crate) physics: Physics,
+    /// More records of the same rig: one pair of time constants for all of them.
+    #[arg(value_name = "MORE")]
+    pub(crate) more: Vec<PathBuf>,
     /// Use a model written by `twinlag diagnose --save`: its effects stay fixed and only the time
     /// constants are fitted.
     #[arg(long, value_name = "JSON")]

@@ -1,4 +1,4 @@
-//! `twinlag characterise FILE`.
+//! `twinlag characterise FILE...`.
 
 use std::fs::File;
 use std::io::stdin;
@@ -14,14 +14,22 @@ use crate::failure::{Failure, explained};
 use crate::grades;
 use crate::print;
 use crate::progress::Progress;
+use crate::several;
 
 pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failure> {
     let options = command.input.method.options()?;
-    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
-    print::notes(&record, console);
+    let files = several::files(&command.input, &command.more)?;
+    if let (Some(path), [_, _, ..]) = (&command.model, &files[..]) {
+        return Err(Failure::Usage(format!(
+            "--model {}: expected one file beside it, got {}. `twinlag diagnose` finds the effects of several records together",
+            path.display(),
+            files.len()
+        )));
+    }
+    let records = several::read(&files, &command.input, console)?;
     let given = command.model.as_deref().map(|path| Ok::<_, Failure>((path, model(path)?))).transpose()?;
-    let run = |options: Options| match &given {
-        Some((path, model)) => {
+    let run = |options: Options| match (&records[..], &given) {
+        ([record], Some((path, model))) => {
             let _progress = Progress::start(console, format!("characterising {} samples", record.len()));
             twinlag::characterise_with(&record, model, &options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
@@ -32,9 +40,10 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
                 e => Failure::in_file(e, &record.source),
             })
         }
-        None => characterise(&record, &options, console),
+        ([record], None) => characterise(record, &options, console),
+        (records, _) => characterise_records(records, &options, console),
     };
-    let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
+    let plausibility = command.physics.plausibility(&records)?;
     let answer = plausibility.answer(options, run, |answer| answer)?;
     print::characterisation(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
@@ -56,6 +65,14 @@ pub(crate) fn characterise(record: &Record, options: &Options, console: Console)
     let progress = Progress::start(console, format!("characterising {} samples", record.len()));
     let answer = twinlag::characterise_watched(record, options, &|task, done, total| progress.watch(task, done, total));
     answer.map_err(|error| Failure::in_file(error, &record.source))
+}
+
+fn characterise_records(records: &[Record], options: &Options, console: Console) -> Result<Characterisation, Failure> {
+    let samples = several::samples(records);
+    let progress = Progress::start(console, format!("characterising {samples} samples of {} records", records.len()));
+    let watch = |task: &str, done, total| progress.watch(task, done, total);
+    let answer = twinlag::characterise_records_watched(records, options, &watch);
+    answer.map_err(|error| Failure::in_file(error, &several::sources(records)))
 }
 
 /// The exit code of a characterisation: it is asked for both time constants, and strictly for their difference as well.

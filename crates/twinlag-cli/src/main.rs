@@ -25,6 +25,7 @@ mod print;
 mod progress;
 mod records;
 mod settings;
+mod several;
 mod simulate;
 mod study;
 mod track;

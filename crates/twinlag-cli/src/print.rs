@@ -29,14 +29,22 @@ pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
 
 /// Prints on standard error how the file was read.
 pub(crate) fn notes(record: &Record, console: Console) {
+    notes_of(record, None, console);
+}
+
+/// Prints on standard error how one of several files was read.
+///
+/// - `source`: its name, which goes before each note
+pub(crate) fn notes_of(record: &Record, source: Option<&str>, console: Console) {
     if !console.quiet {
+        let of = source.map_or(String::new(), |source| format!("{source}: "));
         for note in &record.notes {
             let option = match note {
                 Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
                 Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
                 _ => String::new(),
             };
-            eprintln!("note: {note}{option}");
+            eprintln!("note: {of}{note}{option}");
         }
     }
 }
@@ -83,6 +91,7 @@ fn text(answer: &Characterisation) -> String {
     }
     lines.extend(reasons(asked(answer).chain(free(answer)), "  "));
     lines.extend(answer.plausibility.iter().map(plausibility_in_words));
+    lines.extend(records::of_characterisation(answer));
     lines.push(String::new());
     let white = if answer.residual.white { "white" } else { "not white" };
     lines.push(match answer.residual.chi2_per_dof {
@@ -320,7 +329,7 @@ fn diagnosis_text(answer: &Diagnosis) -> String {
     lines.extend(answer.last.plausibility.iter().map(plausibility_in_words));
     lines.extend(answer.effects.iter().flat_map(effect_lines));
     lines.extend(before_and_after(answer));
-    lines.extend(records::lines(answer));
+    lines.extend(records::of_diagnosis(answer));
     lines.extend(answer.if_known.iter().flat_map(if_known::lines));
     lines.push(String::new());
     if let Some(left) = &answer.unexplained {
@@ -353,7 +362,11 @@ fn of_effects(effects: &[NamedEffect]) -> impl Iterator<Item = (String, &Judgeme
 fn effect_lines(effect: &NamedEffect) -> Vec<String> {
     let about = effect.effect.about();
     let mut lines = vec![String::new()];
-    let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
+    let place = match (&effect.channel, &effect.fitted_in) {
+        (Some(channel), _) => format!(" in {channel}"),
+        (None, Some(channel)) => format!(" in {channel}, or in the other channel with other numbers"),
+        (None, None) => String::new(),
+    };
     lines.push(format!("  {}{place}: {}", effect.effect, about.explanation));
     if let Some(seen) = &effect.seen {
         lines.push(format!("    {seen}"));

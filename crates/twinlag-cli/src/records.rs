@@ -1,13 +1,36 @@
 //! What each of several records has for itself, as a table.
 
-use twinlag::{Diagnosis, DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer};
+use twinlag::{
+    Characterisation, Diagnosis, DisagreementAnswer, EffectInPlace, LeftOutUnit, OwnTimeConstant, RecordAnswer,
+    SensorEstimate,
+};
 use twinlag_pages::parameter_in_words;
 
 use crate::columns::columns;
 use crate::print::{digits, interval};
 
-/// The table, after an empty line; nothing of a single record.
-pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
+/// Two lags on each record, after an empty line; nothing of a single record.
+pub(crate) fn of_characterisation(answer: &Characterisation) -> Vec<String> {
+    let Some(transfer) = &answer.transfer else { return Vec::new() };
+    let header = ["record", "rms", "agrees"].map(str::to_owned);
+    let row = |name: &str, rms: f64, agrees: &str| vec![name.to_owned(), digits(rms, 4), agrees.to_owned()];
+    let of_record = |record: &RecordAnswer| {
+        row(&record.source, record.error.held_out_normalised_rms.after, in_words(record.agrees))
+    };
+    let all = row("all", transfer.error.held_out_normalised_rms.after, "");
+    let rows: Vec<Vec<String>> =
+        [header.to_vec()].into_iter().chain(answer.records.iter().map(of_record)).chain([all]).collect();
+    let mut lines = vec![
+        String::new(),
+        "on a record with the time constants of the others (rms of the whitened residual):".to_owned(),
+    ];
+    lines.extend(indented(&rows, |column| column != 1));
+    lines.extend(each(&answer.records, &answer.sensors));
+    lines
+}
+
+/// The model on each record, after an empty line; nothing of a single record.
+pub(crate) fn of_diagnosis(answer: &Diagnosis) -> Vec<String> {
     let Some(transfer) = answer.transfer.as_ref().filter(|transfer| transfer.left_out == LeftOutUnit::Record) else {
         return Vec::new();
     };
@@ -21,19 +44,51 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
     };
     let of_record = |record: &RecordAnswer| {
         let rms = record.error.held_out_normalised_rms;
-        let agrees = match record.agrees {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "not known",
-        };
-        row(&record.source, rms.before, rms.after, effects(&record.found_on_others), agrees)
+        row(&record.source, rms.before, rms.after, effects(&record.found_on_others), in_words(record.agrees))
     };
     let rms = transfer.error.held_out_normalised_rms;
     let all = row("all", rms.before, rms.after, String::new(), "");
     let rows: Vec<Vec<String>> =
         [header.to_vec()].into_iter().chain(answer.records.iter().map(of_record)).chain([all]).collect();
-    lines.extend(columns(&rows, |column| ![1, 2].contains(&column)).into_iter().map(|line| format!("  {line}")));
-    for record in &answer.records {
+    lines.extend(indented(&rows, |column| ![1, 2].contains(&column)));
+    lines.extend(each(&answer.records, &answer.last.sensors));
+    lines
+}
+
+fn in_words(agrees: Option<bool>) -> &'static str {
+    match agrees {
+        Some(true) => "yes",
+        Some(false) => "no",
+        None => "not known",
+    }
+}
+
+fn indented(rows: &[Vec<String>], is_text: impl Fn(usize) -> bool) -> impl Iterator<Item = String> {
+    columns(rows, is_text).into_iter().map(|line| format!("  {line}"))
+}
+
+/// What each record says by itself, and where it contradicts the others.
+fn each(records: &[RecordAnswer], sensors: &[SensorEstimate; 2]) -> Vec<String> {
+    let mut lines = vec![
+        String::new(),
+        "what each record says by itself, with standard errors, the rest of the model at its best:".to_owned(),
+    ];
+    let [one, two] = sensors.each_ref().map(|sensor| sensor.channel.as_str());
+    let header = vec![
+        "record".to_owned(),
+        format!("time constant of {one}"),
+        format!("of {two}"),
+        format!("noise of {one}"),
+        format!("of {two}"),
+    ];
+    let of_record = |record: &RecordAnswer| {
+        let [tau_1, tau_2] = record.time_constants.map(own_time_constant);
+        let [noise_1, noise_2] = record.noise_std_k.map(|std_k| format!("{} K", digits(std_k, 3)));
+        vec![record.source.clone(), tau_1, tau_2, noise_1, noise_2]
+    };
+    let rows: Vec<Vec<String>> = [header].into_iter().chain(records.iter().map(of_record)).collect();
+    lines.extend(indented(&rows, |_| true));
+    for record in records {
         lines.extend(own(record));
         lines.extend(record.disagreements.iter().map(|one| disagreement(&record.source, one)));
         if record.agrees == Some(false) && record.disagreements.is_empty() {
@@ -43,7 +98,14 @@ pub(crate) fn lines(answer: &Diagnosis) -> Vec<String> {
             ));
         }
     }
+    if records.iter().any(|record| record.agrees == Some(false)) {
+        lines.push("  diagnose that record alone, and the others without it".to_owned());
+    }
     lines
+}
+
+fn own_time_constant(own: Option<OwnTimeConstant>) -> String {
+    own.map_or("-".to_owned(), |own| format!("{} ± {} s", digits(own.value_s, 4), digits(own.standard_error_s, 2)))
 }
 
 fn effects(found: &[EffectInPlace]) -> String {

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Answer, Bench, Gas, Trace, csv, estimates, interval, number, recovers};
+use common::{Answer, Bench, FAST_RIG, Gas, Trace, csv, estimates, interval, number, recovers};
 use serde_json::Value;
 
 /// Of the second channel. Noise of 0.3 K lets 2000 samples tell 0.01 K.
@@ -317,6 +317,31 @@ fn a_copy_of_a_record_is_refused() {
     let bench = offset("diagnose-copy");
     bench.write("copy.csv", with_offset(Trace::GOOD));
     bench.refuses(2, &["diagnose", "run.csv", "copy.csv"], &["copy.csv has the readings of run.csv"]);
+}
+
+/// Both time constants of several records: what is read of each is said with its name, and a model is of one.
+#[test]
+fn several_records_are_characterised_together() {
+    let bench = Bench::new("characterise-several");
+    for (seed, file) in ["1", "2", "3"].iter().zip(["a.csv", "b.csv", "c.csv"]) {
+        bench.write("rig.toml", FAST_RIG);
+        let answer = bench.run(&["simulate", "rig.toml", "--seed", seed, "--out", file, "--quiet"]);
+        assert_eq!(answer.code, 0, "{answer:#?}");
+    }
+    let answer = bench.run(&["characterise", "a.csv", "b.csv", "c.csv", "--json"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    answer.says(&["note: b.csv: ", "note: c.csv: "]);
+    let value = answer.json();
+    let sources: Vec<&str> = list(&value, "records").iter().map(|record| text(record, "source")).collect();
+    assert_eq!(sources, ["a.csv", "b.csv", "c.csv"]);
+    assert_eq!(value["transfer"]["count"], 3);
+    let shown = bench.run(&["characterise", "a.csv", "b.csv", "c.csv", "--quiet"]);
+    for words in ["with the time constants of the others", "what each record says by itself"] {
+        assert!(shown.stdout.contains(words), "{shown:#?}");
+    }
+    let message = &["--model m.json", "one file", "3", "twinlag diagnose"];
+    bench.refuses(2, &["characterise", "a.csv", "b.csv", "c.csv", "--model", "m.json"], message);
+    bench.refuses(2, &["characterise", "a.csv", "a.csv"], &["a.csv is named twice"]);
 }
 
 /// Of several records the one that cannot be used is named.

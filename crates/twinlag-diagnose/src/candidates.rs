@@ -6,9 +6,9 @@ use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
 use twinlag_model::{
-    Bands, Beside, Context, Effort, Fitted, Gas, Identifier, Linearised, Model, ModelError, Observations, Parameter,
-    Place, Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise, line_channel, lines,
-    report, white_deviance,
+    Bands, Beside, Context, Effort, Extra, Fitted, Gas, Identifier, Linearised, Model, ModelError, Observations,
+    Parameter, Place, Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, fit_noise,
+    fit_noise_again, line_channel, lines, report, white_deviance,
 };
 use twinlag_optimise::{End, Scale, Variable};
 
@@ -26,6 +26,10 @@ const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
+/// Rounds of a fit of noise and of what is under its weights, and the change of its parameters, as a part of them, below which it has
+/// settled: a tenth of their scatter in a record of some thousand samples. Rounds bring them nearer by a factor of three or more.
+const MOST_NOISE_ROUNDS: usize = 6;
+const NOISE_CHANGE: f64 = 0.01;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -475,20 +479,46 @@ impl<'a> Search<'a> {
             return None;
         }
         let bands = self.bands(current);
-        let place = match effect.channel() {
-            Some(i) => Place::Reading(i),
-            None => Place::Gas,
-        };
         let starts: Vec<[f64; 2]> = effect.starts().iter().map(|s| [s[0], s[1]]).collect();
-        let white = fit_noise(&plant, self.observations, &bands, None, &[], self.context.is_coarse);
-        let with = fit_noise(&plant, self.observations, &bands, Some(place), &starts, self.context.is_coarse);
+        let fit = |place| fit_noise(&plant, self.observations, &bands, place, &starts, self.context.is_coarse);
+        let (white, with) = (fit(None), fit(Some(place_of(effect))));
         let extra = with.extra?;
         let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
         let mut theta = current.theta.clone();
         theta.extend([extra.std_k, extra.correlation_s]);
-        // The weights move the time constants, and these the noise: once more is enough.
         let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
+        let fitted = self.with_settled_noise(fitted);
         let held_out_nats = 0.5 * (white.held_out - with.held_out);
         Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }
+
+    /// A fit whose noise is fitted again to what its other parameters leave over, and these again under its weights, until neither
+    /// moves: what is left over at time constants that are wrong for want of the noise is more than the noise. Itself without one.
+    pub(crate) fn with_settled_noise(&self, mut fitted: Fitted) -> Fitted {
+        let Some(index) = fitted.model.noise() else { return fitted };
+        let range = fitted.model.range(index);
+        for _ in 0..MOST_NOISE_ROUNDS {
+            let plant = fitted.model.plant(&fitted.theta, self.observations);
+            let bands = self.bands(&fitted);
+            let levels_k = self.context.noise_std_k;
+            let again = fit_noise_again(&plant, levels_k, self.observations, &bands, self.context.is_coarse);
+            let Some((noise_std_k, Extra { std_k, correlation_s, .. })) = again else { break };
+            let now = [std_k, correlation_s];
+            let before = &fitted.theta[range.clone()];
+            let is_settled = now.iter().zip(before).all(|(now, before)| (now / before).ln().abs() < NOISE_CHANGE);
+            let mut theta = fitted.theta.clone();
+            theta[range.clone()].copy_from_slice(&now);
+            let model = fitted.model.clone().with_noise(noise_std_k);
+            fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
+            if is_settled {
+                break;
+            }
+        }
+        fitted
+    }
+}
+
+/// Where a noise enters.
+fn place_of(noise: &Shared) -> Place {
+    noise.channel().map_or(Place::Gas, Place::Reading)
 }

@@ -3,6 +3,7 @@
 use twinlag_cross_relation::TestName;
 use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, summarise};
 
+use crate::candidates::Candidate;
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::errors::Squares;
@@ -18,7 +19,8 @@ use crate::naming::{judge_effect, name, of_defect, of_rapid};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 use crate::ties::{Tie, widen};
-use crate::twins::{ExactTwin, exact_twins};
+use crate::twins::{ExactTwin, cover_twins, exact_twins};
+use crate::whole_form::WholeForm;
 
 /// The answer, its numbers fitted once more to the whole record, and that fit.
 ///
@@ -44,10 +46,16 @@ pub(crate) fn conclude(
         remarks.push(Remark::SearchedInPieces { samples, all, is_screened });
     }
     let places = 0..state.taken.len();
-    let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, &last, &settings.effects)).collect();
-    let (remark, causes) = widen(&mut last, &whole_ties(&state, &twins), policy);
+    let covariance = last.covariance.as_deref();
+    let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, covariance, &settings.effects)).collect();
+    let whole_forms = WholeForm::each(&with_effects, &last, &state.prepared);
+    let ties: Vec<Tie> = whole_forms.iter().map(WholeForm::tie).chain(whole_ties(&state, &twins)).collect();
+    let (remark, causes) = widen(&mut last, &ties, policy);
     remarks.extend(remark);
     let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
+    for (place, found) in &mut found {
+        whole_forms.iter().for_each(|whole| whole.widen(*place, found, &settings.effects));
+    }
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
@@ -89,6 +97,8 @@ pub(crate) fn conclude(
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
     };
     let mut effects = judged(found, &with_effects, &last, &circumstances);
+    // Their intervals are those of the parameters that they follow from, with what these have to cover.
+    cover_twins(&mut last, effects.iter().flat_map(|found| &found.exact_twins));
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
     if !is_given {
         // What they would be under another cause follows from both.
@@ -136,10 +146,12 @@ pub(crate) fn conclude(
 
 /// The fit of all effects to the whole record, in numbers as well, and the first state of the slow body of each effect.
 fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit, Vec<Option<FirstState>>) {
-    let free = to_the_end(&state.current, state);
+    let prepared = &state.prepared;
+    let free = to_the_end(&state.search().with_settled_noise(state.current.clone()), state);
+    let free = free.without_mismatch_bias(&prepared.observations, &prepared.everything);
     let fit = summary(&free, state, policy);
     let is_noise_left = what_is_left(&fit, policy).is_none() && state.rapid.is_none();
-    let (fitted, first_states) = choose(free, &state.prepared, is_noise_left);
+    let (fitted, first_states) = choose(free, prepared, is_noise_left);
     let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
     let fit = if is_any_kept { summary(&fitted, state, policy) } else { fit };
     (fitted, fit, first_states)
@@ -197,12 +209,12 @@ fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>]) -> Vec<Tie> {
     let effects = state.current.model.effects.len();
     let mut out = Vec::new();
     for (taken, twins) in state.taken.iter().zip(twins) {
-        let named = taken.candidate.effect.identifier();
+        let place = |candidate: &Candidate| (candidate.effect.identifier(), candidate.effect.channel());
+        let named = place(&taken.candidate);
         out.extend(twins.iter().map(|twin| Tie::exact(named, twin)));
         let fitted = taken.ties.iter().filter_map(|tie| {
-            let other = tie.effect.identifier();
-            let place = (other, tie.effect.channel());
-            let is_exact = twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == place);
+            let other = place(tie);
+            let is_exact = twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == other);
             let is_whole = tie.fitted.model.effects.len() == effects;
             let is_new = !tie.effect.is_noise() && is_whole && !is_exact;
             is_new.then(|| Tie::fitted(named, other, &tie.fitted, &state.prepared)).flatten()

@@ -85,6 +85,8 @@ pub enum Reason {
     Cause {
         /// The effect that it is right with.
         effect: Identifier,
+        /// The channel of that, 0 or 1; `None` where it is of both.
+        channel: Option<usize>,
     },
     /// Effects may be there that the record hardly shows, and that would move the number out of its interval.
     Hidden {
@@ -269,10 +271,14 @@ impl fmt::Display for Reason {
             ),
             Self::RecordsDisagree { ratio, .. } => write!(
                 f,
-                "the records give values that differ {ratio:.1} times as much as noise explains, so that they have none in common"
+                "the records give values that differ {ratio:.1} times as much as noise explains, so that no value holds for all of them"
             ),
-            Self::Cause { effect } => {
-                write!(f, "right if the cause is {effect}: others explain the record as well and give another number")
+            Self::Cause { effect, channel } => {
+                let place = channel.map_or("", |channel| [" of T1", " of T2"][channel]);
+                write!(
+                    f,
+                    "right if the cause is {effect}{place}: others explain the record as well and give another number"
+                )
             }
             Self::Hidden { effects } => write!(
                 f,

@@ -1,7 +1,8 @@
 //! Several records of one rig: one model, and what each record says of it.
 
 use twinlag_model::{
-    Between, Contradicted, Fitted, ModelError, Observations, OneRecord, Policy, Settings, Value, Watch,
+    Between, BetweenRecords, Contradicted, Fitted, ModelError, Observations, OneRecord, OwnValue, Policy, Settings,
+    Value, Watch,
 };
 
 use crate::conclude::{conclude, is_explained};
@@ -48,6 +49,8 @@ pub struct OfRecord {
     pub left_out: LeftOut,
     /// Noise of its channels, K.
     pub noise_std_k: [f64; 2],
+    /// What it says of each time constant by itself, the rest of the model at its best; `None` where it says nothing.
+    pub time_constants_s: [Option<OwnValue>; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
     /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
@@ -135,6 +138,7 @@ pub fn diagnose_records(
         samples: records[record].samples(),
         left_out: transfer.records[record].clone(),
         noise_std_k: noise_std_k[record],
+        time_constants_s: [0, 1].map(|i| own_value(record, between?.parameters[i].as_ref()?)),
         own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
         agrees: agrees(record),
         disagreements: disagreements[record].clone(),
@@ -161,6 +165,10 @@ fn odd_one(
     let all = &state.prepared.raw.0;
     let (alone, _) = searched(&all.of_member(all.members()[odd].number), settings, watch)?;
     Ok(is_explained(&alone, settings).then_some(odd))
+}
+
+fn own_value(record: usize, between: &BetweenRecords) -> Option<OwnValue> {
+    between.own.iter().find(|own| own.record == record).copied()
 }
 
 /// Whether the records differ in a shared number by more than chance.

@@ -4,6 +4,7 @@ use twinlag_model::{Identifier, KnownTimeConstant, ModelFit, Policy, TimeConstan
 use twinlag_optimise::End;
 
 use crate::grade::{Basis, Judgement, Number, Reason, RecordScatter};
+use crate::transfer::EffectInChannel;
 
 /// Grades of the numbers that every fit has.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,9 +28,9 @@ pub struct Circumstances<'a> {
     pub span_s: f64,
     /// Whether the difference is the total delay of channel 2, which holds wherever the fit ended.
     pub is_total_delay: bool,
-    /// The effect that both time constants and their difference are right with alone, where others that explain the
-    /// record as well give other values.
-    pub causes: [Option<Identifier>; 3],
+    /// The effect, in its channel, that both time constants and their difference are right with alone, where others that explain
+    /// the record as well give other values.
+    pub causes: [Option<EffectInChannel>; 3],
     /// Effects that may be there unseen and would move the number, for both time constants and their difference.
     pub hidden: [Vec<Identifier>; 3],
     /// Effects that may be there unseen and would move the number, for each parameter of the effects in the model.
@@ -107,7 +108,7 @@ impl<'a> Circumstances<'a> {
             return Judgement::of(&reasons);
         };
         let most_s = self.policy.longest_given_share * self.span_s;
-        let cause = self.causes[index].map(|effect| Reason::Cause { effect });
+        let cause = self.causes[index].map(|(effect, channel)| Reason::Cause { effect, channel });
         let hidden = Reason::hidden(&self.hidden[index]);
         let mut own: Vec<Reason> = cause.into_iter().chain(hidden).collect();
         if value.abs() > most_s {

@@ -61,6 +61,7 @@ mod size;
 mod ties;
 mod transfer;
 mod twins;
+mod whole_form;
 
 pub use candidates::accepts;
 pub use diagnose::diagnose;
@@ -79,8 +80,8 @@ pub use remark::Remark;
 pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{
     About, Change, ChangePoint, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant, Line,
-    ModelError, ModelFit, Observations, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant, Trace, Track,
-    Value, Watch, evenly_spread, fit_with, track,
+    ModelError, ModelFit, Observations, OwnValue, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant,
+    Trace, Track, Value, Watch, evenly_spread, fit_with, track,
 };
 pub use twins::ExactTwin;
 

@@ -204,7 +204,8 @@ pub(crate) fn judge_effect(
     // Both time constants come first in a model.
     let hidden = |index: usize| Reason::hidden(circumstances.hidden_from_parameters.get(range.start - 2 + index)?);
     let basis = circumstances.whole_basis();
-    let cause = (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect });
+    let cause =
+        (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect, channel: found.fitted_in });
     for (index, value) in found.parameters.iter_mut().enumerate() {
         let is_positive = parameters.get(index).is_some_and(|p| p.variable.scale == Scale::Logarithmic);
         if index >= parameters.len() && value.standard_error.is_none() && !found.effect.is_noise() {

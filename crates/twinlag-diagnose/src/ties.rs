@@ -1,10 +1,11 @@
 //! What explains a record as well as what is named, and what the time constants are then.
 
-use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, Value, covariance};
+use twinlag_model::{Effort, Fitted, ModelFit, Policy, Prepared, Value, covariance};
 use twinlag_optimise::Scale;
 
 use crate::naming::interval_95;
 use crate::remark::Remark;
+use crate::transfer::EffectInChannel;
 use crate::twins::ExactTwin;
 
 /// Relative change of an end of an interval that is worth a remark.
@@ -14,8 +15,8 @@ const DECISIVE: f64 = 0.5;
 
 /// An effect that explains the record as well as the one that is named.
 pub(crate) struct Tie {
-    named: Identifier,
-    other: Identifier,
+    named: EffectInChannel,
+    other: EffectInChannel,
     /// Both time constants and their difference if it is the cause.
     numbers: [Option<Estimate>; 3],
 }
@@ -28,10 +29,20 @@ struct Estimate {
 
 impl Tie {
     /// By the fit of the whole model with the other effect, which is done once more to the end.
-    pub(crate) fn fitted(named: Identifier, other: Identifier, fitted: &Fitted, prepared: &Prepared) -> Option<Self> {
+    pub(crate) fn fitted(
+        named: EffectInChannel,
+        other: EffectInChannel,
+        fitted: &Fitted,
+        prepared: &Prepared,
+    ) -> Option<Self> {
         let (observations, everything) = (&prepared.observations, &prepared.everything);
         let fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
         let covariance = covariance(&fitted, observations, everything, false)?;
+        Some(Self::of(named, other, &fitted, &covariance))
+    }
+
+    /// By a fit of the whole model with the other effect, or with another form of the same, and its covariance.
+    pub(crate) fn of(named: EffectInChannel, other: EffectInChannel, fitted: &Fitted, covariance: &[Vec<f64>]) -> Self {
         let theta = &fitted.theta;
         let variance = |i: usize, j: usize| covariance[i][j];
         let estimate = |value: f64, variance: f64, scale: Scale| {
@@ -44,23 +55,27 @@ impl Tie {
             estimate(theta[1], variance(1, 1), Scale::Logarithmic),
             estimate(theta[1] - theta[0], of_difference, Scale::Linear { typical: 1.0 }),
         ];
-        Some(Self { named, other, numbers })
+        Self { named, other, numbers }
     }
 
     /// By algebra.
-    pub(crate) fn exact(named: Identifier, twin: &ExactTwin) -> Self {
+    pub(crate) fn exact(named: EffectInChannel, twin: &ExactTwin) -> Self {
         let estimate = |number: &Value| {
             let (standard_error, interval_95) = number.standard_error.zip(number.interval_95)?;
             Some(Estimate { value: number.value, standard_error, interval_95 })
         };
         let [one, two] = &twin.time_constants;
-        Self { named, other: twin.effect, numbers: [one, two, &twin.difference].map(estimate) }
+        Self { named, other: (twin.effect, Some(twin.channel)), numbers: [one, two, &twin.difference].map(estimate) }
     }
 }
 
 /// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
-/// the right one; returns what to say of that, and with which effect alone each of them was right before.
-pub(crate) fn widen(fit: &mut ModelFit, ties: &[Tie], policy: &Policy) -> (Option<Remark>, [Option<Identifier>; 3]) {
+/// the right one; returns what to say of that, and with which effect alone, in its channel, each of them was right before.
+pub(crate) fn widen(
+    fit: &mut ModelFit,
+    ties: &[Tie],
+    policy: &Policy,
+) -> (Option<Remark>, [Option<EffectInChannel>; 3]) {
     let (mut effects, mut causes) = (Vec::new(), [None; 3]);
     for Tie { named, other, numbers } in ties {
         for (i, estimate) in numbers.iter().enumerate() {
@@ -69,10 +84,11 @@ pub(crate) fn widen(fit: &mut ModelFit, ties: &[Tie], policy: &Policy) -> (Optio
             let Some([low, high]) = &mut number.interval_95_s else { continue };
             if *standard_error > 0.0 && (i == 2 || *standard_error < policy.vague_log_std * value) {
                 let more = (*low - from).max(0.0) + (to - *high).max(0.0);
-                if i < 2 && more > NOTICEABLE * value {
-                    effects.push(*other);
+                // Another form of the same effect is no other cause.
+                if i < 2 && more > NOTICEABLE * value && other != named {
+                    effects.push(other.0);
                 }
-                if more > DECISIVE * (*high - *low) {
+                if more > DECISIVE * (*high - *low) && other != named {
                     causes[i] = Some(*named);
                 }
                 (*low, *high) = (low.min(*from), high.max(*to));

@@ -8,6 +8,7 @@ use crate::grade::{Number, RecordScatter};
 use crate::judge::Circumstances;
 use crate::naming::interval_95;
 use crate::propagate::variance;
+use crate::whole_form::cover;
 
 /// An exact twin of an effect, and what the numbers are if it is the cause.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,11 +26,16 @@ pub struct ExactTwin {
     pub difference: Value,
 }
 
-/// Twins of effect `index` of the model `last`, whose uncertainty is that of `fit`.
+/// Twins of effect `index` of the model `last`, whose parameters have this covariance.
 ///
 /// - `allowed`: effects that may be named
-pub(crate) fn exact_twins(index: usize, last: &Fitted, fit: &ModelFit, allowed: &[Identifier]) -> Vec<ExactTwin> {
-    let Some(covariance) = &fit.covariance else { return Vec::new() };
+pub(crate) fn exact_twins(
+    index: usize,
+    last: &Fitted,
+    covariance: Option<&[Vec<f64>]>,
+    allowed: &[Identifier],
+) -> Vec<ExactTwin> {
+    let Some(covariance) = covariance else { return Vec::new() };
     let places: Vec<usize> = (0..2).chain(last.model.range(index)).collect();
     let all = |values: &[f64]| last.model.effects[index].twins(&values[2..], [values[0], values[1]]);
     let here: Vec<f64> = places.iter().map(|place| last.theta[*place]).collect();
@@ -47,7 +53,7 @@ pub(crate) fn exact_twins(index: usize, last: &Fitted, fit: &ModelFit, allowed: 
             time_constants: [0, 1].map(|i| number("time_constant", "s", &|twin| twin.time_constants_s[i])),
             difference: number("difference", "s", &|twin| twin.time_constants_s[1] - twin.time_constants_s[0]),
         };
-        out.set_intervals(1.0);
+        out.set_intervals();
         out
     };
     let twins = all(&here).into_iter().enumerate();
@@ -63,17 +69,46 @@ impl ExactTwin {
             .into_iter()
             .filter_map(|place| widening(place, last, fit, circumstances))
             .fold(1.0, f64::max);
-        self.set_intervals(factor);
+        for (number, is_positive) in self.numbers() {
+            let value = number.value;
+            let further = |end: f64| {
+                if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
+            };
+            number.interval_95 = number.interval_95.map(|ends| ends.map(further));
+        }
     }
 
-    /// Intervals of so many times the standard errors' own.
-    fn set_intervals(&mut self, factor: f64) {
-        let set = |number: &mut Value, scale: Scale| {
-            number.interval_95 = number.standard_error.map(|error| interval_95(number.value, factor * error, &scale));
-        };
-        self.time_constants.iter_mut().for_each(|number| set(number, Scale::Logarithmic));
-        set(&mut self.parameter, Scale::Linear { typical: 1.0 });
-        set(&mut self.difference, Scale::Linear { typical: 1.0 });
+    /// Makes its intervals cover those of the same twin of another form of the effect.
+    pub(crate) fn cover(&mut self, mut other: Self) {
+        for ((number, _), (other, _)) in self.numbers().into_iter().zip(other.numbers()) {
+            other.interval_95.into_iter().for_each(|interval| cover(number, interval));
+        }
+    }
+
+    fn set_intervals(&mut self) {
+        for (number, is_positive) in self.numbers() {
+            let scale = if is_positive { Scale::Logarithmic } else { Scale::Linear { typical: 1.0 } };
+            number.interval_95 = number.standard_error.map(|error| interval_95(number.value, error, &scale));
+        }
+    }
+
+    /// All of its numbers, and whether each is positive.
+    fn numbers(&mut self) -> [(&mut Value, bool); 4] {
+        let [one, two] = &mut self.time_constants;
+        [(one, true), (two, true), (&mut self.parameter, false), (&mut self.difference, false)]
+    }
+}
+
+/// Makes the intervals of both time constants and of their difference cover those of exact twins as well.
+pub(crate) fn cover_twins<'a>(fit: &mut ModelFit, twins: impl Iterator<Item = &'a ExactTwin>) {
+    for twin in twins {
+        let [one, two] = &mut fit.time_constants;
+        let numbers = [one, two, &mut fit.difference].into_iter();
+        for (number, of_twin) in numbers.zip([&twin.time_constants[0], &twin.time_constants[1], &twin.difference]) {
+            if let (Some([low, high]), Some([from, to])) = (&mut number.interval_95_s, of_twin.interval_95) {
+                (*low, *high) = (low.min(from), high.max(to));
+            }
+        }
     }
 }
 

@@ -73,6 +73,13 @@ pub fn log_determinant(matrix: &[Vec<f64>]) -> Option<f64> {
     Some((0..n).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum())
 }
 
+/// Adds a matrix to another.
+pub fn add(to: &mut [Vec<f64>], other: &[Vec<f64>]) {
+    for (row, other) in to.iter_mut().zip(other) {
+        row.iter_mut().zip(other).for_each(|(a, b)| *a += b);
+    }
+}
+
 /// Product of a matrix with a vector.
 pub fn times(matrix: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
     matrix.iter().map(|row| dot(row, vector)).collect()

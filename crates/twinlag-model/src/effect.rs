@@ -136,6 +136,13 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
+    /// The form that an instrument has of which this one is a part, and where its fit starts from `values` of this one: numbers of this
+    /// form are right for those of the other one only where the rest of it is nil, so their intervals cover both. By default this form
+    /// is the whole.
+    fn whole(&self, _values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+        None
+    }
+
     /// Whether parameters belong to a record and not to the rig: the phase of a line, a function of time. They are
     /// fitted again where the effect is known from another record, and of several records each has its own. Such an effect
     /// installs functions of time and offsets, nothing else.

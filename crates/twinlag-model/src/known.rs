@@ -110,6 +110,7 @@ impl Known {
         if !fitted.chi2.is_finite() {
             return Err(ModelError::Absurd);
         }
+        let fitted = fitted.without_mismatch_bias(&prepared.observations, &prepared.everything);
         Ok(Self { prepared, fitted, fitted_again })
     }
 }

@@ -16,8 +16,8 @@ use crate::selection::Selection;
 
 /// Time between two records, as a share of the longest one: enough to see the gap in a picture. Nothing else depends on it.
 const GAP_SHARE: f64 = 0.02;
-/// Relative difference of two sample periods that are one.
-const SAME_PERIOD: f64 = 1e-6;
+/// Relative difference of two sample periods that are one: clocks differ by less, and time constants move by no more than this share.
+const SAME_PERIOD: f64 = 1e-4;
 
 /// One record of several of a rig.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,7 +53,8 @@ impl Observations {
     /// ```
     ///
     /// # Errors
-    /// As [`Self::new`]: [`ModelError::TooShort`] for no record.
+    /// As [`Self::new`]: [`ModelError::TooShort`] for no record. [`ModelError::OtherPeriod`] for records of different sample periods; one
+    /// without a period makes all of them uneven.
     pub fn joined(records: &[Self]) -> Result<Self, ModelError> {
         let gap_s = GAP_SHARE * records.iter().map(Self::span_s).fold(0.0, f64::max);
         let mut stretches = Vec::new();
@@ -64,12 +65,12 @@ impl Observations {
             stretches.extend(record.stretches.iter().map(|stretch| stretch.as_member(number, later_s)));
             free_from_s = Some(last_s + later_s + gap_s);
         }
-        let period_s = records.first().and_then(|record| record.period_s);
-        let is_same = |other: Option<f64>| match (period_s, other) {
-            (Some(one), Some(other)) => (one - other).abs() <= SAME_PERIOD * one,
-            _ => false,
-        };
-        Self::new(stretches, period_s.filter(|_| records.iter().all(|record| is_same(record.period_s))))
+        let periods_s: Option<Vec<f64>> = records.iter().map(|record| record.period_s).collect();
+        let Some(&[first_s, ref later_s @ ..]) = periods_s.as_deref() else { return Self::new(stretches, None) };
+        match (2..).zip(later_s).find(|(_, period_s)| (*period_s - first_s).abs() > SAME_PERIOD * first_s) {
+            Some((record, period_s)) => Err(ModelError::OtherPeriod { record, period_s: *period_s, first_s }),
+            None => Self::new(stretches, Some(first_s)),
+        }
     }
 
     /// The records that these are, in order: one, unless they were joined.
@@ -297,10 +298,13 @@ mod tests {
         assert_eq!(factor(&left.raw.0), [1.0; 2]);
     }
 
-    /// Records with different sample periods are as one whose samples are not evenly spaced.
+    /// Failed: records of 0.5 and 0.25 s were as one with uneven samples, which fits neither.
     #[test]
-    fn different_periods_are_uneven_steps() {
-        let joined = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.25, 0.0)]).expect("two records");
-        assert_eq!(joined.period_s, None);
+    fn records_of_different_periods_are_refused() {
+        let error = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.25, 0.0)]).expect_err("two periods");
+        assert_eq!(error, ModelError::OtherPeriod { record: 2, period_s: 0.25, first_s: 0.5 });
+        // Clocks that differ by 20 parts in a million.
+        let joined = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.500_01, 0.0)]).expect("one period");
+        assert_eq!(joined.period_s, Some(0.5));
     }
 }

@@ -128,7 +128,7 @@ fn edges(bins: usize) -> Vec<usize> {
 }
 
 /// Power of each path of noise into the disagreement, per unit variance: both channels, the gas.
-struct Paths {
+pub(crate) struct Paths {
     rows: [Vec<f64>; 3],
     base: [f64; 2],
     extra: Vec<Extra>,
@@ -146,7 +146,7 @@ fn autoregressive(correlation_s: f64, step_s: f64, omega: f64) -> f64 {
 }
 
 impl Paths {
-    fn of(plant: &Plant, observations: &Observations) -> Self {
+    pub(crate) fn of(plant: &Plant, observations: &Observations) -> Self {
         Self {
             rows: plant.noise_paths(observations),
             base: plant.noise_std_k.map(|s| s * s),
@@ -155,23 +155,22 @@ impl Paths {
         }
     }
 
-    fn through(&self, place: Place) -> &[f64] {
-        match place {
+    /// Power that noise of unit variance at `place` has in the disagreement.
+    pub(crate) fn power(&self, place: Place, omega: f64) -> f64 {
+        let row = match place {
             Place::Reading(i) => &self.rows[i],
             Place::Gas => &self.rows[2],
-        }
+        };
+        power(row, omega)
     }
 
     /// Power of the disagreement.
-    fn total(&self, variance: [f64; 2], extra: &[Extra], omega: f64) -> f64 {
+    pub(crate) fn total(&self, variance: [f64; 2], extra: &[Extra], omega: f64) -> f64 {
         let white: f64 = (0..2).map(|i| variance[i] * power(&self.rows[i], omega)).sum();
         let coloured: f64 = extra
             .iter()
             .map(|e| {
-                e.std_k
-                    * e.std_k
-                    * autoregressive(e.correlation_s, self.step_s, omega)
-                    * power(self.through(e.place), omega)
+                e.std_k * e.std_k * autoregressive(e.correlation_s, self.step_s, omega) * self.power(e.place, omega)
             })
             .sum();
         white + coloured
@@ -244,7 +243,8 @@ struct NoiseSearch<'a> {
     /// Power of the whitening in each band.
     base: Vec<f64>,
     place: Option<Place>,
-    starts: &'a [[f64; 2]],
+    /// Factors of both levels, and the extra noise, that solvers start from.
+    starts: Vec<Vec<f64>>,
     is_coarse: [bool; 2],
 }
 
@@ -253,12 +253,21 @@ impl<'a> NoiseSearch<'a> {
         let paths = Paths::of(plant, observations);
         let power = |b: &Band| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE);
         let base = bands.0.iter().map(power).collect();
-        Self { observations, bands, paths, base, place: None, starts: &[], is_coarse }
+        Self { observations, bands, paths, base, place: None, starts: vec![vec![1.0; 2]], is_coarse }
     }
 
     fn cost(&self, half: Half) -> NoiseCost<'_> {
         let Self { bands, paths, base, place, is_coarse, .. } = self;
         NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse }
+    }
+
+    /// Levels of the channels, K.
+    fn noise_std_k(&self, x: &[f64]) -> [f64; 2] {
+        [0, 1].map(|i| self.paths.base[i].sqrt() * x[i])
+    }
+
+    fn extra(&self, x: &[f64]) -> Option<Extra> {
+        self.place.map(|place| Extra { place, std_k: x[2], correlation_s: x[3] })
     }
 
     /// The best levels, and the best extra noise, of a half.
@@ -267,7 +276,6 @@ impl<'a> NoiseSearch<'a> {
         let mut variables = ["level 1", "level 2"]
             .map(|name| Variable::logarithmic(name, 1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR))
             .to_vec();
-        let mut all = vec![vec![1.0, 1.0]];
         if self.place.is_some() {
             let swing = self.observations.swing_k();
             variables.push(Variable::logarithmic("noise std", 1e-6 * swing, 10.0 * swing));
@@ -276,11 +284,10 @@ impl<'a> NoiseSearch<'a> {
                 MIN_CORRELATION_STEPS * self.observations.step_s(),
                 MAX_CORRELATION_SPANS * self.observations.span_s(),
             ));
-            all = self.starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
         }
         let problem = Problem::new(&cost, variables).expect("bounds are in order");
         let simplex = Optimiser::NelderMead { spread_tolerance: 1e-7, edge: 0.5 };
-        let fits = all.iter().map(|start| {
+        let fits = self.starts.iter().map(|start| {
             let fit = simplex.minimise(&problem, start, &Budget { iterations: 300, evaluations: 600 });
             fit.expect("the start is finite")
         });
@@ -310,15 +317,40 @@ pub fn fit_noise(
     starts: &[[f64; 2]],
     is_coarse: [bool; 2],
 ) -> NoiseFit {
-    let search = NoiseSearch { place, starts, ..NoiseSearch::of(plant, observations, bands, is_coarse) };
+    let mut search = NoiseSearch { place, ..NoiseSearch::of(plant, observations, bands, is_coarse) };
+    if place.is_some() {
+        search.starts = starts.iter().map(|s| vec![1.0, 1.0, s[0], s[1]]).collect();
+    }
     let [x, even, odd] = [Half::Both, Half::Even, Half::Odd].map(|half| search.solve(half));
     let cost = search.cost(Half::Both);
     NoiseFit {
-        noise_std_k: [0, 1].map(|i| plant.noise_std_k[i] * x[i]),
-        extra: place.map(|place| Extra { place, std_k: x[2], correlation_s: x[3] }),
+        noise_std_k: search.noise_std_k(&x),
+        extra: search.extra(&x),
         likelihood: cost.likelihood(&x, Half::Both),
         held_out: cost.likelihood(&even, Half::Odd) + cost.likelihood(&odd, Half::Even),
     }
+}
+
+/// Fits the levels of white noise, and the extra noise of `plant`, to the residual that this plant has whitened. Nearly white, it has
+/// none of the power of low frequencies in high ones, as the blocks of a spectrum give a residual that is far from white.
+///
+/// - `levels_k`: levels of the channels as third differences have them
+/// - `is_coarse`: channels whose levels these do not determine
+pub fn fit_noise_again(
+    plant: &Plant,
+    levels_k: [f64; 2],
+    observations: &Observations,
+    bands: &Bands,
+    is_coarse: [bool; 2],
+) -> Option<([f64; 2], Extra)> {
+    let mut search = NoiseSearch::of(plant, observations, bands, is_coarse);
+    let extra = search.paths.extra.pop()?;
+    search.place = Some(extra.place);
+    search.paths.base = levels_k.map(|k| k * k);
+    let factor = |i: usize| (plant.noise_std_k[i] / levels_k[i]).clamp(1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR);
+    search.starts = vec![vec![factor(0), factor(1), extra.std_k, extra.correlation_s]];
+    let x = search.solve(Half::Both);
+    Some((search.noise_std_k(&x), search.extra(&x)?))
 }
 
 /// Runs of samples, each with its residual and whether this says anything.

@@ -109,7 +109,11 @@ pub fn summarise(
 ) -> ModelFit {
     let Left { tests, chi2_per_dof, trace } = Left::of(fitted, observations, selection, levels, policy);
     let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
-    let covariance = covariance(fitted, observations, selection, rejects);
+    let covariance = covariance(fitted, observations, selection, rejects).map(|mut covariance| {
+        let of_mismatch = fitted.mismatch_covariance(observations, selection);
+        of_mismatch.iter().for_each(|other| dense::add(&mut covariance, other));
+        covariance
+    });
     let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
     let (time_constants, difference) =
         time_constants(fitted, observations, selection, covariance.as_deref(), influence.as_ref(), policy);

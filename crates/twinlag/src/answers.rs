@@ -23,7 +23,8 @@ pub use gas_spectrum::{GasBand, GasSpectrum};
 pub use model::{Model, ModelEffect, ModelNumber};
 pub use plausible::PlausibleTimeConstant;
 pub use records::{
-    DisagreementAnswer, EffectInPlace, LeftOutUnit, RecordAnswer, RecordNumber, TransferAnswer, TransferError,
+    DisagreementAnswer, EffectInPlace, LeftOutUnit, OwnTimeConstant, RecordAnswer, RecordNumber, TransferAnswer,
+    TransferError,
 };
 pub use track::{Along, Ratio, Track};
 

@@ -106,6 +106,7 @@ impl Error {
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
             Self::Convection(_) => vec![Setting::Typical, Setting::Fluid],
             Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
+            Self::Model(ModelError::OtherPeriod { .. }) => vec![Setting::Sampling],
             Self::ModelChannels { .. } | Self::OtherChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],

@@ -4,7 +4,8 @@
 //! verb, and each verb has an answer that says how far it can be trusted:
 //!
 //! - [`characterise()`]: the time constant of each sensor *blind*, without knowing the gas
-//!   temperature, with 95 % intervals that account for the noise it finds;
+//!   temperature, with 95 % intervals that account for the noise it finds; [`characterise_records()`] does so for several records
+//!   of one rig;
 //! - [`diagnose()`]: which physical effect the model of two first-order lags lacks, and how much
 //!   better it is with it; [`characterise_with`] takes that model to other records of the rig;
 //! - [`compensate()`]: the gas temperature at every sample, with its standard deviation;
@@ -86,9 +87,9 @@ mod watch;
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
     ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, IntervalMethod, LeftOutUnit,
-    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, PlausibleTimeConstant, Quality, Ratio,
-    RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer,
-    TransferError,
+    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
+    PlausibleTimeConstant, Quality, Ratio, RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag,
+    SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
 pub use error::Error;
 pub use options::Options;
@@ -97,8 +98,9 @@ pub use reference::AgainstReference;
 pub use setting::Setting;
 pub use verbs::{
     CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
-    characterise_watched, characterise_with, compensate, compensate_watched, diagnose, diagnose_records,
-    diagnose_records_watched, diagnose_watched, joined, readings, track, track_watched,
+    characterise_records, characterise_records_watched, characterise_watched, characterise_with, compensate,
+    compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, joined, readings,
+    track, track_watched,
 };
 pub use watch::Watch;
 

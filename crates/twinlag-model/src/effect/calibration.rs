@@ -124,6 +124,11 @@ impl Effect for Calibration {
         fewer.iter().map(|(kind, start)| (of_kind(*kind, &self.context), start.to_vec())).collect()
     }
 
+    /// An instrument has a gain and an offset. A curvature is an effect beside them.
+    fn whole(&self, values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+        if matches!(self.kind, Kind::Gain | Kind::Offset) { self.extended(values) } else { None }
+    }
+
     fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
         match self.kind {
             Kind::Gain | Kind::Both => (0..2).map(|channel| Twin::crosstalk(channel, values[0], tau_s)).collect(),

@@ -29,27 +29,42 @@ pub(crate) static ABOUT: About = About::new("crosstalk", 8, candidates)
 pub(super) const MAX_SHARE: f64 = 0.25;
 
 struct Crosstalk {
+    /// Whether an offset of the channel is fitted with it, so that the temperature that adds nothing is free.
+    has_offset: bool,
     channel: usize,
     /// Temperature of the other channel that adds nothing, °C.
     about_c: f64,
+    context: Context,
     seat: Seat,
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
-    let both = |channel: usize| [0.0, context.mean_c[1 - channel]].map(|about_c| about(channel, about_c));
+    let both = |channel: usize| [0.0, context.mean_c[1 - channel]].map(|about_c| about(channel, about_c, context));
     (0..2).flat_map(both).collect()
 }
 
-fn about(channel: usize, about_c: f64) -> Shared {
+fn about(channel: usize, about_c: f64, context: &Context) -> Shared {
+    of_kind(channel, about_c, false, context)
+}
+
+fn of_kind(channel: usize, about_c: f64, has_offset: bool, context: &Context) -> Shared {
     let variable = Variable::linear("share", 0.03, -MAX_SHARE, MAX_SHARE);
     let share = Parameter::new("share", "1", variable).within(Domain::Share);
-    Arc::new(Crosstalk { channel, about_c, seat: Seat::new(Identifier::CROSSTALK, Some(channel), vec![share]) })
+    let mut parameters = vec![share];
+    if has_offset {
+        let other_c = context.mean_c[1 - channel] - about_c;
+        let widest = MAX_SHARE * (10.0 * context.swing_k + other_c.abs());
+        let variable = Variable::linear("offset", context.typical_k(channel), -widest, widest);
+        parameters.push(Parameter::new("offset", "K", variable));
+    }
+    let seat = Seat::new(Identifier::CROSSTALK, Some(channel), parameters);
+    Arc::new(Crosstalk { has_offset, channel, about_c, context: context.clone(), seat })
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "other effects may need what a record has not")]
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
     let neutral_c = |channel: usize| known.parameter("neutral_temperature").unwrap_or(context.mean_c[1 - channel]);
-    Ok(described_by(known, (0..2).map(|channel| about(channel, neutral_c(channel))).collect()))
+    Ok(described_by(known, (0..2).map(|channel| about(channel, neutral_c(channel), context)).collect()))
 }
 
 impl Effect for Crosstalk {
@@ -58,7 +73,7 @@ impl Effect for Crosstalk {
     }
 
     fn starts(&self) -> Vec<Vec<f64>> {
-        vec![vec![0.03]]
+        vec![if self.has_offset { vec![0.03, 0.0] } else { vec![0.03] }]
     }
 
     fn twins(&self, values: &[f64], tau_s: [f64; 2]) -> Vec<Twin> {
@@ -66,9 +81,17 @@ impl Effect for Crosstalk {
         vec![gain, Twin::crosstalk(1 - self.channel, gain.value, gain.time_constants_s)]
     }
 
+    /// The temperature that adds nothing is known of no instrument.
+    fn whole(&self, values: &[f64]) -> Option<(Shared, Vec<f64>)> {
+        (!self.has_offset).then(|| (of_kind(self.channel, self.about_c, true, &self.context), vec![values[0], 0.0]))
+    }
+
     fn install(&self, values: &[Number], plant: &mut Plant) {
         let reading = &mut plant.sensors[self.channel].reading;
         (reading.crosstalk, reading.crosstalk_about_c) = (values[0], self.about_c);
+        if self.has_offset {
+            reading.offset_k += values[1];
+        }
     }
 
     fn derived(&self) -> Vec<Derived> {

@@ -7,7 +7,7 @@ use twinlag_estimate::{IntervalBasis, Known, NoiseSource};
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, Sampling, SamplingKind};
 
-use crate::answers::PlausibleTimeConstant;
+use crate::answers::{PlausibleTimeConstant, RecordAnswer, TransferAnswer};
 use crate::options::Options;
 use crate::setting::Setting;
 
@@ -252,6 +252,13 @@ pub struct Characterisation {
     /// that are no-go, or was found in other data than these.
     #[serde(default)]
     pub model_remarks: Vec<String>,
+    /// Each record, where there are several of one rig.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub records: Vec<RecordAnswer>,
+    /// Errors of records that had no part in the fit, each left out in turn, where there are several: with two lags alone, so before
+    /// and after are the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transfer: Option<TransferAnswer>,
     /// The time constants beside what was expected of them, where that was asked ([`Plausibility`](crate::Plausibility)).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plausibility: Vec<PlausibleTimeConstant>,

@@ -71,6 +71,8 @@ impl FittedAnswer<'_> {
             status,
             not_identifiable: undetermined.map(|i| Known::NAMES[i].to_owned()).collect(),
             model_remarks: Vec::new(),
+            records: Vec::new(),
+            transfer: None,
             plausibility: Vec::new(),
             warnings: Vec::new(),
             advice: Vec::new(),

@@ -1,7 +1,9 @@
 //! What a diagnosis of several records says of each of them.
 
 use serde::{Deserialize, Serialize};
-use twinlag_diagnose::{BeforeAfter, Disagreement, EffectInChannel, Identifier, LeftOut, Masked, Transfer};
+use twinlag_diagnose::{BeforeAfter, Disagreement, EffectInChannel, Identifier, LeftOut, Masked, OwnValue, Transfer};
+
+use crate::answers::Characterisation;
 
 /// What is left out in turn, so that what is found has no part in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -94,6 +96,22 @@ pub struct RecordNumber {
     pub unit: String,
 }
 
+/// A time constant that all records share, as one of them has it by itself, the rest of the model at its best.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct OwnTimeConstant {
+    /// The estimate, s.
+    pub value_s: f64,
+    /// Its standard error in that record, s.
+    pub standard_error_s: f64,
+}
+
+impl OwnTimeConstant {
+    fn of(own: OwnValue) -> Self {
+        Self { value_s: own.value, standard_error_s: own.standard_error }
+    }
+}
+
 /// A number that all records share, and that this one contradicts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -152,6 +170,10 @@ pub struct RecordAnswer {
     /// Noise of its channels, K.
     #[serde(rename = "noise_std_K")]
     pub noise_std_k: [f64; 2],
+    /// Both time constants as it has them by itself, the rest of the model at its best; `None` where all records together do not
+    /// give the time constant.
+    #[serde(default)]
+    pub time_constants: [Option<OwnTimeConstant>; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<RecordNumber>,
     /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
@@ -166,12 +188,14 @@ pub struct RecordAnswer {
 }
 
 impl RecordAnswer {
+    /// - `shared`: what all records have together
     pub(crate) fn of(
         found: &twinlag_diagnose::OfRecord,
         source: &str,
-        channels: &[String; 2],
+        shared: &Characterisation,
         masked: Vec<Masked>,
     ) -> Self {
+        let channels = &shared.record.channels;
         let number = |own: &twinlag_diagnose::OwnNumber| RecordNumber {
             of: EffectInPlace::of(own.effect, channels),
             name: own.number.name.clone(),
@@ -188,6 +212,10 @@ impl RecordAnswer {
             error: TransferError::of(&found.left_out),
             found_on_others: found.left_out.found.iter().map(|e| EffectInPlace::of(*e, channels)).collect(),
             noise_std_k: found.noise_std_k,
+            time_constants: [0, 1].map(|i| {
+                let own = found.time_constants_s[i].filter(|_| shared.sensors[i].time_constant_s.is_some());
+                own.map(OwnTimeConstant::of)
+            }),
             own: found.own.iter().map(number).collect(),
             agrees: found.agrees,
             are_others_explained: found.left_out.are_others_explained == Some(true),

@@ -30,6 +30,7 @@ use crate::setting::Setting;
 use crate::watch::{Stop, UNWATCHED, Watch};
 use conclude::Judged;
 use excerpt::Excerpt;
+pub(super) use unseen::judge_unseen;
 
 /// Both time constants of `record`, with intervals, noise levels and residual tests.
 ///
@@ -95,7 +96,7 @@ pub fn characterise_watched(record: &Record, options: &Options, watch: Watch<'_>
         let what = "right if nothing is missing: of a single tone two time constants absorb any effect".into();
         answer.rest_on(&Reason::Fault { what, grade: Grade::Conditional });
     } else {
-        unseen::judge_unseen(&mut answer, &looked_at.observations, options, &stop)?;
+        judge_unseen(&mut answer, &looked_at.observations, options, &stop)?;
     }
     Ok(answer)
 }

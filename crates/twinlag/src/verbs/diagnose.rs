@@ -220,7 +220,7 @@ fn remark_on_reference(error: &ErrorBeforeAfter) -> Option<String> {
 }
 
 /// What was asked of the two-lag model that the loop does not use.
-fn remark_on_options(options: &Options) -> Option<String> {
+pub(super) fn unused(options: &Options) -> Vec<Setting> {
     let is_time_constant = |p: Parameter| matches!(p, Parameter::Tau1 | Parameter::Tau2);
     let asked = [
         (options.estimator != Options::default().estimator, Setting::Estimator),
@@ -234,7 +234,11 @@ fn remark_on_options(options: &Options) -> Option<String> {
         (options.discard.is_some(), Setting::Discard),
         (options.intervals != Intervals::Auto, Setting::Intervals),
     ];
-    let unused: Vec<Setting> = asked.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect();
+    asked.into_iter().filter_map(|(is_asked, what)| is_asked.then_some(what)).collect()
+}
+
+fn remark_on_options(options: &Options) -> Option<String> {
+    let unused = unused(options);
     (!unused.is_empty()).then(|| {
         format!(
             "a diagnosis uses the noise levels and the time constants that are given, and nothing else that is asked of \

@@ -48,6 +48,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             status,
             not_identifiable: Vec::new(),
             model_remarks: Vec::new(),
+            records: Vec::new(),
+            transfer: None,
             plausibility: Vec::new(),
             warnings: Vec::new(),
             advice: Vec::new(),

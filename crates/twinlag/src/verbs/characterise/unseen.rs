@@ -14,7 +14,7 @@ use crate::watch::Stop;
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-pub(super) fn judge_unseen(
+pub(in crate::verbs) fn judge_unseen(
     answer: &mut Characterisation,
     observations: &Observations,
     options: &Options,

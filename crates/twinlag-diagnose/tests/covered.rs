@@ -1,0 +1,83 @@
+//! That intervals cover what a record leaves open beside the effect that is named. The rigs are those of `twinlag-signal`, which share
+//! no code with the models that are fitted.
+
+mod common;
+
+use common::{TAU_S, found, record};
+use twinlag_diagnose::{Diagnosis, Identifier, Observations, Settings, Stretch, Verdict, diagnose};
+use twinlag_signal::{Gas, Mismatch, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+/// Failed: a gain of 1.03 beside an offset of −0.1 K, at 300 °C, was given as 1.0296667 with an interval of seven digits, and so was the
+/// share of the crosstalk that would look the same. Of an interval twice as wide the truth is outside once in ten thousand times.
+#[test]
+fn a_gain_is_right_if_there_is_an_offset_as_well() {
+    let [gain, offset_k] = [1.03, -0.1];
+    for seed in 1..=4 {
+        let diagnosis = found(&record(seed, |sensors| (sensors[1].gain, sensors[1].offset_k) = (gain, offset_k)));
+        assert_eq!(diagnosis.verdict, Verdict::Explained);
+        let [effect] = &diagnosis.effects[..] else { panic!("{:#?}", diagnosis.effects) };
+        let holds = |interval: Option<[f64; 2]>, truth: f64| {
+            let [low, high] = interval.expect("it has an interval");
+            let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+            assert!((truth - middle).abs() < 2.0 * half, "[{low}, {high}], want {truth}");
+        };
+        // Whichever of them was taken to be the cause.
+        let parameter = effect.parameters.iter().find(|p| ["gain", "share"].contains(&&p.name[..])).expect("a size");
+        if effect.effect == Identifier::CALIBRATION {
+            holds(parameter.interval_95, gain);
+        }
+        for (i, tau_s) in TAU_S.into_iter().enumerate() {
+            holds(diagnosis.last.time_constants[i].interval_95_s, tau_s);
+        }
+        let shares = effect.exact_twins.iter().filter(|twin| (twin.effect, twin.channel) == (Identifier::CROSSTALK, 1));
+        shares.for_each(|twin| holds(twin.parameter.interval_95, gain - 1.0));
+    }
+}
+
+/// A rig of which one sensor sees gas that differs by 3 % of what it moves.
+fn mismatched(seed: u64, channel: &str) -> Observations {
+    let sensors = [0.1, 0.4].map(|tau_s| {
+        let mut sensor = Sensor::new(format!("{tau_s}"), tau_s);
+        sensor.noise = Some(Noise::white(0.05));
+        sensor
+    });
+    let gas = Signal::Turbulence(Turbulence { std_k: 15.0, corner_hz: 0.4, cutoff_hz: 8.0 });
+    let rig = Rig::new(seed, Record::new(4000, 0.02), Gas::new(300.0, gas), sensors).expect("a rig");
+    let mut mismatch = Mismatch::new(0.5, 0.8);
+    mismatch.channel = Some(channel.to_owned());
+    let record = rig.with_mismatch(mismatch).expect("a rig").simulate().expect("a record");
+    let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+    Observations::new(vec![stretch], Some(0.02)).expect("a record")
+}
+
+/// Failed: both time constants were too short, by 1.3 standard errors in the mean, since the lag that is tried undoes part of what the
+/// mismatch has. In a mean of eight a standard error is 0.35; half the difference between both sensors is within it.
+#[test]
+fn a_mismatch_of_the_gas_leaves_no_bias() {
+    let watch = |_: &str, _, _| std::ops::ControlFlow::Continue(());
+    let diagnosed = |observations: &Observations| -> Diagnosis {
+        diagnose(observations, &Settings::default(), &watch).expect("a record that can be diagnosed")
+    };
+    for channel in ["0.1", "0.4"] {
+        let mut deviations = [0.0; 2];
+        let mut count = 0.0;
+        for seed in 1..=8 {
+            let diagnosis = diagnosed(&mismatched(seed, channel));
+            let is_of_noise = diagnosis.effects.iter().all(|found| found.effect.about().is_noise);
+            if diagnosis.verdict != Verdict::Explained || !is_of_noise || diagnosis.effects[0].fitted_in.is_some() {
+                continue;
+            }
+            count += 1.0;
+            for (i, truth_s) in [0.1, 0.4].into_iter().enumerate() {
+                let tau = &diagnosis.last.time_constants[i];
+                let (value_s, error_s) = (tau.value_s.expect("given"), tau.standard_error_s.expect("given"));
+                deviations[i] += (value_s - truth_s) / error_s;
+            }
+        }
+        assert!(count >= 5.0, "{count} of 8 records name the mismatch");
+        for sum in deviations {
+            let mean: f64 = sum / count;
+            assert!(mean.abs() < 3.0 / f64::sqrt(count), "{channel}: {mean} standard errors in {count} records");
+        }
+    }
+}
