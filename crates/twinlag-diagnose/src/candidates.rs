@@ -486,8 +486,8 @@ impl<'a> Search<'a> {
         let model = current.model.with(effect.clone()).with_noise(with.noise_std_k);
         let mut theta = current.theta.clone();
         theta.extend([extra.std_k, extra.correlation_s]);
+        // The weights move the time constants, and these the noise: with the last model that is settled.
         let fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
-        let fitted = self.with_settled_noise(fitted);
         let held_out_nats = 0.5 * (white.held_out - with.held_out);
         Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }
