@@ -147,9 +147,17 @@ pub(crate) fn conclude(
 /// The fit of all effects to the whole record, in numbers as well, and the first state of the slow body of each effect.
 fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit, Vec<Option<FirstState>>) {
     let prepared = &state.prepared;
-    let free = to_the_end(&state.search().with_settled_noise(state.current.clone()), state);
-    let free = free.without_mismatch_bias(&prepared.observations, &prepared.everything);
-    let fit = summary(&free, state, policy);
+    let in_numbers = |fitted: Fitted| {
+        let fit = summary(&fitted, state, policy);
+        (fitted, fit)
+    };
+    // A noise is fitted again to what is left over where that is noise, and not an error of the model.
+    let settled = state.current.model.noise().map(|_| {
+        let settled = to_the_end(&state.search().with_settled_noise(state.current.clone()), state);
+        in_numbers(settled.without_mismatch_bias(&prepared.observations, &prepared.everything))
+    });
+    let settled = settled.filter(|(_, fit)| what_is_left(fit, policy).is_none());
+    let (free, fit) = settled.unwrap_or_else(|| in_numbers(to_the_end(&state.current, state)));
     let is_noise_left = what_is_left(&fit, policy).is_none() && state.rapid.is_none();
     let (fitted, first_states) = choose(free, prepared, is_noise_left);
     let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
