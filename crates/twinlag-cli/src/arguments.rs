@@ -82,7 +82,7 @@ pub(crate) enum Command {
     Demo(Demo),
 }
 
-/// Estimate both time constants of a record.
+/// Estimate both time constants of a record, or of several of one rig.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 FILE is delimited text as loggers write it (comma, semicolon or tab; decimal comma; units in the header; comments; ISO or
@@ -151,8 +151,8 @@ pub(crate) struct Diagnose {
     /// Save the model with its effects, for `--model` of other commands.
     #[arg(long, value_name = "JSON")]
     pub(crate) save: Option<PathBuf>,
-    /// Do not consider this effect; may be given several times.
-    #[arg(long, value_name = "EFFECT")]
+    /// Do not consider this effect; several after commas, or given several times.
+    #[arg(long, value_name = "EFFECT", value_delimiter = ',')]
     pub(crate) without: Vec<Identifier>,
     /// Overwrite output files that exist.
     #[arg(long)]
@@ -588,11 +588,11 @@ pub(crate) struct Plan {
 /// Explain a name in plain words.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-NAME is an effect (delay), a verdict (partly-explained), a status (model-rejected), a test of the residual (coherence), or
-two-sensors, which is what two sensors alone can never reveal. Any other name is answered with the list.")]
+NAME is an effect (delay), a verdict (partly-explained), a status (model-rejected), a grade (conditional), a test of the residual
+(coherence), a part of an answer (transfer), or two-sensors, which is what two sensors alone can never reveal.")]
 pub(crate) struct Explain {
-    /// What to explain.
-    pub(crate) name: String,
+    /// What to explain; without it, all that can be explained is listed.
+    pub(crate) name: Option<String>,
 }
 
 /// Simulate a built-in rig and diagnose it.

@@ -120,6 +120,35 @@ const TESTS: [(TestName, &str); 11] = [
     ),
 ];
 
+/// Fields of an answer that are about something else than a number.
+const FIELDS: [(&str, &str); 4] = [
+    (
+        "transfer",
+        "errors on what had no part in finding the model: of several records each in turn, where nothing is fitted but what belongs to \
+         a record; of a single one each quarter in turn. 1 is noise; before is two first-order lags, after is the model",
+    ),
+    (
+        "agrees",
+        "whether one of several records agrees with the others. It does not if it contradicts them on a number that all share, or if it \
+         is explained and so are they, but not together; not known (null) where the records do not say which of them differs, or are \
+         not explained",
+    ),
+    (
+        "exact-twins",
+        "causes that no record distinguishes from the one that is named, whatever the gas and however little noise, with the numbers \
+         that each would mean: a gain and a share of one channel in the other are such twins. What is known of the rig decides",
+    ),
+    (
+        "first-state",
+        "whether the slow body of a slow mode was in equilibrium with the gas as the record began, or began anywhere: the residual says \
+         nothing of it, one number for each record does. The answer says which was taken, with which odds, and the numbers of the \
+         other case",
+    ),
+];
+
+/// Kinds of names, in the order in which they are listed.
+const KINDS: [&str; 7] = ["effect", "verdict", "status", "grade", "test", "answer", "limit"];
+
 /// A name with what it means.
 #[derive(Serialize)]
 struct Explanation {
@@ -136,14 +165,21 @@ struct Explanations<'a> {
 
 pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     let all = explanations();
+    let of = |kind: &str| all.iter().filter(|e| e.kind == kind).map(|e| e.name).collect::<Vec<_>>().join(", ");
+    let list = KINDS.map(|kind| format!("\n  {kind}: {}", of(kind))).concat();
+    let name = command.name.as_ref().map(|name| name.replace('_', "-"));
     // `calibration` is an effect and a test.
-    let found: Vec<&Explanation> = all.iter().filter(|e| e.name == command.name).collect();
-    if found.is_empty() {
-        let of = |kind: &str| all.iter().filter(|e| e.kind == kind).map(|e| e.name).collect::<Vec<_>>().join(", ");
-        let known: Vec<String> = ["effect", "verdict", "status", "grade", "test", "limit"]
-            .map(|kind| format!("\n  {kind}: {}", of(kind)))
-            .to_vec();
-        return Err(Failure::Usage(format!("nothing is called '{}'; there are{}", command.name, known.concat())));
+    let found: Vec<&Explanation> = all.iter().filter(|e| name.as_ref().is_none_or(|name| e.name == *name)).collect();
+    match &command.name {
+        Some(name) if found.is_empty() => {
+            return Err(Failure::Usage(format!("nothing is called '{name}'; there are{list}")));
+        }
+        None if !console.json => {
+            writeln!(stdout(), "twinlag explain NAME, with one of{list}")
+                .map_err(|e| Failure::Other(format!("standard output: {e}")))?;
+            return Ok(0);
+        }
+        _ => {}
     }
     if console.json {
         print::json(&Explanations { explanations: found })?;
@@ -172,6 +208,7 @@ fn explanations() -> Vec<Explanation> {
         .chain(GRADES.map(worded("grade")))
         .chain([("grades", GRADE)].map(worded("grade")))
         .chain(tests.map(worded("test")))
+        .chain(FIELDS.map(worded("answer")))
         .chain([two_sensors])
         .collect()
 }

@@ -1,10 +1,7 @@
 //! What each of several records has for itself, as a table.
 
-use twinlag::{
-    Characterisation, Diagnosis, DisagreementAnswer, EffectInPlace, LeftOutUnit, OwnTimeConstant, RecordAnswer,
-    SensorEstimate,
-};
-use twinlag_pages::parameter_in_words;
+use twinlag::{Characterisation, Diagnosis, EffectInPlace, LeftOutUnit, OwnTimeConstant, RecordAnswer, SensorEstimate};
+use twinlag_pages::{contradictions_in_words, parameter_in_words};
 
 use crate::columns::columns;
 use crate::print::{digits, interval};
@@ -90,13 +87,7 @@ fn each(records: &[RecordAnswer], sensors: &[SensorEstimate; 2]) -> Vec<String> 
     lines.extend(indented(&rows, |_| true));
     for record in records {
         lines.extend(own(record));
-        lines.extend(record.disagreements.iter().map(|one| disagreement(&record.source, one)));
-        if record.agrees == Some(false) && record.disagreements.is_empty() {
-            lines.push(format!(
-                "  {} contradicts the others: it is explained alone, and they are without it, but not together",
-                record.source
-            ));
-        }
+        lines.extend(contradictions_in_words(record).into_iter().map(|line| format!("  {line}")));
     }
     if records.iter().any(|record| record.agrees == Some(false)) {
         lines.push("  diagnose that record alone, and the others without it".to_owned());
@@ -130,19 +121,4 @@ fn own(record: &RecordAnswer) -> Vec<String> {
         format!("  {} alone: {} of {} {value}", record.source, parameter_in_words(&own.name), in_place(&own.of))
     };
     record.own.iter().map(number).collect()
-}
-
-fn disagreement(source: &str, one: &DisagreementAnswer) -> String {
-    let what = match &one.of {
-        Some(effect) => format!("{} of {}", parameter_in_words(&one.name), in_place(effect)),
-        None => format!("the time constant of {}", one.name),
-    };
-    let unit = if one.unit == "1" { String::new() } else { format!(" {}", one.unit) };
-    format!(
-        "  {source} contradicts the others: it gives {what} as {} ± {}{unit}, and they give {} ± {}{unit}",
-        digits(one.value, 4),
-        digits(one.standard_error, 2),
-        digits(one.others, 4),
-        digits(one.others_standard_error, 2)
-    )
 }

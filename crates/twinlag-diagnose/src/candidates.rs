@@ -27,7 +27,7 @@ const GRID_TO_SHARE: f64 = 0.03;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
 /// Rounds of a fit of noise and of what is under its weights, and the change of its parameters, as a part of them, below which it has
-/// settled: a tenth of their scatter in a record of some thousand samples. Rounds bring them nearer by a factor of three or more.
+/// settled. Chosen.
 const MOST_NOISE_ROUNDS: usize = 6;
 const NOISE_CHANGE: f64 = 0.01;
 /// Samples beyond the reach of the model without which no noise is fitted.

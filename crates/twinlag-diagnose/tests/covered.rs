@@ -50,7 +50,7 @@ fn mismatched(seed: u64, channel: &str) -> Observations {
     Observations::new(vec![stretch], Some(0.02)).expect("a record")
 }
 
-/// Failed: both time constants were too short, by 1.3 standard errors in the mean, since the lag that is tried undoes part of what the
+/// Failed: both time constants were too short, by half to one standard error in the mean of records with 0.4 K, since the lag that is tried undoes part of what the
 /// mismatch has. In a mean of eight a standard error is 0.35; half the difference between both sensors is within it.
 #[test]
 fn a_mismatch_of_the_gas_leaves_no_bias() {

@@ -26,7 +26,7 @@ use crate::plant::Place;
 use crate::selection::Selection;
 use crate::spectrum::Paths;
 
-/// Frequencies of a mean over all of them: the spectra bend over a twentieth of the highest one at the fastest.
+/// Frequencies of a mean over all of them. Chosen.
 const FREQUENCIES: usize = 1024;
 /// Step of derivatives, relative to the scale of a parameter: rounding then leaves half of all digits.
 const STEP: f64 = 1e-5;

@@ -5,6 +5,7 @@ mod evidence;
 mod if_known;
 mod limits;
 mod numbers;
+mod records;
 mod series;
 mod verdict;
 
@@ -35,6 +36,7 @@ pub fn diagnosis_report(record: &Record, answer: &Diagnosis, command: &str) -> R
     document = page.residual(document)?;
     document = page.evidence(document);
     document = page.numbers(document)?;
+    document = page.records(document)?;
     document = page.if_known(document)?;
     document = page.errors(document);
     document = page.tests(document);

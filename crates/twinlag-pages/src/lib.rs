@@ -16,4 +16,4 @@ pub use diagnosis::{diagnosis_report, residual_picture};
 pub use gas::{gas_report, track_report};
 pub use pictures::{gas_picture, track_picture};
 pub use twinlag_report::ReportError;
-pub use words::{parameter_in_words, plausibility_in_words};
+pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words};

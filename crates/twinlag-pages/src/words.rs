@@ -2,8 +2,10 @@
 
 use twinlag::cross_relation::TestName;
 use twinlag::diagnosis::{Grade, Identifier, Judgement};
-use twinlag::{Difference, EffectNumber, PlausibleTimeConstant, SensorEstimate};
-use twinlag_report::{between, rounded};
+use twinlag::{
+    Difference, DisagreementAnswer, EffectInPlace, EffectNumber, PlausibleTimeConstant, RecordAnswer, SensorEstimate,
+};
+use twinlag_report::{between, plus_minus, rounded};
 
 pub(crate) const ABSENT: &str = "not given";
 
@@ -49,6 +51,35 @@ pub fn parameter_in_words(name: &str) -> String {
         "curvature_skew" => "third moment of its temperatures over the variance".into(),
         _ => name.replace('_', " "),
     }
+}
+
+/// An effect with its channel.
+pub(crate) fn in_place(EffectInPlace { effect, channel, .. }: &EffectInPlace) -> String {
+    let name = words(*effect);
+    channel.as_ref().map_or_else(|| name.clone(), |channel| format!("{name} in {channel}"))
+}
+
+/// What a record contradicts the others on; nothing where it does not.
+pub fn contradictions_in_words(record: &RecordAnswer) -> Vec<String> {
+    let source = &record.source;
+    if record.agrees == Some(false) && record.disagreements.is_empty() {
+        return vec![format!(
+            "{source} contradicts the others: it is explained alone, and they are without it, but not together"
+        )];
+    }
+    let of = |one: &DisagreementAnswer| {
+        let what = match &one.of {
+            Some(effect) => format!("{} of {}", parameter_in_words(&one.name), in_place(effect)),
+            None => format!("the time constant of {}", one.name),
+        };
+        let number = |value: f64, error: f64| with_unit(&plus_minus(value, Some(error)), &one.unit);
+        format!(
+            "{source} contradicts the others: it gives {what} as {}, and they give {}",
+            number(one.value, one.standard_error),
+            number(one.others, one.others_standard_error)
+        )
+    };
+    record.disagreements.iter().map(of).collect()
 }
 
 /// Whether a time constant is what was expected of it, and what it would take where it is not.
