@@ -339,6 +339,10 @@ fn several_records_are_characterised_together() {
     for words in ["with the time constants of the others", "what each record says by itself"] {
         assert!(shown.stdout.contains(words), "{shown:#?}");
     }
+    let answer = bench.run(&["diagnose", "a.csv", "b.csv", "--report", "page.html", "--quiet"]);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let page = String::from_utf8(bench.read("page.html")).expect("text");
+    assert!(page.contains("Each record") && page.contains("b.csv"), "{page}");
     let message = &["--model m.json", "one file", "3", "twinlag diagnose"];
     bench.refuses(2, &["characterise", "a.csv", "b.csv", "c.csv", "--model", "m.json"], message);
     bench.refuses(2, &["characterise", "a.csv", "a.csv"], &["a.csv is named twice"]);
