@@ -156,7 +156,10 @@ fn odd_one(
     watch: Watch<'_>,
 ) -> Result<Option<usize>, ModelError> {
     let left_out = transfer.records.iter().enumerate();
-    let explained = left_out.filter(|(_, left_out)| left_out.are_others_explained == Some(true));
+    // Two rigs together leave a residual that goes with the gas of each in another way, which looks like noise of any colour.
+    let is_explained_by_more =
+        |of: &LeftOut| of.are_others_explained == Some(true) && !of.are_others_explained_by_noise;
+    let explained = left_out.filter(|(_, left_out)| is_explained_by_more(left_out));
     let explained: Vec<usize> = explained.map(|(record, _)| record).collect();
     let &[odd] = &explained[..] else { return Ok(None) };
     if transfer.records.len() < FEWEST_TO_HAVE_AN_ODD_ONE {

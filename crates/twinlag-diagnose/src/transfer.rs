@@ -31,6 +31,8 @@ pub struct LeftOut {
     pub found: Vec<EffectInChannel>,
     /// Whether two lags and what was found on them explain the other records; `None` of a block.
     pub are_others_explained: Option<bool>,
+    /// Whether a noise that was found in the residual is part of that explanation: it may stand for what these records differ.
+    pub are_others_explained_by_noise: bool,
 }
 
 /// Errors on records, or blocks of one, that were left out, one at a time.
@@ -89,7 +91,13 @@ impl Errors {
         let [normalised_rms, input_difference_k] = before_and_after(squares);
         let effects = model.effects.iter().filter(|effect| !effect.is_noise());
         let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
-        self.each.push(LeftOut { normalised_rms, input_difference_k, found, are_others_explained });
+        self.each.push(LeftOut {
+            normalised_rms,
+            input_difference_k,
+            found,
+            are_others_explained,
+            are_others_explained_by_noise: model.noise().is_some(),
+        });
     }
 
     fn transfer(self) -> Transfer {
