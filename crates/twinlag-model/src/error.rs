@@ -23,7 +23,7 @@ pub enum ModelError {
     TooFewRecords { records: usize },
     #[error(
         "records that are fitted together have one sample period: that of the first is {first_s} s, that of record {record} is \
-         {period_s} s. Take those of one period together, or the time stamps of all as unevenly spaced"
+         {period_s} s. Take those of one period together"
     )]
     OtherPeriod { record: usize, period_s: f64, first_s: f64 },
     #[error("expected finite readings and times, got one that is not")]

@@ -52,7 +52,7 @@ pub enum Error {
     ModelChannels { model: [String; 2], record: [String; 2] },
     #[error(
         "{file}: expected the sensors of the first record, {} and {}, in this order, got {} and {}. Records of one rig have the \
-         same two sensors: choose their columns", expected[0], expected[1], found[0], found[1]
+         same two sensors: choose their columns, and give these the same names in all files", expected[0], expected[1], found[0], found[1]
     )]
     OtherChannels { file: String, expected: [String; 2], found: [String; 2] },
     #[error("{file}: {error}")]
@@ -106,7 +106,6 @@ impl Error {
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
             Self::Convection(_) => vec![Setting::Typical, Setting::Fluid],
             Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
-            Self::Model(ModelError::OtherPeriod { .. }) => vec![Setting::Sampling],
             Self::ModelChannels { .. } | Self::OtherChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],

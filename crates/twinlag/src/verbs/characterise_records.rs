@@ -50,8 +50,8 @@ pub fn characterise_records_watched(
     if let [first, others @ ..] = &unused(options)[..] {
         return Err(Error::Setting {
             setting: *first,
-            expected: "a single record for it: of several, noise levels and time constants can be given, and a diagnosis finds \
-                       gain, offset and second lags"
+            expected: "one record beside it. Of several records the noise levels and known time constants can be given; what else \
+                       they share, a diagnosis finds"
                 .into(),
             got: format!("{} records", records.len()),
             also: others.to_vec(),
