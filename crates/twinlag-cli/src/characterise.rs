@@ -31,7 +31,7 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
     let run = |options: Options| match (&records[..], &given) {
         ([record], Some((path, model))) => {
             let _progress = Progress::start(console, format!("characterising {} samples", record.len()));
-            twinlag::characterise_with(&record, model, &options).map_err(|e| match e {
+            twinlag::characterise_with(record, model, &options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
                 | twinlag::Error::Model(

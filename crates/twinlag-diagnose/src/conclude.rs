@@ -49,13 +49,10 @@ pub(crate) fn conclude(
     let covariance = last.covariance.as_deref();
     let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, covariance, &settings.effects)).collect();
     let whole_forms = WholeForm::each(&with_effects, &last, &state.prepared);
-    let ties: Vec<Tie> = whole_forms.iter().map(WholeForm::tie).chain(whole_ties(&state, &twins)).collect();
-    let (remark, causes) = widen(&mut last, &ties, policy);
+    let (remark, causes) = widen(&mut last, &whole_ties(&state, &twins, &whole_forms), policy);
     remarks.extend(remark);
     let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
-    for (place, found) in &mut found {
-        whole_forms.iter().for_each(|whole| whole.widen(*place, found, &settings.effects));
-    }
+    whole_forms.iter().for_each(|whole| whole.widen_each(&mut found, &settings.effects));
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
     {
@@ -213,9 +210,10 @@ fn base_fit(state: &State<'_>, unmasked: Option<&Fitted>, policy: &Policy) -> Mo
 /// them is noise, and those that are exact twins are known without a fit.
 ///
 /// - `twins`: of each effect
-fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>]) -> Vec<Tie> {
+/// - `whole_forms`: of effects that are parts
+fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>], whole_forms: &[WholeForm]) -> Vec<Tie> {
     let effects = state.current.model.effects.len();
-    let mut out = Vec::new();
+    let mut out: Vec<Tie> = whole_forms.iter().map(WholeForm::tie).collect();
     for (taken, twins) in state.taken.iter().zip(twins) {
         let place = |candidate: &Candidate| (candidate.effect.identifier(), candidate.effect.channel());
         let named = place(&taken.candidate);

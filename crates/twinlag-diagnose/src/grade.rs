@@ -273,13 +273,7 @@ impl fmt::Display for Reason {
                 f,
                 "the records give values that differ {ratio:.1} times as much as noise explains, so that no value holds for all of them"
             ),
-            Self::Cause { effect, channel } => {
-                let place = channel.map_or("", |channel| [" of T1", " of T2"][channel]);
-                write!(
-                    f,
-                    "right if the cause is {effect}{place}: others explain the record as well and give another number"
-                )
-            }
+            Self::Cause { effect, channel } => right_with(f, *effect, *channel),
             Self::Hidden { effects } => write!(
                 f,
                 "right if there is no {} of a usual size: the record would hardly show one, and it would move this number out of \
@@ -467,6 +461,11 @@ impl Basis {
             None => Self { reasons: vec![Reason::LeftOver], excess_energy: 0.0 },
         }
     }
+}
+
+fn right_with(f: &mut fmt::Formatter<'_>, effect: Identifier, channel: Option<usize>) -> fmt::Result {
+    let place = channel.map_or("", |channel| [" of T1", " of T2"][channel]);
+    write!(f, "right if the cause is {effect}{place}: others explain the record as well and give another number")
 }
 
 /// A number with its interval, on its own scale.

@@ -44,13 +44,18 @@ impl WholeForm {
         Tie::of(place, place, &self.fitted, &self.covariance)
     }
 
-    /// Makes the intervals of `found`, which are those of a part, cover those of the whole form; `place` is its place in the model.
+    /// Makes the intervals of the effect, which are those of a part, cover those of the whole form.
     ///
+    /// - `found`: all effects, each with its place in the model
     /// - `allowed`: effects that may be named
-    pub(crate) fn widen(&self, place: Option<usize>, found: &mut Found, allowed: &[Identifier]) {
-        if place != Some(self.index) {
-            return;
-        }
+    pub(crate) fn widen_each(&self, found: &mut [(Option<usize>, Found)], allowed: &[Identifier]) {
+        found
+            .iter_mut()
+            .filter(|(place, _)| *place == Some(self.index))
+            .for_each(|(_, found)| self.widen(found, allowed));
+    }
+
+    fn widen(&self, found: &mut Found, allowed: &[Identifier]) {
         let Self { index, fitted, covariance } = self;
         let range = fitted.model.range(*index);
         let parameters = fitted.model.effects[*index].parameters();
