@@ -369,6 +369,11 @@ fn sampling(text: &str) -> Result<SamplingChoice, String> {
 }
 
 impl Columns {
+    /// Whether it was said which columns are the two sensors.
+    pub(crate) fn are_sensors_chosen(&self) -> bool {
+        self.t1.is_some() && self.t2.is_some()
+    }
+
     pub(crate) fn selection(&self) -> Selection {
         Selection {
             time: self.time.clone(),

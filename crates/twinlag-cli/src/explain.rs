@@ -121,7 +121,7 @@ const TESTS: [(TestName, &str); 11] = [
 ];
 
 /// Fields of an answer that are about something else than a number.
-const FIELDS: [(&str, &str); 4] = [
+const FIELDS: [(&str, &str); 5] = [
     (
         "transfer",
         "errors on what had no part in finding the model: of several records each in turn, where nothing is fitted but what belongs to \
@@ -132,6 +132,12 @@ const FIELDS: [(&str, &str); 4] = [
         "whether one of several records agrees with the others. It does not if it contradicts them on a number that all share, or if it \
          is explained and so are they, but not together; not known (null) where the records do not say which of them differs, or are \
          not explained",
+    ),
+    (
+        "interval-covers",
+        "what makes an interval longer than the noise of the readings does: other-models explain the record as well and give another \
+         number, left-over is what the model leaves, parts are parts of the record that differ, records are records of one rig that \
+         differ. Of two records that differ by chance the interval is long, since two do not say how much a third would differ",
     ),
     (
         "exact-twins",

@@ -36,18 +36,22 @@ pub(crate) fn graded(number: Option<String>, judgement: &Judgement) -> String {
     }
 }
 
-/// Why numbers are not simply `go`, each reason once with the names of the numbers that it is of.
+/// Why numbers are not simply `go`, and what intervals cover beside noise, each reason once with the names of the numbers that it is of.
 pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgement)>, indent: &str) -> Vec<String> {
-    let mut groups: Vec<(Grade, &str, Vec<String>)> = Vec::new();
-    for (name, judgement) in numbers.into_iter().filter(|(_, judgement)| judgement.grade != Grade::Go) {
-        for reason in judgement.because.split("; ") {
-            match groups.iter_mut().find(|(grade, other, _)| (*grade, *other) == (judgement.grade, reason)) {
+    let mut groups: Vec<(Grade, String, Vec<String>)> = Vec::new();
+    for (name, judgement) in numbers {
+        let reasons: Vec<String> = match judgement.grade {
+            Grade::Go => judgement.interval_covers.iter().map(ToString::to_string).collect(),
+            _ => judgement.because.split("; ").map(str::to_owned).collect(),
+        };
+        for reason in reasons {
+            match groups.iter_mut().find(|(grade, other, _)| (*grade, &*other) == (judgement.grade, &reason)) {
                 Some((_, _, names)) => names.push(name.clone()),
                 None => groups.push((judgement.grade, reason, vec![name.clone()])),
             }
         }
     }
-    let line = |(grade, reason, names): (Grade, &str, Vec<String>)| {
+    let line = |(grade, reason, names): (Grade, String, Vec<String>)| {
         format!("{indent}{grade} ({}): {reason}", names.join(", "))
     };
     groups.into_iter().map(line).collect()

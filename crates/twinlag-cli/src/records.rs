@@ -90,7 +90,7 @@ fn each(records: &[RecordAnswer], sensors: &[SensorEstimate; 2]) -> Vec<String> 
         lines.extend(contradictions_in_words(record).into_iter().map(|line| format!("  {line}")));
     }
     if records.iter().any(|record| record.agrees == Some(false)) {
-        lines.push("  diagnose that record alone, and the others without it".to_owned());
+        lines.push("  diagnose that record alone, and the others without it: it had a part in the models that their errors are of".to_owned());
     }
     lines
 }

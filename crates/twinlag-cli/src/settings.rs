@@ -10,6 +10,7 @@ pub(crate) fn options(setting: Setting) -> &'static [&'static str] {
         Setting::Flow => &["--flow", "--position"],
         Setting::Sampling => &["--sampling"],
         Setting::Estimator => &["--estimator"],
+        Setting::Optimiser => &["--optimiser"],
         Setting::Hold => &["--hold"],
         Setting::Noise => &["--noise"],
         Setting::NoiseRatio => &["--noise-ratio"],

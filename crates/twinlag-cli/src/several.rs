@@ -32,13 +32,25 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
 pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<Vec<Record>, Failure> {
     let mut records = Vec::new();
     for file in files {
-        let record = read_watched(file, &input.columns.selection(), console)?;
+        let mut record = read_watched(file, &input.columns.selection(), console)?;
         let source = (files.len() > 1).then_some(record.source.as_str());
         print::notes_of(&record, source, console);
+        if let Some(first) = records.first().filter(|_| input.columns.are_sensors_chosen()) {
+            named_as(&mut record, first, console);
+        }
         records.push(record);
     }
     no_copies(&records)?;
     Ok(records)
+}
+
+/// Gives the sensors of a record the names that they have in the first one, where the columns of both were chosen.
+fn named_as(record: &mut Record, first: &Record, console: Console) {
+    if record.channels != first.channels && !console.quiet {
+        let ([one, two], [as_one, as_two]) = (&record.channels, &first.channels);
+        eprintln!("note: {}: {one} and {two} are the sensors {as_one} and {as_two} of {}", record.source, first.source);
+    }
+    record.channels.clone_from(&first.channels);
 }
 
 /// Refuses a record that is a copy of another: left out, it would be there all the same.

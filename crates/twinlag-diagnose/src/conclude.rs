@@ -95,7 +95,7 @@ pub(crate) fn conclude(
     };
     let mut effects = judged(found, &with_effects, &last, &circumstances);
     // Their intervals are those of the parameters that they follow from, with what these have to cover.
-    cover_twins(&mut last, effects.iter().flat_map(|found| &found.exact_twins));
+    cover_twins(&mut last, &mut judgements, effects.iter().flat_map(|found| &found.exact_twins));
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
     if !is_given {
         // What they would be under another cause follows from both.
@@ -190,7 +190,8 @@ pub(crate) fn to_the_end(fitted: &Fitted, state: &State<'_>) -> Fitted {
     fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
 }
 
-fn summary(fitted: &Fitted, state: &State<'_>, policy: &Policy) -> ModelFit {
+/// A fit to the whole record, in numbers.
+pub(crate) fn summary(fitted: &Fitted, state: &State<'_>, policy: &Policy) -> ModelFit {
     let prepared = &state.prepared;
     summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy)
 }

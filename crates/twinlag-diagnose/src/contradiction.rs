@@ -6,11 +6,13 @@
 //! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance. A fit that has
 //! then left behind what was given with a deviation may not be used.
 
-use twinlag_model::{Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Settings, summarise};
+use twinlag_model::{
+    ChannelNoise, Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Selection, Settings, summarise,
+};
 
 use crate::grade::{Grade, REJECTING_CHI2, Reason};
 use crate::judge::given;
-use crate::moves::State;
+use crate::moves::{Move, State};
 use crate::remark::Remark;
 
 /// Quantiles of the chi-square distribution with one and with two degrees of freedom that chance exceeds once in 10⁴, as a test of
@@ -40,8 +42,8 @@ impl Contradiction {
             return None;
         }
         let (observations, everything) = (&state.prepared.observations, &state.prepared.everything);
-        let of = |held: &Fitted, free: &Fitted, grade| {
-            let fit = summarise(free, observations, everything, &state.prepared.levels, policy);
+        let of = |held: &Fitted, free: &Fitted, selection: &Selection, levels: &ChannelNoise, grade| {
+            let fit = summarise(free, observations, selection, levels, policy);
             let deviance = (held.chi2 - free.chi2) / free.mean_energy().max(1.0);
             let beyond = CONTRADICTING_DEVIANCES[known.len().min(2) - 1];
             (!fit.is_contradicted() && deviance > beyond).then(|| Self {
@@ -52,14 +54,24 @@ impl Contradiction {
             })
         };
         // Where two lags alone leave only noise, effects that were found make up for what was given.
-        let alone = state.base.model.clone().knowing_nothing();
-        let alone = alone.fit_over_grid(&[], STARTS, observations, everything);
-        let held = state.base.model.fit(&state.base.theta, observations, everything, Effort::Finish);
-        of(&held, &alone, Grade::NoGo)
+        let two_lags = |selection: &Selection, levels: &ChannelNoise| {
+            let model = state.base.model.clone().with_noise(levels.std_k);
+            let alone = model.clone().knowing_nothing().fit_over_grid(&[], STARTS, observations, selection);
+            let held = model.fit(&state.base.theta, observations, selection, Effort::Finish);
+            of(&held, &alone, selection, levels, Grade::NoGo)
+        };
+        let levels = &state.prepared.levels;
+        two_lags(everything, levels)
+            .or_else(|| {
+                // A fit that a wrong value spoils may have put what it leaves over into noise levels or weights.
+                let is_put = |entry: &Move| matches!(entry, Move::LowerNoise { .. } | Move::Reweigh { .. });
+                let (selection, levels) = state.moves.iter().any(is_put).then(|| state.prepared.before_residuals())?;
+                two_lags(&selection, levels)
+            })
             .or_else(|| {
                 let free = with_effects.model.clone().knowing_nothing();
                 let free = free.fit(&with_effects.theta, observations, everything, Effort::Finish);
-                of(with_effects, &free, Grade::Conditional)
+                of(with_effects, &free, everything, levels, Grade::Conditional)
             })
             .or_else(|| Self::left_behind(with_effects, settings))
     }

@@ -11,8 +11,10 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use twinlag_cross_relation::{PartScatter, Z_975};
 use twinlag_model::{BetweenRecords, Identifier, ModelFit, Policy};
+use twinlag_optimise::Scale;
 
 use crate::diagnosis::Verdict;
+use crate::naming::interval_95;
 
 /// Whether a number may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -204,6 +206,16 @@ impl Reason {
         }
     }
 
+    /// Whether it says that the interval covers this.
+    fn says(&self, covered: Covered) -> bool {
+        match covered {
+            Covered::OtherModels => matches!(self, Self::Cause { .. }),
+            Covered::LeftOver => matches!(self, Self::LeavesSome { .. }),
+            Covered::Parts => matches!(self, Self::PartsDisagree { .. }),
+            Covered::Records => matches!(self, Self::RecordsDisagree { .. }),
+        }
+    }
+
     /// What speaks against the use of a model, as a clause by itself; `None` of any other reason.
     ///
     /// ```
@@ -346,6 +358,32 @@ pub(crate) fn rounded(deviations: f64) -> String {
     if deviations < 100.0 { format!("{deviations:.0}") } else { "more than 100".into() }
 }
 
+/// What an interval covers beside the noise of the readings. Its [`Display`](fmt::Display) is a clause for the reader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Covered {
+    /// Other models that explain the record as well: other effects, or the whole form of one of which the record supports a part.
+    OtherModels,
+    /// What the model leaves over.
+    LeftOver,
+    /// What the parts of the record differ.
+    Parts,
+    /// What the records of the rig differ.
+    Records,
+}
+
+impl fmt::Display for Covered {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::OtherModels => "the interval covers other models that explain the record as well",
+            Self::LeftOver => "the interval covers what is left over",
+            Self::Parts => "the interval covers what the parts of the record differ",
+            Self::Records => "the interval covers what the records differ",
+        })
+    }
+}
+
 /// The grade of a number, and why.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
@@ -356,6 +394,9 @@ pub struct Judgement {
     /// Why, for the reader; of a number that may be used, what speaks for it.
     #[serde(default)]
     pub because: String,
+    /// What its interval covers beside the noise: without these it would be shorter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub interval_covers: Vec<Covered>,
 }
 
 impl Judgement {
@@ -376,7 +417,29 @@ impl Judgement {
         // Of a number that is not given, conditions are of no use.
         let of_grade: Vec<String> = reasons.iter().filter(|r| r.grade() == grade).map(ToString::to_string).collect();
         let because = if of_grade.is_empty() { WHY_GO.to_owned() } else { said_once(&of_grade) };
-        Self { grade, because }
+        Self { grade, because, interval_covers: Vec::new() }
+    }
+
+    /// Puts down that the interval covers this, once.
+    ///
+    /// - `is_said`: whether a reason says so
+    pub(crate) fn cover(&mut self, covered: Covered, is_said: bool) {
+        if self.interval_covers.contains(&covered) {
+            return;
+        }
+        self.interval_covers.push(covered);
+        if !is_said && self.grade != Grade::NoGo {
+            self.because = said_once(&[std::mem::take(&mut self.because), covered.to_string()]);
+        }
+    }
+
+    /// Makes the interval of the number cover that of another model as well, and says so where it is longer for it.
+    pub(crate) fn cover_with(&mut self, interval: &mut [f64; 2], other: [f64; 2]) {
+        let before = *interval;
+        *interval = [before[0].min(other[0]), before[1].max(other[1])];
+        if is_longer(*interval, before) {
+            self.cover(Covered::OtherModels, false);
+        }
     }
 
     /// This judgement with one reason more.
@@ -392,12 +455,12 @@ impl Judgement {
 
     /// The judgement of what was given beforehand.
     pub fn given() -> Self {
-        Self { grade: Grade::Go, because: "known beforehand".into() }
+        Self { because: "known beforehand".into(), ..Self::of(&[]) }
     }
 
     /// The judgement of a point to which parameters refer: it is of the record as it stands, and no estimate.
     pub(crate) fn reference_point() -> Self {
-        Self { grade: Grade::Go, because: "a point of reference, and no estimate".into() }
+        Self { because: "a point of reference, and no estimate".into(), ..Self::of(&[]) }
     }
 
     /// The judgement of what follows from numbers with these judgements, each with its name.
@@ -473,7 +536,9 @@ fn right_with(f: &mut fmt::Formatter<'_>, effect: Identifier, channel: Option<us
 pub struct Number {
     /// The number.
     pub value: f64,
-    /// Its 95 % interval.
+    /// Its standard error by noise alone; `None` where its interval is not that of a standard error.
+    pub standard_error: Option<f64>,
+    /// Its 95 % interval, with other models that explain the record as well.
     pub interval_95: Option<[f64; 2]>,
     /// How far it moves between parts of the record.
     pub scatter: Option<PartScatter>,
@@ -514,24 +579,45 @@ impl Number {
             reasons.push(Reason::NoInterval);
             return (Judgement::of(&reasons), None);
         };
+        let mut covers = Vec::new();
+        if self.interval_of_noise().is_some_and(|of_noise| is_longer(interval, of_noise)) {
+            covers.push(Covered::OtherModels);
+        }
         let mut factor = (1.0 + basis.excess_energy).sqrt();
+        if factor > 1.0 {
+            covers.push(Covered::LeftOver);
+        }
         if let Some(scatter) = self.scatter.filter(|s| s.p_value() < policy.parts_rejection_probability) {
             reasons.push(Reason::PartsDisagree { ratio: scatter.ratio() });
+            covers.push(Covered::Parts);
             factor = factor.max(T_975_OF_7 / Z_975 * scatter.ratio());
         }
-        let interval = self.widened(interval, factor);
+        let mut interval = self.widened(interval, factor);
         if factor > 1.0 && self.is_vague(interval, policy) {
             reasons.push(Reason::LeftOver);
         }
-        let Some(RecordScatter { interval_95: between, ratio, p_value }) = self.between else {
-            return (Judgement::of(&reasons), Some(interval));
-        };
-        let interval = [interval[0].min(between[0]), interval[1].max(between[1])];
-        let is_known = !self.is_vague(interval, policy);
-        if p_value < policy.records_rejection_probability || !is_known {
-            reasons.push(Reason::RecordsDisagree { ratio, is_known });
+        if let Some(RecordScatter { interval_95: between, ratio, p_value }) = self.between {
+            let with_between = [interval[0].min(between[0]), interval[1].max(between[1])];
+            if is_longer(with_between, interval) {
+                covers.push(Covered::Records);
+            }
+            interval = with_between;
+            let is_known = !self.is_vague(interval, policy);
+            if p_value < policy.records_rejection_probability || !is_known {
+                reasons.push(Reason::RecordsDisagree { ratio, is_known });
+            }
         }
-        (Judgement::of(&reasons), Some(interval))
+        let mut judgement = Judgement::of(&reasons);
+        for covered in covers {
+            judgement.cover(covered, reasons.iter().any(|reason| reason.says(covered)));
+        }
+        (judgement, Some(interval))
+    }
+
+    /// The 95 % interval that noise alone makes; `None` where nothing says what that is.
+    fn interval_of_noise(&self) -> Option<[f64; 2]> {
+        let scale = if self.is_positive { Scale::Logarithmic } else { Scale::Linear { typical: 1.0 } };
+        self.standard_error.map(|error| interval_95(self.value, error, &scale))
     }
 
     fn widened(&self, [low, high]: [f64; 2], factor: f64) -> [f64; 2] {
@@ -552,6 +638,16 @@ impl Number {
         }
     }
 }
+
+/// Whether an interval reaches beyond another one by more than rounding.
+fn is_longer([low, high]: [f64; 2], [from, to]: [f64; 2]) -> bool {
+    let rounding = ROUNDING * (to - from);
+    low < from - rounding || high > to + rounding
+}
+
+/// Share of an interval that is rounding: intervals from a standard error and back differ by some 1e-15 of the number, which may be
+/// 10⁶ times as large as they are.
+const ROUNDING: f64 = 1e-6;
 
 /// Quantile 0.975 of Student's distribution with as many degrees of freedom as the parts of a record have.
 const T_975_OF_7: f64 = 2.364_624;
@@ -610,7 +706,7 @@ mod tests {
     use super::*;
 
     fn number(value: f64, interval: [f64; 2], is_positive: bool) -> Number {
-        Number { value, interval_95: Some(interval), scatter: None, between: None, is_positive }
+        Number { value, standard_error: None, interval_95: Some(interval), scatter: None, between: None, is_positive }
     }
 
     /// Whether reasons come together, one after the other, or with what something else rests on.
@@ -668,12 +764,29 @@ mod tests {
             let between = Some(RecordScatter { interval_95, ratio: 2.5, p_value });
             let (judgement, interval) =
                 Number { between, ..number(2.0, [1.8, 2.2], false) }.judged(Vec::new(), &basis, &policy);
-            (judgement.grade, interval.expect("it had one"))
+            let said = judgement.because.matches("covers").count();
+            (judgement.grade, interval.expect("it had one"), judgement.interval_covers, said)
         };
-        assert_eq!(judged([1.9, 2.1], 0.2), (Grade::Go, [1.8, 2.2]));
-        assert_eq!(judged([1.0, 2.1], 0.2), (Grade::Go, [1.0, 2.2]));
-        assert_eq!(judged([1.0, 2.1], 1e-6), (Grade::Conditional, [1.0, 2.2]));
-        assert_eq!(judged([-1.0, 3.0], 0.2), (Grade::NoGo, [-1.0, 3.0]));
+        let records = || vec![Covered::Records];
+        assert_eq!(judged([1.9, 2.1], 0.2), (Grade::Go, [1.8, 2.2], vec![], 0));
+        assert_eq!(judged([1.0, 2.1], 0.2), (Grade::Go, [1.0, 2.2], records(), 1));
+        assert_eq!(judged([1.0, 2.1], 1e-6), (Grade::Conditional, [1.0, 2.2], records(), 1));
+        assert_eq!(judged([-1.0, 3.0], 0.2), (Grade::NoGo, [-1.0, 3.0], records(), 0));
+    }
+
+    /// An interval that is longer than noise makes it says so, on its own scale.
+    #[test]
+    fn an_interval_says_what_it_covers() {
+        let judged = |interval, standard_error, is_positive| {
+            let number = Number { standard_error: Some(standard_error), ..number(2.0, interval, is_positive) };
+            number.judged(Vec::new(), &Basis::default(), &Policy::default()).0.interval_covers
+        };
+        let half = Z_975 * 0.1;
+        assert_eq!(judged([2.0 - half, 2.0 + half], 0.1, false), []);
+        assert_eq!(judged([2.0 - half, 2.1 + half], 0.1, false), [Covered::OtherModels]);
+        let factor = (0.5 * half).exp();
+        assert_eq!(judged([2.0 / factor, 2.0 * factor], 0.1, true), []);
+        assert_eq!(judged([1.9 / factor, 2.0 * factor], 0.1, true), [Covered::OtherModels]);
     }
 
     /// A number whose sign or size is lost in a wider interval is not given.

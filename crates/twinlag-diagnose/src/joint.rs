@@ -5,15 +5,13 @@ use twinlag_model::{
     Value, Watch,
 };
 
-use crate::conclude::{conclude, is_explained};
+use crate::conclude::conclude;
 use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
-use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
-
-/// Fewest records of which one can be the odd one.
-const FEWEST_TO_HAVE_AN_ODD_ONE: usize = 3;
+use crate::odd_one::OddOne;
+use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_noise, withdraw_what_does_not_transfer};
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +35,13 @@ pub struct Disagreement {
     pub unit: &'static str,
     /// What the record says, and the others.
     pub values: Contradicted,
+}
+
+impl Disagreement {
+    /// That on the time constant of sensor `sensor`, 0 or 1.
+    pub(crate) fn of_time_constant(sensor: usize, values: Contradicted) -> Self {
+        Self { effect: None, name: format!("T{}", sensor + 1), unit: "s", values }
+    }
 }
 
 /// One of several records beside the others.
@@ -117,18 +122,27 @@ pub fn diagnose_records(
     withdraw_what_does_not_transfer(&mut state, watch)?;
     let transfer = transfer(&state, settings, watch)?;
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
-    let odd = odd_one(&state, &transfer, settings, watch)?;
+    let odd = OddOne::find(&state, &transfer, settings, watch)?;
+    if odd.is_some() {
+        // Neither the odd one nor the others need it.
+        withdraw_noise(&mut state);
+    }
     let (diagnosis, last) = conclude(state, settings, tones)?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
     let odd = odd.filter(|_| !is_whole);
     let between = diagnosis.last.between.as_ref();
-    let disagreements: Vec<_> =
+    let mut disagreements: Vec<_> =
         (0..records.len()).map(|record| disagreements(record, &last, between, settings)).collect();
+    if let Some(OddOne { record, disagreements: of_odd }) = &odd
+        && disagreements[*record].is_empty()
+    {
+        disagreements[*record].clone_from(of_odd);
+    }
     let is_any_named = disagreements.iter().any(|of_record| !of_record.is_empty());
     let differ = between.is_some_and(|between| differ(between, &settings.policy));
     let do_others_agree = odd.is_some() || (is_whole && (is_any_named || !differ));
     let agrees = |record: usize| {
-        if odd == Some(record) || !disagreements[record].is_empty() {
+        if odd.as_ref().is_some_and(|odd| odd.record == record) || !disagreements[record].is_empty() {
             Some(false)
         } else {
             do_others_agree.then_some(true)
@@ -145,29 +159,6 @@ pub fn diagnose_records(
     };
     let records = (0..records.len()).map(of).collect();
     Ok(JointDiagnosis { diagnosis, records, transfer })
-}
-
-/// The one record without which the others are explained, if it is explained alone as well: then it is another rig. One that is not
-/// may only show what the others are too short or too quiet for. `None` of two records, either of which may be it.
-fn odd_one(
-    state: &State<'_>,
-    transfer: &Transfer,
-    settings: &Settings,
-    watch: Watch<'_>,
-) -> Result<Option<usize>, ModelError> {
-    let left_out = transfer.records.iter().enumerate();
-    // Two rigs together leave a residual that goes with the gas of each in another way, which looks like noise of any colour.
-    let is_explained_by_more =
-        |of: &LeftOut| of.are_others_explained == Some(true) && !of.are_others_explained_by_noise;
-    let explained = left_out.filter(|(_, left_out)| is_explained_by_more(left_out));
-    let explained: Vec<usize> = explained.map(|(record, _)| record).collect();
-    let &[odd] = &explained[..] else { return Ok(None) };
-    if transfer.records.len() < FEWEST_TO_HAVE_AN_ODD_ONE {
-        return Ok(None);
-    }
-    let all = &state.prepared.raw.0;
-    let (alone, _) = searched(&all.of_member(all.members()[odd].number), settings, watch)?;
-    Ok(is_explained(&alone, settings).then_some(odd))
 }
 
 fn own_value(record: usize, between: &BetweenRecords) -> Option<OwnValue> {
@@ -193,7 +184,7 @@ fn disagreements(record: usize, last: &Fitted, between: Option<&Between>, settin
     let of = |(at, values): (usize, Contradicted)| {
         let model = &last.model;
         match (0..model.effects.len()).find(|index| model.range(*index).contains(&at)) {
-            None => Disagreement { effect: None, name: format!("T{}", at + 1), unit: "s", values },
+            None => Disagreement::of_time_constant(at, values),
             Some(index) => {
                 let effect = &model.effects[index];
                 let parameter = &effect.parameters()[at - model.range(index).start];

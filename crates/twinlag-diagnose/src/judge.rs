@@ -114,9 +114,9 @@ impl<'a> Circumstances<'a> {
         if value.abs() > most_s {
             own.push(Reason::TooLong { most_s });
         }
-        let TimeConstant { interval_95_s, scatter, .. } = *number;
+        let TimeConstant { standard_error_s: standard_error, interval_95_s: interval_95, scatter, .. } = *number;
         let (judgement, interval) =
-            Number { value, interval_95: interval_95_s, scatter, between, is_positive: index < 2 }.judged(
+            Number { value, standard_error, interval_95, scatter, between, is_positive: index < 2 }.judged(
                 own,
                 basis,
                 self.policy,

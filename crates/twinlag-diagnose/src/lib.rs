@@ -53,6 +53,7 @@ mod limits;
 mod long;
 mod moves;
 mod naming;
+mod odd_one;
 mod propagate;
 mod rank;
 mod rapid;
@@ -69,7 +70,7 @@ pub use diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Limit, Masked, U
 pub use evidence::Evidence;
 pub use excitation::{is_single_tone, is_single_tone_in};
 pub use first_state::{FirstState, FirstStateChoice};
-pub use grade::{Basis, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
+pub use grade::{Basis, Covered, Excess, Grade, Judgement, Number, Reason, RecordScatter, excess};
 pub use hidden::{pieces_of_long, unseen};
 pub use if_known::{Held, HeldEffect, IfKnown};
 pub use joint::{Disagreement, JointDiagnosis, OfRecord, OwnNumber, diagnose_records};
@@ -79,9 +80,9 @@ pub use moves::Move;
 pub use remark::Remark;
 pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{
-    About, Change, ChangePoint, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant, Line,
-    ModelError, ModelFit, Observations, OwnValue, Policy, RatioTest, ResidualPart, Settings, Stretch, TimeConstant,
-    Trace, Track, Value, Watch, evenly_spread, fit_with, track,
+    About, Change, ChangePoint, Contradicted, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant,
+    Line, ModelError, ModelFit, Observations, OwnValue, Policy, RatioTest, ResidualPart, Settings, Stretch,
+    TimeConstant, Trace, Track, Value, Watch, evenly_spread, fit_with, track,
 };
 pub use twins::ExactTwin;
 

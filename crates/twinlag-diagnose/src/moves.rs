@@ -364,6 +364,7 @@ impl<'a> State<'a> {
     /// Takes out effect `index`, which gains no deviance on records that were left out.
     pub(crate) fn withdrawal(&self, index: usize, gain: f64) -> Proposal {
         let (model, theta) = self.current.without(index);
+        let model = if self.taken[index].is_noise() { model.with_noise(self.prepared.levels.std_k) } else { model };
         let search = self.search();
         let without = model.fit(&theta, search.observations, search.selection, Effort::Compare);
         let effect = &self.taken[index].candidate.effect;

@@ -215,7 +215,8 @@ pub(crate) fn judge_effect(
         let scatter = scatter.get(index).copied().flatten();
         let between = fit.between.as_ref().filter(|_| index < parameters.len());
         let between = RecordScatter::of(between.and_then(|between| between.parameters[range.start + index].as_ref()));
-        let number = Number { value: value.value, interval_95: value.interval_95, scatter, between, is_positive };
+        let Value { standard_error, interval_95, .. } = *value;
+        let number = Number { value: value.value, standard_error, interval_95, scatter, between, is_positive };
         let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
         let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
         let hidden = if index < parameters.len() { hidden(index) } else { (0..parameters.len()).find_map(hidden) };

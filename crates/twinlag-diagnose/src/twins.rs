@@ -5,7 +5,7 @@ use twinlag_model::{Fitted, Identifier, ModelFit, Twin, Value};
 use twinlag_optimise::Scale;
 
 use crate::grade::{Number, RecordScatter};
-use crate::judge::Circumstances;
+use crate::judge::{Circumstances, Judgements};
 use crate::naming::interval_95;
 use crate::propagate::variance;
 use crate::whole_form::cover;
@@ -61,15 +61,18 @@ pub(crate) fn exact_twins(
 }
 
 impl ExactTwin {
-    /// Makes the intervals wider by as much as those of the numbers that they follow from: by the largest factor of these.
+    /// Makes the intervals wider by as much as those of the numbers that they follow from: the parameter of a twin from that of the
+    /// effect alone, and time constants from these as well, by the largest factor.
     ///
     /// - `parameter`: place of the parameter of the effect among all of the model `last`
     pub(crate) fn widen(&mut self, parameter: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
-        let factor = [0, 1, parameter]
-            .into_iter()
-            .filter_map(|place| widening(place, last, fit, circumstances))
-            .fold(1.0, f64::max);
-        for (number, is_positive) in self.numbers() {
+        let widening = |place: usize| widening(place, last, fit, circumstances).unwrap_or(1.0);
+        let of_parameter = widening(parameter);
+        let of_all = [0, 1].map(widening).into_iter().fold(of_parameter, f64::max);
+        let [one, two, parameter, difference] = self.numbers();
+        for ((number, is_positive), factor) in
+            [(one, of_all), (two, of_all), (parameter, of_parameter), (difference, of_all)]
+        {
             let value = number.value;
             let further = |end: f64| {
                 if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
@@ -100,13 +103,18 @@ impl ExactTwin {
 }
 
 /// Makes the intervals of both time constants and of their difference cover those of exact twins as well.
-pub(crate) fn cover_twins<'a>(fit: &mut ModelFit, twins: impl Iterator<Item = &'a ExactTwin>) {
+pub(crate) fn cover_twins<'a>(
+    fit: &mut ModelFit,
+    judgements: &mut Judgements,
+    twins: impl Iterator<Item = &'a ExactTwin>,
+) {
     for twin in twins {
-        let [one, two] = &mut fit.time_constants;
-        let numbers = [one, two, &mut fit.difference].into_iter();
-        for (number, of_twin) in numbers.zip([&twin.time_constants[0], &twin.time_constants[1], &twin.difference]) {
-            if let (Some([low, high]), Some([from, to])) = (&mut number.interval_95_s, of_twin.interval_95) {
-                (*low, *high) = (low.min(from), high.max(to));
+        let ([one, two], [of_one, of_two]) = (&mut fit.time_constants, &mut judgements.time_constants);
+        let numbers = [(one, of_one), (two, of_two), (&mut fit.difference, &mut judgements.difference)];
+        let of_twin = [&twin.time_constants[0], &twin.time_constants[1], &twin.difference];
+        for ((number, judgement), of_twin) in numbers.into_iter().zip(of_twin) {
+            if let (Some(interval), Some(other)) = (&mut number.interval_95_s, of_twin.interval_95) {
+                judgement.cover_with(interval, other);
             }
         }
     }
@@ -119,6 +127,7 @@ fn widening(place: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circums
     let between = fit.between.as_ref().and_then(|between| between.parameters[place].as_ref());
     let number = Number {
         value,
+        standard_error: None,
         interval_95: (half > 0.0).then_some([value - half, value + half]),
         scatter: fit.scatter[place],
         between: RecordScatter::of(between),

@@ -5,7 +5,9 @@ mod common;
 use std::ops::ControlFlow;
 
 use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
-use twinlag_diagnose::{Identifier, JointDiagnosis, Observations, Settings, Verdict, diagnose_records};
+use twinlag_diagnose::{
+    Contradicted, Identifier, JointDiagnosis, Move, Observations, Settings, Verdict, diagnose_records,
+};
 use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Turbulence};
 
 fn joint(records: &[Observations]) -> JointDiagnosis {
@@ -99,6 +101,29 @@ fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
     let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
     let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
     let told = told(&joint.diagnosis);
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+    // Its time constant and theirs, each within four standard errors.
+    let [of_t2] = &joint.records[2].disagreements[..] else { panic!("{:?}", joint.records[2].disagreements) };
+    let Contradicted { own, others, others_error, .. } = of_t2.values;
+    assert_eq!((of_t2.name.as_str(), own.record), ("T2", 2));
+    assert!((own.value - 1.15 * TAU_S[1]).abs() < 4.0 * own.standard_error, "{own:?}");
+    assert!((others - TAU_S[1]).abs() < 4.0 * others_error, "{others} ± {others_error} s");
+}
+
+/// A sensor of 50 ms among records of one of 45 ms leaves a residual that looks like gas which both sensors do not share. No record left
+/// out shows such gas, so it is taken out, and the record is named.
+#[test]
+fn a_record_of_another_rig_is_no_noise() {
+    let of = |seed: u64, second_s: f64| {
+        let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 5.0, cutoff_hz: 200.0 });
+        let simulated = readings(seed, gas, |sensors| sensors[1].time_constant_s = second_s);
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let joint = joint(&[of(1, 0.045), of(2, 0.045), of(4, 0.050)]);
+    let told = told(&joint.diagnosis);
+    assert!(joint.diagnosis.moves.iter().any(|m| matches!(m, Move::Withdraw { .. })), "{told}");
+    assert!(joint.diagnosis.effects.iter().all(|found| !found.effect.is_noise()), "{told}");
     let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
     assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
 }

@@ -7,7 +7,7 @@
 //! error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a number has a large standard
 //! error, and so little weight.
 
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 
 use crate::dense;
 use crate::fit::Fitted;
@@ -65,6 +65,26 @@ pub struct Contradicted {
     pub others_error: f64,
     /// Probability of at least as large a difference by chance, if records differ as the others do.
     pub p_value: f64,
+}
+
+impl Contradicted {
+    /// A record and all others, each by a fit of its own, where nothing is known of what records of the rig differ but their noise.
+    ///
+    /// - `own`, `others`: the number and its standard error
+    ///
+    /// ```
+    /// use twinlag_model::Contradicted;
+    ///
+    /// // Five standard errors of the difference apart: by chance once in 1.7 million.
+    /// let contradicted = Contradicted::beyond_noise(2, (1.5, 0.06), (1.0, 0.08));
+    /// assert!((contradicted.p_value / 5.733e-7 - 1.0).abs() < 1e-3);
+    /// ```
+    pub fn beyond_noise(record: usize, own: (f64, f64), others: (f64, f64)) -> Self {
+        let ((value, standard_error), (others, others_error)) = (own, others);
+        let deviations = (value - others).abs() / standard_error.hypot(others_error);
+        let p_value = 2.0 * Normal::standard().sf(deviations);
+        Self { own: OwnValue { record, value, standard_error }, others, others_error, p_value }
+    }
 }
 
 impl BetweenRecords {

@@ -205,6 +205,13 @@ impl Prepared {
         }
     }
 
+    /// All of the record and its noise levels as they were before either was weighed by what a fit leaves over.
+    pub fn before_residuals(&self) -> (Selection, &ChannelNoise) {
+        let levels = &self.raw.1;
+        let weighting = Weighting::of(&self.observations, levels.std_k);
+        (Selection { weighting, ..self.everything.clone() }, levels)
+    }
+
     /// From here on frequencies count by the spectrum of what `fitted` leaves over.
     pub fn weigh_by(&mut self, fitted: &Fitted) {
         let left = fitted.model.residual_runs(&fitted.theta, &self.observations, |s| self.searched.holds(s));

@@ -145,10 +145,10 @@ pub(crate) fn parameter(number: &EffectNumber) -> String {
     }
 }
 
-/// The grade of a number, with its reason where it has a condition.
+/// The grade of a number, with its reason where it has a condition or an interval that covers more than noise.
 pub(crate) fn grade(judgement: &Judgement) -> String {
     match judgement.grade {
-        Grade::Go => "go".into(),
+        Grade::Go if judgement.interval_covers.is_empty() => "go".into(),
         grade => format!("{grade}: {}", judgement.because),
     }
 }

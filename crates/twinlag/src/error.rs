@@ -52,7 +52,7 @@ pub enum Error {
     ModelChannels { model: [String; 2], record: [String; 2] },
     #[error(
         "{file}: expected the sensors of the first record, {} and {}, in this order, got {} and {}. Records of one rig have the \
-         same two sensors: choose their columns, and give these the same names in all files", expected[0], expected[1], found[0], found[1]
+         same two sensors: say which columns they are, or give these the same names in all files", expected[0], expected[1], found[0], found[1]
     )]
     OtherChannels { file: String, expected: [String; 2], found: [String; 2] },
     #[error("{file}: {error}")]

@@ -18,6 +18,8 @@ pub enum Setting {
     Sampling,
     /// The estimator.
     Estimator,
+    /// How its minimum is found.
+    Optimiser,
     /// What the gas does between samples.
     Hold,
     /// Noise levels.
@@ -59,6 +61,7 @@ impl fmt::Display for Setting {
             Self::Flow => "flow",
             Self::Sampling => "sampling",
             Self::Estimator => "estimator",
+            Self::Optimiser => "optimiser",
             Self::Hold => "hold",
             Self::Noise => "noise levels",
             Self::NoiseRatio => "noise ratio",

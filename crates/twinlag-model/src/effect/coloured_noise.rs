@@ -13,7 +13,7 @@ pub(crate) static ABOUT: About = About::new("coloured-noise", 13, candidates)
     .in_words(
         "the noise of one channel is correlated from sample to sample: an amplifier, a filter, \
          electromagnetic interference",
-        "the sensors are fine; weights and intervals take the noise into account. A better amplifier reduces it",
+        "a better amplifier, where it is noise: two places with different gas look much like it. Weights and intervals take it into account",
         "which channel has slow noise that both sensors could follow",
     )
     .imitating(&["input-mismatch", "drift"])

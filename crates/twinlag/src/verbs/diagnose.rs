@@ -224,6 +224,7 @@ pub(super) fn unused(options: &Options) -> Vec<Setting> {
     let is_time_constant = |p: Parameter| matches!(p, Parameter::Tau1 | Parameter::Tau2);
     let asked = [
         (options.estimator != Options::default().estimator, Setting::Estimator),
+        (options.optimiser != Options::default().optimiser, Setting::Optimiser),
         (options.hold != Hold::Auto, Setting::Hold),
         (options.noise_ratio.is_some(), Setting::NoiseRatio),
         (!options.quiet_segments_s.is_empty(), Setting::QuietSegment),

@@ -20,7 +20,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let judged = |value: Option<f64>, interval_95, scatter, is_positive, limit_s: f64| {
             let Some(value) = value else { return (Judgement::of(&[Reason::NotDetermined]), interval_95) };
             let own = if value.abs() > limit_s { vec![Reason::TooLong { most_s: limit_s }] } else { Vec::new() };
-            Number { value, interval_95, scatter, between: None, is_positive }.judged(own, &basis, &policy)
+            Number { value, standard_error: None, interval_95, scatter, between: None, is_positive }
+                .judged(own, &basis, &policy)
         };
         for i in 0..2 {
             let sensor = &mut out.sensors[i];
