@@ -151,7 +151,7 @@ pub(crate) struct Diagnose {
     /// Save the model with its effects, for `--model` of other commands.
     #[arg(long, value_name = "JSON")]
     pub(crate) save: Option<PathBuf>,
-    /// Do not consider this effect; several after commas, or given several times.
+    /// Leave this effect out; separate several by commas, or repeat the option.
     #[arg(long, value_name = "EFFECT", value_delimiter = ',')]
     pub(crate) without: Vec<Identifier>,
     /// Overwrite output files that exist.

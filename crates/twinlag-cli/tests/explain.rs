@@ -7,7 +7,8 @@ use common::Bench;
 #[test]
 fn names_of_every_kind_are_explained() {
     let bench = Bench::new("every_kind");
-    // An effect, a verdict, a status, a grade, a test, a part of an answer, and what two sensors never reveal, each with a word that its text must have.
+    // An effect, a verdict, a status, a grade, a test, a part of an answer, and what two sensors never reveal, each with a word that
+    // its text must have.
     let names = [
         ("slow-mode", "at the rig"),
         ("unexplained", "no interval covers"),

@@ -26,10 +26,10 @@ const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
-/// Rounds of a fit of noise and of what is under its weights, and the change of its parameters, as a part of them, below which it has
-/// settled. Chosen.
+/// Rounds of a fit of noise and of what is under its weights. Chosen.
 const MOST_NOISE_ROUNDS: usize = 6;
-const NOISE_CHANGE: f64 = 0.01;
+/// Change of the logarithm of a noise's parameters below which it has settled. Chosen.
+const SETTLED_LOG_CHANGE: f64 = 0.01;
 /// Samples beyond the reach of the model without which no noise is fitted.
 const FEWEST_NOISE_SAMPLES: usize = 20;
 
@@ -492,29 +492,36 @@ impl<'a> Search<'a> {
         Some(Candidate { held_out_nats, ..self.candidate(effect, fitted, white.likelihood - with.likelihood, 0.0) })
     }
 
-    /// A fit whose noise is fitted again to what its other parameters leave over, and these again under its weights, until neither
-    /// moves: what is left over at time constants that are wrong for want of the noise is more than the noise. Itself without one.
+    /// A fit whose noise is fitted again to what its other parameters leave over, and these again under its weights, until the noise
+    /// hardly changes: what is left over at time constants that are wrong for want of the noise is more than the noise. Returned as it
+    /// is where it has none.
     pub(crate) fn with_settled_noise(&self, mut fitted: Fitted) -> Fitted {
-        let Some(index) = fitted.model.noise() else { return fitted };
-        let range = fitted.model.range(index);
+        let effects = fitted.model.effects.clone();
+        let noises: Vec<usize> = (0..effects.len()).filter(|index| effects[*index].is_noise()).collect();
         for _ in 0..MOST_NOISE_ROUNDS {
-            let plant = fitted.model.plant(&fitted.theta, self.observations);
-            let bands = self.bands(&fitted);
-            let levels_k = self.context.noise_std_k;
-            let again = fit_noise_again(&plant, levels_k, self.observations, &bands, self.context.is_coarse);
-            let Some((noise_std_k, Extra { std_k, correlation_s, .. })) = again else { break };
-            let now = [std_k, correlation_s];
-            let before = &fitted.theta[range.clone()];
-            let is_settled = now.iter().zip(before).all(|(now, before)| (now / before).ln().abs() < NOISE_CHANGE);
-            let mut theta = fitted.theta.clone();
-            theta[range.clone()].copy_from_slice(&now);
-            let model = fitted.model.clone().with_noise(noise_std_k);
-            fitted = model.fit(&theta, self.observations, self.selection, Effort::Compare);
-            if is_settled {
+            let before = fitted.theta.clone();
+            for index in &noises {
+                fitted = self.with_noise_fitted_again(fitted, *index);
+            }
+            let mut of_noises = noises.iter().flat_map(|index| fitted.model.range(*index));
+            if of_noises.all(|at| (fitted.theta[at] / before[at]).ln().abs() < SETTLED_LOG_CHANGE) {
                 break;
             }
         }
         fitted
+    }
+
+    /// A fit whose noise of place `index` is fitted again to what its other parameters leave over, and these again under its weights.
+    fn with_noise_fitted_again(&self, fitted: Fitted, index: usize) -> Fitted {
+        let Search { observations, selection, context, .. } = self;
+        let plant = fitted.model.plant(&fitted.theta, observations);
+        let (place, bands) = (place_of(&fitted.model.effects[index]), self.bands(&fitted));
+        let again = fit_noise_again(&plant, place, context.noise_std_k, observations, &bands, context.is_coarse);
+        let Some((noise_std_k, Extra { std_k, correlation_s, .. })) = again else { return fitted };
+        let mut theta = fitted.theta.clone();
+        theta[fitted.model.range(index)].copy_from_slice(&[std_k, correlation_s]);
+        let model = fitted.model.with_noise(noise_std_k);
+        model.fit(&theta, observations, selection, Effort::Compare)
     }
 }
 

@@ -49,7 +49,7 @@ pub(crate) fn conclude(
     let covariance = last.covariance.as_deref();
     let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, covariance, &settings.effects)).collect();
     let whole_forms = WholeForm::each(&with_effects, &last, &state.prepared);
-    let (remark, causes) = widen(&mut last, &whole_ties(&state, &twins, &whole_forms), policy);
+    let (remark, causes) = widen(&mut last, &whole_ties(&state, &with_effects, &twins, &whole_forms), policy);
     remarks.extend(remark);
     let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
     whole_forms.iter().for_each(|whole| whole.widen_each(&mut found, &settings.effects));
@@ -94,8 +94,8 @@ pub(crate) fn conclude(
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
     };
     let mut effects = judged(found, &with_effects, &last, &circumstances);
-    // Their intervals are those of the parameters that they follow from, with what these have to cover.
-    cover_twins(&mut last, &mut judgements, effects.iter().flat_map(|found| &found.exact_twins));
+    // Twins were widened with the parameters that they follow from: time constants cover them as they are now.
+    cover_twins(&mut last, &mut judgements, policy, effects.iter().flat_map(|found| &found.exact_twins));
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
     if !is_given {
         // What they would be under another cause follows from both.
@@ -142,7 +142,7 @@ pub(crate) fn conclude(
 }
 
 /// The fit of all effects to the whole record, in numbers as well, and the first state of the slow body of each effect.
-fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit, Vec<Option<FirstState>>) {
+pub(crate) fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit, Vec<Option<FirstState>>) {
     let prepared = &state.prepared;
     let in_numbers = |fitted: Fitted| {
         let fit = summary(&fitted, state, policy);
@@ -171,8 +171,7 @@ fn bounded_excess(state: &State<'_>, fitted: &Fitted, fit: &ModelFit, policy: &P
 /// Whether two lags and what a search has found explain its record.
 pub(crate) fn is_explained(state: &State<'_>, settings: &Settings) -> bool {
     let policy = &settings.policy;
-    let fitted = to_the_end(&state.current, state);
-    let fit = summary(&fitted, state, policy);
+    let (fitted, fit, _) = last_fit(state, policy);
     let left = what_is_left(&fit, policy);
     let unbounded = left.as_ref().filter(|_| bounded_excess(state, &fitted, &fit, policy).is_none());
     matches!(verdict(state, state.taken.is_empty(), unbounded, policy), Verdict::Adequate | Verdict::Explained)
@@ -180,8 +179,8 @@ pub(crate) fn is_explained(state: &State<'_>, settings: &Settings) -> bool {
 
 /// Whether a search has left more than noise in its record.
 pub(crate) fn leaves_more_than_noise(state: &State<'_>, settings: &Settings) -> bool {
-    let fitted = to_the_end(&state.current, state);
-    what_is_left(&summary(&fitted, state, &settings.policy), &settings.policy).is_some()
+    let (_, fit, _) = last_fit(state, &settings.policy);
+    what_is_left(&fit, &settings.policy).is_some()
 }
 
 /// A fit of the search, of the whole record.
@@ -190,8 +189,7 @@ pub(crate) fn to_the_end(fitted: &Fitted, state: &State<'_>) -> Fitted {
     fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order()
 }
 
-/// A fit to the whole record, in numbers.
-pub(crate) fn summary(fitted: &Fitted, state: &State<'_>, policy: &Policy) -> ModelFit {
+fn summary(fitted: &Fitted, state: &State<'_>, policy: &Policy) -> ModelFit {
     let prepared = &state.prepared;
     summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy)
 }
@@ -210,9 +208,10 @@ fn base_fit(state: &State<'_>, unmasked: Option<&Fitted>, policy: &Policy) -> Mo
 /// Ties of the whole model: those of a time when less was known have been looked at again. None of
 /// them is noise, and those that are exact twins are known without a fit.
 ///
+/// - `last`: the whole model
 /// - `twins`: of each effect
 /// - `whole_forms`: of effects that are parts
-fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>], whole_forms: &[WholeForm]) -> Vec<Tie> {
+fn whole_ties(state: &State<'_>, last: &Fitted, twins: &[Vec<ExactTwin>], whole_forms: &[WholeForm]) -> Vec<Tie> {
     let effects = state.current.model.effects.len();
     let mut out: Vec<Tie> = whole_forms.iter().map(WholeForm::tie).collect();
     for (taken, twins) in state.taken.iter().zip(twins) {
@@ -224,7 +223,7 @@ fn whole_ties(state: &State<'_>, twins: &[Vec<ExactTwin>], whole_forms: &[WholeF
             let is_exact = twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == other);
             let is_whole = tie.fitted.model.effects.len() == effects;
             let is_new = !tie.effect.is_noise() && is_whole && !is_exact;
-            is_new.then(|| Tie::fitted(named, other, &tie.fitted, &state.prepared)).flatten()
+            is_new.then(|| Tie::fitted((named, last), other, &tie.fitted, &state.prepared)).flatten()
         });
         out.extend(fitted);
     }

@@ -59,6 +59,7 @@ fn tried(index: usize, free: &Fitted, prepared: &Prepared) -> Option<(Fitted, Fi
     let (effect, log_odds) = free.in_equilibrium(index, observations, everything)?;
     let model = free.model.replaced(index, effect);
     let in_equilibrium = model.fit(&free.theta, observations, everything, Effort::Finish);
+    let in_equilibrium = in_equilibrium.with_bias_as(free, observations, everything);
     let is_usable = in_equilibrium.end.is_usable() && !matches!(in_equilibrium.end, End::OnBound(_));
     let is_kept = is_usable && log_odds > prepared.policy.first_state_odds.ln();
     let (choice, other) =

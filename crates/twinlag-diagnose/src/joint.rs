@@ -59,7 +59,8 @@ pub struct OfRecord {
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
     /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
-    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all; and where the others
+    /// are explained by a noise alone, which may stand for what differs among them.
     pub agrees: Option<bool>,
     /// Shared numbers on which it contradicts all others together.
     pub disagreements: Vec<Disagreement>,

@@ -2,7 +2,7 @@
 
 use twinlag_model::{Contradicted, ModelError, ModelFit, Settings, Watch};
 
-use crate::conclude::{is_explained, summary, to_the_end};
+use crate::conclude::{is_explained, last_fit};
 use crate::diagnose::searched;
 use crate::joint::Disagreement;
 use crate::moves::State;
@@ -43,8 +43,7 @@ impl OddOne {
             return Ok(None);
         }
         let (others, _) = searched(&all.without_member(number), settings, watch)?;
-        let [alone, others] =
-            [alone, others].map(|state| summary(&to_the_end(&state.current, &state), &state, &settings.policy));
+        let [alone, others] = [alone, others].map(|state| last_fit(&state, &settings.policy).1);
         let probability = settings.policy.records_rejection_probability / 2.0;
         let disagreements = (0..2).filter_map(|i| differ(i, record, [&alone, &others], probability)).collect();
         Ok(Some(Self { record, disagreements }))

@@ -29,14 +29,17 @@ struct Estimate {
 
 impl Tie {
     /// By the fit of the whole model with the other effect, which is done once more to the end.
+    ///
+    /// - `last`: the model with the named one
     pub(crate) fn fitted(
-        named: EffectInChannel,
+        (named, last): (EffectInChannel, &Fitted),
         other: EffectInChannel,
         fitted: &Fitted,
         prepared: &Prepared,
     ) -> Option<Self> {
         let (observations, everything) = (&prepared.observations, &prepared.everything);
         let fitted = fitted.model.fit(&fitted.theta, observations, everything, Effort::Finish).in_order();
+        let fitted = fitted.with_bias_as(last, observations, everything);
         let covariance = covariance(&fitted, observations, everything, false)?;
         Some(Self::of(named, other, &fitted, &covariance))
     }
@@ -77,18 +80,24 @@ pub(crate) fn widen(
     policy: &Policy,
 ) -> (Option<Remark>, [Option<EffectInChannel>; 3]) {
     let (mut effects, mut causes) = (Vec::new(), [None; 3]);
+    let of = |fit: &ModelFit, i: usize| {
+        if i < 2 { fit.time_constants[i].interval_95_s } else { fit.difference.interval_95_s }
+    };
+    let before = [0, 1, 2].map(|i| of(fit, i));
     for Tie { named, other, numbers } in ties {
         for (i, estimate) in numbers.iter().enumerate() {
             let Some(Estimate { value, standard_error, interval_95: [from, to] }) = estimate else { continue };
             let number = if i < 2 { &mut fit.time_constants[i] } else { &mut fit.difference };
-            let Some([low, high]) = &mut number.interval_95_s else { continue };
+            let (Some([low, high]), Some([low_before, high_before])) = (&mut number.interval_95_s, before[i]) else {
+                continue;
+            };
             if *standard_error > 0.0 && (i == 2 || *standard_error < policy.vague_log_std * value) {
-                let more = (*low - from).max(0.0) + (to - *high).max(0.0);
+                let more = (low_before - from).max(0.0) + (to - high_before).max(0.0);
                 // Another form of the same effect is no other cause.
                 if i < 2 && more > NOTICEABLE * value && other != named {
                     effects.push(other.0);
                 }
-                if more > DECISIVE * (*high - *low) && other != named {
+                if more > DECISIVE * (high_before - low_before) && other != named {
                     causes[i] = Some(*named);
                 }
                 (*low, *high) = (low.min(*from), high.max(*to));

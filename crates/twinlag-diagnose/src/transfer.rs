@@ -31,7 +31,7 @@ pub struct LeftOut {
     pub found: Vec<EffectInChannel>,
     /// Whether two lags and what was found on them explain the other records; `None` of a block.
     pub are_others_explained: Option<bool>,
-    /// Whether a noise that was found in the residual is part of that explanation: it may stand for what these records differ.
+    /// Whether a noise is in the model of the others: it may stand for differences between them. Of a block `false`.
     pub are_others_explained_by_noise: bool,
 }
 

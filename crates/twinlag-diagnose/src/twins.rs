@@ -1,7 +1,7 @@
 //! Exact twins of an effect that was found, in numbers: no record distinguishes them, and each is right with time constants of its own.
 
 use twinlag_cross_relation::Z_975;
-use twinlag_model::{Fitted, Identifier, ModelFit, Twin, Value};
+use twinlag_model::{Fitted, Identifier, ModelFit, Policy, Twin, Value};
 use twinlag_optimise::Scale;
 
 use crate::grade::{Number, RecordScatter};
@@ -102,18 +102,22 @@ impl ExactTwin {
     }
 }
 
-/// Makes the intervals of both time constants and of their difference cover those of exact twins as well.
+/// Makes the intervals of both time constants and of their difference cover those of exact twins as well, but for a time constant of
+/// which a twin says nothing.
 pub(crate) fn cover_twins<'a>(
     fit: &mut ModelFit,
     judgements: &mut Judgements,
+    policy: &Policy,
     twins: impl Iterator<Item = &'a ExactTwin>,
 ) {
     for twin in twins {
         let ([one, two], [of_one, of_two]) = (&mut fit.time_constants, &mut judgements.time_constants);
         let numbers = [(one, of_one), (two, of_two), (&mut fit.difference, &mut judgements.difference)];
         let of_twin = [&twin.time_constants[0], &twin.time_constants[1], &twin.difference];
-        for ((number, judgement), of_twin) in numbers.into_iter().zip(of_twin) {
-            if let (Some(interval), Some(other)) = (&mut number.interval_95_s, of_twin.interval_95) {
+        for (i, ((number, judgement), of_twin)) in numbers.into_iter().zip(of_twin).enumerate() {
+            let is_known = i == 2 || of_twin.standard_error.is_some_and(|e| e < policy.vague_log_std * of_twin.value);
+            let other = of_twin.interval_95.filter(|_| is_known);
+            if let (Some(interval), Some(other)) = (&mut number.interval_95_s, other) {
                 judgement.cover_with(interval, other);
             }
         }

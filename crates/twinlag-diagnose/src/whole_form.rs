@@ -33,6 +33,7 @@ impl WholeForm {
         theta.splice(range, start);
         let model = last.model.replaced(index, effect);
         let fitted = model.fit(&theta, observations, everything, Effort::Finish).in_order();
+        let fitted = fitted.with_bias_as(last, observations, everything);
         let covariance = covariance(&fitted, observations, everything, fit.is_weighted_by_residual)?;
         fitted.end.is_usable().then_some(Self { index, fitted, covariance })
     }

@@ -12,6 +12,7 @@ use twinlag_signal::{Gas, Mismatch, Noise, Record, Rig, Sensor, Signal, Turbulen
 #[test]
 fn a_gain_is_right_if_there_is_an_offset_as_well() {
     let [gain, offset_k] = [1.03, -0.1];
+    let (mut gains, mut shares_seen) = (0, 0);
     for seed in 1..=4 {
         let diagnosis = found(&record(seed, |sensors| (sensors[1].gain, sensors[1].offset_k) = (gain, offset_k)));
         assert_eq!(diagnosis.verdict, Verdict::Explained);
@@ -20,18 +21,25 @@ fn a_gain_is_right_if_there_is_an_offset_as_well() {
             let [low, high] = interval.expect("it has an interval");
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
             assert!((truth - middle).abs() < 2.0 * half, "[{low}, {high}], want {truth}");
+            half
         };
         // Whichever of them was taken to be the cause.
         let parameter = effect.parameters.iter().find(|p| ["gain", "share"].contains(&&p.name[..])).expect("a size");
         if effect.effect == Identifier::CALIBRATION {
-            holds(parameter.interval_95, gain);
+            // 1 % of a gas at 300 °C is 3 K, which no offset of a tenth of a kelvin hides.
+            assert!(holds(parameter.interval_95, gain) < 0.01, "{parameter:?}");
+            gains += 1;
         }
         for (i, tau_s) in TAU_S.into_iter().enumerate() {
             holds(diagnosis.last.time_constants[i].interval_95_s, tau_s);
         }
         let shares = effect.exact_twins.iter().filter(|twin| (twin.effect, twin.channel) == (Identifier::CROSSTALK, 1));
-        shares.for_each(|twin| holds(twin.parameter.interval_95, gain - 1.0));
+        for twin in shares {
+            assert!(holds(twin.parameter.interval_95, gain - 1.0) < 0.01, "{twin:?}");
+            shares_seen += 1;
+        }
     }
+    assert!(gains > 0 && shares_seen > 0, "{gains} gains, {shares_seen} shares");
 }
 
 /// A rig of which one sensor sees gas that differs by 3 % of what it moves.
@@ -50,8 +58,8 @@ fn mismatched(seed: u64, channel: &str) -> Observations {
     Observations::new(vec![stretch], Some(0.02)).expect("a record")
 }
 
-/// Failed: both time constants were too short, by half to one standard error in the mean of records with 0.4 K, since the lag that is tried undoes part of what the
-/// mismatch has. In a mean of eight a standard error is 0.35; half the difference between both sensors is within it.
+/// Where the loop finds the mismatch and its size by itself, time constants are as far from the truth as their standard errors say. How
+/// large the bias would be is known of many records (tests of `twinlag-model`).
 #[test]
 fn a_mismatch_of_the_gas_leaves_no_bias() {
     let watch = |_: &str, _, _| std::ops::ControlFlow::Continue(());

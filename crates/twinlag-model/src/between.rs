@@ -237,7 +237,7 @@ fn is_of_noise(fitted: &Fitted, parameter: usize) -> bool {
     (0..model.effects.len()).any(|index| model.effects[index].is_noise() && model.range(index).contains(&parameter))
 }
 
-/// How far the minimum of a record's own energy is from a joint fit.
+/// How far the estimate of a record by itself is from a joint fit.
 struct Step {
     /// To be subtracted.
     step: Vec<f64>,
@@ -248,7 +248,10 @@ impl Step {
     fn of(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Option<Self> {
         let Fitted { model, theta, .. } = fitted;
         let normal = model.normal_equations(theta, observations, selection, None);
-        let step = dense::times(&model.curvature(theta, observations, selection, &normal)?, &normal.slope);
+        let mut step = dense::times(&model.curvature(theta, observations, selection, &normal)?, &normal.slope);
+        // The step is to the minimum, and the fit is not there.
+        let bias = fitted.removed_bias(observations, selection);
+        bias.iter().for_each(|bias| step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias));
         let covariance = covariance(fitted, observations, selection, false)?;
         Some(Self { step, covariance })
     }

@@ -136,9 +136,8 @@ pub trait Effect: Send + Sync {
         Vec::new()
     }
 
-    /// The form that an instrument has of which this one is a part, and where its fit starts from `values` of this one: numbers of this
-    /// form are right for those of the other one only where the rest of it is nil, so their intervals cover both. By default this form
-    /// is the whole.
+    /// The whole form of which this one is a part, such as gain and offset of a gain alone, and where its fit starts. Intervals of the
+    /// part have to cover it, since the rest is small in an instrument and not nil. `None`, the default, where this form is whole.
     fn whole(&self, _values: &[f64]) -> Option<(Shared, Vec<f64>)> {
         None
     }

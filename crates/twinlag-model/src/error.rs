@@ -22,8 +22,8 @@ pub enum ModelError {
     #[error("a joint model needs two records of one rig or more, got {records}")]
     TooFewRecords { records: usize },
     #[error(
-        "records that are fitted together have one sample period: that of the first is {first_s} s, that of record {record} is \
-         {period_s} s. Take those of one period together"
+        "records that are fitted together have one sample period: that of the first is {first_s} s, that of record {} is \
+         {period_s} s. Take those of one period together", record + 1
     )]
     OtherPeriod { record: usize, period_s: f64, first_s: f64 },
     #[error("expected finite readings and times, got one that is not")]

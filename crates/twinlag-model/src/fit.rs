@@ -76,6 +76,8 @@ pub struct Fitted {
     pub end: End,
     /// The report of the solver.
     pub report: Fit,
+    /// Whether the bias that a mismatch of the gas makes has been removed from the parameters.
+    pub is_mismatch_bias_removed: bool,
 }
 
 impl Fitted {
@@ -133,7 +135,15 @@ impl Model {
         let cost = ResidualCost::new(self, start, observations, selection);
         let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
         let count = self.degrees_of_freedom(cost.count(), &fit.x, observations, selection);
-        Fitted { model: self.clone(), theta: fit.x.clone(), chi2: fit.value, count, end: fit.end.clone(), report: fit }
+        Fitted {
+            model: self.clone(),
+            theta: fit.x.clone(),
+            chi2: fit.value,
+            count,
+            end: fit.end.clone(),
+            report: fit,
+            is_mismatch_bias_removed: false,
+        }
     }
 
     /// Degrees of freedom of `residuals` that count, as the fit weighs frequencies.

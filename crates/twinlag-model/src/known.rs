@@ -110,9 +110,22 @@ impl Known {
         if !fitted.chi2.is_finite() {
             return Err(ModelError::Absurd);
         }
-        let fitted = fitted.without_mismatch_bias(&prepared.observations, &prepared.everything);
+        let fitted = if is_noise_left(&fitted, &prepared, settings) {
+            fitted.without_mismatch_bias(&prepared.observations, &prepared.everything)
+        } else {
+            fitted
+        };
         Ok(Self { prepared, fitted, fitted_again })
     }
+}
+
+/// Whether a fit leaves nothing but noise, so that what was found as a mismatch of the gas is one.
+fn is_noise_left(fitted: &Fitted, prepared: &Prepared, settings: &Settings) -> bool {
+    if fitted.model.noise().is_none() {
+        return true;
+    }
+    let Prepared { observations, everything, levels, .. } = prepared;
+    !summarise(fitted, observations, everything, levels, &settings.policy).is_contradicted()
 }
 
 /// A parameter of a model that comes from outside must be one that its kind can have.

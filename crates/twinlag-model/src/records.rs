@@ -66,8 +66,8 @@ impl Observations {
             free_from_s = Some(last_s + later_s + gap_s);
         }
         let periods_s: Option<Vec<f64>> = records.iter().map(|record| record.period_s).collect();
-        let Some(&[first_s, ref later_s @ ..]) = periods_s.as_deref() else { return Self::new(stretches, None) };
-        match (2..).zip(later_s).find(|(_, period_s)| (*period_s - first_s).abs() > SAME_PERIOD * first_s) {
+        let Some(&[first_s, ref others_s @ ..]) = periods_s.as_deref() else { return Self::new(stretches, None) };
+        match (1..).zip(others_s).find(|(_, period_s)| (*period_s - first_s).abs() > SAME_PERIOD * first_s) {
             Some((record, period_s)) => Err(ModelError::OtherPeriod { record, period_s: *period_s, first_s }),
             None => Self::new(stretches, Some(first_s)),
         }
@@ -302,7 +302,7 @@ mod tests {
     #[test]
     fn records_of_different_periods_are_refused() {
         let error = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.25, 0.0)]).expect_err("two periods");
-        assert_eq!(error, ModelError::OtherPeriod { record: 2, period_s: 0.25, first_s: 0.5 });
+        assert_eq!(error, ModelError::OtherPeriod { record: 1, period_s: 0.25, first_s: 0.5 });
         // Clocks that differ by 20 parts in a million.
         let joined = Observations::joined(&[record(90, 0.5, 0.0), record(80, 0.500_01, 0.0)]).expect("one period");
         assert_eq!(joined.period_s, Some(0.5));

@@ -331,21 +331,23 @@ pub fn fit_noise(
     }
 }
 
-/// Fits the levels of white noise, and the extra noise of `plant`, to the residual that this plant has whitened. Nearly white, it has
-/// none of the power of low frequencies in high ones, as the blocks of a spectrum give a residual that is far from white.
+/// Fits the levels of white noise, and the extra noise of `plant` that enters at `place`, to the residual whitened with all its noise:
+/// nearly white, so that hardly any power leaks from low frequencies into the bands of high ones. `None` of a plant without such noise.
 ///
 /// - `levels_k`: levels of the channels as third differences have them
 /// - `is_coarse`: channels whose levels these do not determine
 pub fn fit_noise_again(
     plant: &Plant,
+    place: Place,
     levels_k: [f64; 2],
     observations: &Observations,
     bands: &Bands,
     is_coarse: [bool; 2],
 ) -> Option<([f64; 2], Extra)> {
     let mut search = NoiseSearch::of(plant, observations, bands, is_coarse);
-    let extra = search.paths.extra.pop()?;
-    search.place = Some(extra.place);
+    let at = search.paths.extra.iter().position(|extra| extra.place == place)?;
+    let extra = search.paths.extra.remove(at);
+    search.place = Some(place);
     search.paths.base = levels_k.map(|k| k * k);
     let factor = |i: usize| (plant.noise_std_k[i] / levels_k[i]).clamp(1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR);
     search.starts = vec![vec![factor(0), factor(1), extra.std_k, extra.correlation_s]];

@@ -63,7 +63,8 @@ fn is_flat(
 }
 
 /// Covariance of the parameters: `H⁻¹ B H⁻¹`, `H` half the second derivatives of the energy, `B` the covariance of half its first
-/// ones, for white noise or, where the residual is not that, with its own autocorrelation.
+/// ones, for white noise or, where the residual is not that, with its own autocorrelation; and that of a mismatch of the gas, of which
+/// the record does not say at which sensor it is.
 pub fn covariance(
     fitted: &Fitted,
     observations: &Observations,
@@ -84,7 +85,9 @@ pub fn covariance(
     } else {
         white
     };
-    Some(dense::product(&dense::product(&inverse, &middle), &inverse))
+    let mut out = dense::product(&dense::product(&inverse, &middle), &inverse);
+    fitted.mismatch_covariance(observations, selection).iter().for_each(|other| dense::add(&mut out, other));
+    Some(out)
 }
 
 /// Covariance of half the first derivatives of the energy for noise that is correlated as the residual is: products of the columns
@@ -109,11 +112,7 @@ pub fn summarise(
 ) -> ModelFit {
     let Left { tests, chi2_per_dof, trace } = Left::of(fitted, observations, selection, levels, policy);
     let rejects = tests.iter().any(|t| t.p_value < policy.rejection_p_value());
-    let covariance = covariance(fitted, observations, selection, rejects).map(|mut covariance| {
-        let of_mismatch = fitted.mismatch_covariance(observations, selection);
-        of_mismatch.iter().for_each(|other| dense::add(&mut covariance, other));
-        covariance
-    });
+    let covariance = covariance(fitted, observations, selection, rejects);
     let influence = covariance.as_deref().and_then(|c| Influence::of(fitted, observations, selection, c));
     let (time_constants, difference) =
         time_constants(fitted, observations, selection, covariance.as_deref(), influence.as_ref(), policy);

@@ -55,6 +55,11 @@ pub enum Error {
          same two sensors: say which columns they are, or give these the same names in all files", expected[0], expected[1], found[0], found[1]
     )]
     OtherChannels { file: String, expected: [String; 2], found: [String; 2] },
+    #[error(
+        "{file}: expected the sample period of {first_file}, {first_s} s, got {period_s} s. Records that are fitted together have one: take \
+         those of one period together"
+    )]
+    OtherPeriod { file: String, first_file: String, first_s: f64, period_s: f64 },
     #[error("{file}: {error}")]
     InRecord { file: String, error: Box<Error> },
     #[error(

@@ -171,6 +171,7 @@ impl Local<'_> {
             count,
             end: fit.end.clone(),
             report: fit,
+            is_mismatch_bias_removed: false,
         }
     }
 

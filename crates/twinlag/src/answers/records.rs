@@ -170,14 +170,15 @@ pub struct RecordAnswer {
     /// Noise of its channels, K.
     #[serde(rename = "noise_std_K")]
     pub noise_std_k: [f64; 2],
-    /// Both time constants as it has them by itself, the rest of the model at its best; `None` where all records together do not
-    /// give the time constant.
+    /// Both time constants as it has them by itself, the rest of the model at its best; `None` where it does not determine one, and
+    /// where none is given for all records together.
     #[serde(default)]
     pub time_constants: [Option<OwnTimeConstant>; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<RecordNumber>,
     /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
-    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all.
+    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all; and where the others
+    /// are explained by a noise alone, which may stand for what differs among them.
     pub agrees: Option<bool>,
     /// Whether two lags and the effects that were found on them explain the others.
     pub are_others_explained: bool,

@@ -31,7 +31,7 @@ impl<'a> Several<'a> {
         }
         let rows: Vec<Rows> = records.iter().map(rows).collect::<Result<_, _>>()?;
         let observations: Vec<Observations> = rows.iter().map(|rows| rows.observations.clone()).collect();
-        let joint = close_the_loop(&observations, settings, watch)?;
+        let joint = close_the_loop(&observations, settings, watch).map_err(|error| in_files(error, records))?;
         let joined = in_a_row(records, &observations)?;
         let of_all = Self { records, rows, joined, of_records: joint.records, transfer: joint.transfer };
         Ok((of_all, joint.diagnosis))
@@ -70,6 +70,17 @@ impl<'a> Several<'a> {
             own
         };
         self.rows.iter().zip(self.records).map(of_record).collect()
+    }
+}
+
+/// An error of several records with the names of their files.
+fn in_files(error: ModelError, records: &[Record]) -> Error {
+    match error {
+        ModelError::OtherPeriod { record, period_s, first_s } => {
+            let [first_file, file] = [0, record].map(|i| records[i].source.clone());
+            Error::OtherPeriod { file, first_file, first_s, period_s }
+        }
+        error => error.into(),
     }
 }
 
