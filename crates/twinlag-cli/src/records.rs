@@ -85,13 +85,8 @@ fn each(records: &[RecordAnswer], sensors: &[SensorEstimate; 2]) -> Vec<String> 
     };
     let rows: Vec<Vec<String>> = [header].into_iter().chain(records.iter().map(of_record)).collect();
     lines.extend(indented(&rows, |_| true));
-    for record in records {
-        lines.extend(own(record));
-        lines.extend(contradictions_in_words(record).into_iter().map(|line| format!("  {line}")));
-    }
-    if records.iter().any(|record| record.agrees == Some(false)) {
-        lines.push("  diagnose that record alone, and the others without it: it had a part in the models that their errors are of".to_owned());
-    }
+    lines.extend(records.iter().flat_map(own));
+    lines.extend(contradictions_in_words(records).into_iter().map(|line| format!("  {line}")));
     lines
 }
 

@@ -5,13 +5,13 @@ use twinlag_model::{
     Value, Watch,
 };
 
-use crate::conclude::conclude;
+use crate::conclude::{conclude, is_explained};
 use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
 use crate::odd_one::OddOne;
-use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_noise, withdraw_what_does_not_transfer};
+use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,8 +62,10 @@ pub struct OfRecord {
     /// together. `None` where the records do not say which of them it is that differs, or are not explained at all; and where the others
     /// are explained by a noise alone, which may stand for what differs among them.
     pub agrees: Option<bool>,
-    /// Shared numbers on which it contradicts all others together.
+    /// Shared numbers on which it contradicts all others together, or on which two records contradict each other.
     pub disagreements: Vec<Disagreement>,
+    /// Effects that it shows alone, noise aside; `None` where it was not looked at alone, since nothing speaks against it.
+    pub found_alone: Option<Vec<EffectInChannel>>,
 }
 
 /// The result of a diagnosis of several records.
@@ -124,31 +126,27 @@ pub fn diagnose_records(
     let transfer = transfer(&state, settings, watch)?;
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
     let odd = OddOne::find(&state, &transfer, settings, watch)?;
-    if odd.is_some() {
-        // Neither the odd one nor the others need it.
-        withdraw_noise(&mut state);
+    if let Some(odd) = odd.as_ref().filter(|odd| odd.differs())
+        && (state.has_noise() || !is_explained(&state, settings))
+    {
+        odd.withdraw_what_neither_needs(&mut state);
     }
     let (diagnosis, last) = conclude(state, settings, tones)?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
     let odd = odd.filter(|_| !is_whole);
     let between = diagnosis.last.between.as_ref();
-    let mut disagreements: Vec<_> =
+    let contradictions: Vec<Vec<Disagreement>> =
         (0..records.len()).map(|record| disagreements(record, &last, between, settings)).collect();
-    if let Some(OddOne { record, disagreements: of_odd }) = &odd
-        && disagreements[*record].is_empty()
-    {
-        disagreements[*record].clone_from(of_odd);
-    }
-    let is_any_named = disagreements.iter().any(|of_record| !of_record.is_empty());
+    let is_any_named = contradictions.iter().any(|of_record| !of_record.is_empty());
     let differ = between.is_some_and(|between| differ(between, &settings.policy));
-    let do_others_agree = odd.is_some() || (is_whole && (is_any_named || !differ));
-    let agrees = |record: usize| {
-        if odd.as_ref().is_some_and(|odd| odd.record == record) || !disagreements[record].is_empty() {
-            Some(false)
-        } else {
-            do_others_agree.then_some(true)
-        }
+    let is_odd = |record: usize| odd.as_ref().is_some_and(|odd| odd.is_known && odd.record == record);
+    let do_others_agree = odd.as_ref().is_some_and(|odd| odd.is_known) || (is_whole && (is_any_named || !differ));
+    let agrees = |record: usize| match is_odd(record) || !contradictions[record].is_empty() {
+        true => Some(false),
+        false => do_others_agree.then_some(true),
     };
+    // What a record says by itself that the others do not.
+    let beside_the_others = |record: usize| odd.as_ref().and_then(|odd| odd.of(record));
     let of = |record: usize| OfRecord {
         samples: records[record].samples(),
         left_out: transfer.records[record].clone(),
@@ -156,7 +154,11 @@ pub fn diagnose_records(
         time_constants_s: [0, 1].map(|i| own_value(record, between?.parameters[i].as_ref()?)),
         own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
         agrees: agrees(record),
-        disagreements: disagreements[record].clone(),
+        disagreements: match (&contradictions[record][..], beside_the_others(record)) {
+            ([], Some(beside)) => beside.disagreements.clone(),
+            (contradictions, _) => contradictions.to_vec(),
+        },
+        found_alone: beside_the_others(record).map(|beside| beside.found.clone()),
     };
     let records = (0..records.len()).map(of).collect();
     Ok(JointDiagnosis { diagnosis, records, transfer })

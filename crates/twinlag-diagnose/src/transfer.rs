@@ -139,15 +139,6 @@ pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watc
     Ok(())
 }
 
-/// Takes out a noise of all records together which the model of those that were left out, and of the others, does without: it gains
-/// nothing there.
-pub(crate) fn withdraw_noise(state: &mut State<'_>) {
-    while let Some(index) = state.current.model.noise() {
-        let withdrawal = state.withdrawal(index, 0.0);
-        state.apply(withdrawal);
-    }
-}
-
 /// The effect, noise aside, that saves the least deviance on records which had no part in fitting it, and this deviance.
 fn least_gain(state: &State<'_>, watch: Watch<'_>) -> Result<Option<(usize, f64)>, ModelError> {
     let current = without_noise(&state.current, &state.prepared);

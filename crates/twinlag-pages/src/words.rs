@@ -59,13 +59,42 @@ pub(crate) fn in_place(EffectInPlace { effect, channel, .. }: &EffectInPlace) ->
     channel.as_ref().map_or_else(|| name.clone(), |channel| format!("{name} in {channel}"))
 }
 
-/// What a record contradicts the others on; nothing where it does not.
-pub fn contradictions_in_words(record: &RecordAnswer) -> Vec<String> {
+/// Which records contradict the others, and on what, or two records each other; and what to do. Nothing where none does.
+pub fn contradictions_in_words(records: &[RecordAnswer]) -> Vec<String> {
+    let (known, open): (Vec<&RecordAnswer>, Vec<&RecordAnswer>) = records.iter().partition(|r| r.agrees.is_some());
+    let mut out: Vec<String> = known.into_iter().flat_map(contradiction_in_words).collect();
+    if !out.is_empty() {
+        out.push(
+            "diagnose that record alone, and the others without it: it had a part in the models that their errors are of".to_owned(),
+        );
+    }
+    // What one of two says of the other, that says of the one.
+    if let Some(lines) = open.into_iter().map(contradiction_in_words).find(|lines| !lines.is_empty()) {
+        out.extend(lines);
+        out.push("two records do not say which of them is of another rig: diagnose each alone".to_owned());
+    }
+    out
+}
+
+fn contradiction_in_words(record: &RecordAnswer) -> Vec<String> {
     let source = &record.source;
-    if record.agrees == Some(false) && record.disagreements.is_empty() {
-        return vec![format!(
-            "{source} contradicts the others: it is explained alone, and they are without it, but not together"
-        )];
+    // Of two records either may be the one of another rig.
+    let (contradicts, others, they_give) = match record.agrees {
+        Some(_) => ("contradicts the others", "the others", "they give"),
+        None => ("contradicts the other record", "the other", "that gives"),
+    };
+    let effects = |found: &[EffectInPlace]| match found {
+        [] => "two lags".to_owned(),
+        found => format!("two lags with {}", listed(&found.iter().map(in_place).collect::<Vec<_>>())),
+    };
+    let mut out = Vec::new();
+    if let Some(alone) = record.found_alone.as_ref().filter(|alone| **alone != record.found_on_others) {
+        let (alone, of_others) = (effects(alone), effects(&record.found_on_others));
+        out.push(format!(
+            "{source} {contradicts}: {alone} explain it, {of_others} explain {others}, and nothing explains them together"
+        ));
+    } else if record.agrees == Some(false) && record.disagreements.is_empty() {
+        out.push(format!("{source} {contradicts}: it is explained alone, and they are without it, but not together"));
     }
     let of = |one: &DisagreementAnswer| {
         let what = match &one.of {
@@ -74,12 +103,13 @@ pub fn contradictions_in_words(record: &RecordAnswer) -> Vec<String> {
         };
         let number = |value: f64, error: f64| with_unit(&plus_minus(value, Some(error)), &one.unit);
         format!(
-            "{source} contradicts the others: it gives {what} as {}, and they give {}",
+            "{source} {contradicts}: it gives {what} as {}, and {they_give} {}",
             number(one.value, one.standard_error),
             number(one.others, one.others_standard_error)
         )
     };
-    record.disagreements.iter().map(of).collect()
+    out.extend(record.disagreements.iter().map(of));
+    out
 }
 
 /// Whether a time constant is what was expected of it, and what it would take where it is not.

@@ -28,8 +28,7 @@ impl Page<'_> {
             ),
             None => document,
         };
-        let contradictions = self.answer.records.iter().flat_map(contradictions_in_words);
-        Ok(contradictions.fold(document, Document::warning))
+        Ok(contradictions_in_words(&self.answer.records).into_iter().fold(document, Document::warning))
     }
 
     fn record_table(&self, transfer: &TransferAnswer) -> Table {

@@ -182,8 +182,11 @@ pub struct RecordAnswer {
     pub agrees: Option<bool>,
     /// Whether two lags and the effects that were found on them explain the others.
     pub are_others_explained: bool,
-    /// Shared numbers on which it contradicts all others together.
+    /// Shared numbers on which it contradicts all others together, or on which two records contradict each other.
     pub disagreements: Vec<DisagreementAnswer>,
+    /// Effects that it shows alone; `None` where it was not looked at alone, since nothing speaks against it.
+    #[serde(default)]
+    pub found_alone: Option<Vec<EffectInPlace>>,
     /// Readings that are left out of the fit, by their lines in its file.
     pub masked: Vec<Masked>,
 }
@@ -205,13 +208,16 @@ impl RecordAnswer {
             interval_95: own.number.interval_95,
             unit: own.number.unit.clone(),
         };
+        let in_place = |found: &[EffectInChannel]| -> Vec<EffectInPlace> {
+            found.iter().map(|effect| EffectInPlace::of(*effect, channels)).collect()
+        };
         let disagreements: Vec<DisagreementAnswer> =
             found.disagreements.iter().map(|one| DisagreementAnswer::of(one, channels)).collect();
         Self {
             source: source.to_owned(),
             samples: found.samples,
             error: TransferError::of(&found.left_out),
-            found_on_others: found.left_out.found.iter().map(|e| EffectInPlace::of(*e, channels)).collect(),
+            found_on_others: in_place(&found.left_out.found),
             noise_std_k: found.noise_std_k,
             time_constants: [0, 1].map(|i| {
                 let own = found.time_constants_s[i].filter(|_| shared.sensors[i].time_constant_s.is_some());
@@ -221,6 +227,7 @@ impl RecordAnswer {
             agrees: found.agrees,
             are_others_explained: found.left_out.are_others_explained == Some(true),
             disagreements,
+            found_alone: found.found_alone.as_ref().map(|alone| in_place(alone)),
             masked,
         }
     }
