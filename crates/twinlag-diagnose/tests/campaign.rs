@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
 use twinlag_diagnose::{
-    Contradicted, Identifier, JointDiagnosis, Move, Observations, Settings, Verdict, diagnose_records,
+    Contradicted, Identifier, JointDiagnosis, Move, Observations, OwnValue, Settings, Verdict, diagnose_records,
 };
 use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Turbulence};
 
@@ -133,7 +133,31 @@ fn a_record_of_another_rig_is_no_noise() {
 fn of_two_records_none_is_named() {
     let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
     let joint = joint(&[record(SEED, |_| ()), of_another]);
-    assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{}", told(&joint.diagnosis));
+    let told = told(&joint.diagnosis);
+    assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{told}");
+    // Together they look as if the gas were not the same: that is no cause, and nothing is explained by it.
+    assert_eq!(joint.diagnosis.verdict, Verdict::Unexplained, "{told}");
+    for (record, second_s) in joint.records.iter().zip([TAU_S[1], 1.15 * TAU_S[1]]) {
+        let [of_t2] = &record.disagreements[..] else { panic!("{:?}", record.disagreements) };
+        let OwnValue { value, standard_error, .. } = of_t2.values.own;
+        assert!((value - second_s).abs() < 4.0 * standard_error, "{value} ± {standard_error} s");
+    }
+}
+
+/// A gain of one record is no drift of all of them: the record is named, with what it shows alone.
+#[test]
+fn what_an_odd_record_shows_alone_is_said() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].gain = 1.02);
+    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
+    let told = told(&joint.diagnosis);
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+    let alone = joint.records[2].found_alone.as_deref().expect("it was looked at");
+    assert_eq!(alone, [(Identifier::CALIBRATION, Some(1))], "{told}");
+    assert!(
+        joint.records[0].found_alone.is_none() && named(&joint).iter().all(|e| e.0 == Identifier::CALIBRATION),
+        "{told}"
+    );
 }
 
 /// Someone exchanged the second sensor before the last record: that one is named, with its time constant.

@@ -53,11 +53,14 @@ pub struct Sensor {
     /// the record's first and last sample; 0 if left out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub drift_k_per_s: f64,
-    /// Part ε of the other channel's signal that is picked up: `y₁ → y₁ + ε (y₂ − mean(y₂))`, both
-    /// taken before noise and before the other's own crosstalk, the mean over the record; 0 if left
-    /// out. Between −1 and 1.
+    /// Part ε of the other channel's signal that is picked up: `y₁ → y₁ + ε (y₂ − c)`, both taken before noise and before the
+    /// other's own crosstalk, with `c` from [`Self::crosstalk_about_c`]; 0 if left out. Between −1 and 1.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub crosstalk: f64,
+    /// Temperature of the other channel at which nothing is picked up, °C; the mean of its record if left out. An instrument has
+    /// one, so records of one rig need it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub crosstalk_about_c: Option<f64>,
     /// How far the sensor stands downstream of the place whose gas temperature is recorded, m; 0 if
     /// left out. It meets the gas that passed there when the [`Stream`](crate::Stream) had so far to
     /// carry it. Held gas comes late by whole sample periods, rounded up.
@@ -141,6 +144,7 @@ impl Sensor {
             delay_s: 0.0,
             drift_k_per_s: 0.0,
             crosstalk: 0.0,
+            crosstalk_about_c: None,
             downstream_m: 0.0,
             stream_exponent: 0.0,
             second_time_constant_s: None,
@@ -203,6 +207,9 @@ impl Sensor {
         not_negative(within, "delay_s", self.delay_s)?;
         finite(within, "drift_k_per_s", self.drift_k_per_s)?;
         between(within, "crosstalk", self.crosstalk, -1.0, 1.0)?;
+        if let Some(about_c) = self.crosstalk_about_c {
+            finite(within, "crosstalk_about_c", about_c)?;
+        }
         not_negative(within, "downstream_m", self.downstream_m)?;
         finite(within, "stream_exponent", self.stream_exponent)?;
         if let Some(mode) = self.slow_mode {

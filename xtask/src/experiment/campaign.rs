@@ -76,7 +76,10 @@ impl Plan {
         let sampling = Sampling::new(self.samples, drawn.rig.record().sample_period_s);
         let mut gas = drawn.rig.gas().clone();
         gas.per_trial = true;
-        drawn.rig = drawn.rig.with_record(sampling)?.with_gas(gas)?;
+        let mut sensors = drawn.rig.sensors().clone();
+        // An instrument has one temperature at which nothing is picked up, and not the mean of each record.
+        sensors.iter_mut().for_each(|sensor| sensor.crosstalk_about_c = Some(gas.mean_c));
+        drawn.rig = drawn.rig.with_record(sampling)?.with_gas(gas)?.with_sensors(sensors)?;
         Ok(drawn)
     }
 }
