@@ -14,7 +14,7 @@ use twinlag_model::{BetweenRecords, Identifier, ModelFit, Policy};
 use twinlag_optimise::Scale;
 
 use crate::diagnosis::Verdict;
-use crate::naming::interval_95;
+use crate::naming::{hull, interval_95};
 
 /// Whether a number may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -436,7 +436,7 @@ impl Judgement {
     /// Makes the interval of the number cover that of another model as well, and says so where it is longer for it.
     pub(crate) fn cover_with(&mut self, interval: &mut [f64; 2], other: [f64; 2]) {
         let before = *interval;
-        *interval = [before[0].min(other[0]), before[1].max(other[1])];
+        *interval = hull(before, other);
         if is_longer(*interval, before) {
             self.cover(Covered::OtherModels, false);
         }
@@ -597,7 +597,7 @@ impl Number {
             reasons.push(Reason::LeftOver);
         }
         if let Some(RecordScatter { interval_95: between, ratio, p_value }) = self.between {
-            let with_between = [interval[0].min(between[0]), interval[1].max(between[1])];
+            let with_between = hull(interval, between);
             if is_longer(with_between, interval) {
                 covers.push(Covered::Records);
             }

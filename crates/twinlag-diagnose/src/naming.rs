@@ -109,6 +109,11 @@ pub(crate) fn interval_95(value: f64, error: f64, scale: &Scale) -> [f64; 2] {
     }
 }
 
+/// The shortest interval that holds two others.
+pub(crate) fn hull(one: [f64; 2], other: [f64; 2]) -> [f64; 2] {
+    [one[0].min(other[0]), one[1].max(other[1])]
+}
+
 /// A number that follows from the parameters in `range`, its error to first order.
 fn derived(derived: &Derived, theta: &[f64], range: Range<usize>, covariance: Option<&[Vec<f64>]>) -> Value {
     let at = &theta[range.clone()];

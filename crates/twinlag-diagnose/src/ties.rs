@@ -3,7 +3,7 @@
 use twinlag_model::{Effort, Fitted, ModelFit, Policy, Prepared, Value, covariance};
 use twinlag_optimise::Scale;
 
-use crate::naming::interval_95;
+use crate::naming::{hull, interval_95};
 use crate::remark::Remark;
 use crate::transfer::EffectInChannel;
 use crate::twins::ExactTwin;
@@ -80,27 +80,21 @@ pub(crate) fn widen(
     policy: &Policy,
 ) -> (Option<Remark>, [Option<EffectInChannel>; 3]) {
     let (mut effects, mut causes) = (Vec::new(), [None; 3]);
-    let of = |fit: &ModelFit, i: usize| {
-        if i < 2 { fit.time_constants[i].interval_95_s } else { fit.difference.interval_95_s }
-    };
-    let before = [0, 1, 2].map(|i| of(fit, i));
-    for Tie { named, other, numbers } in ties {
-        for (i, estimate) in numbers.iter().enumerate() {
-            let Some(Estimate { value, standard_error, interval_95: [from, to] }) = estimate else { continue };
-            let number = if i < 2 { &mut fit.time_constants[i] } else { &mut fit.difference };
-            let (Some([low, high]), Some([low_before, high_before])) = (&mut number.interval_95_s, before[i]) else {
-                continue;
-            };
+    let [one, two] = &mut fit.time_constants;
+    for (i, number) in [one, two, &mut fit.difference].into_iter().enumerate() {
+        let Some([low, high]) = number.interval_95_s else { continue };
+        for Tie { named, other, numbers } in ties {
+            let Some(Estimate { value, standard_error, interval_95 }) = &numbers[i] else { continue };
             if *standard_error > 0.0 && (i == 2 || *standard_error < policy.vague_log_std * value) {
-                let more = (low_before - from).max(0.0) + (to - high_before).max(0.0);
+                let more = (low - interval_95[0]).max(0.0) + (interval_95[1] - high).max(0.0);
                 // Another form of the same effect is no other cause.
                 if i < 2 && more > NOTICEABLE * value && other != named {
                     effects.push(other.0);
                 }
-                if more > DECISIVE * (high_before - low_before) && other != named {
+                if more > DECISIVE * (high - low) && other != named {
                     causes[i] = Some(*named);
                 }
-                (*low, *high) = (low.min(*from), high.max(*to));
+                number.interval_95_s = number.interval_95_s.map(|widened| hull(widened, *interval_95));
             }
         }
     }

@@ -7,7 +7,7 @@
 use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Prepared, Value, covariance};
 
 use crate::diagnosis::Found;
-use crate::naming::interval_95;
+use crate::naming::{hull, interval_95};
 use crate::ties::Tie;
 use crate::twins::exact_twins;
 
@@ -77,8 +77,6 @@ impl WholeForm {
 }
 
 /// Makes the interval of a value, where it has one, cover another one as well.
-pub(crate) fn cover(value: &mut Value, [from, to]: [f64; 2]) {
-    if let Some([low, high]) = &mut value.interval_95 {
-        (*low, *high) = (low.min(from), high.max(to));
-    }
+pub(crate) fn cover(value: &mut Value, other: [f64; 2]) {
+    value.interval_95 = value.interval_95.map(|interval| hull(interval, other));
 }

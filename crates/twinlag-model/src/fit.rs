@@ -81,6 +81,21 @@ pub struct Fitted {
 }
 
 impl Fitted {
+    /// A model where a solver ended.
+    ///
+    /// - `count`: degrees of freedom
+    pub(crate) fn of(model: &Model, report: Fit, count: f64) -> Self {
+        Self {
+            model: model.clone(),
+            theta: report.x.clone(),
+            chi2: report.value,
+            count,
+            end: report.end.clone(),
+            report,
+            is_mismatch_bias_removed: false,
+        }
+    }
+
     /// This fit with parameters in their conventional order, where the model is the same for several.
     #[must_use]
     pub fn in_order(mut self) -> Self {
@@ -135,15 +150,7 @@ impl Model {
         let cost = ResidualCost::new(self, start, observations, selection);
         let fit = minimised(&cost, cost.variables.clone(), start, selection.counted(), effort);
         let count = self.degrees_of_freedom(cost.count(), &fit.x, observations, selection);
-        Fitted {
-            model: self.clone(),
-            theta: fit.x.clone(),
-            chi2: fit.value,
-            count,
-            end: fit.end.clone(),
-            report: fit,
-            is_mismatch_bias_removed: false,
-        }
+        Fitted::of(self, fit, count)
     }
 
     /// Degrees of freedom of `residuals` that count, as the fit weighs frequencies.

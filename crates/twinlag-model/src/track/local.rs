@@ -164,15 +164,7 @@ impl Local<'_> {
         let variables = self.model.variables(start, self.observations);
         let fit = minimised(self, variables, start, self.selection.counted(), Effort::Finish);
         let count = self.model.degrees_of_freedom(self.count(&fit.x), &fit.x, self.observations, self.selection);
-        Fitted {
-            model: self.model.clone(),
-            theta: fit.x.clone(),
-            chi2: fit.value,
-            count,
-            end: fit.end.clone(),
-            report: fit,
-            is_mismatch_bias_removed: false,
-        }
+        Fitted::of(self.model, fit, count)
     }
 
     /// Number of residuals that count, and of what is known beforehand.
