@@ -158,7 +158,12 @@ pub(crate) fn last_fit(state: &State<'_>, policy: &Policy) -> (Fitted, ModelFit,
     let is_noise_left = what_is_left(&fit, policy).is_none() && state.rapid.is_none();
     let (fitted, first_states) = choose(free, prepared, is_noise_left);
     let is_any_kept = first_states.iter().flatten().any(|first| first.choice == FirstStateChoice::Equilibrium);
-    let fit = if is_any_kept { summary(&fitted, state, policy) } else { fit };
+    let mut fit = if is_any_kept { summary(&fitted, state, policy) } else { fit };
+    if let Some(covariance) = &mut fit.covariance {
+        for (at, variance) in state.search().noise_variances(&fitted) {
+            covariance[at][at] = variance;
+        }
+    }
     (fitted, fit, first_states)
 }
 

@@ -53,6 +53,7 @@ mod limits;
 mod long;
 mod moves;
 mod naming;
+mod noise;
 mod odd_one;
 mod propagate;
 mod rank;

@@ -27,7 +27,6 @@ pub(crate) fn numbers(
     last: &Fitted,
     covariance: Option<&[Vec<f64>]>,
 ) -> Vec<Value> {
-    let covariance = covariance.filter(|_| !effect.is_noise());
     let pairs = effect.parameters().iter().zip(range.clone());
     let mut out: Vec<Value> = pairs.map(|(p, i)| value(p, last.theta[i], covariance.map(|c| c[i][i]))).collect();
     out.extend(effect.derived().into_iter().map(|d| derived(&d, &last.theta, range.clone(), covariance)));
@@ -199,8 +198,8 @@ pub(crate) fn judge_effect(
     circumstances: &Circumstances<'_>,
 ) {
     let (parameters, range) = (last.model.effects[effect].parameters(), last.model.range(effect));
-    // What is derived from parameters has no scatter.
-    let scatter = &fit.scatter[range.clone()];
+    // What is derived from parameters has no scatter, nor has a noise, which no residual influences alone.
+    let scatter = if found.effect.is_noise() { &[][..] } else { &fit.scatter[range.clone()] };
     let has_ended_on = |at: usize| matches!(&last.end, End::OnBound(which) if which.contains(&at));
     let is_on_bound = |index: usize| {
         has_ended_on(range.start + index) || !is_inside_bounds(&parameters[index], last.theta[range.start + index])

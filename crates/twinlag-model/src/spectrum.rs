@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem, Variable};
 use twinlag_transform::Forward;
 
+use crate::dense;
 use crate::disagreement::Evaluator;
 use crate::effect::coloured_noise::{MAX_CORRELATION_SPANS, MIN_CORRELATION_STEPS};
 use crate::implied::{is_all_informed, is_informed};
@@ -196,6 +197,8 @@ const MAX_LEVEL_FACTOR: f64 = 5.0;
 /// of the gas as well; above, where nothing but scatter is.
 const LEVELS_LOOSE: f64 = 0.3;
 const LEVELS_TIGHT: f64 = 0.03;
+/// Step of derivatives in the logarithm of a parameter: about the cube root of rounding.
+const LOG_STEP: f64 = 1e-5;
 
 struct NoiseCost<'a> {
     bands: &'a Bands,
@@ -353,6 +356,44 @@ pub fn fit_noise_again(
     search.starts = vec![vec![factor(0), factor(1), extra.std_k, extra.correlation_s]];
     let x = search.solve(Half::Both);
     Some((search.noise_std_k(&x), search.extra(&x)?))
+}
+
+/// Covariance of the logarithms of the size and of the correlation time of the extra noise of `plant` that enters at `place`, the levels
+/// of white noise unknown beside them: the inverse of Whittle's information `½ Σ ν ∂ ln S ∂ ln S`, over bands of `ν` degrees of
+/// freedom and with the power `S`. `None` of a plant without such noise, or where the residual does not determine it.
+///
+/// - `bands`: those of the residual that it was fitted to
+pub fn noise_covariance(
+    plant: &Plant,
+    place: Place,
+    observations: &Observations,
+    bands: &Bands,
+    is_coarse: [bool; 2],
+) -> Option<[[f64; 2]; 2]> {
+    let mut search = NoiseSearch::of(plant, observations, bands, is_coarse);
+    let at = search.paths.extra.iter().position(|extra| extra.place == place)?;
+    let extra = search.paths.extra.remove(at);
+    search.place = Some(place);
+    let cost = search.cost(Half::Both);
+    let log_power = |omega: f64, changed: usize, by: f64| {
+        let mut x = [1.0, 1.0, extra.std_k, extra.correlation_s];
+        x[changed] *= by.exp();
+        let (variance, extra) = cost.parts(&x);
+        search.paths.total(variance, &extra, omega).ln()
+    };
+    let mut information = vec![vec![0.0; 4]; 4];
+    for band in &bands.0 {
+        let slope = [0, 1, 2, 3]
+            .map(|i| (log_power(band.omega, i, LOG_STEP) - log_power(band.omega, i, -LOG_STEP)) / (2.0 * LOG_STEP));
+        for (row, a) in information.iter_mut().zip(slope) {
+            row.iter_mut().zip(slope).for_each(|(sum, b)| *sum += 0.5 * band.dof() * a * b);
+        }
+    }
+    // What third differences say of the levels.
+    (0..2).for_each(|i| information[i][i] += LEVELS_LOOSE.powi(-2));
+    let covariance = dense::inverse(&information)?;
+    let out = [2, 3].map(|i| [2, 3].map(|j| covariance[i][j]));
+    (out[0][0] > 0.0 && out[1][1] > 0.0).then_some(out)
 }
 
 /// Runs of samples, each with its residual and whether this says anything.
