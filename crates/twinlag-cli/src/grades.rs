@@ -45,7 +45,7 @@ pub(crate) fn reasons<'a>(numbers: impl IntoIterator<Item = (String, &'a Judgeme
             _ => judgement.because.split("; ").map(str::to_owned).collect(),
         };
         for reason in reasons {
-            match groups.iter_mut().find(|(grade, other, _)| (*grade, &*other) == (judgement.grade, &reason)) {
+            match groups.iter_mut().find(|(grade, other, _)| (*grade, &other[..]) == (judgement.grade, &reason[..])) {
                 Some((_, _, names)) => names.push(name.clone()),
                 None => groups.push((judgement.grade, reason, vec![name.clone()])),
             }

@@ -141,9 +141,8 @@ pub fn diagnose_records(
     let differ = between.is_some_and(|between| differ(between, &settings.policy));
     let is_odd = |record: usize| odd.as_ref().is_some_and(|odd| odd.is_known && odd.record == record);
     let do_others_agree = odd.as_ref().is_some_and(|odd| odd.is_known) || (is_whole && (is_any_named || !differ));
-    let agrees = |record: usize| match is_odd(record) || !contradictions[record].is_empty() {
-        true => Some(false),
-        false => do_others_agree.then_some(true),
+    let agrees = |record: usize| {
+        if is_odd(record) || !contradictions[record].is_empty() { Some(false) } else { do_others_agree.then_some(true) }
     };
     // What a record says by itself that the others do not.
     let beside_the_others = |record: usize| odd.as_ref().and_then(|odd| odd.of(record));

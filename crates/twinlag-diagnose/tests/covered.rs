@@ -79,7 +79,10 @@ fn a_mismatch_of_the_gas_leaves_no_bias() {
             // 0.5 K, and 1/(2π · 0.8 Hz); four standard errors, none of which is a quarter of its number.
             for (parameter, truth) in diagnosis.effects[0].parameters.iter().zip([0.5, 0.199]) {
                 let error = parameter.standard_error.expect("it has an interval") / parameter.value;
-                assert!((parameter.value / truth).ln().abs() < 4.0 * error && error < 0.25, "{parameter:?}, want {truth}");
+                assert!(
+                    (parameter.value / truth).ln().abs() < 4.0 * error && error < 0.25,
+                    "{parameter:?}, want {truth}"
+                );
             }
             for (i, truth_s) in [0.1, 0.4].into_iter().enumerate() {
                 let tau = &diagnosis.last.time_constants[i];
