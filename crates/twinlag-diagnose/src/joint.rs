@@ -125,10 +125,9 @@ pub fn diagnose_records(
     withdraw_what_does_not_transfer(&mut state, watch)?;
     let transfer = transfer(&state, settings, watch)?;
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
-    let odd = OddOne::find(&state, &transfer, settings, watch)?;
-    if let Some(odd) = odd.as_ref().filter(|odd| odd.differs())
-        && (state.has_noise() || !is_explained(&state, settings))
-    {
+    let is_one_rig = !state.has_noise() && is_explained(&state, settings);
+    let odd = if is_one_rig { None } else { OddOne::find(&state, &transfer, settings, watch)? };
+    if let Some(odd) = odd.as_ref().filter(|odd| odd.differs()) {
         odd.withdraw_what_neither_needs(&mut state);
     }
     let (diagnosis, last) = conclude(state, settings, tones)?;

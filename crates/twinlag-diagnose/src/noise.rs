@@ -1,6 +1,6 @@
 //! Noise that a search finds in the spectrum of a residual: its size, how certain that is, and the fit under its weights.
 
-use twinlag_model::{Effort, Extra, Fitted, Place, Shared, fit_noise, fit_noise_again, noise_covariance};
+use twinlag_model::{Effort, Extra, Fitted, Place, Shared, fit_noise, fit_noise_again, noise_log_variances};
 
 use crate::candidates::{Candidate, Search};
 
@@ -66,21 +66,19 @@ impl Search<'_> {
         model.fit(&theta, observations, selection, Effort::Compare)
     }
 
-    /// Variances of the parameters of the noises of a fit, each with its place among all parameters: that of a number on a logarithmic
-    /// scale is times its square. None of a noise that the residual does not determine.
+    /// Variances of the parameters of the noises of a fit, each with its place among all parameters; none of a noise that the residual
+    /// does not determine.
     pub(crate) fn noise_variances(&self, fitted: &Fitted) -> Vec<(usize, f64)> {
-        let plant = fitted.model.plant(&fitted.theta, self.observations);
+        let Fitted { model, theta, .. } = fitted;
+        let plant = model.plant(theta, self.observations);
         let bands = self.bands(fitted);
         let of_noise = |index: usize| {
-            let place = place_of(&fitted.model.effects[index]);
-            let covariance = noise_covariance(&plant, place, self.observations, &bands, self.context.is_coarse);
-            let range = fitted.model.range(index);
-            covariance
-                .into_iter()
-                .flat_map(move |covariance| range.clone().zip([covariance[0][0], covariance[1][1]]).collect::<Vec<_>>())
+            let place = place_of(&model.effects[index]);
+            let variances = noise_log_variances(&plant, place, self.observations, &bands, self.context.is_coarse);
+            variances.into_iter().flat_map(move |variances| model.range(index).zip(variances))
         };
-        let noises = (0..fitted.model.effects.len()).filter(|index| fitted.model.effects[*index].is_noise());
-        noises.flat_map(of_noise).map(|(at, variance)| (at, variance * fitted.theta[at].powi(2))).collect()
+        let noises = (0..model.effects.len()).filter(|index| model.effects[*index].is_noise());
+        noises.flat_map(of_noise).map(|(at, of_log)| (at, of_log * theta[at].powi(2))).collect()
     }
 }
 

@@ -250,8 +250,9 @@ impl Step {
         let normal = model.normal_equations(theta, observations, selection, None);
         let mut step = dense::times(&model.curvature(theta, observations, selection, &normal)?, &normal.slope);
         // The step is to the minimum, and the fit is not there.
-        let bias = fitted.removed_bias(observations, selection);
-        bias.iter().for_each(|bias| step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias));
+        if let Some(bias) = fitted.removed_bias(observations, selection) {
+            step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias);
+        }
         let covariance = covariance(fitted, observations, selection, false)?;
         Some(Self { step, covariance })
     }

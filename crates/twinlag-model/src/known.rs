@@ -110,22 +110,16 @@ impl Known {
         if !fitted.chi2.is_finite() {
             return Err(ModelError::Absurd);
         }
-        let fitted = if is_noise_left(&fitted, &prepared, settings) {
-            fitted.without_mismatch_bias(&prepared.observations, &prepared.everything)
-        } else {
-            fitted
-        };
+        let Prepared { observations, everything, levels, .. } = &prepared;
+        let corrected = fitted.clone().without_mismatch_bias(observations, everything);
+        // Where more than noise is left, what was found as a mismatch of the gas may be something else.
+        let is_noise_left =
+            || !summarise(&fitted, observations, everything, levels, &settings.policy).is_contradicted();
+        if corrected.is_mismatch_bias_removed && is_noise_left() {
+            fitted = corrected;
+        }
         Ok(Self { prepared, fitted, fitted_again })
     }
-}
-
-/// Whether a fit leaves nothing but noise, so that what was found as a mismatch of the gas is one.
-fn is_noise_left(fitted: &Fitted, prepared: &Prepared, settings: &Settings) -> bool {
-    if fitted.model.noise().is_none() {
-        return true;
-    }
-    let Prepared { observations, everything, levels, .. } = prepared;
-    !summarise(fitted, observations, everything, levels, &settings.policy).is_contradicted()
 }
 
 /// A parameter of a model that comes from outside must be one that its kind can have.

@@ -77,7 +77,7 @@ pub use prepare::Prepared;
 pub use records::{Member, OneRecord};
 pub use selection::{Samples, Selection};
 pub use settings::{Settings, Watch, report};
-pub use spectrum::{Bands, fit_noise, fit_noise_again, noise_covariance, white_deviance};
+pub use spectrum::{Bands, fit_noise, fit_noise_again, noise_log_variances, white_deviance};
 pub use spline::Spline;
 pub use summary::{covariance, is_unresolved, summarise};
 pub use trace::{Line, ResidualPart, Trace};

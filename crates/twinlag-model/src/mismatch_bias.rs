@@ -10,10 +10,10 @@
 //! ```
 //!
 //! over the frequencies of as many residuals as count, with the weights `W`, the spectrum `M` of the mismatch and that of the
-//! disagreement, `V`. To first order the estimate is off by `−H⁻¹ c`, `H` half the second derivatives of the energy: for a mismatch of
-//! 3 % of the gas in 3000 samples of turbulence about one standard error. The record does not say which of the sensors sees the other
-//! gas. The mean of both corrections is taken, and half their difference is a standard error beside the others. Where the bias is not
-//! removed, the mean correction is one as well.
+//! disagreement, `V`. To first order the estimate is off by `−H⁻¹ c`, `H` half the second derivatives of the energy: by about a
+//! standard error in the records of the test, whose mismatch is 5 % of the gas. The record does not say which of the sensors sees the
+//! other gas. The mean of both corrections is taken, and half their difference is a standard error beside the others. Where the bias
+//! is not removed, the mean correction is one as well.
 
 use std::f64::consts::PI;
 

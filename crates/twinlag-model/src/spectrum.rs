@@ -259,6 +259,20 @@ impl<'a> NoiseSearch<'a> {
         Self { observations, bands, paths, base, place: None, starts: vec![vec![1.0; 2]], is_coarse }
     }
 
+    /// A search for the extra noise of `plant` at `place`, and this noise as it is; `None` of a plant without it.
+    fn of_extra(
+        plant: &Plant,
+        place: Place,
+        observations: &'a Observations,
+        bands: &'a Bands,
+        is_coarse: [bool; 2],
+    ) -> Option<(Self, Extra)> {
+        let mut search = Self { place: Some(place), ..Self::of(plant, observations, bands, is_coarse) };
+        let at = search.paths.extra.iter().position(|extra| extra.place == place)?;
+        let extra = search.paths.extra.remove(at);
+        Some((search, extra))
+    }
+
     fn cost(&self, half: Half) -> NoiseCost<'_> {
         let Self { bands, paths, base, place, is_coarse, .. } = self;
         NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse }
@@ -347,10 +361,7 @@ pub fn fit_noise_again(
     bands: &Bands,
     is_coarse: [bool; 2],
 ) -> Option<([f64; 2], Extra)> {
-    let mut search = NoiseSearch::of(plant, observations, bands, is_coarse);
-    let at = search.paths.extra.iter().position(|extra| extra.place == place)?;
-    let extra = search.paths.extra.remove(at);
-    search.place = Some(place);
+    let (mut search, extra) = NoiseSearch::of_extra(plant, place, observations, bands, is_coarse)?;
     search.paths.base = levels_k.map(|k| k * k);
     let factor = |i: usize| (plant.noise_std_k[i] / levels_k[i]).clamp(1.0 / MAX_LEVEL_FACTOR, MAX_LEVEL_FACTOR);
     search.starts = vec![vec![factor(0), factor(1), extra.std_k, extra.correlation_s]];
@@ -358,22 +369,19 @@ pub fn fit_noise_again(
     Some((search.noise_std_k(&x), search.extra(&x)?))
 }
 
-/// Covariance of the logarithms of the size and of the correlation time of the extra noise of `plant` that enters at `place`, the levels
+/// Variances of the logarithms of the size and of the correlation time of the extra noise of `plant` that enters at `place`, the levels
 /// of white noise unknown beside them: the inverse of Whittle's information `½ Σ ν ∂ ln S ∂ ln S`, over bands of `ν` degrees of
 /// freedom and with the power `S`. `None` of a plant without such noise, or where the residual does not determine it.
 ///
 /// - `bands`: those of the residual that it was fitted to
-pub fn noise_covariance(
+pub fn noise_log_variances(
     plant: &Plant,
     place: Place,
     observations: &Observations,
     bands: &Bands,
     is_coarse: [bool; 2],
-) -> Option<[[f64; 2]; 2]> {
-    let mut search = NoiseSearch::of(plant, observations, bands, is_coarse);
-    let at = search.paths.extra.iter().position(|extra| extra.place == place)?;
-    let extra = search.paths.extra.remove(at);
-    search.place = Some(place);
+) -> Option<[f64; 2]> {
+    let (search, extra) = NoiseSearch::of_extra(plant, place, observations, bands, is_coarse)?;
     let cost = search.cost(Half::Both);
     let log_power = |omega: f64, changed: usize, by: f64| {
         let mut x = [1.0, 1.0, extra.std_k, extra.correlation_s];
@@ -392,8 +400,8 @@ pub fn noise_covariance(
     // What third differences say of the levels.
     (0..2).for_each(|i| information[i][i] += LEVELS_LOOSE.powi(-2));
     let covariance = dense::inverse(&information)?;
-    let out = [2, 3].map(|i| [2, 3].map(|j| covariance[i][j]));
-    (out[0][0] > 0.0 && out[1][1] > 0.0).then_some(out)
+    let variances = [covariance[2][2], covariance[3][3]];
+    variances.iter().all(|variance| *variance > 0.0).then_some(variances)
 }
 
 /// Runs of samples, each with its residual and whether this says anything.
