@@ -19,12 +19,14 @@ use crate::naming::{judge_effect, name, of_defect, of_rapid};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 use crate::ties::{Tie, widen};
+use crate::transfer::Across;
 use crate::twins::{ExactTwin, cover_twins, exact_twins};
 use crate::whole_form::WholeForm;
 
 /// The answer, its numbers fitted once more to the whole record, and that fit.
 ///
 /// - `tones`: of the gas, where its power is in tones
+/// - `across`: what records that were left out say, of several
 ///
 /// # Errors
 /// [`ModelError::Cancelled`] if the watch says so.
@@ -32,6 +34,7 @@ pub(crate) fn conclude(
     state: State<'_>,
     settings: &Settings,
     tones: Option<usize>,
+    across: Option<&Across>,
 ) -> Result<(Diagnosis, Fitted), ModelError> {
     let policy = &settings.policy;
     // Before is before everything: with the defects of the data in it.
@@ -67,14 +70,18 @@ pub(crate) fn conclude(
     }
     let excess = bounded_excess(&state, &with_effects, &last, policy);
     let unbounded = left.as_ref().filter(|_| excess.is_none());
-    let verdict = if is_refused { Verdict::Refused } else { verdict(&state, found.is_empty(), unbounded, policy) };
+    let contradiction = Contradiction::find(&state, &with_effects, settings, policy);
+    let is_wrong =
+        across.is_some_and(Across::is_refuted) || contradiction.as_ref().is_some_and(Contradiction::is_of_known);
+    let fitted = verdict(&state, found.is_empty(), unbounded, policy);
+    let verdict = if is_refused { Verdict::Refused } else { unless_wrong(fitted, is_wrong) };
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
-    if let Some(contradiction) = Contradiction::find(&state, &with_effects, settings, policy) {
-        basis.reasons.push(contradiction.reason());
-        remarks.extend(contradiction.remark());
-    }
+    basis.reasons.extend(across.and_then(Across::reason));
+    remarks.extend(across.and_then(Across::remark).filter(|_| verdict == Verdict::PartlyExplained));
+    basis.reasons.extend(contradiction.as_ref().map(Contradiction::reason));
+    remarks.extend(contradiction.and_then(Contradiction::remark));
     let span_s = state.prepared.observations.span_s();
     let mut circumstances =
         Circumstances { is_total_delay, causes, ..Circumstances::new(basis, &settings.known, span_s, policy) };
@@ -97,16 +104,10 @@ pub(crate) fn conclude(
     // Twins were widened with the parameters that they follow from: time constants cover them as they are now.
     cover_twins(&mut last, &mut judgements, policy, effects.iter().flat_map(|found| &found.exact_twins));
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
-    if !is_given {
-        // What they would be under another cause follows from both.
-        effects.iter_mut().for_each(|found| found.exact_twins.clear());
-    }
-    // Numbers of the other case are given where those of this one are.
-    let is_withheld = |found: &Found| !is_whole || found.judgements.iter().any(|j| j.grade == Grade::NoGo);
-    for found in effects.iter_mut().filter(|found| is_withheld(found)) {
-        found.first_state.iter_mut().for_each(|first| first.otherwise.clear());
-    }
-    let if_known = if is_refused || (is_whole && is_given) {
+    withhold_other_cases(&mut effects, is_whole, is_given);
+    // A time constant that is known does not make one rig of several, nor one that is wrong any better.
+    let is_no_use = is_wrong || across.is_some_and(|across| across.are_of_several_rigs);
+    let if_known = if is_refused || is_no_use || (is_whole && is_given) {
         None
     } else {
         if_known(&with_effects, last.chi2_per_dof, is_whole, &state, policy)
@@ -293,6 +294,25 @@ fn judged(
         found
     };
     found.into_iter().map(of_place).collect()
+}
+
+/// A verdict on how well the model fits, where something else says that it is no cause.
+fn unless_wrong(verdict: Verdict, is_wrong: bool) -> Verdict {
+    if verdict == Verdict::Explained && is_wrong { Verdict::PartlyExplained } else { verdict }
+}
+
+/// Takes back numbers under other causes and in other cases where those of this one are not given.
+///
+/// - `is_given`: whether both time constants are
+fn withhold_other_cases(effects: &mut [Found], is_whole: bool, is_given: bool) {
+    if !is_given {
+        // What they would be under another cause follows from both.
+        effects.iter_mut().for_each(|found| found.exact_twins.clear());
+    }
+    let is_withheld = |found: &Found| !is_whole || found.judgements.iter().any(|j| j.grade == Grade::NoGo);
+    for found in effects.iter_mut().filter(|found| is_withheld(found)) {
+        found.first_state.iter_mut().for_each(|first| first.otherwise.clear());
+    }
 }
 
 /// Takes back a difference of time constants neither of which is determined: it is that of where the fit ended in their valley,

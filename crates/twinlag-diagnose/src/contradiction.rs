@@ -86,6 +86,11 @@ impl Contradiction {
         is_far.then(|| Self { what: given(known), instead: None, deviations, grade: Grade::NoGo })
     }
 
+    /// Whether what was given is wrong, and effects that were found make up for that.
+    pub(crate) fn is_of_known(&self) -> bool {
+        self.grade == Grade::NoGo
+    }
+
     /// The reason that each number has for it.
     pub(crate) fn reason(&self) -> Reason {
         let Self { what, deviations, grade, .. } = self;

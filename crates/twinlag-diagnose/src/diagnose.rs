@@ -5,7 +5,7 @@ use twinlag_model::{ModelError, Observations, Prepared, Settings, Watch, is_unre
 
 use crate::conclude::{conclude, leaves_more_than_noise};
 use crate::diagnosis::Diagnosis;
-use crate::excitation::{SINGLE, tones};
+use crate::excitation::{SINGLE, tones_of_each};
 use crate::long::pieces;
 use crate::moves::{Proposal, Searched, State};
 use crate::rapid::rapid_variation;
@@ -35,7 +35,7 @@ pub fn diagnose(observations: &Observations, settings: &Settings, watch: Watch<'
     let (state, tones) = searched(observations, settings, watch)?;
     let is_of_all = state.rapid.is_none() && tones != Some(SINGLE);
     let transfer = if is_of_all { Some(over_blocks(&state, watch)?) } else { None };
-    let (diagnosis, _) = conclude(state, settings, tones)?;
+    let (diagnosis, _) = conclude(state, settings, tones, None)?;
     Ok(Diagnosis { transfer, ..diagnosis })
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn searched<'a>(
 ) -> Result<(State<'a>, Option<usize>), ModelError> {
     let prepared = Prepared::new(observations, settings)?;
     report(watch, "two lags", 0, 1)?;
-    let tones = tones(observations, &settings.policy);
+    let tones = tones_of_each(observations, &settings.policy);
     let can_learn = tones != Some(SINGLE);
     let mut state = match pieces(observations) {
         Some(pieces) => {

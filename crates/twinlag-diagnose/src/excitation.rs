@@ -33,6 +33,14 @@ pub(crate) fn tones(observations: &Observations, policy: &Policy) -> Option<usiz
     tones_of(&stretch.reading_c[channel], policy, || Some(levels(observations)?.std_k[channel]))
 }
 
+/// Number of separate tones of one record, as of [`tones`], or of all of several together; `None` where one of them is spread.
+pub(crate) fn tones_of_each(observations: &Observations, policy: &Policy) -> Option<usize> {
+    if !observations.is_joined() {
+        return tones(observations, policy);
+    }
+    observations.members().iter().map(|member| tones(&observations.of_member(member.number), policy)).sum()
+}
+
 /// Number of separate tones in the readings of one channel, as of [`tones`].
 ///
 /// - `noise_k`: standard deviation of the noise, asked for where there are readings enough

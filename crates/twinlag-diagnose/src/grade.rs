@@ -83,6 +83,16 @@ pub enum Reason {
         /// Whether the interval says anything still.
         is_known: bool,
     },
+    /// The others do not show without this record what was found, so that it rests on it alone.
+    RestsOnRecord {
+        /// The record, from 0.
+        record: usize,
+    },
+    /// Of several records the models of the others leave more than noise.
+    DoesNotTransfer {
+        /// How many records these are.
+        records: usize,
+    },
     /// Other effects explain the record as well, and with them the number is another.
     Cause {
         /// The effect that it is right with.
@@ -199,6 +209,7 @@ impl Reason {
             | Self::LeftBehind { .. }
             | Self::OnBound
             | Self::SingleTone
+            | Self::DoesNotTransfer { .. }
             | Self::RatioChanges { .. }
             | Self::RecordsDisagree { is_known: false, .. } => Grade::NoGo,
             Self::Follows { grade, .. } | Self::Fault { grade, .. } | Self::Contradicted { grade, .. } => *grade,
@@ -244,6 +255,35 @@ impl Reason {
     }
 }
 
+impl Reason {
+    /// What several records say, as a clause; empty for any other reason.
+    fn of_records(&self) -> String {
+        match self {
+            Self::RecordsDisagree { ratio, is_known: true } => format!(
+                "right if these records are typical: they give values that differ {ratio:.1} times as much as noise explains, \
+                 which the interval covers"
+            ),
+            Self::RecordsDisagree { ratio, .. } => format!(
+                "the records give values that differ {ratio:.1} times as much as noise explains, so that no value holds for all of them"
+            ),
+            Self::RestsOnRecord { record } => format!(
+                "right if record {} is of one rig with the others, which do not show without it what was found",
+                record + 1
+            ),
+            Self::DoesNotTransfer { records } => format!(
+                "the model of the others leaves more than noise in {}, left out in turn",
+                counted_records(*records)
+            ),
+            _ => String::new(),
+        }
+    }
+}
+
+/// So many records, in words.
+pub(crate) fn counted_records(records: usize) -> String {
+    if records == 1 { "one record".into() } else { format!("{records} records") }
+}
+
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -276,15 +316,9 @@ impl fmt::Display for Reason {
                 "right if the record is typical: its parts give values that differ {ratio:.1} times as much as noise explains, \
                  which the interval covers"
             ),
-            Self::RecordsDisagree { ratio, is_known: true } => write!(
-                f,
-                "right if these records are typical: they give values that differ {ratio:.1} times as much as noise explains, \
-                 which the interval covers"
-            ),
-            Self::RecordsDisagree { ratio, .. } => write!(
-                f,
-                "the records give values that differ {ratio:.1} times as much as noise explains, so that no value holds for all of them"
-            ),
+            Self::RecordsDisagree { .. } | Self::RestsOnRecord { .. } | Self::DoesNotTransfer { .. } => {
+                f.write_str(&self.of_records())
+            }
             Self::Cause { effect, channel } => right_with(f, *effect, *channel),
             Self::Hidden { effects } => write!(
                 f,

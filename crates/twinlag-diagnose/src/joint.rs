@@ -11,7 +11,7 @@ use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
 use crate::odd_one::OddOne;
-use crate::transfer::{EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
+use crate::transfer::{Across, EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,8 +59,9 @@ pub struct OfRecord {
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
     /// Whether it agrees with the others: not so if it contradicts them on a number, or if it is explained and so are they, but not
-    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all; and where the others
-    /// are explained by a noise alone, which may stand for what differs among them.
+    /// together. `None` where the records do not say which of them it is that differs, or are not explained at all; where the model of the
+    /// others leaves more than noise in it; and where the others are explained by a noise alone, which may stand for what differs among
+    /// them.
     pub agrees: Option<bool>,
     /// Shared numbers on which it contradicts all others together, or on which two records contradict each other.
     pub disagreements: Vec<Disagreement>,
@@ -130,7 +131,15 @@ pub fn diagnose_records(
     if let Some(odd) = odd.as_ref().filter(|odd| odd.differs()) {
         odd.withdraw_what_neither_needs(&mut state);
     }
-    let (diagnosis, last) = conclude(state, settings, tones)?;
+    let samples: Vec<usize> = records.iter().map(Observations::samples).collect();
+    let across = Across::new(
+        &transfer,
+        &state.current.model,
+        &samples,
+        odd.as_ref().is_some_and(OddOne::differs),
+        &settings.policy,
+    );
+    let (diagnosis, last) = conclude(state, settings, tones, Some(&across))?;
     let is_whole = matches!(diagnosis.verdict, Verdict::Adequate | Verdict::Explained);
     let odd = odd.filter(|_| !is_whole);
     let between = diagnosis.last.between.as_ref();
@@ -139,9 +148,13 @@ pub fn diagnose_records(
     let is_any_named = contradictions.iter().any(|of_record| !of_record.is_empty());
     let differ = between.is_some_and(|between| differ(between, &settings.policy));
     let is_odd = |record: usize| odd.as_ref().is_some_and(|odd| odd.is_known && odd.record == record);
-    let do_others_agree = odd.as_ref().is_some_and(|odd| odd.is_known) || (is_whole && (is_any_named || !differ));
+    let is_odd_known = odd.as_ref().is_some_and(|odd| odd.is_known);
+    let do_agree_together = is_whole && (is_any_named || !differ);
     let agrees = |record: usize| {
-        if is_odd(record) || !contradictions[record].is_empty() { Some(false) } else { do_others_agree.then_some(true) }
+        if is_odd(record) || !contradictions[record].is_empty() {
+            return Some(false);
+        }
+        (is_odd_known || (do_agree_together && !across.is_doubtful(record))).then_some(true)
     };
     // What a record says by itself that the others do not.
     let beside_the_others = |record: usize| odd.as_ref().and_then(|odd| odd.of(record));

@@ -6,7 +6,7 @@ use crate::conclude::{is_explained, last_fit};
 use crate::diagnose::searched;
 use crate::joint::Disagreement;
 use crate::moves::State;
-use crate::transfer::{EffectInChannel, LeftOut, Transfer};
+use crate::transfer::{EffectInChannel, LeftOut, Transfer, places};
 
 /// One record and all others, each explained, which together are of more than one rig.
 pub(crate) struct OddOne {
@@ -56,7 +56,7 @@ impl OddOne {
         let [of_alone, of_others] = [&alone, &others].map(|state| last_fit(state, &settings.policy).1);
         let probability = settings.policy.records_rejection_probability / 2.0;
         let side = |record: usize, state: &State<'_>, fits: [&ModelFit; 2]| Side {
-            found: found(state),
+            found: places(&state.current.model).collect(),
             has_noise: state.has_noise(),
             disagreements: (0..2).filter_map(|i| disagreement(i, record, fits, probability)).collect(),
         };
@@ -90,12 +90,6 @@ impl OddOne {
             state.apply(withdrawal);
         }
     }
-}
-
-/// Effects that a search has found, noise aside.
-fn found(state: &State<'_>) -> Vec<EffectInChannel> {
-    let effects = state.current.model.effects.iter().filter(|effect| !effect.is_noise());
-    effects.map(|effect| (effect.identifier(), effect.channel())).collect()
 }
 
 /// Time constant `i` of a record and of what it is beside, where both differ by more than chance does with this probability.

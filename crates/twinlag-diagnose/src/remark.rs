@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use twinlag_model::Identifier;
 
-use crate::grade::rounded;
+use crate::grade::{counted_records, rounded};
 
 /// Something to know before using the numbers of a diagnosis. Its [`Display`](fmt::Display) is a
 /// sentence for the reader.
@@ -65,6 +65,11 @@ pub enum Remark {
         /// The effect.
         effect: Identifier,
     },
+    /// Of several records that were left out, in turn, the model of the others leaves more than noise.
+    NotOneRig {
+        /// How many records these are.
+        records: usize,
+    },
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
     /// Something changes faster than a model of the whole record can follow.
@@ -116,7 +121,7 @@ impl Remark {
         match self {
             Self::SingleTone => 0,
             Self::Contradicted { .. } => 1,
-            Self::LagAlone => 2,
+            Self::LagAlone | Self::NotOneRig { .. } => 2,
             Self::BiasUnknown { .. } => 3,
             Self::VariesTooFast { .. } => 4,
             Self::ModelErrorAsNoise => 5,
@@ -219,6 +224,12 @@ impl fmt::Display for Remark {
                 f,
                 "{effect} explained a part of these records and was removed, because it does not help on a record that had no part in \
                  finding it: it stands in for something that changes from record to record"
+            ),
+            Self::NotOneRig { records } => write!(
+                f,
+                "the model fits these records together, but the model of the others leaves more than noise in {}, left out in turn: it makes up for something that changes from record to record, and is no cause. Diagnose each record alone, \
+                 and together those that were taken without a change of the rig",
+                counted_records(*records)
             ),
             Self::Needless { effect } => write!(
                 f,

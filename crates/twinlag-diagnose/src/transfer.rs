@@ -7,14 +7,16 @@
 //! Of a single record errors are those of its blocks, and show how far the model carries within it. Nothing is taken out for them: a
 //! block may be hotter than all others, and what goes with temperature is then not tried on it but extrapolated to it.
 
-use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Settings, Watch, report};
+use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Policy, Settings, Watch, report};
 
 use crate::conclude::{is_explained, to_the_end};
 use crate::diagnose::searched;
 use crate::diagnosis::BeforeAfter;
 use crate::errors::Squares;
+use crate::grade::Reason;
 use crate::moves::State;
 use crate::rapid::without_noise;
+use crate::remark::Remark;
 
 /// An effect with its channel, 0 or 1; `None` where it is of both, or relative.
 pub type EffectInChannel = (Identifier, Option<usize>);
@@ -45,6 +47,83 @@ pub struct Transfer {
     pub input_difference_k: BeforeAfter<f64>,
     /// Errors of each, in their order.
     pub records: Vec<LeftOut>,
+}
+
+/// Standard deviations by which chance exceeds the mean once in a thousand.
+const FAR_DEVIATIONS: f64 = 3.09;
+
+/// What records that were left out say of the model of all.
+#[derive(Clone, Debug)]
+pub(crate) struct Across {
+    /// Records, from 0, in which the model of the others leaves more than noise.
+    pub(crate) unexplained: Vec<usize>,
+    /// The record without which the others do not show what was found.
+    rests_on: Option<usize>,
+    /// Whether the records are known not to be of one rig.
+    pub(crate) are_of_several_rigs: bool,
+    /// Whether a noise is in the model of all: it may stand for what differs among them.
+    has_noise: bool,
+}
+
+impl Across {
+    /// - `model`: of all records
+    /// - `samples`: of each record
+    pub(crate) fn new(
+        transfer: &Transfer,
+        model: &Model,
+        samples: &[usize],
+        are_of_several_rigs: bool,
+        policy: &Policy,
+    ) -> Self {
+        // The mean square of n numbers of unit variance has the standard deviation √(2/n).
+        let chance = |samples: usize| (1.0 + FAR_DEVIATIONS * (2.0 / samples.max(1) as f64).sqrt()).sqrt();
+        let most = |record: usize| chance(samples[record]) + policy.left_out_rms_margin;
+        let errors = |record: usize| transfer.records[record].normalised_rms;
+        let unexplained: Vec<usize> =
+            (0..samples.len()).filter(|record| errors(*record).after > most(*record)).collect();
+        // Two lags that leave more than noise in a record, and the model of the others does not: it holds there.
+        let holds_on = |record: usize| errors(record).before > most(record) && !unexplained.contains(&record);
+        let lacking = |place: EffectInChannel| {
+            let lacks = |record: &usize| !transfer.records[*record].found.contains(&place);
+            let lacking: Vec<usize> = (0..samples.len()).filter(lacks).collect();
+            let [record] = lacking[..] else { return None };
+            (0..samples.len()).all(|other| other == record || !holds_on(other)).then_some(record)
+        };
+        let rests_on = match unexplained[..] {
+            [record] => Some(record),
+            _ => places(model).find_map(lacking),
+        };
+        Self { unexplained, rests_on, are_of_several_rigs, has_noise: model.noise().is_some() }
+    }
+
+    /// Whether the model is no cause of what the records show: those that had no part in finding it are not explained by it. One such
+    /// record may be the only one that shows what is missing in the others, but a noise that all of them have is no such thing.
+    pub(crate) fn is_refuted(&self) -> bool {
+        self.unexplained.len() > usize::from(!self.has_noise)
+    }
+
+    /// What the numbers of the model rest on.
+    pub(crate) fn reason(&self) -> Option<Reason> {
+        if self.is_refuted() {
+            return Some(Reason::DoesNotTransfer { records: self.unexplained.len() });
+        }
+        self.rests_on.map(|record| Reason::RestsOnRecord { record })
+    }
+
+    /// What to know of records that a model fits together and does not explain.
+    pub(crate) fn remark(&self) -> Option<Remark> {
+        self.is_refuted().then_some(Remark::NotOneRig { records: self.unexplained.len() })
+    }
+
+    /// Whether it is not known that a record is of one rig with the others, even if all of them are explained together.
+    pub(crate) fn is_doubtful(&self, record: usize) -> bool {
+        self.unexplained.contains(&record) || self.rests_on == Some(record)
+    }
+}
+
+/// Effects of a model with their channels, noise aside.
+pub(crate) fn places(model: &Model) -> impl Iterator<Item = EffectInChannel> {
+    model.effects.iter().filter(|effect| !effect.is_noise()).map(|effect| (effect.identifier(), effect.channel()))
 }
 
 /// What each record is when it is left out, with the model of the others.
@@ -89,8 +168,7 @@ impl Errors {
             *sum = sum.and(squares);
         }
         let [normalised_rms, input_difference_k] = before_and_after(squares);
-        let effects = model.effects.iter().filter(|effect| !effect.is_noise());
-        let found = effects.map(|effect| (effect.identifier(), effect.channel())).collect();
+        let found = places(model).collect();
         self.each.push(LeftOut {
             normalised_rms,
             input_difference_k,

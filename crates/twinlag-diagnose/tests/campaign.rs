@@ -4,11 +4,11 @@ mod common;
 
 use std::ops::ControlFlow;
 
-use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
+use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, readings_about, record, recovers, told, turbulence};
 use twinlag_diagnose::{
-    Contradicted, Identifier, JointDiagnosis, Move, Observations, OwnValue, Settings, Verdict, diagnose_records,
+    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Settings, Verdict, diagnose_records,
 };
-use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Turbulence};
+use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Tone, Turbulence};
 
 fn joint(records: &[Observations]) -> JointDiagnosis {
     diagnose_records(records, &Settings::default(), &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
@@ -177,4 +177,57 @@ fn what_one_record_alone_has_is_told_by_that_record() {
     let told = told(&joint.diagnosis);
     assert_ne!(joint.diagnosis.verdict, Verdict::Explained, "{told}");
     assert_eq!(disagreeing, [false, false, false, false, false, true], "{told}");
+}
+
+/// A reference junction that is warmer in each record: the calibration is none of the rig, though a fit of all records together finds
+/// something for the rest.
+#[test]
+fn an_offset_of_each_record_is_no_cause_of_all() {
+    let of = |k: u32| {
+        record(SEED + u64::from(k), |sensors| {
+            sensors[1].gain = 1.01;
+            sensors[1].offset_k = -0.5 - 0.6 * f64::from(k);
+        })
+    };
+    let joint = joint(&(0..4).map(of).collect::<Vec<_>>());
+    let told = told(&joint.diagnosis);
+    assert!(!matches!(joint.diagnosis.verdict, Verdict::Adequate | Verdict::Explained), "{told}");
+    assert!(joint.diagnosis.judgements.time_constants.iter().all(|judgement| judgement.grade == Grade::NoGo), "{told}");
+    assert!(joint.records.iter().all(|record| record.agrees != Some(true)), "{told}");
+}
+
+/// A gas of one tone in one record, and of many in the others: two equations more.
+#[test]
+fn one_record_of_a_single_tone_refuses_no_others() {
+    let tone = Signal::Sine(Tone { amplitude_k: 20.0, frequency_hz: 4.0, phase_rad: 0.3 });
+    let simulated = readings(SEED, tone, |_| {});
+    let tone = even(simulated.t1_c, simulated.t2_c).expect("finite and long");
+    let others = [SEED + 1, SEED + 2].map(|seed| record(seed, |_| {}));
+    let [one, two] = others;
+    let joint = joint(&[one, two, tone]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+}
+
+/// One record in which a sensor is slower is the only one in a colder gas too: a time constant that goes with temperature explains it, and
+/// rests on that record.
+#[test]
+fn what_one_record_alone_shows_rests_on_it() {
+    let of = |seed: u64, mean_c: f64, tau_s: f64| {
+        let simulated = readings_about(seed, mean_c, turbulence(), |sensors| sensors[1].time_constant_s = tau_s);
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let [_, tau_s] = TAU_S;
+    let joint = joint(&[
+        of(SEED, 250.0, tau_s),
+        of(SEED + 1, 250.0, tau_s),
+        of(SEED + 2, 250.0, tau_s),
+        of(SEED + 3, 80.0, 1.04 * tau_s),
+    ]);
+    let told = told(&joint.diagnosis);
+    let numbers = joint.diagnosis.effects.iter().flat_map(|effect| &effect.judgements);
+    let all = numbers.chain(&joint.diagnosis.judgements.time_constants);
+    assert!(all.clone().all(|judgement| judgement.grade != Grade::Go), "{told}");
+    assert_eq!(joint.records[3].agrees, None, "{told}");
 }

@@ -166,6 +166,10 @@ policy! {
     /// Probability that records of one rig seem to differ, in their noise or in a number that they share, of a right model: as of
     /// parts of a record.
     records_rejection_probability: f64 = 1e-3,
+    /// How much more than chance the root mean square of a whitened residual may exceed 1 in a record that was left out: what the
+    /// parameters of the others are uncertain by adds to it. With right models it is at most 1.06, and with records of more than one rig
+    /// 1.2 and more in one record at least, by `cargo test -p twinlag-diagnose --test several_records`.
+    left_out_rms_margin: f64 = 0.1,
     /// Probability that a record has an effect that the search has not named: chosen, one in four, of which each kind of effect
     /// that has a size has an equal share, and its places, forms and starts share that.
     prior_effect_probability: f64 = 0.25,
