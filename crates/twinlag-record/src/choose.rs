@@ -10,7 +10,7 @@ use crate::names::{
     is_temperature, is_time,
 };
 use crate::note::Note;
-use crate::selection::{Selection, Setting};
+use crate::selection::{ColumnRef, Selection, Setting};
 use crate::table::Table;
 use crate::time_axis::TimeColumns;
 use crate::unit::Unit;
@@ -85,12 +85,46 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         return Ok(Chosen { time: None, channels, reference, flow, position });
     }
     let Some(time) = time else {
+        if table.period_s().is_some() {
+            return Ok(Chosen { time: None, channels, reference, flow, position });
+        }
         return Err(RecordError::NoTime { file: table.source().to_owned(), columns: table.listing() });
     };
     if let Some(index) = guessed_time {
         notes.insert(0, Note::Guessed { role: "time", column: table.title(index) });
     }
     Ok(Chosen { time: Some(time), channels, reference, flow, position })
+}
+
+impl Table {
+    /// The selection with what it leaves open: the columns that are guessed. Each is named as in the header, or numbered where its name
+    /// is empty or that of another column too.
+    ///
+    /// # Errors
+    /// As [`crate::Record::from_table`] on columns that cannot be identified.
+    pub fn resolved(&self, selection: &Selection) -> Result<Selection, RecordError> {
+        let chosen = choose(self, selection, &mut Vec::new())?;
+        let columns = self.columns();
+        let column = |index: usize| {
+            let name = columns[index].name();
+            let is_unique = columns.iter().filter(|column| column.name() == name).count() == 1;
+            if name.is_empty() || !is_unique { ColumnRef::Number(index + 1) } else { ColumnRef::Name(name.to_owned()) }
+        };
+        let time = chosen.time.map(|time| match time {
+            TimeColumns::One(index) | TimeColumns::DateAndTime { date: index, .. } => column(index),
+        });
+        let [t1, t2] = chosen.channels.map(|index| Some(column(index)));
+        let reference = chosen.reference.map(column);
+        Ok(Selection {
+            time,
+            t1,
+            t2,
+            reference,
+            flow: chosen.flow.map(column),
+            position: chosen.position.map(column),
+            ..selection.clone()
+        })
+    }
 }
 
 fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {

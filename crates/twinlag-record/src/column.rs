@@ -53,6 +53,15 @@ impl Column {
         self.values.push(value.unwrap_or(f64::NAN));
     }
 
+    /// Takes the values of all rows; those that are not finite are missing.
+    pub(crate) fn take_values(&mut self, mut values: Vec<f64>) {
+        for value in values.iter_mut().filter(|value| !value.is_finite()) {
+            *value = f64::NAN;
+            self.missing += 1;
+        }
+        self.values = values;
+    }
+
     /// Takes the text of a stamp, which becomes the value of row `row`, the next one.
     pub(crate) fn push_stamp(&mut self, row: usize, text: &str) {
         self.values.push(f64::NAN);

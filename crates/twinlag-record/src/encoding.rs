@@ -1,31 +1,42 @@
-//! From bytes to text: UTF-8 and UTF-16 by their byte-order marks, else UTF-8 if valid, else
-//! Windows-1252, which every byte sequence is. Zero bytes outside UTF-16 are in no text file, so
-//! that they mark a binary one.
+//! From bytes to text: UTF-8 and UTF-16 by their byte-order marks, else UTF-8 if valid, else Shift_JIS if the letters are likely in
+//! it, else Windows-1252, which every byte sequence is. Zero bytes outside UTF-16 are in no text file, so that they mark a binary
+//! one.
 
 use std::borrow::Cow;
 
-use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
+use chardetng::{EncodingDetector, Iso2022JpDetection, Utf8Detection};
+use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use crate::RecordError;
 
-/// The text of a file without its byte-order mark, and the name of its encoding.
+/// The text of a file without its byte-order mark, and its encoding.
 ///
 /// # Errors
 /// [`RecordError::Binary`].
-pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<(Cow<'a, str>, &'static str), RecordError> {
+pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<(Cow<'a, str>, &'static Encoding), RecordError> {
     if let Some((encoding, _)) = Encoding::for_bom(bytes)
         && (encoding == UTF_16LE || encoding == UTF_16BE)
     {
-        return Ok((encoding.decode_with_bom_removal(bytes).0, encoding.name()));
+        return Ok((encoding.decode_with_bom_removal(bytes).0, encoding));
     }
     if let Some(offset) = bytes.iter().position(|&byte| byte == 0) {
         return Err(RecordError::Binary { file: file.to_owned(), offset });
     }
     let body = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    Ok(match std::str::from_utf8(body) {
-        Ok(text) => (Cow::Borrowed(text), UTF_8.name()),
-        Err(_) => (WINDOWS_1252.decode_without_bom_handling(body).0, WINDOWS_1252.name()),
-    })
+    if let Ok(text) = std::str::from_utf8(body) {
+        return Ok((Cow::Borrowed(text), UTF_8));
+    }
+    let encoding = of_letters(body);
+    Ok((encoding.decode_without_bom_handling(body).0, encoding))
+}
+
+/// The encoding of bytes that are no UTF-8. Other encodings than these two are not guessed: the few letters of a header do not tell
+/// them apart (the same bytes are Chinese in GBK and Japanese in EUC-JP), and a wrong guess would lose the `°` of a unit.
+pub(crate) fn of_letters(bytes: &[u8]) -> &'static Encoding {
+    let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
+    detector.feed(bytes, true);
+    let guess = detector.guess(None, Utf8Detection::Deny);
+    if guess == SHIFT_JIS { SHIFT_JIS } else { WINDOWS_1252 }
 }
 
 #[cfg(test)]
@@ -45,7 +56,32 @@ mod tests {
         ];
         for (bytes, name) in cases {
             let (text, encoding) = decode(bytes, "x").expect("text");
-            assert_eq!((text.as_ref(), encoding), ("°C", name));
+            assert_eq!((text.as_ref(), encoding.name()), ("°C", name));
+        }
+    }
+
+    /// The bytes are those of Python's encoder.
+    #[test]
+    fn japanese_letters_are_told_from_western_ones() {
+        let japanese = b"\x8e\x9e\x8d\x8f,\x89\xb7\x93x1(\x81\x8e),\x89\xb7\x93x2(\x81\x8e)\r\n0,20.1,21.3\r\n";
+        let (text, encoding) = decode(japanese, "x").expect("text");
+        assert_eq!((encoding.name(), text.lines().next()), ("Shift_JIS", Some("時刻,温度1(℃),温度2(℃)")));
+    }
+
+    #[test]
+    fn signs_and_letters_of_the_west_stay_those_of_the_west() {
+        for header in [
+            "t;T1 [°C];T2 [°C]",
+            "Zeit (µs);Fühler fein (°C);Fühler grob (°C)",
+            "Ø 0,5 mm [°C]",
+            "température (°C)",
+            "°F",
+            "25 °C ± 0,5",
+        ] {
+            let bytes = WINDOWS_1252.encode(header).0;
+            let rows = [bytes.as_ref(), b"\r\n0;20,1;21,3\r\n"].concat();
+            let (text, encoding) = decode(&rows, "x").expect("text");
+            assert_eq!((encoding.name(), text.lines().next()), ("windows-1252", Some(header)));
         }
     }
 

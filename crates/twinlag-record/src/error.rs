@@ -5,6 +5,7 @@ use std::fmt;
 
 use thiserror::Error;
 
+use crate::form::Program;
 use crate::selection::Setting;
 use crate::wording::{Counted, plain};
 
@@ -74,6 +75,10 @@ impl fmt::Display for Candidates {
 pub enum RecordError {
     #[error("{file}: cannot be read: {reason}; check the path and its permissions")]
     CannotRead { file: String, reason: String },
+    #[error("{file}: the gzip file is cut off: it ends within its compressed data; copy or download it again")]
+    CutGzip { file: String },
+    #[error("{file}: the gzip file is damaged ({reason}); copy or download it again")]
+    DamagedGzip { file: String, reason: String },
     #[error("{file}: is a directory, expected a file; name one file in it")]
     IsDirectory { file: String },
     #[error(
@@ -120,6 +125,13 @@ pub enum RecordError {
          (a decimal comma or an unquoted separator in a text adds cells)"
     )]
     CellCount { file: String, line: usize, expected: usize, found: usize },
+    #[error("{file}: line {line}: taken for {program}, expected {expected}, found {found}")]
+    BadHeader { file: String, program: Program, line: usize, expected: &'static str, found: String },
+    #[error(
+        "{file}: line {line}: the header of another measurement begins, expected one measurement in a file; let LabVIEW write one \
+         header only, or save each measurement to a file of its own"
+    )]
+    SecondMeasurement { file: String, line: usize },
     #[error("{file}: line {line}: a quotation mark is opened and not closed; close it or remove it")]
     OpenQuote { file: String, line: usize },
     #[error(

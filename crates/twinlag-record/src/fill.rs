@@ -6,6 +6,8 @@ use std::borrow::Cow;
 use crate::RecordError;
 use crate::cells::{is_idle, split};
 use crate::column::Column;
+use crate::form::Program;
+use crate::lab_view;
 use crate::layout::Layout;
 use crate::note::Note;
 use crate::row_lines::RowLines;
@@ -100,8 +102,13 @@ impl<'a> Filling<'a> {
     }
 
     fn row(&mut self, line: usize, content: &str, is_last: bool) -> Result<(), RecordError> {
+        let form = &self.layout.form;
+        let content = &*form.unwrap(content);
+        if is_idle(content) {
+            return Ok(());
+        }
         if self.decimal == Decimal::Point && plain_numbers(content.as_bytes(), self.layout.delimiter, &mut self.row) {
-            self.columns.iter_mut().zip(&self.row).for_each(|(column, value)| column.push_value(Some(*value)));
+            self.columns.iter_mut().zip(&self.row).for_each(|(column, value)| column.push_value(form.present(*value)));
             self.lines.push(line);
             return Ok(());
         }
@@ -121,10 +128,13 @@ impl<'a> Filling<'a> {
             return Err(RecordError::OpenQuote { file: file(), line });
         }
         let found = cells.len();
-        let trailing = found == width + 1 && cells[width].is_empty();
+        let trailing = found == width + 1 && form.may_follow(&cells[width]);
         if open || (is_last && found < width) {
             self.notes.push(Note::CutLine { line, found, expected: width });
             return Ok(());
+        }
+        if form.program == Some(Program::LabView) && lab_view::begins_another(content) {
+            return Err(RecordError::SecondMeasurement { file: file(), line });
         }
         if found != width && !trailing {
             let whole = |cell: &Cow<'_, str>| cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
@@ -137,7 +147,7 @@ impl<'a> Filling<'a> {
         }
         let row = self.lines.len();
         for (column, cell) in self.columns.iter_mut().zip(&cells) {
-            column.push(row, cell, self.decimal);
+            column.push(row, form.cell(cell, self.decimal), self.decimal);
         }
         self.lines.push(line);
         Ok(())

@@ -7,7 +7,9 @@
 use jiff::Timestamp;
 
 use crate::RecordError;
-use crate::column::Column;
+use crate::column::{Column, Kind};
+use crate::names;
+use crate::note::Note;
 use crate::sign::Decimal;
 use crate::table::{Places, Table};
 use crate::unit::Unit;
@@ -59,6 +61,39 @@ impl NamedColumn {
         Self { unit: unit.into(), ..self }
     }
 
+    /// Whether name and unit are those of a temperature, whatever the values are.
+    ///
+    /// ```
+    /// use twinlag_record::NamedColumn;
+    ///
+    /// assert!(NamedColumn::numbers("inlet [K]", []).is_called_temperature());
+    /// assert!(NamedColumn::numbers("Temp2", []).is_called_temperature());
+    /// assert!(!NamedColumn::numbers("Temp2", []).with_unit("mV").is_called_temperature());
+    /// ```
+    pub fn is_called_temperature(&self) -> bool {
+        names::is_called_temperature(&self.head())
+    }
+
+    /// Whether name and unit are those of a time, whatever the values are.
+    pub fn is_called_time(&self) -> bool {
+        names::is_time(&self.head())
+    }
+
+    /// The unit of a time in seconds; `None` if it is no unit of time.
+    pub fn time_unit_s(&self) -> Option<f64> {
+        match self.head().unit() {
+            Unit::Time { seconds, .. } => Some(*seconds),
+            _ => None,
+        }
+    }
+
+    /// Its head as a column of numbers without values.
+    fn head(&self) -> Column {
+        let mut column = Column::new(self.name.clone(), Unit::parse(&self.unit));
+        column.kind = Kind::Number;
+        column
+    }
+
     fn new(name: String, values: Values) -> Self {
         Self { name, unit: String::new(), values }
     }
@@ -74,9 +109,7 @@ impl NamedColumn {
     fn into_column(self) -> Column {
         let mut column = Column::new(self.name, Unit::parse(&self.unit));
         match self.values {
-            Values::Numbers(values) => {
-                values.into_iter().for_each(|value| column.push_value(Some(value).filter(|v| v.is_finite())));
-            }
+            Values::Numbers(values) => column.take_values(values),
             Values::Instants(values) => {
                 for (row, value) in values.into_iter().enumerate() {
                     match value.and_then(|ns| Timestamp::from_nanosecond(ns.into()).ok()) {
@@ -145,6 +178,14 @@ impl Table {
             return Err(RecordError::Empty { file });
         }
         let columns = columns.into_iter().map(NamedColumn::into_column).collect();
-        Ok(Self { source: file, columns, places: Places::Samples(rows), notes: Vec::new() })
+        Ok(Self { source: file, columns, places: Places::Samples(rows), notes: Vec::new(), text: None })
+    }
+
+    /// Adds a note to those of the table, behind the others: of how its columns were read, for
+    /// example.
+    #[must_use]
+    pub fn with_note(mut self, note: Note) -> Self {
+        self.notes.push(note);
+        self
     }
 }

@@ -9,8 +9,11 @@ use std::borrow::Cow;
 use crate::RecordError;
 use crate::cells::{is_idle, lines, lines_from_end, split, uncommented};
 use crate::dialect::{Look, look, sniff_delimiter};
+use crate::form::{Form, Program};
+use crate::serial::Wrapping;
 use crate::sign::Delimiter;
 use crate::unit::Unit;
+use crate::{lab_view, sea_bird};
 
 /// The layout of a file.
 #[derive(Debug)]
@@ -27,6 +30,7 @@ pub(crate) struct Layout {
     pub(crate) first_line: usize,
     /// Lines above the rows that are no comments: one of these may come again after a file roll.
     pub(crate) head: Vec<String>,
+    pub(crate) form: Form,
 }
 
 /// Words under the names that say how a value was made, not its unit (Campbell's third and fourth
@@ -34,13 +38,30 @@ pub(crate) struct Layout {
 const PROCESSING: [&str; 12] = ["avg", "smp", "min", "max", "std", "tot", "ts", "rn", "mean", "raw", "-", "--"];
 
 impl Layout {
-    /// Finds the layout.
+    /// Finds the layout: that which the header of a known program states, else what the lines look like.
+    ///
+    /// # Errors
+    /// [`RecordError::BadHeader`], and those of [`Self::of_lines`].
+    pub(crate) fn find(text: &str, file: &str) -> Result<Self, RecordError> {
+        if let Some(layout) = sea_bird::layout(text, file).or_else(|| lab_view::layout(text, file)) {
+            return layout;
+        }
+        let Some(wrapping) = Wrapping::find(text) else { return Self::of_lines(text, file) };
+        let mut layout = Self::of_lines(&wrapping.unwrap_text(text), file)?;
+        if let Some((names, units)) = wrapping.columns().filter(|(names, _)| names.len() == layout.width) {
+            (layout.names, layout.units) = (names, units);
+        }
+        layout.form = Form { program: Some(Program::Serial), wrapping: Some(wrapping), ..Form::default() };
+        Ok(layout)
+    }
+
+    /// Finds the layout from what the lines look like.
     ///
     /// # Errors
     /// [`RecordError::Empty`], [`RecordError::NoData`], [`RecordError::OneColumn`],
     /// [`RecordError::CellCount`], [`RecordError::DecimalCommaBetweenCommas`],
     /// [`RecordError::WholeNumbersWithoutHeader`].
-    pub(crate) fn find(text: &str, file: &str) -> Result<Self, RecordError> {
+    fn of_lines(text: &str, file: &str) -> Result<Self, RecordError> {
         let file = || file.to_owned();
         let all: Vec<_> = lines_from_end(text).filter(|line| !is_idle(line)).take(401).collect();
         if all.is_empty() {
@@ -147,7 +168,7 @@ impl Layout {
         }
         units.resize(width, Unit::Unstated);
         let head = head.iter().map(|(_, line, _)| (*line).to_owned()).collect();
-        Ok(Self { delimiter, names, header_line, units, width, first_line, head })
+        Ok(Self { delimiter, names, header_line, units, width, first_line, head, form: Form::default() })
     }
 }
 

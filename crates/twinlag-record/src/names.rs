@@ -4,7 +4,7 @@
 use crate::column::{Column, Kind};
 use crate::unit::Unit;
 
-const TIME: [&str; 17] = [
+const TIME: [&str; 20] = [
     "time",
     "zeit",
     "timestamp",
@@ -22,12 +22,15 @@ const TIME: [&str; 17] = [
     "systime",
     "millis",
     "epoch",
+    "時刻",
+    "時間",
+    "日時",
 ];
 const INDEX: [&str; 14] = [
     "sample", "samples", "no", "nr", "number", "record", "rn", "count", "counter", "index", "scan", "row", "id",
     "messung",
 ];
-pub(crate) const TEMPERATURE: [&str; 20] = [
+pub(crate) const TEMPERATURE: [&str; 21] = [
     "t",
     "tc",
     "temp",
@@ -48,6 +51,7 @@ pub(crate) const TEMPERATURE: [&str; 20] = [
     "fühler",
     "tcouple",
     "therm",
+    "温度",
 ];
 /// Never T1 or T2, whatever else is there.
 const APART: [&str; 15] = [

@@ -4,6 +4,7 @@
 use std::fmt;
 
 use crate::Place;
+use crate::form::Program;
 use crate::sampling::{Sampling, SamplingKind};
 use crate::sign::{Decimal, Delimiter};
 use crate::wording::{Counted, brief, three};
@@ -26,6 +27,15 @@ pub enum Note {
         encoding: &'static str,
         /// Line of the column names, from 1; `None` if there are none.
         header_line: Option<usize>,
+        /// The program that wrote it, where its header says so.
+        program: Option<Program>,
+    },
+    /// The file was compressed by gzip.
+    Decompressed,
+    /// How columns were read that did not come as text: format, version, group.
+    Read {
+        /// A phrase such as `read as an MDF file, version 4.10`.
+        how: String,
     },
     /// A column was chosen from its name or place, not by the caller.
     Guessed {
@@ -106,10 +116,12 @@ pub enum Note {
         /// From row to row, if it does.
         step_s: f64,
     },
-    /// Time was counted from the row number and a period that the caller gave.
+    /// Time was counted from the row number and a period.
     PeriodGiven {
         /// The period.
         period_s: f64,
+        /// Whether the file states it; the caller gave it otherwise.
+        is_of_file: bool,
     },
     /// The very last line was cut off and left out.
     CutLine {
@@ -218,19 +230,24 @@ impl Note {
 impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Format { delimiter, decimal, encoding, header_line } => {
-                write!(f, "read as {delimiter}-separated {encoding} text with decimal {decimal}, ")?;
+            Self::Format { delimiter, decimal, encoding, header_line, program } => {
+                write!(f, "read as ")?;
+                program.map_or(Ok(()), |program| write!(f, "{program}: "))?;
+                write!(f, "{delimiter}-separated {encoding} text with decimal {decimal}, ")?;
                 match header_line {
                     Some(line) => write!(f, "column names on line {line}"),
                     None => write!(f, "without column names"),
                 }
             }
+            Self::Decompressed => write!(f, "decompressed from gzip"),
+            Self::Read { how } => write!(f, "{how}"),
             Self::Guessed { role, column } => write!(f, "{role} guessed to be column {column}"),
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
             Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
             Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
-            Self::PeriodGiven { period_s } => {
-                write!(f, "time counted from the row number, {period_s} s per row as given; no time column was used")
+            Self::PeriodGiven { period_s, is_of_file } => {
+                let by = if *is_of_file { "as its header says" } else { "as given" };
+                write!(f, "time counted from the row number, {period_s} s per row {by}; no time column was used")
             }
             Self::CutLine { line, found, expected } => {
                 write!(f, "last line {line} is cut off ({found} of {expected} cells) and was left out")

@@ -2,10 +2,10 @@
 
 use std::io::Read;
 
-use encoding_rs::{UTF_8, WINDOWS_1252};
+use encoding_rs::{Encoding, UTF_8};
 
 use crate::RecordError;
-use crate::encoding;
+use crate::{encoding, gzip};
 
 /// Bytes that are looked at before the rest is read: some ten thousand rows of any logger.
 const LOOK_BYTES: usize = 4 << 20;
@@ -26,7 +26,7 @@ pub(crate) struct Parts<'a, R> {
     is_open: bool,
     /// Whether every byte so far is in both encodings the same.
     is_ascii: bool,
-    encoding: &'static str,
+    encoding: &'static Encoding,
 }
 
 impl<'a, R: Read> Parts<'a, R> {
@@ -47,7 +47,7 @@ impl<'a, R: Read> Parts<'a, R> {
             is_at_end: false,
             is_open: false,
             is_ascii: true,
-            encoding: UTF_8.name(),
+            encoding: UTF_8,
         }
     }
 
@@ -68,7 +68,7 @@ impl<'a, R: Read> Parts<'a, R> {
 
     /// All bytes, where [`Self::first`] gave none.
     pub(crate) fn all(mut self) -> Result<Vec<u8>, RecordError> {
-        self.reader.read_to_end(&mut self.bytes).map_err(|error| cannot_read(self.source, &error))?;
+        self.reader.read_to_end(&mut self.bytes).map_err(|error| gzip::failure(self.source, &error))?;
         Ok(self.bytes)
     }
 
@@ -98,17 +98,17 @@ impl<'a, R: Read> Parts<'a, R> {
 
     fn decode(&mut self, end: usize, seen: usize) -> Result<String, RecordError> {
         let bytes = &self.bytes[..end];
-        if self.encoding == UTF_8.name() {
+        if self.encoding == UTF_8 {
             match std::str::from_utf8(bytes) {
                 Ok(text) => return Ok(text.to_owned()),
                 Err(error) if !self.is_ascii => {
                     let lines = memchr::memchr_iter(b'\n', &bytes[..error.valid_up_to()]).count();
                     return Err(RecordError::EncodingChanges { file: self.source.to_owned(), line: seen + lines + 1 });
                 }
-                Err(_) => self.encoding = WINDOWS_1252.name(),
+                Err(_) => self.encoding = encoding::of_letters(bytes),
             }
         }
-        Ok(WINDOWS_1252.decode_without_bom_handling(bytes).0.into_owned())
+        Ok(self.encoding.decode_without_bom_handling(bytes).0.into_owned())
     }
 
     /// Whether no line break follows the last line.
@@ -116,8 +116,8 @@ impl<'a, R: Read> Parts<'a, R> {
         self.is_open
     }
 
-    /// The name of the encoding.
-    pub(crate) fn encoding(&self) -> &'static str {
+    /// The encoding so far.
+    pub(crate) fn encoding(&self) -> &'static Encoding {
         self.encoding
     }
 
@@ -125,7 +125,7 @@ impl<'a, R: Read> Parts<'a, R> {
     fn read(&mut self, wanted: usize) -> Result<(), RecordError> {
         let missing = wanted.saturating_sub(self.bytes.len());
         let read = self.reader.by_ref().take(missing as u64).read_to_end(&mut self.bytes);
-        self.is_at_end |= read.map_err(|error| cannot_read(self.source, &error))? < missing;
+        self.is_at_end |= read.map_err(|error| gzip::failure(self.source, &error))? < missing;
         Ok(())
     }
 
@@ -133,10 +133,6 @@ impl<'a, R: Read> Parts<'a, R> {
         self.bytes.drain(..bytes);
         self.before += bytes;
     }
-}
-
-fn cannot_read(source: &str, error: &std::io::Error) -> RecordError {
-    RecordError::CannotRead { file: source.to_owned(), reason: error.to_string() }
 }
 
 #[cfg(test)]

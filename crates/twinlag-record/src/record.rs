@@ -153,7 +153,10 @@ impl Record {
     }
 
     /// As [`Self::from_table`], without a second copy of what the table holds.
-    fn from_owned(mut table: Table, selection: &Selection) -> Result<Self, RecordError> {
+    ///
+    /// # Errors
+    /// Those of [`Record::from_table`].
+    pub fn from_owned(mut table: Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(&table, selection, &mut notes)?;
         table.keep_values_of(&chosen.columns());
@@ -163,9 +166,9 @@ impl Record {
                     time_axis::read(&mut table, columns, selection.time_unit.as_ref(), &mut notes)?;
                 (time_s, Some(clock))
             }
-            (None, period_s) => {
-                let period_s = period_s.unwrap_or(1.0);
-                notes.push(Note::PeriodGiven { period_s });
+            (None, given) => {
+                let period_s = given.or(table.period_s()).unwrap_or(1.0);
+                notes.push(Note::PeriodGiven { period_s, is_of_file: given.is_none() });
                 let time_s = (0..table.rows()).map(|row| row as f64 * period_s).collect();
                 // Row numbers times a period show no clock.
                 (time_s, None)

@@ -3,12 +3,12 @@
 use crate::cells::{is_idle, split};
 use crate::choose::choose;
 use crate::column::Kind;
-use crate::note::Note;
+use crate::form::Form;
 use crate::number::{self, Value};
 use crate::record::{ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C};
 use crate::selection::Selection;
 use crate::sign::{Decimal, Delimiter};
-use crate::table::{Table, shortened};
+use crate::table::{Table, Text, shortened};
 use crate::time_axis::{self, TimeColumns, seconds};
 use crate::unit::Unit;
 use crate::{Place, RecordError};
@@ -27,8 +27,7 @@ pub struct Row {
 #[derive(Clone, Debug)]
 pub struct RowReader {
     source: String,
-    delimiter: Delimiter,
-    decimal: Decimal,
+    text: Text,
     width: usize,
     time: Option<Time>,
     channels: [Channel; 2],
@@ -69,11 +68,8 @@ impl RowReader {
     /// As [`crate::Record::from_table`] on columns that cannot be identified.
     pub fn after(table: &Table, selection: &Selection) -> Result<Self, RecordError> {
         let chosen = choose(table, selection, &mut Vec::new())?;
-        let format = table.notes().iter().find_map(|note| match note {
-            Note::Format { delimiter, decimal, .. } => Some((*delimiter, *decimal)),
-            _ => None,
-        });
-        let (delimiter, decimal) = format.unwrap_or((Delimiter::Comma, Decimal::Point));
+        let usual = || Text { delimiter: Delimiter::Comma, decimal: Decimal::Point, form: Form::default() };
+        let text = table.text.clone().unwrap_or_else(usual);
         let column = |index: usize| &table.columns()[index];
         let time = match chosen.time {
             Some(TimeColumns::One(index)) if column(index).kind() == Kind::Number => {
@@ -89,7 +85,7 @@ impl RowReader {
             unit: column(index).unit().clone(),
         });
         let width = table.columns().len();
-        Ok(Self { source: table.source().to_owned(), delimiter, decimal, width, time, channels })
+        Ok(Self { source: table.source().to_owned(), text, width, time, channels })
     }
 
     /// The row of line `number`, from 1; `None` for a blank or a comment.
@@ -100,20 +96,23 @@ impl RowReader {
     /// be read.
     pub fn read(&self, line: &str, number: usize) -> Result<Option<Row>, RecordError> {
         let line = line.trim_end_matches(['\n', '\r']);
+        let (form, decimal) = (&self.text.form, self.text.decimal);
+        let line = &*form.unwrap(line);
         if is_idle(line) {
             return Ok(None);
         }
         let file = || self.source.clone();
         let mut cells = Vec::with_capacity(self.width + 1);
-        split(line, self.delimiter, &mut cells).map_err(|_| RecordError::OpenQuote { file: file(), line: number })?;
+        split(line, self.text.delimiter, &mut cells)
+            .map_err(|_| RecordError::OpenQuote { file: file(), line: number })?;
         let found = cells.len();
-        if found != self.width && !(found == self.width + 1 && cells[self.width].is_empty()) {
+        if found != self.width && !(found == self.width + 1 && form.may_follow(&cells[self.width])) {
             return Err(RecordError::CellCount { file: file(), line: number, expected: self.width, found });
         }
         let reading = |channel: &Channel| {
             let cell = cells[channel.index].as_ref();
             let column = channel.title.clone();
-            let value = match number::read(cell, self.decimal) {
+            let value = match number::read(form.cell(cell, decimal), decimal) {
                 Value::Missing => return Ok(None),
                 Value::Number(value) => value,
                 Value::Other => {
@@ -130,7 +129,7 @@ impl RowReader {
             }
         };
         let reading_c = [reading(&self.channels[0])?, reading(&self.channels[1])?];
-        let time_s = self.time.as_ref().and_then(|time| match number::read(&cells[time.index], self.decimal) {
+        let time_s = self.time.as_ref().and_then(|time| match number::read(&cells[time.index], decimal) {
             Value::Number(value) => Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite()),
             Value::Missing | Value::Other => None,
         });

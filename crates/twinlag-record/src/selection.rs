@@ -4,15 +4,18 @@ use std::convert::Infallible;
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
 use crate::unit::Unit;
 
 /// A column, by name or by number from 1.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected the name of a column, or its number from 1")]
 pub enum ColumnRef {
-    /// As in the header, with or without its unit.
-    Name(String),
     /// From 1, from the left. A column with exactly this name goes before.
     Number(usize),
+    /// As in the header, with or without its unit.
+    Name(String),
 }
 
 impl FromStr for ColumnRef {
@@ -38,7 +41,8 @@ impl fmt::Display for ColumnRef {
 }
 
 /// How the stamps are to be understood.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum SamplingChoice {
     /// Judge by the stamps.
     #[default]
@@ -50,7 +54,7 @@ pub enum SamplingChoice {
 }
 
 /// What to read from a table. What is `None` is guessed from the header, and the guess is noted;
-/// the reference is never guessed.
+/// the reference is never guessed. Serialised it is a profile, by which other files are read in the same way.
 ///
 /// ```
 /// use twinlag_record::{ColumnRef, Record, Selection, Table};
@@ -79,26 +83,80 @@ pub enum SamplingChoice {
 /// assert_eq!(record.reference_c.expect("it was chosen")[..3], [20.0, 25.0, 25.0]);
 /// # Ok::<(), twinlag_record::RecordError>(())
 /// ```
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Selection {
     /// The time column.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnRef>,
     /// The unit of a time column of numbers, [`Unit::Time`]; it goes before the one in the header.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "write_unit", deserialize_with = "read_unit")]
     pub time_unit: Option<Unit>,
     /// The first sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub t1: Option<ColumnRef>,
     /// The second sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub t2: Option<ColumnRef>,
     /// A trusted temperature, if wanted.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<ColumnRef>,
     /// A flow velocity or density, in any unit, if there is one: time constants may go with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub flow: Option<ColumnRef>,
     /// The position of sensors that move, m, if there is one: a depth or a height. Time constants may go with their speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub position: Option<ColumnRef>,
     /// Time from one row to the next; then no time column is used.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub period_s: Option<f64>,
     /// How the stamps are to be understood.
+    #[serde(skip_serializing_if = "is_auto")]
     pub sampling: SamplingChoice,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_auto(choice: &SamplingChoice) -> bool {
+    *choice == SamplingChoice::Auto
+}
+
+#[expect(clippy::ref_option, reason = "as serde calls it")]
+fn write_unit<S: Serializer>(unit: &Option<Unit>, serializer: S) -> Result<S::Ok, S::Error> {
+    unit.as_ref().map(ToString::to_string).serialize(serializer)
+}
+
+fn read_unit<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Unit>, D::Error> {
+    match Option::<String>::deserialize(deserializer)?.map(|text| Unit::parse(&text)) {
+        Some(unit @ Unit::Time { .. }) => Ok(Some(unit)),
+        None => Ok(None),
+        Some(other) => Err(de::Error::custom(format!("expected a unit of time, as ms, found '{other}'"))),
+    }
+}
+
+impl Selection {
+    /// This selection, and where it says nothing what the other one says. A period or a time column goes before both of the other.
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        let is_timed = self.time.is_some() || self.period_s.is_some();
+        let (time, period_s) = if is_timed { (self.time, self.period_s) } else { (other.time, other.period_s) };
+        let (flow, position) = if self.flow.is_some() || self.position.is_some() {
+            (self.flow, self.position)
+        } else {
+            (other.flow, other.position)
+        };
+        let sampling = if is_auto(&self.sampling) { other.sampling } else { self.sampling };
+        Self {
+            time,
+            time_unit: self.time_unit.or(other.time_unit),
+            t1: self.t1.or(other.t1),
+            t2: self.t2.or(other.t2),
+            reference: self.reference.or(other.reference),
+            flow,
+            position,
+            period_s,
+            sampling,
+        }
+    }
 }
 
 /// One of the things that a [`Selection`] sets and a message may ask for.
@@ -131,6 +189,22 @@ impl Setting {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_not_said_is_what_the_other_says() {
+        let column = |name: &str| Some(ColumnRef::Name(name.into()));
+        let profile = Selection {
+            time: column("t"),
+            t1: column("a"),
+            t2: column("b"),
+            flow: column("u"),
+            ..Selection::default()
+        };
+        let said = Selection { t2: column("c"), period_s: Some(0.5), position: column("z"), ..Selection::default() };
+        let want = Selection { t1: column("a"), ..said.clone() };
+        assert_eq!(said.or(profile.clone()), want);
+        assert_eq!(Selection::default().or(profile.clone()), profile);
+    }
 
     #[test]
     fn a_positive_number_is_a_column_number_and_all_else_a_name() {

@@ -5,17 +5,20 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use encoding_rs::Encoding;
+
 use crate::cells::{is_idle, line_end, lines, split};
 use crate::column::{Column, Kind};
 use crate::dialect::{Evidence, Unclear};
 use crate::fill::Filling;
+use crate::form::Form;
 use crate::layout::Layout;
 use crate::note::Note;
 use crate::parts::Parts;
 use crate::row_lines::RowLines;
 use crate::selection::ColumnRef;
-use crate::sign::Decimal;
-use crate::{Place, RecordError, encoding};
+use crate::sign::{Decimal, Delimiter};
+use crate::{Place, RecordError, encoding, gzip};
 
 /// Delimited text as loggers write it, taken apart: columns of numbers, of date-times, of text.
 #[derive(Clone, Debug)]
@@ -24,6 +27,15 @@ pub struct Table {
     pub(crate) columns: Vec<Column>,
     pub(crate) places: Places,
     pub(crate) notes: Vec<Note>,
+    pub(crate) text: Option<Text>,
+}
+
+/// How the lines of a file of text are taken apart.
+#[derive(Clone, Debug)]
+pub(crate) struct Text {
+    pub(crate) delimiter: Delimiter,
+    pub(crate) decimal: Decimal,
+    pub(crate) form: Form,
 }
 
 /// Where the rows of a table are from.
@@ -55,7 +67,7 @@ impl Table {
     /// Takes text apart: encoding, delimiter, decimal sign, preamble, header, unit row and rows are
     /// found by looking.
     ///
-    /// - `bytes`: the whole file; UTF-8, UTF-16 with byte-order mark, or Windows-1252
+    /// - `bytes`: the whole file; UTF-8, UTF-16 with byte-order mark, Shift_JIS or Windows-1252
     /// - `source`: its name in messages
     ///
     /// Comment lines (`#`, `%`, `//`), blank lines, a header that comes again and a cut-off very
@@ -77,7 +89,7 @@ impl Table {
     }
 
     /// Reads text as it comes, without keeping it: what is found by looking is found in the first
-    /// 4 MiB, and must hold for all lines after them. Otherwise as [`Table::read`].
+    /// 4 MiB, and must hold for all lines after them. What is compressed by gzip is decompressed. Otherwise as [`Table::read`].
     ///
     /// ```
     /// let text = "time,T1,T2\n".to_owned() + &(0..9).map(|k| format!("{k},20.5,21\n")).collect::<String>();
@@ -91,9 +103,12 @@ impl Table {
     /// # Errors
     /// [`RecordError::CannotRead`], [`RecordError::EncodingChanges`], and those of [`Table::read`].
     pub fn from_reader(reader: impl Read, source: &str) -> Result<Self, RecordError> {
+        let (reader, is_compressed) = gzip::decompressed(reader).map_err(|error| gzip::failure(source, &error))?;
         let mut parts = Parts::new(reader, source);
         let first = parts.first()?;
-        let Some(first) = first else { return Self::read(&parts.all()?, source) };
+        let Some(first) = first else {
+            return Ok(Self::read(&parts.all()?, source)?.noting_compression(is_compressed));
+        };
         let look = Look::at(&first, source)?;
         let mut filling = Filling::new(source, &look.layout, look.decimal);
         filling.take(&first, b'\n')?;
@@ -102,15 +117,26 @@ impl Table {
             filling.take(&part, b'\n')?;
         }
         filling.end(parts.is_open())?;
-        Ok(Self::of(filling, parts.encoding()))
+        Ok(Self::of(filling, parts.encoding()).noting_compression(is_compressed))
     }
 
-    fn of(filling: Filling<'_>, encoding: &'static str) -> Self {
+    fn noting_compression(mut self, is_compressed: bool) -> Self {
+        if is_compressed {
+            self.notes.insert(0, Note::Decompressed);
+        }
+        self
+    }
+
+    fn of(filling: Filling<'_>, encoding: &'static Encoding) -> Self {
         let Filling { source, layout, decimal, mut columns, lines, mut notes, .. } = filling;
-        let Layout { delimiter, header_line, .. } = *layout;
-        notes.insert(0, Note::Format { delimiter, decimal, encoding, header_line });
+        let Layout { delimiter, header_line, ref form, .. } = *layout;
+        notes.insert(
+            0,
+            Note::Format { delimiter, decimal, encoding: encoding.name(), header_line, program: form.program },
+        );
         columns.iter_mut().for_each(Column::judge);
-        Self { source: source.to_owned(), columns, places: Places::Lines(lines), notes }
+        let text = Some(Text { delimiter, decimal, form: form.clone() });
+        Self { source: source.to_owned(), columns, places: Places::Lines(lines), notes, text }
     }
 
     /// The name that the caller gave.
@@ -161,6 +187,11 @@ impl Table {
         let mut values = std::mem::take(&mut self.columns[index].values);
         values.shrink_to_fit();
         values
+    }
+
+    /// Time from row to row, where the file states it.
+    pub(crate) fn period_s(&self) -> Option<f64> {
+        self.text.as_ref().and_then(|text| text.form.period_s)
     }
 
     /// What was understood of the file so far.
@@ -257,7 +288,7 @@ struct Look {
 impl Look {
     fn at(text: &str, source: &str) -> Result<Self, RecordError> {
         let layout = Layout::find(text, source)?;
-        let decimal = sniff_decimal(text, &layout, source)?;
+        let decimal = layout.form.decimal.map_or_else(|| sniff_decimal(text, &layout, source), Ok)?;
         Ok(Self { layout, decimal })
     }
 }
@@ -265,13 +296,14 @@ impl Look {
 /// Looks at 500 rows, or at as many more as it takes to see a decimal sign.
 fn sniff_decimal(text: &str, layout: &Layout, file: &str) -> Result<Decimal, RecordError> {
     let mut evidence = Evidence::default();
-    let mut cells = Vec::new();
     let rows = lines(text).skip(layout.first_line - 1).filter(|(_, line)| !is_idle(line));
     for (row, (line, content)) in rows.enumerate() {
         if row >= 500 && evidence.is_enough() {
             break;
         }
-        if split(content, layout.delimiter, &mut cells).is_ok() {
+        let mut cells = Vec::new();
+        let content = layout.form.unwrap(content);
+        if split(&content, layout.delimiter, &mut cells).is_ok() {
             evidence.add(line, &cells);
         }
     }

@@ -1,0 +1,253 @@
+//! Files of programs that are known by their headers. The forms are those of the programs' own manuals and of files in public
+//! collections; the oracle is the numbers that the text was made from.
+
+mod common;
+
+use std::io::Write as _;
+
+use common::{assert_is_the_rig, assert_says, notes, record, record_with, refusal, rows};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use twinlag_record::{ColumnRef, Program, Record, RecordError, RowReader, Selection, Table, Unit};
+
+/// The body of a record of the rig: `row` is told time, T1 and T2.
+fn body(row: impl Fn(f64, f64, f64) -> String) -> String {
+    rows("", |_, t, a, b| row(t, a, b)).split_off(1)
+}
+
+fn comma(value: f64) -> String {
+    format!("{value:.6}").replace('.', ",")
+}
+
+const SEA_BIRD: &str = "\
+* Sea-Bird SBE 9 Data File:\r
+* FileName = C:\\CTD\\CAST01.HEX\r
+* NMEA Latitude = 28 14.23 N\r
+** Ship: Pelican, cruise = 12\r
+# nquan = 6\r
+# nvalues = 10\r
+# units = specified\r
+# name 0 = prDM: Pressure, Digiquartz [db]\r
+# name 1 = t090C: Temperature [ITS-90, deg C]\r
+# name 2 = t190C: Temperature, 2 [ITS-90, deg C]\r
+# name 3 = c0S/m: Conductivity [S/m]\r
+# name 4 = timeS: Time, Elapsed [seconds]\r
+# name 5 = flag:  0.000e+00\r
+# span 0 =      1.000,     10.000\r
+# interval = seconds: 0.5\r
+# start_time = Jul 03 2012 10:30:00 [NMEA time, header]\r
+# bad_flag = -9.990e-29\r
+# datcnv_date = Jul 04 2012 09:23:56, 7.22\r
+# file_type = ascii\r
+*END*\r
+";
+
+fn sea_bird_rows() -> String {
+    body(|t, a, b| format!("{:>11}{a:>11.4}{b:>11.4}{:>11}{t:>11.3}  0.000e+00\r", "1.000", "3.512345"))
+}
+
+#[test]
+fn a_sea_bird_cast_is_read_by_its_header() {
+    let got = record(&(SEA_BIRD.to_owned() + &sea_bird_rows()));
+    assert_is_the_rig(&got, 0.0);
+    assert_eq!(got.channels, ["t090C", "t190C"]);
+    let said = notes(&got);
+    assert!(said.contains("Sea-Bird") && said.contains("column names on line 8"), "{said}");
+}
+
+#[test]
+fn the_bad_flag_is_missing_and_no_temperature() {
+    let bad = sea_bird_rows().replacen("    21.0000", " -9.990e-29", 1);
+    let got = record(&(SEA_BIRD.to_owned() + &bad));
+    // T1 is 21 in row 4.
+    assert_eq!((got.missing, got.t1_c[4].is_nan()), (1, true));
+}
+
+/// A conductivity of a sensor in the air, and a pressure, that fill their columns.
+#[test]
+fn numbers_that_touch_are_parted_by_the_width_of_their_columns() {
+    let touching = sea_bird_rows().replace("   3.512345", "-49.1234567").replacen("      1.000", "-123.000000", 1);
+    let text = SEA_BIRD.to_owned() + &touching;
+    assert!(text.contains("-49.1234567      ") && text.contains("20.0000-49.1234567"), "{text}");
+    assert_is_the_rig(&record(&text), 0.0);
+    let table = Table::read(text.as_bytes(), "cast.cnv").expect("text");
+    assert_eq!(
+        (table.numbers(0).expect("numbers")[..2].to_vec(), table.numbers(3).expect("numbers")[9]),
+        (vec![-123.0, 1.0], -49.123_456_7)
+    );
+}
+
+#[test]
+fn a_cast_without_times_has_the_interval_of_its_header() {
+    let scans = SEA_BIRD.replace("timeS: Time, Elapsed [seconds]", "scan: Scan Count");
+    assert_is_the_rig(&record(&(scans + &sea_bird_rows())), 0.0);
+    // Days have six decimals: 0.09 s.
+    let days = SEA_BIRD.replace("timeS: Time, Elapsed [seconds]", "timeJ: Julian Days");
+    let got = record(&(days + &sea_bird_rows()));
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("as its header says"), "{}", notes(&got));
+    let by_pressure = SEA_BIRD
+        .replace("timeS: Time, Elapsed [seconds]", "nbin: number of scans per bin")
+        .replace("seconds: 0.5", "decibars: 1");
+    assert_says(&refusal(&(by_pressure + &sea_bird_rows())), &["no column is recognisably the time", "period"]);
+}
+
+#[test]
+fn a_cast_that_is_cut_off_or_in_binary_is_refused_with_its_line() {
+    let headless = SEA_BIRD.replace("*END*\r\n", "");
+    assert_says(&refusal(&headless), &["Sea-Bird", "'*END*'", "line 20"]);
+    assert_says(&refusal(&SEA_BIRD.replace("= ascii", "= binary")), &["line 19", "ASCII output", "binary"]);
+    assert_says(&refusal(&SEA_BIRD.replace("# name", "# nome")), &["line 20", "the columns"]);
+    assert_says(&refusal(&SEA_BIRD.replace("name 3", "name 7")), &["line 11", "in order", "name 7"]);
+}
+
+/// `separator` and `decimal` as the file header names them, the names and rows in that.
+fn lab_view(
+    x_columns: &str,
+    separator: &str,
+    sign: &str,
+    names: &[&str],
+    row: impl Fn(f64, f64, f64) -> String,
+) -> String {
+    let between = if separator == "Tab" { "\t" } else { "," };
+    let line = |cells: &[&str]| cells.join(between) + "\r\n";
+    let header = [
+        line(&["LabVIEW Measurement", ""]),
+        line(&["Writer_Version", "2"]),
+        line(&["Reader_Version", "2"]),
+        line(&["Separator", separator]),
+        line(&["Decimal_Separator", sign]),
+        line(&["Multi_Headings", "No"]),
+        line(&["X_Columns", x_columns]),
+        line(&["Time_Pref", "Relative"]),
+        line(&["Date", "2026/01/31"]),
+        line(&["Time", "12:00:00"]),
+        "***End_of_Header***\r\n".into(),
+        "\r\n".into(),
+        line(&["Channels", "2"]),
+        line(&["Samples", "10", "10"]),
+        line(&["Date", "2026/01/31", "2026/01/31"]),
+        line(&["Time", "12:00:00", "12:00:00"]),
+        line(&["Y_Unit_Label", "deg C", "deg C"]),
+        line(&["X_Dimension", "Time", "Time"]),
+        line(&["X0", &format!("0{sign}0000000000000000E+0"), &format!("0{sign}0000000000000000E+0")]),
+        line(&["Delta_X", &format!("0{sign}500000"), &format!("0{sign}500000")]),
+        "***End_of_Header***\r\n".into(),
+        line(names),
+    ];
+    header.concat() + &body(|t, a, b| row(t, a, b) + "\r")
+}
+
+#[test]
+fn a_lab_view_measurement_is_read_by_its_headers() {
+    let names = ["X_Value", "Fine", "Coarse", "Comment"];
+    let tabs = lab_view("One", "Tab", ",", &names, |t, a, b| [comma(t), comma(a), comma(b)].join("\t"));
+    let commas = lab_view("One", "Comma", ".", &names, |t, a, b| format!("{t:.6},{a:.6},{b:.6},"));
+    let multi = ["X_Value", "Fine", "X_Value", "Coarse", "Comment"];
+    let multi = lab_view("Multi", "Tab", ".", &multi, |t, a, b| format!("{t}\t{a}\t{t}\t{b}\t"));
+    let none = lab_view("No", "Tab", ".", &names, |_, a, b| format!("\t{a}\t{b}"));
+    for text in [&tabs, &commas, &multi, &none] {
+        let got = record(text);
+        assert_is_the_rig(&got, 0.0);
+        assert_eq!(got.channels, ["Fine", "Coarse"]);
+        assert!(notes(&got).contains("LabVIEW"), "{}", notes(&got));
+    }
+    assert!(notes(&record(&none)).contains("0.5 s per row as its header says"));
+}
+
+#[test]
+fn comments_behind_rows_are_left_out() {
+    let names = ["X_Value", "Fine", "Coarse", "Comment"];
+    let text = lab_view("One", "Tab", ".", &names, |t, a, b| {
+        format!("{t}\t{a}\t{b}\t{}", if t == 2.0 { "burner on" } else { "" })
+    });
+    assert_is_the_rig(&record(&text), 0.0);
+}
+
+#[test]
+fn what_is_not_one_measurement_at_one_time_is_refused() {
+    let names = ["X_Value", "Fine", "Coarse", "Comment"];
+    let text = lab_view("One", "Tab", ".", &names, |t, a, b| format!("{t}\t{a}\t{b}"));
+    let twice = text.clone() + text.split_once("***End_of_Header***\r\n\r\n").expect("two headers").1;
+    assert_says(&refusal(&twice), &["line 33", "another measurement", "one header only"]);
+    let apart = text.replace("Delta_X\t0.500000\t0.500000", "Delta_X\t0.500000\t0.100000");
+    assert_says(&refusal(&apart), &["same X0 and Delta_X", "resample"]);
+    let cut = text.split_once("Delta_X").expect("it has one").0;
+    assert_says(&refusal(cut), &["LabVIEW", "the end of the file"]);
+}
+
+#[test]
+fn a_serial_log_is_read_with_the_time_of_arrival() {
+    let at = |t: f64| format!("12:00:{:02}.{:03}", t.floor(), (t.fract() * 1e3).round());
+    let plain = body(|t, a, b| format!("{} -> {a},{b}", at(t)));
+    let named = body(|t, a, b| format!("{} -> T1:{a},T2:{b}", at(t)));
+    let boot = "11:59:59.100 -> ets Jul 29 2019, boot\n11:59:59.900 -> T1,T2\n".to_owned() + &plain;
+    let dated = body(|t, a, b| format!("[2026-01-31 {}] {a} {b}", at(t)));
+    for text in [&plain, &named, &boot, &dated] {
+        let got = record(text);
+        assert_is_the_rig(&got, 1e-12);
+        assert_eq!(got.channels, ["T1", "T2"]);
+    }
+}
+
+#[test]
+fn a_plotter_log_has_its_names_in_each_line() {
+    let half = Selection { period_s: Some(0.5), ..Selection::default() };
+    let named = body(|_, a, b| format!("T bare:{a},T sheathed:{b}"));
+    let spaced = body(|_, a, b| format!("T bare: {a} C\tT sheathed: {b} C"));
+    for text in [&named, &spaced] {
+        let got = record_with(text.as_bytes(), &half).expect("names before numbers");
+        assert_is_the_rig(&got, 0.0);
+        assert_eq!(got.channels, ["T bare", "T sheathed"]);
+        // A plotter has no time.
+        assert_says(&refusal(text), &["no column is recognisably the time", "period"]);
+    }
+    let timed = body(|t, a, b| format!("ms:{},bare:{a},sheathed:{b}", t * 1e3));
+    assert_is_the_rig(&record(&timed), 0.0);
+    let table = Table::read(spaced.as_bytes(), "log").expect("text");
+    assert_eq!(table.columns()[1].unit(), &Unit::Celsius);
+}
+
+#[test]
+fn rows_that_arrive_later_are_unwrapped_as_well() {
+    let start = body(|t, a, b| format!("ms:{},bare:{a},sheathed:{b}", t * 1e3));
+    let table = Table::read(start.as_bytes(), "logger").expect("text");
+    let rows = RowReader::after(&table, &Selection::default()).expect("clear columns");
+    let row = rows.read("ms:5000,bare:22.5,sheathed:nan\n", 11).expect("a row").expect("no comment");
+    assert_eq!((row.time_s, row.reading_c), (Some(5.0), [Some(22.5), None]));
+    assert!(matches!(rows.read("sensor lost\n", 12), Err(RecordError::CellCount { line: 12, .. })));
+}
+
+#[test]
+fn a_program_is_told_in_the_notes() {
+    let table = Table::read((SEA_BIRD.to_owned() + &sea_bird_rows()).as_bytes(), "cast.cnv").expect("text");
+    assert!(table.notes().iter().any(|note| note.to_string().contains(&Program::SeaBird.to_string())));
+    let index = table.find(&ColumnRef::Name("t190C".into())).expect("by its short name");
+    assert_eq!(table.columns()[index].unit(), &Unit::Celsius);
+}
+
+fn compressed(text: &str) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(text.as_bytes()).expect("memory");
+    encoder.finish().expect("memory")
+}
+
+/// Whatever it is called; also of several parts, as loggers append them, and long ones.
+#[test]
+fn compressed_files_are_read_and_damaged_ones_refused() {
+    let read = |bytes: &[u8]| Record::from_reader(bytes, common::FILE, &Selection::default());
+    let text = SEA_BIRD.to_owned() + &sea_bird_rows();
+    let bytes = compressed(&text);
+    let got = read(&bytes).expect("gzip");
+    assert_is_the_rig(&got, 0.0);
+    assert!(notes(&got).contains("gzip"), "{}", notes(&got));
+    let (first, second) = text.split_at(text.len() / 2);
+    assert_is_the_rig(&read(&[compressed(first), compressed(second)].concat()).expect("two parts"), 0.0);
+    for end in [2, 9, bytes.len() / 2, bytes.len() - 1] {
+        assert_says(&read(&bytes[..end]).expect_err("cut off").to_string(), &["gzip", "cut off"]);
+    }
+    let mut damaged = bytes.clone();
+    let last = damaged.len() - 6;
+    damaged[last] ^= 0x55;
+    assert_says(&read(&damaged).expect_err("another checksum").to_string(), &["gzip", "damaged"]);
+}
