@@ -1,0 +1,513 @@
+"""Writes the fixtures of the tests with the libraries that people use, and beside each what is in it.
+
+    python -m venv venv && venv/bin/pip install asammdf npTDMS openpyxl odfpy pandas pyarrow h5py netCDF4 scipy xlwt
+    venv/bin/python make_fixtures.py [NAME...]
+
+A fixture `x.mf4` comes with `x.mf4.csv`: names, units and kinds of the columns in the first three lines, then one
+line for each row. Numbers stand as repr() gives them, that is, to the bit; instants as nanoseconds since 1970-01-01;
+what is missing is empty. Numbers are those that the library itself reads back, wherever it has a reader.
+"""
+
+import datetime
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+HERE = Path(__file__).parent / "fixtures"
+ROWS = 40
+START = datetime.datetime(2026, 1, 31, 10, 0, 0)
+START_NS = int(START.replace(tzinfo=datetime.timezone.utc).timestamp()) * 10**9
+
+
+def expect(name, columns):
+    """Writes what is in a fixture.
+
+    columns: (name, unit, values), values being numbers, datetimes or texts; None, NaN and NaT are missing.
+    """
+
+    def kind(values):
+        some = next(v for v in values if v is not None)
+        if isinstance(some, (datetime.datetime, np.datetime64)):
+            return "instant"
+        return "text" if isinstance(some, str) else "number"
+
+    def cell(value, kind):
+        if value is None or (kind == "instant" and np.isnat(np.datetime64(value))):
+            return ""
+        if kind == "instant":
+            return str(int(np.datetime64(value).astype("datetime64[ns]").astype(np.int64)))
+        if kind == "text":
+            return value
+        return "" if math.isnan(value) else repr(float(value))
+
+    kinds = [kind(values) for _, _, values in columns]
+    lines = [[n for n, _, _ in columns], [u for _, u, _ in columns], kinds]
+    for row in zip(*(values for _, _, values in columns), strict=True):
+        lines.append([cell(v, k) for v, k in zip(row, kinds)])
+    text = "".join(",".join(line) + "\n" for line in lines)
+    (HERE / f"{name}.csv").write_text(text, encoding="utf-8")
+
+
+def masked(values, valid):
+    return [v if ok else None for v, ok in zip(values, valid)]
+
+
+def warm(seed, rows=ROWS, fine=True):
+    """A temperature in degrees Celsius that uses all digits of a double."""
+    rng = np.random.default_rng(seed)
+    return 20 + (3 if fine else 2) * np.sin(np.arange(rows) / (3 if fine else 5)) + 0.01 * rng.standard_normal(rows)
+
+
+def read_back(path, sheet, column, first):
+    """Numbers of a column as openpyxl reads them: workbooks are written with 16 digits."""
+    import openpyxl
+
+    rows = openpyxl.load_workbook(HERE / path)[sheet].iter_rows(min_row=first, values_only=True)
+    cells = [row[column] for row in rows if any(cell is not None for cell in row)]
+    return [None if cell == "#N/A" else cell for cell in cells]
+
+
+def spreadsheets():
+    import openpyxl
+    import pandas
+    import xlwt
+
+    # Title and settings above, dates as time, an error, an empty cell, an empty row, a second sheet without a table.
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "Messung 1"
+    sheet.append(["Prüfstand 3"])
+    sheet.append(["Operator", "K. M."])
+    sheet.append([])
+    sheet.append(["when", "T1 [°C]", "T2 [K]", "remark"])
+    t1, t2 = warm(1), warm(2, fine=False) + 273.15
+    stamps = [START + datetime.timedelta(milliseconds=250 * k) for k in range(ROWS)]
+    for k in range(ROWS):
+        if k == 30:
+            sheet.append([])
+        sheet.append([stamps[k], "#N/A" if k == 7 else float(t1[k]), None if k == 9 else float(t2[k]), "ok" if k == 3 else None])
+    book.create_sheet("notes").append(["nothing", "here"])
+    book.save(HERE / "preamble.xlsx")
+    remark = ["ok" if k == 3 else "" for k in range(ROWS)]
+    expect(
+        "preamble.xlsx",
+        [
+            ("when", "", stamps),
+            ("T1 [°C]", "", read_back("preamble.xlsx", "Messung 1", 1, 5)),
+            ("T2 [K]", "", read_back("preamble.xlsx", "Messung 1", 2, 5)),
+            ("remark", "", remark),
+        ],
+    )
+
+    # Names, then units, then whole numbers and floats; words for a missing one make a column of texts.
+    t1, t2 = warm(3), np.round(warm(4), 2)
+    rows = [["time", "T1", "T2"], ["ms", "°C", "°C"]]
+    rows += [[20 * k, float(t1[k]), "OL" if k == 5 else float(t2[k])] for k in range(ROWS)]
+    pandas.DataFrame(rows).to_excel(HERE / "units.ods", engine="odf", header=False, index=False, sheet_name="log")
+    expect(
+        "units.ods",
+        [
+            ("time", "ms", [20.0 * k for k in range(ROWS)]),
+            ("T1", "°C", t1),
+            ("T2", "°C", ["OL" if k == 5 else repr(float(v)) for k, v in enumerate(t2)]),
+        ],
+    )
+
+    # Day and time of day in two columns; no unit; integers.
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("Sheet1")
+    day, clock = xlwt.XFStyle(), xlwt.XFStyle()
+    day.num_format_str, clock.num_format_str = "yyyy-mm-dd", "hh:mm:ss"
+    for column, name in enumerate(["date", "clock", "T1", "T2"]):
+        sheet.write(0, column, name)
+    t1 = warm(5)
+    for k in range(ROWS):
+        sheet.write(k + 1, 0, START.date(), day)
+        sheet.write(k + 1, 1, datetime.time(10, 0, k), clock)
+        sheet.write(k + 1, 2, float(t1[k]))
+        sheet.write(k + 1, 3, 20 + k % 3)
+    book.save(str(HERE / "day.xls"))
+    expect(
+        "day.xls",
+        [
+            ("date", "", [str(START.date())] * ROWS),
+            ("clock", "", [f"10:00:{k:02}.000000000" for k in range(ROWS)]),
+            ("T1", "", t1),
+            ("T2", "", [20.0 + k % 3 for k in range(ROWS)]),
+        ],
+    )
+
+    # Two sheets with tables, one of which has two temperatures.
+    with pandas.ExcelWriter(HERE / "sheets.xlsx", engine="openpyxl") as writer:
+        frame = pandas.DataFrame({"time [s]": [0.5 * k for k in range(ROWS)], "p [bar]": 1 + warm(6) / 100})
+        frame.to_excel(writer, sheet_name="pressure", index=False)
+        frame = pandas.DataFrame({"time [s]": [0.1 * k for k in range(ROWS)], "T1": warm(7), "T2": warm(8)})
+        frame.to_excel(writer, sheet_name="gas", index=False)
+    expect("sheets.xlsx", [(name, "", read_back("sheets.xlsx", "gas", at, 2)) for at, name in enumerate(frame)])
+
+
+def mdf():
+    from asammdf import MDF, Signal
+
+    def signal(name, unit, samples, time, invalid=None, conversion=None):
+        return Signal(
+            samples=samples, timestamps=time, name=name, unit=unit, invalidation_bits=invalid, conversion=conversion
+        )
+
+    def start(file):
+        file.start_time = START.replace(tzinfo=datetime.timezone.utc)
+
+    def read(path, names, invalid={}):
+        with MDF(path) as file:
+            columns = []
+            for name, unit in names:
+                signal = file.get(name, ignore_invalidation_bits=True)
+                assert signal.unit == unit, (signal.unit, unit)
+                valid = ~invalid.get(name, np.zeros(len(signal), bool))
+                columns.append((name, unit, masked(signal.samples, valid)))
+            return [("time", "s", signal.timestamps), *columns]
+
+    time = 0.01 * np.arange(ROWS)
+    linear = {"a": 0.01, "b": -40.0}
+    counts = np.round((warm(12) + 40) / 0.01).astype(np.int16)
+    invalid = np.arange(ROWS) % 11 == 4
+
+    # Doubles, scaled integers with invalid samples, floats.
+    file = MDF(version="4.10")
+    start(file)
+    file.append(
+        [
+            signal("T1", "°C", warm(11), time),
+            signal("T2", "°C", counts, time, invalid, linear),
+            signal("p", "bar", (warm(13) / 10).astype(np.float32), time),
+        ],
+        acq_name="gas",
+        comment="gas",
+    )
+    file.save(HERE / "plain.mf4", overwrite=True)
+    expect("plain.mf4", read(HERE / "plain.mf4", [("T1", "°C"), ("T2", "°C"), ("p", "bar")], {"T2": invalid}))
+
+    # Two groups of different rates, compressed and transposed; one has the temperatures.
+    file = MDF(version="4.11")
+    start(file)
+    file.append([signal("speed", "rpm", np.arange(80.0), 0.005 * np.arange(80))], acq_name="engine")
+    file.append([signal("T1", "K", warm(14) + 273.15, time), signal("T2", "K", warm(15) + 273.15, time)], acq_name="gas")
+    file.save(HERE / "groups.mf4", overwrite=True, compression=2)
+    expect("groups.mf4", read(HERE / "groups.mf4", [("T1", "K"), ("T2", "K")]))
+
+    # Each temperature in a group of its own: only joined are they a record. All times are sums of powers of two, so
+    # that the interpolation is exact.
+    time, its_time = np.arange(ROWS) / 128, 1 / 256 + np.arange(18) / 64
+    its, bad = np.arange(18.0), np.arange(18) == 9
+    file = MDF(version="4.10")
+    start(file)
+    file.append([signal("T1", "°C", warm(16), time)], acq_name="ECU1")
+    file.append([signal("T2", "°C", its, its_time, bad)], acq_name="ECU2")
+    file.save(HERE / "apart.mf4", overwrite=True)
+    joined = np.interp(time, its_time, its, left=np.nan, right=np.nan)
+    joined[(time > its_time[8]) & (time < its_time[10])] = np.nan
+    expect("apart.mf4", [*read(HERE / "apart.mf4", [("T1", "°C")]), ("T2", "°C", joined)])
+
+    # MDF 3, with scaled integers.
+    time = 0.01 * np.arange(ROWS)
+    file = MDF(version="3.30")
+    start(file)
+    file.append([signal("T1", "°C", warm(17), time), signal("T2", "°C", counts, time, None, linear)], comment="gas")
+    file.save(HERE / "old.mdf", overwrite=True)
+    expect("old.mdf", read(HERE / "old.mdf", [("T1", "°C"), ("T2", "°C")]))
+
+
+def tdms():
+    from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
+
+    waveform = {"wf_increment": 0.002, "wf_start_offset": 0.5, "wf_start_time": np.datetime64(START), "wf_samples": ROWS}
+
+    def read(path, group, names):
+        with TdmsFile.open(path) as file:
+            return [(name, unit, file[group][name][:]) for name, unit in names]
+
+    clock = [0.5 + 0.002 * k for k in range(ROWS)]
+
+    # Doubles and floats in two segments, of which the second has no list of its own; integers that are numbers.
+    path = HERE / "segments.tdms"
+    t1, t2 = warm(21), (warm(22) + 273.15).astype(np.float32)
+    with TdmsWriter(path) as writer:
+        for part in [slice(0, 25), slice(25, ROWS)]:
+            writer.write_segment([
+                RootObject({"title": "rig"}),
+                GroupObject("gas"),
+                ChannelObject("gas", "T1", t1[part], {**waveform, "unit_string": "°C"}),
+                ChannelObject("gas", "T2", t2[part], {**waveform, "unit_string": "K"}),
+                ChannelObject("gas", "state", np.arange(ROWS, dtype=np.int16)[part] - 7, waveform),
+            ])
+    columns = read(path, "gas", [("T1", "°C"), ("T2", "K"), ("state", "")])
+    expect("segments.tdms", [("time", "s", clock), *columns])
+
+    # What LabVIEW writes while it streams: one segment of several chunks. npTDMS does not write it but reads it, so the
+    # raw data of equal segments are put behind each other and the lead-in is told so.
+    path = HERE / "chunks.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject("gas", "T1", t1[:10], waveform), ChannelObject("gas", "T2", warm(23)[:10], waveform)])
+    raw = bytearray(path.read_bytes())
+    more = np.concatenate([np.concatenate([t1[k : k + 10], warm(23)[k : k + 10]]) for k in (10, 20, 30)])
+    raw[12:20] = (int.from_bytes(raw[12:20], "little") + more.nbytes).to_bytes(8, "little")
+    path.write_bytes(bytes(raw) + more.tobytes())
+    expect("chunks.tdms", [("time", "s", clock), *read(path, "gas", [("T1", ""), ("T2", "")])])
+
+    # Interleaved samples, big-endian numbers, stamps as a channel: the first by its flag, which npTDMS reads.
+    path = HERE / "interleaved.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject("gas", "T1", t1, {}), ChannelObject("gas", "T2", warm(24), {})])
+    raw = bytearray(path.read_bytes())
+    start = 28 + int.from_bytes(raw[20:28], "little")
+    pairs = np.frombuffer(bytes(raw[start:]), "<f8").reshape(2, ROWS).T.copy()
+    raw[4:8] = (int.from_bytes(raw[4:8], "little") | 0x20).to_bytes(4, "little")
+    path.write_bytes(bytes(raw[:start]) + pairs.tobytes())
+    expect("interleaved.tdms", read(path, "gas", [("T1", ""), ("T2", "")]))
+
+    # Stamps as a channel, beside a group of another length.
+    path = HERE / "stamps.tdms"
+    stamps = np.datetime64(START) + np.arange(ROWS) * np.timedelta64(250, "ms")
+    with TdmsWriter(path) as writer:
+        writer.write_segment([
+            ChannelObject("log", "Time", stamps.astype("datetime64[us]")),
+            ChannelObject("log", "T1", t1, {"unit_string": "°C"}),
+            ChannelObject("log", "T2", warm(25), {"unit_string": "°C"}),
+            ChannelObject("other", "p", np.arange(7.0)),
+        ])
+    expect("stamps.tdms", [("Time", "", stamps), *read(path, "log", [("T1", "°C"), ("T2", "°C")])])
+
+    # Counts with a thermocouple's scale that is still to be applied.
+    scale = {
+        "NI_Scaling_Status": "unscaled",
+        "NI_Number_Of_Scales": 1,
+        "NI_Scale[0]_Scale_Type": "Thermocouple",
+        "NI_Scale[0]_Thermocouple_Thermocouple_Type": 10073,
+    }
+    with TdmsWriter(HERE / "unscaled.tdms") as writer:
+        counts = np.arange(ROWS, dtype=np.int16)
+        writer.write_segment([ChannelObject("daq", name, counts, {**waveform, **scale}) for name in ["T1", "T2"]])
+
+
+def parquet():
+    import pandas
+    import pyarrow
+    import pyarrow.parquet as pq
+
+    stamps = [START + datetime.timedelta(microseconds=1500 * k) for k in range(ROWS)]
+
+    def read(path, units={}):
+        table = pq.read_table(path)
+        return [(name, units.get(name, ""), table[name].to_pylist()) for name in table.column_names]
+
+    # Nulls, floats, whole numbers, texts; several row groups; zstd.
+    t2 = [None if k % 9 == 2 else float(v) for k, v in enumerate(warm(32))]
+    table = pyarrow.table({
+        "time": pyarrow.array(stamps, pyarrow.timestamp("us")),
+        "T1 [°C]": warm(31),
+        "T2 [°C]": pyarrow.array(t2, pyarrow.float64()),
+        "p": pyarrow.array(warm(33), pyarrow.float32()),
+        "n": pyarrow.array(range(ROWS), pyarrow.uint16()),
+        "remark": pyarrow.array(["ok" if k == 3 else None for k in range(ROWS)], pyarrow.string()),
+    })
+    pq.write_table(table, HERE / "nulls.parquet", compression="zstd", row_group_size=16)
+    columns = read(HERE / "nulls.parquet")
+    expect("nulls.parquet", [(n, u, ["" if v is None else v for v in vs] if n == "remark" else vs) for n, u, vs in columns])
+
+    # A data frame with its index, snappy, dictionary; nanoseconds.
+    frame = pandas.DataFrame({"T1": warm(34), "T2": np.round(warm(35), 1)}, index=pandas.DatetimeIndex(stamps, name="when"))
+    frame.to_parquet(HERE / "frame.parquet")
+    when = [np.datetime64(stamp) for stamp in stamps]
+    expect("frame.parquet", [("T1", "", frame["T1"]), ("T2", "", frame["T2"]), ("when", "", when)])
+
+    # Milliseconds, no compression, pages of version 2, a time in seconds.
+    table = pyarrow.table({
+        "t [s]": 0.5 * np.arange(ROWS),
+        "T1": warm(36),
+        "T2": warm(37),
+        "when": pyarrow.array(stamps, pyarrow.timestamp("ms"), safe=False),
+    })
+    pq.write_table(table, HERE / "pages.parquet", compression="none", data_page_version="2.0", use_dictionary=False)
+    expect("pages.parquet", read(HERE / "pages.parquet"))
+
+
+def hdf5():
+    import h5py
+
+    # Groups, attributes of units, packed integers with a fill value, chunks; a time since an instant.
+    path = HERE / "groups.h5"
+    counts = np.round((warm(42) + 40) / 0.01).astype(np.int16)
+    counts[[5, 17]] = -9999
+    with h5py.File(path, "w") as file:
+        gas = file.create_group("rig/gas")
+        gas.create_dataset("time", data=0.25 * np.arange(ROWS)).attrs["units"] = "seconds since 2026-01-31 10:00:00"
+        gas.create_dataset("T1", data=warm(41), chunks=(16,), compression="gzip", shuffle=True).attrs["units"] = "degC"
+        packed = gas.create_dataset("T2", data=counts)
+        packed.attrs.update({"units": "degC", "scale_factor": 0.01, "add_offset": -40.0, "_FillValue": np.int16(-9999)})
+        file.create_dataset("rig/note", data="nothing")
+        file.create_dataset("other/p", data=np.arange(7.0))
+    with h5py.File(path) as file:
+        gas = file["rig/gas"]
+        t2 = [None if v == -9999 else float(v) * 0.01 + -40.0 for v in gas["T2"][:]]
+        expect("groups.h5", [
+            ("T1", "degC", gas["T1"][:]),
+            ("T2", "degC", t2),
+            ("time", "seconds since 2026-01-31 10:00:00", gas["time"][:]),
+        ])
+
+    # Records with fields; floats of big-endian order.
+    path = HERE / "records.h5"
+    records = np.zeros(ROWS, dtype=[("t", "<f8"), ("T1", ">f4"), ("T2", "<f8"), ("n", "<i4")])
+    records["t"], records["T1"], records["T2"], records["n"] = 0.1 * np.arange(ROWS), warm(43), warm(44), np.arange(ROWS)
+    with h5py.File(path, "w") as file:
+        file.create_dataset("log", data=records)
+    with h5py.File(path) as file:
+        log = file["log"][:]
+        expect("records.h5", [(name, "", log[name]) for name in log.dtype.names])
+
+    # A matrix, and the rate as an attribute.
+    path = HERE / "matrix.h5"
+    with h5py.File(path, "w") as file:
+        matrix = file.create_dataset("T", data=np.stack([warm(45), warm(46)], axis=1).astype(np.float32))
+        matrix.attrs["units"] = "K"
+        file.attrs["fs"] = 500.0
+    with h5py.File(path) as file:
+        matrix = file["T"][:]
+    clock = [0.002 * k for k in range(ROWS)]
+    expect("matrix.h5", [("time", "s", clock), ("T 1", "K", matrix[:, 0]), ("T 2", "K", matrix[:, 1])])
+
+    # MATLAB 7.3 as MATLAB lays it out: a block of text before, vectors as rows, classes as attributes.
+    path = HERE / "seven.mat"
+    with h5py.File(path, "w", userblock_size=512, libver="earliest") as file:
+        for name, values in [("T1", warm(47)), ("T2", warm(48)), ("fs", np.array([100.0]))]:
+            file.create_dataset(name, data=values.reshape(1, -1)).attrs["MATLAB_class"] = np.bytes_("double")
+        text = np.frombuffer("rig".encode("utf-16-le"), np.uint16).reshape(-1, 1)
+        file.create_dataset("title", data=text).attrs["MATLAB_class"] = np.bytes_("char")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM")
+    clock = [0.01 * k for k in range(ROWS)]
+    expect("seven.mat", [("time", "s", clock), ("T1", "", warm(47)), ("T2", "", warm(48))])
+
+
+def netcdf():
+    from netCDF4 import Dataset
+
+    def write(path, kind, unlimited=False):
+        with Dataset(path, "w", format=kind) as file:
+            file.createDimension("time", None if unlimited else ROWS)
+            time = file.createVariable("time", "f8", ("time",))
+            time.units = "seconds since 2026-01-31 10:00:00"
+            time[:] = 0.25 * np.arange(ROWS)
+            t1 = file.createVariable("T1", "f8", ("time",), fill_value=-999.0)
+            t1.units = "degC"
+            t1[:] = np.ma.masked_where(np.arange(ROWS) % 13 == 6, warm(51))
+            t2 = file.createVariable("T2", "i2", ("time",))
+            t2.setncatts({"units": "K", "scale_factor": 0.01, "add_offset": 300.0, "valid_range": np.array([-3000, 3000], "i2")})
+            t2.set_auto_maskandscale(False)
+            stored = np.round((warm(52) + 273.15 - 300) / 0.01).astype(np.int16)
+            stored[8] = 9999
+            t2[:] = stored
+
+    def read(path):
+        with Dataset(path) as file:
+            columns = []
+            for name in ["time", "T1", "T2"]:
+                variable = file[name]
+                valid = ~np.ma.getmaskarray(variable[:])
+                # The library scales floats in another order on some platforms; it is defined as stored * scale + offset.
+                variable.set_auto_maskandscale(False)
+                scale, offset = getattr(variable, "scale_factor", 1.0), getattr(variable, "add_offset", 0.0)
+                values = [float(v) * scale + offset if "scale_factor" in variable.ncattrs() else float(v) for v in variable[:]]
+                columns.append((name, variable.units, masked(values, valid)))
+            return columns
+
+    for name, kind, unlimited in [
+        ("classic.nc", "NETCDF3_CLASSIC", True),
+        ("offset.nc", "NETCDF3_64BIT_OFFSET", False),
+        ("four.nc", "NETCDF4", False),
+    ]:
+        write(HERE / name, kind, unlimited)
+        expect(name, read(HERE / name))
+
+    # Two dimensions, groups, and values that were never written.
+    path = HERE / "stations.nc"
+    with Dataset(path, "w") as file:
+        rig = file.createGroup("rig")
+        rig.createDimension("time", ROWS)
+        rig.createDimension("place", 2)
+        rig.createVariable("time", "i4", ("time",))[:] = 100 * np.arange(ROWS)
+        rig["time"].units = "milliseconds since 2026-01-31"
+        t = rig.createVariable("T", "f4", ("time", "place"))
+        t.units = "degC"
+        t[:30, :] = np.stack([warm(53), warm(54)], axis=1)[:30]
+    with Dataset(path) as file:
+        rig = file["rig"]
+        values = np.ma.filled(rig["T"][:], np.nan)
+        expect("stations.nc", [
+            ("time", rig["time"].units, rig["time"][:]),
+            ("T 1", "degC", values[:, 0]),
+            ("T 2", "degC", values[:, 1]),
+        ])
+
+
+def numpy():
+    # A structured array with instants, big-endian and whole numbers, and a gap for alignment.
+    path = HERE / "fields.npy"
+    kinds = np.dtype([("when", "<M8[us]"), ("T1", ">f8"), ("n", "<u2"), ("T2", "<f4")], align=True)
+    records = np.zeros(ROWS, dtype=kinds)
+    records["when"] = np.datetime64(START) + np.arange(ROWS) * np.timedelta64(1500, "us")
+    records["T1"], records["n"], records["T2"] = warm(61), np.arange(ROWS), warm(62)
+    records["T1"][4] = np.nan
+    np.save(path, records)
+    back = np.load(path)
+    expect("fields.npy", [(name, "", list(back[name])) for name in back.dtype.names])
+
+    # A matrix in the order of Fortran.
+    path = HERE / "matrix.npy"
+    np.save(path, np.asfortranarray(np.stack([0.5 * np.arange(ROWS), warm(63), warm(64)], axis=1)))
+    back = np.load(path)
+    expect("matrix.npy", [("", "", back[:, column]) for column in range(3)])
+
+    # Names, a rate, floats, an array of another length.
+    path = HERE / "named.npz"
+    np.savez_compressed(path, T1=warm(65), T2=warm(66).astype(np.float32), fs=np.float64(50), other=np.arange(3))
+    back = np.load(path)
+    clock = [0.02 * k for k in range(ROWS)]
+    expect("named.npz", [("time", "s", clock), ("T1", "", back["T1"]), ("T2", "", back["T2"])])
+
+
+def matlab():
+    from scipy.io import loadmat, savemat
+
+    def read(path, names):
+        back = loadmat(path)
+        return [(name, "", back[name].ravel()) for name in names]
+
+    # Vectors with their time, compressed, beside a text and a structure.
+    path = HERE / "vectors.mat"
+    values = {"t": 0.1 * np.arange(ROWS), "T1": warm(71), "T2": warm(72).astype(np.float32)}
+    savemat(path, {**values, "title": "rig", "settings": {"gain": 2.0}}, do_compression=True, oned_as="column")
+    expect("vectors.mat", read(path, ["t", "T1", "T2"]))
+
+    # A rate instead of a time; whole numbers; rows.
+    path = HERE / "rate.mat"
+    savemat(path, {"T1": warm(73), "T2": np.arange(ROWS, dtype=np.int32), "Fs": 20.0}, oned_as="row")
+    clock = [0.05 * k for k in range(ROWS)]
+    expect("rate.mat", [("time", "s", clock), *read(path, ["T1", "T2"])])
+
+    # A matrix, whose columns are channels.
+    path = HERE / "columns.mat"
+    savemat(path, {"T": np.stack([warm(74), warm(75)], axis=1), "dt": 0.25})
+    back = loadmat(path)["T"]
+    clock = [0.25 * k for k in range(ROWS)]
+    expect("columns.mat", [("time", "s", clock), ("T 1", "", back[:, 0]), ("T 2", "", back[:, 1])])
+
+
+MAKERS = {maker.__name__: maker for maker in [spreadsheets, mdf, tdms, parquet, hdf5, netcdf, numpy, matlab]}
+
+if __name__ == "__main__":
+    HERE.mkdir(exist_ok=True)
+    for wanted in sys.argv[1:] or MAKERS:
+        MAKERS[wanted]()
