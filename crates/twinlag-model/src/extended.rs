@@ -9,6 +9,7 @@ use twinlag_compensate::{Coloured, Readings, Rig, Sensor, SensorAt, SlowPath};
 use crate::effect::{Identifier, Shared};
 use crate::error::ModelError;
 use crate::fit::Fitted;
+use crate::implied::Evaluation;
 use crate::model::Model;
 use crate::number::Number;
 use crate::observations::Observations;
@@ -69,6 +70,21 @@ impl Extended {
         let plant = self.model.plant(parameters, &self.observations);
         [0, 1]
             .map(|i| time_s.iter().map(|t| (plant.sensors[i].tau_s * plant.sensors[i].tau_factor_at(*t)).re).collect())
+    }
+
+    /// The residual with other `parameters`, and the gas temperatures that it is of.
+    pub fn evaluate(&self, parameters: &[f64]) -> Evaluation {
+        self.model.evaluate(parameters, &self.observations)
+    }
+
+    /// The record that it was fitted to.
+    pub(crate) fn observations(&self) -> &Observations {
+        &self.observations
+    }
+
+    /// The rig that it describes.
+    pub(crate) fn plant(&self) -> Plant {
+        self.model.plant(&self.theta, &self.observations)
     }
 
     /// Gain and offset of the second channel against the first, 1 and K.

@@ -77,6 +77,17 @@ impl ModelFit {
     pub fn is_contradicted(&self) -> bool {
         self.is_weighted_by_residual
     }
+
+    /// Standard errors of a time constant by noise, s: if all other parameters were known, and as they are; `None` without a
+    /// covariance, and where something that was held leaves none to invert.
+    ///
+    /// `1/√((C⁻¹)_ii)` and `√C_ii`, `C` the covariance.
+    pub fn standard_errors_s(&self, sensor: usize) -> Option<[f64; 2]> {
+        let covariance = self.covariance.as_ref()?;
+        let information = crate::dense::inverse(covariance)?.get(sensor)?.get(sensor)?.recip();
+        let errors_s = [information.sqrt(), covariance[sensor][sensor].sqrt()];
+        errors_s.iter().all(|error_s| error_s.is_finite() && *error_s > 0.0).then_some(errors_s)
+    }
 }
 
 /// A fit with effects that were known beforehand.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::blocks;
+use crate::correlation::autocorrelation;
 use crate::fit::Fitted;
 use crate::implied::Details;
 use crate::instants::Instants;
@@ -17,6 +18,11 @@ const MAX_POINTS: usize = 65_536;
 const SHOWN_PARTS: usize = 100;
 /// Parts of the record of which the one with most of the residual is named.
 const NAMED_PARTS: usize = 10;
+/// Lags of the autocorrelation: twice those of the test of whiteness, so that what follows them is seen as well.
+const LAGS: usize = 40;
+/// Order statistics at either end that are all kept, and those between them.
+const EXTREMES: usize = 30;
+const BETWEEN: usize = 140;
 
 /// Values over time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,7 +39,7 @@ impl Line {
     /// with NaN then, but for the first.
     ///
     /// - `stretches`: their places among the values
-    fn thinned(time_s: &Instants, value: &[f64], stretches: impl Iterator<Item = Range<usize>>) -> Self {
+    pub(crate) fn thinned(time_s: &Instants, value: &[f64], stretches: impl Iterator<Item = Range<usize>>) -> Self {
         if value.len() <= MAX_POINTS {
             return Self { time_s: time_s.iter().collect(), value: value.to_vec() };
         }
@@ -101,6 +107,12 @@ pub struct Trace {
     pub gas_change_k: f64,
     /// Power of the residual in bands: frequency in Hz, power, degrees of freedom.
     pub bands: Vec<[f64; 3]>,
+    /// Autocorrelation of the residual at lags of 0, 1, 2, … samples: 1 at none.
+    pub autocorrelation: Vec<f64>,
+    /// Order statistics of the residual: rank from 1, and value; the extremes all, of the others as many as a picture shows.
+    pub order_statistics: Vec<(usize, f64)>,
+    /// How many residuals there are.
+    pub count: usize,
 }
 
 impl Trace {
@@ -127,6 +139,9 @@ impl Trace {
             gas_change_k: gas_change_k(fitted, details.sample(), &gas_c, observations),
             gas_c: Line::thinned(time_s, &gas_c, details.stretches()),
             bands: Vec::new(),
+            autocorrelation: normalised(autocorrelation(residual, LAGS.min(n.saturating_sub(1) / 4))),
+            order_statistics: order_statistics(residual),
+            count: n,
         }
     }
 
@@ -135,6 +150,23 @@ impl Trace {
         let to_hz = 1.0 / (std::f64::consts::TAU * observations.step_s());
         Self { bands: bands.0.iter().map(|b| [b.omega * to_hz, b.power(), b.dof()]).collect(), ..self }
     }
+}
+
+/// An autocorrelation over its value at no lag; nothing of a series without energy.
+fn normalised(values: Vec<f64>) -> Vec<f64> {
+    let Some(energy) = values.first().copied().filter(|energy| *energy > 0.0) else { return Vec::new() };
+    values.into_iter().map(|value| value / energy).collect()
+}
+
+/// Ranks with their values, as [`Trace::order_statistics`] has them.
+fn order_statistics(residual: &[f64]) -> Vec<(usize, f64)> {
+    let mut sorted = residual.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let n = sorted.len();
+    let inner = EXTREMES.min(n)..n.saturating_sub(EXTREMES);
+    let step = inner.len().div_ceil(BETWEEN).max(1);
+    let kept = (0..inner.start).chain(inner.clone().step_by(step)).chain(inner.end.max(inner.start)..n);
+    kept.map(|k| (k + 1, sorted[k])).collect()
 }
 
 /// The one of [`NAMED_PARTS`] parts, equal but for a value, with the largest mean square; `None` of no values.
@@ -182,6 +214,26 @@ mod tests {
         assert_eq!(worst_of(residual), Some(([302.0, 402.0], 101)));
         assert_eq!(worst_of(vec![1.0, 2.0]).map(|(_, count)| count), Some(1));
         assert_eq!(worst_of(Vec::new()), None);
+    }
+
+    /// White noise that flips its sign each time has the autocorrelation ±1, and its ranks are all there, in order.
+    #[test]
+    fn autocorrelation_and_order_statistics_are_of_the_whole_residual() {
+        let residual: Vec<f64> = (0..1000).map(|k| if k % 2 == 0 { 2.0 } else { -2.0 }).collect();
+        let of_lags = normalised(autocorrelation(&residual, 3));
+        for (lag, got) in of_lags.iter().enumerate() {
+            // Lag m has n − m products.
+            let want = (1.0 - lag as f64 / 1000.0) * if lag % 2 == 0 { 1.0 } else { -1.0 };
+            assert!((got - want).abs() < 1e-12, "{got} at {lag}, not {want}");
+        }
+        assert!(normalised(vec![0.0; 4]).is_empty());
+        for n in [0, 1, 59, 60, 61, 1000] {
+            let falling: Vec<f64> = (0..n).map(|k| (n - k) as f64).collect();
+            let kept = order_statistics(&falling);
+            assert!(kept.iter().all(|(rank, value)| *rank as f64 == *value), "{n}");
+            assert!(kept.windows(2).all(|pair| pair[0].0 < pair[1].0) && kept.len() <= 2 * EXTREMES + BETWEEN, "{n}");
+            assert_eq!(kept.first().map(|k| k.0).zip(kept.last().map(|k| k.0)), (n > 0).then_some((1, n)));
+        }
     }
 
     /// Every extreme of a hundredth of a long line is in the thinned one, at its instant; a short line is kept as it is.

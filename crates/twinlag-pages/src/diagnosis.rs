@@ -1,8 +1,10 @@
 //! A diagnosis as a page: what was found, how well it is shown, what it changes, and what stays
 //! open, with pictures.
 
+mod budget;
 mod evidence;
 mod if_known;
+mod likelihood;
 mod limits;
 mod numbers;
 mod records;
@@ -12,9 +14,12 @@ mod verdict;
 use twinlag::diagnosis::Diagnosis as Core;
 use twinlag::record::Record;
 use twinlag::{Characterisation, Diagnosis};
-use twinlag_report::{Colour, Document, ReportError};
+use twinlag_report::{Document, ReportError};
 
-use crate::figures::{PlottedModel, frequency_figure};
+use crate::Making;
+use crate::figures::{self, PlottedModel};
+use crate::making::{file_names, notes};
+use crate::residual_figures::frequency_figure;
 
 const BEFORE: &str = "two first-order lags";
 const AFTER: &str = "with the effects";
@@ -23,26 +28,29 @@ const AFTER: &str = "with the effects";
 /// give equal bytes. Its numbers are those of the answer; its pictures need the series of
 /// [`Diagnosis::core`], and an answer that was read from JSON has none.
 ///
-/// - `command`: the one that makes it again
-///
 /// # Errors
 /// [`ReportError`] if something cannot be drawn. What a diagnosis does not determine, up to one
 /// that was refused, is said in the report and is no error.
-pub fn diagnosis_report(record: &Record, answer: &Diagnosis, command: &str) -> Result<String, ReportError> {
+pub fn diagnosis_report(record: &Record, answer: &Diagnosis, making: &Making) -> Result<String, ReportError> {
     let page = Page { record, answer, changed: has_two_models(answer) };
-    let mut document = Document::new(format!("Diagnosis of {}", record.source));
-    document = page.verdict(document);
+    let base = &answer.base;
+    let mut document = Document::new(format!("Diagnosis of {}", file_names(&record.source, &answer.records)));
+    document = page.first_screen(document, making)?;
+    document = page.found(document);
     document = page.traces(document)?;
     document = page.residual(document)?;
     document = page.evidence(document);
     document = page.numbers(document)?;
+    document = page.budget(document);
+    document = page.likelihood(document)?;
     document = page.records(document)?;
     document = page.if_known(document)?;
     document = page.errors(document);
-    document = page.tests(document);
+    document = page.tests(document)?;
     document = page.unexplained(document);
     document = page.unknowable(document);
-    Ok(page.reproduction(document, command).to_html())
+    document = making.reproduction(document, &base.made_by.program, &base.made_by.version);
+    Ok(making.page(&notes(document, &base.notes)))
 }
 
 /// Power of the residual against frequency, before and after, as SVG; `None` if the answer has no
@@ -51,7 +59,7 @@ pub fn diagnosis_report(record: &Record, answer: &Diagnosis, command: &str) -> R
 /// # Errors
 /// [`ReportError`] if it cannot be drawn.
 pub fn residual_picture(answer: &Diagnosis) -> Result<Option<String>, ReportError> {
-    frequency_figure(&models(answer)).map(|figure| figure.to_svg()).transpose()
+    frequency_figure(&models(answer), "Power of the residual").map(|figure| figure.to_svg()).transpose()
 }
 
 /// Whether the answer has a model beside that of two lags: one with effects, or one in which model error that was taken
@@ -78,8 +86,8 @@ struct Column<'a> {
 /// series.
 fn models(answer: &Diagnosis) -> Vec<PlottedModel<'_>> {
     let Some(core) = answer.core.as_deref() else { return Vec::new() };
-    let before = PlottedModel { name: BEFORE, fit: &core.base, colour: Colour::Vermilion };
-    let after = PlottedModel { name: AFTER, fit: &core.last, colour: Colour::Blue };
+    let before = PlottedModel { name: BEFORE, fit: &core.base, colour: figures::BEFORE };
+    let after = PlottedModel { name: AFTER, fit: &core.last, colour: figures::AFTER };
     if has_two_models(answer) { vec![before, after] } else { vec![before] }
 }
 
@@ -101,15 +109,5 @@ impl Page<'_> {
         let before = Column { name: BEFORE, column: "before", answer: &self.answer.base };
         let after = Column { name: AFTER, column: "after", answer: &self.answer.last };
         if self.changed { vec![before, after] } else { vec![Column { column: "value", ..before }] }
-    }
-
-    fn reproduction(&self, document: Document, command: &str) -> Document {
-        let base = &self.answer.base;
-        let mut document = document.heading("How to reproduce this");
-        if !command.is_empty() {
-            document = document.command(command);
-        }
-        document = document.paragraph(format!("Made by {} {}.", base.made_by.program, base.made_by.version));
-        base.notes.iter().fold(document, |document, note| document.note(note.clone()))
     }
 }

@@ -1,11 +1,26 @@
-//! Pictures of the residual before and after.
+//! What pictures of answers share: colours that a reader meets again in every report, traces with their gaps, and axes that one
+//! outlier does not flatten.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use twinlag::diagnosis::{ModelFit, ResidualPart};
-use twinlag_report::{Axis, Chart, Colour, Figure, Series};
+use twinlag::diagnosis::ModelFit;
+use twinlag_report::{Axis, Chart, Colour, Series};
 
-const NOISE: &str = "95 % of white noise";
+use crate::words::capital;
+
 pub(crate) const WIDTH_PX: f64 = 900.0;
+/// Width of a picture that has another beside it, px.
+pub(crate) const HALF_PX: f64 = 470.0;
+/// A channel keeps its colour in every report; so do the gas, the reference and the models.
+pub(crate) const CHANNELS: [Colour; 2] = [Colour::Blue, Colour::Vermilion];
+pub(crate) const GAS: Colour = Colour::Green;
+pub(crate) const REFERENCE: Colour = Colour::Black;
+pub(crate) const BEFORE: Colour = Colour::Orange;
+pub(crate) const AFTER: Colour = Colour::Purple;
+/// Values at either end that an axis need not reach: so many at least, and this share of all.
+const OUTLIERS: usize = 3;
+const OUTLIER_SHARE: f64 = 2e-3;
+/// An axis leaves them out where it would be so many times as long with them.
+const FLATTENED: f64 = 3.0;
 /// A step longer than this multiple of the usual one is a gap.
 const GAP_STEPS: f64 = 10.0;
 
@@ -14,6 +29,13 @@ pub(crate) struct PlottedModel<'a> {
     pub(crate) name: &'static str,
     pub(crate) fit: &'a ModelFit,
     pub(crate) colour: Colour,
+}
+
+impl PlottedModel<'_> {
+    /// The name as a title.
+    pub(crate) fn title(&self) -> String {
+        capital(self.name)
+    }
 }
 
 /// A chart of the series that are there; `None` without any.
@@ -46,88 +68,6 @@ pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
     drawn.then(|| Series::trace(name, at, values).colour(colour))
 }
 
-/// The residual of each model along the record, and its root mean square in parts of the record.
-pub(crate) fn time_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
-    let largest: Vec<f64> = models
-        .iter()
-        .map(|m| {
-            m.fit.trace.residual.value.iter().filter(|r| r.is_finite()).fold(0.0, |most: f64, r| most.max(r.abs()))
-        })
-        .collect();
-    // One scale for both, unless the smaller would then be a line.
-    let widest = largest.iter().copied().fold(0.0, f64::max);
-    let common = largest.iter().all(|l| 4.0 * l > widest);
-    let mut figure = Figure::new("").columns(1).panel_size(WIDTH_PX, 230.0);
-    let mut parts = Vec::new();
-    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
-    let mut fewest = usize::MAX;
-    let mut any = false;
-    for (PlottedModel { name, fit, colour, .. }, largest) in models.iter().zip(&largest) {
-        let trace = &fit.trace;
-        let limit = 1.08 * if common { widest } else { *largest };
-        let axis = Axis::linear("residual");
-        let axis = if limit > 0.0 { axis.range(-limit, limit) } else { axis };
-        let lines = [self::trace("", &trace.residual.time_s, &trace.residual.value, *colour)];
-        if let Some(chart) = chart(*name, [Axis::linear("time (s)"), axis], lines) {
-            figure = figure.panel(chart);
-            any = true;
-        }
-        let size = trace.parts.first().map_or(1, |part| part.count);
-        // A short last part would be outside the range of the others.
-        let parts_shown: Vec<&ResidualPart> = trace.parts.iter().filter(|part| part.count == size).collect();
-        let (mut x, mut y): (Vec<f64>, Vec<f64>) =
-            parts_shown.iter().map(|part| (part.ends_s[0], part.mean_square.sqrt())).unzip();
-        if let (Some(first), Some(last)) = (parts_shown.first(), parts_shown.last()) {
-            ends = [ends[0].min(first.ends_s[0]), ends[1].max(last.ends_s[1])];
-            x.push(last.ends_s[1]);
-            y.push(last.mean_square.sqrt());
-        }
-        if y.iter().any(|v| v.is_finite() && *v > 0.0) {
-            fewest = fewest.min(size);
-            parts.push(Some(Series::steps(*name, x, y).colour(*colour)));
-        }
-    }
-    if !any {
-        return None;
-    }
-    if ends[0] < ends[1]
-        && let Some([low, high]) = white_noise(fewest as f64)
-    {
-        let band = Series::trace(NOISE, ends, [1.0, 1.0]).band([low.sqrt(); 2], [high.sqrt(); 2]).colour(Colour::Grey);
-        parts.insert(0, Some(band));
-    }
-    let axes = [Axis::linear("time (s)"), Axis::logarithmic("root mean square")];
-    if let Some(chart) = chart("In hundredths of the record", axes, parts) {
-        figure = figure.panel(chart);
-    }
-    Some(figure)
-}
-
-/// Power of the residual of each model against frequency.
-pub(crate) fn frequency_figure(models: &[PlottedModel<'_>]) -> Option<Figure> {
-    let shown = |band: &&[f64; 3]| band.iter().all(|v| v.is_finite() && *v > 0.0);
-    let mut series = Vec::new();
-    let bands: Vec<&[f64; 3]> = models.last()?.fit.trace.bands.iter().filter(shown).collect();
-    let (mut x, mut low, mut high) = (Vec::new(), Vec::new(), Vec::new());
-    for band in bands {
-        if let Some(range) = white_noise(band[2]) {
-            x.push(band[0]);
-            low.push(range[0]);
-            high.push(range[1]);
-        }
-    }
-    if !x.is_empty() {
-        let ones = vec![1.0; x.len()];
-        series.push(Some(Series::trace(NOISE, x, ones).band(low, high).colour(Colour::Grey)));
-    }
-    for PlottedModel { name, fit, colour, .. } in models {
-        let (x, y): (Vec<f64>, Vec<f64>) = fit.trace.bands.iter().filter(shown).map(|b| (b[0], b[1])).unzip();
-        series.push((!x.is_empty()).then(|| Series::line(*name, x, y).colour(*colour)));
-    }
-    let axes = [Axis::logarithmic("frequency (Hz)"), Axis::logarithmic("power (that of the noise is 1)")];
-    Some(Figure::new("").panel_size(WIDTH_PX, 360.0).panel(chart("Power of the residual", axes, series)?))
-}
-
 /// The range that holds the mean square of so many values of white noise of unit variance in 95 %
 /// of all cases.
 pub(crate) fn white_noise(dof: f64) -> Option<[f64; 2]> {
@@ -143,4 +83,52 @@ pub(crate) fn pairs<'a>(
     to: f64,
 ) -> impl Iterator<Item = (f64, f64)> + 'a {
     time_s.iter().copied().zip(values.iter().copied()).filter(move |(t, _)| (from..=to).contains(t))
+}
+
+/// A range for an axis, and how many values lie outside: all but a few outliers where these would flatten the rest. `None` where
+/// the axis may as well show everything.
+pub(crate) fn without_outliers(values: impl Iterator<Item = f64>) -> Option<([f64; 2], usize)> {
+    let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let n = sorted.len();
+    let left_out = OUTLIERS.max((OUTLIER_SHARE * n as f64) as usize);
+    if n < 20 * OUTLIERS {
+        return None;
+    }
+    let (low, high) = (sorted[left_out], sorted[n - 1 - left_out]);
+    if high <= low || sorted[n - 1] - sorted[0] < FLATTENED * (high - low) {
+        return None;
+    }
+    let pad = 0.15 * (high - low);
+    let range = [low - pad, high + pad];
+    let outside = sorted.iter().filter(|v| **v < range[0] || **v > range[1]).count();
+    Some((range, outside))
+}
+
+/// An axis that outliers do not flatten, and what is to be said of them beside a title.
+pub(crate) fn robust_axis(label: &str, values: impl Iterator<Item = f64>) -> (Axis, String) {
+    match without_outliers(values) {
+        Some(([low, high], outside)) => {
+            let values = if outside == 1 { "value lies" } else { "values lie" };
+            (Axis::linear(label).range(low, high), format!(" ({outside} {values} outside)"))
+        }
+        None => (Axis::linear(label), String::new()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_outliers;
+
+    /// One spike does not set the scale; a step that lasts does.
+    #[test]
+    fn an_axis_leaves_out_spikes_and_keeps_steps() {
+        let mut values: Vec<f64> = (0..1000).map(|k| f64::from(k).sin()).collect();
+        assert_eq!(without_outliers(values.iter().copied()), None);
+        values[500] = 1e4;
+        let ([low, high], outside) = without_outliers(values.iter().copied()).expect("a spike");
+        assert!(outside == 1 && low < -1.0 && high > 1.0 && high < 2.0, "{low} to {high}, {outside}");
+        values[400..440].fill(1e4);
+        assert_eq!(without_outliers(values.iter().copied()), None);
+    }
 }

@@ -2,36 +2,49 @@
 
 use twinlag::diagnosis::Grade;
 use twinlag::record::Record;
-use twinlag_report::{Document, Figure, ReportError, Table, between, probability, rounded};
+use twinlag_report::{Document, Figure, ReportError, Table, Tone, between, probability, rounded};
 
+use crate::Making;
 use crate::figures::WIDTH_PX;
-use crate::pictures::{spectra, temperature_figure, track_picture};
-use crate::words::{grade, interval_of, listed, plausibility_in_words, seconds, sentence, with_unit, words};
-use twinlag::{Characterisation, Compensation, Track};
+use crate::making::{file_name, notes};
+use crate::pictures::{spectra, temperature_figure, track_figure};
+use crate::words::{capital, grade, interval_of, listed, plausibility_in_words, seconds, sentence, with_unit, words};
+use twinlag::{Characterisation, Compensation, Quality, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
 /// bytes.
 ///
-/// - `command`: the one that makes it again
-///
 /// # Errors
 /// [`ReportError`], if something cannot be drawn. Where there is no gas temperature the page says
 /// why, and that is no error.
-pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Result<String, ReportError> {
-    let document = Document::new(format!("Gas temperature of {}", record.source)).heading("Gas temperature");
-    let mut document = plausibility(cautions(document, &answer.last), &answer.last);
-    document = match &answer.gas {
-        None => document.lead(format!("There is no gas temperature to use: {}.", answer.judgement.because)),
-        Some(_) if answer.judgement.grade == Grade::NoGo => {
-            document.lead(format!("No go, and drawn only since it was asked for: {}.", answer.judgement.because))
-        }
-        Some(gas) => document.lead(format!(
-            "The gas temperature is known to {} (standard deviation, median), and follows the gas up to {}.",
-            with_unit(&rounded(gas.median_std_k, 2), "K"),
-            gas.bandwidth_hz
-                .map_or("no frequency: it moves less than the noise".into(), |hz| with_unit(&rounded(hz, 3), "Hz"))
-        )),
+pub fn gas_report(record: &Record, answer: &Compensation, making: &Making) -> Result<String, ReportError> {
+    let document = Document::new(format!("Gas temperature of {}", file_name(&record.source)));
+    let document = document.byline(making.byline(&[samples(&answer.last)]));
+    let tone = tone(answer.judgement.grade);
+    let worth = format!("{}.", capital(&answer.judgement.grade.to_string()));
+    let document = match &answer.gas {
+        None => document.verdict(
+            Tone::Bad,
+            worth,
+            format!("There is no gas temperature to use: {}.", answer.judgement.because),
+        ),
+        Some(_) if answer.judgement.grade == Grade::NoGo => document.verdict(
+            tone,
+            worth,
+            format!("No go, and drawn only since it was asked for: {}.", answer.judgement.because),
+        ),
+        Some(gas) => document.verdict(
+            tone,
+            worth,
+            format!(
+                "The gas temperature is known to {} (standard deviation, median), and follows the gas up to {}.",
+                with_unit(&rounded(gas.median_std_k, 2), "K"),
+                gas.bandwidth_hz
+                    .map_or("no frequency: it moves less than the noise".into(), |hz| with_unit(&rounded(hz, 3), "Hz"))
+            ),
+        ),
     };
+    let mut document = plausibility(cautions(document, &answer.last), &answer.last);
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
@@ -47,8 +60,6 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
                     format!("two lags, and {}", listed(&effects))
                 },
             ),
-            ("Its parameters' share of the standard deviation", with_unit(&rounded(gas.parameter_std_k, 2), "K")),
-            ("Bands are multiplied by", rounded(gas.widened_by, 3)),
         ];
         if let Some(reference) = &gas.reference {
             facts.push((
@@ -61,26 +72,30 @@ pub fn gas_report(record: &Record, answer: &Compensation, command: &str) -> Resu
             ));
             facts.push(("Reference inside the 95 % band", with_unit(&rounded(100.0 * reference.inside_95, 3), "%")));
         }
-        document = document.facts(facts).figure(
-            temperature_figure(record, answer, "").to_svg()?,
-            "Readings, and the gas temperature with its 95 % band. Below, enlarged, the part where it moves most.",
-        );
-        let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 260.0).panel(spectra(record, answer));
-        document = document.heading("Before and after").figure(
-            spectra.to_svg()?,
+        document = document
+            .drawing(
+                temperature_figure(record, answer, "").live(),
+                "Readings, and the gas temperature with its 95 % band. Below, enlarged, some twenty time constants of the slower sensor, \
+                 where it moves most.",
+            )?
+            .facts(facts);
+        document = budget(document.heading("What the band consists of"), gas);
+        let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 300.0).panel(spectra(record, answer));
+        document = document.heading("Before and after").drawing(
+            spectra,
             "Spectra of the faster sensor's reading, of the gas temperature, and of the noise that the \
              inferred gas temperature would have without the prior. The lag is compensated up to the line; \
              beyond it the answer follows from the prior of the gas, not from the readings.",
-        );
+        )?;
     }
-    Ok(end(numbers(document, &answer.last), &answer.last, command))
+    Ok(end(numbers(document, &answer.last), &answer.last, making))
 }
 
 /// The report on time constants along a record, like [`gas_report`].
 ///
 /// # Errors
 /// As [`gas_report`].
-pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<String, ReportError> {
+pub fn track_report(record: &Record, answer: &Track, making: &Making) -> Result<String, ReportError> {
     let lead = match (answer.change.as_str(), answer.coefficients, &answer.step) {
         _ if answer.time_s.is_empty() => {
             format!("There are no time constants along this record to use: {}.", answer.judgement.because)
@@ -100,9 +115,11 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
         ("windows", _, _) => format!("Each of {} windows is characterised separately.", answer.time_s.len()),
         _ => "No change of the time constants is detected.".into(),
     };
-    let document = Document::new(format!("Time constants along {}", record.source));
-    let document = document.heading("Time constants along the record");
-    let mut document = cautions(document, &answer.last).lead(lead);
+    let document = Document::new(format!("Time constants along {}", file_name(&record.source)));
+    let document = document.byline(making.byline(&[samples(&answer.last)]));
+    let grade_of = answer.judgement.grade;
+    let document = document.verdict(tone(grade_of), format!("{}.", capital(&grade_of.to_string())), lead);
+    let mut document = cautions(document, &answer.last);
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
@@ -112,11 +129,12 @@ pub fn track_report(record: &Record, answer: &Track, command: &str) -> Result<St
         let (p, count) = (probability(ratio.test.p_value), ratio.test.degrees_of_freedom);
         facts.push(("The ratio of both", format!("shows no change (p = {p}, {count} degrees of freedom)")));
     }
-    document = document.facts(facts);
     if !answer.time_s.is_empty() {
-        document = document.figure(track_picture(answer)?, "Both time constants with their pointwise 95 % bands.");
+        document = document
+            .drawing(track_figure(answer, "").live(), "Both time constants with their pointwise 95 % bands.")?;
     }
-    Ok(end(numbers(document, &answer.last), &answer.last, command))
+    document = document.facts(facts);
+    Ok(end(numbers(document, &answer.last), &answer.last, making))
 }
 
 /// What speaks against the use of the model that was given, before all else.
@@ -145,13 +163,52 @@ fn numbers(document: Document, last: &Characterisation) -> Document {
     }
     let record = &last.record;
     document.heading("The record and its model").table(table).facts([
-        ("Source", record.source.clone()),
+        ("Source", file_name(&record.source).to_owned()),
         ("Samples", format!("{}, {} apart", record.samples, with_unit(&rounded(record.sample_period_s, 4), "s"))),
     ])
 }
 
-fn end(document: Document, last: &Characterisation, command: &str) -> String {
-    let mut document = document.heading("How to reproduce this").command(command);
-    document = document.paragraph(format!("Made by {} {}.", last.made_by.program, last.made_by.version));
-    last.notes.iter().fold(document, |document, note| document.note(note.clone())).to_html()
+fn end(document: Document, last: &Characterisation, making: &Making) -> String {
+    let document = making.reproduction(document, &last.made_by.program, &last.made_by.version);
+    making.page(&notes(document, &last.notes))
+}
+
+/// How long the record is.
+fn samples(last: &Characterisation) -> String {
+    let record = &last.record;
+    format!("{} samples, {} apart", record.samples, with_unit(&rounded(record.sample_period_s, 4), "s"))
+}
+
+fn tone(grade: Grade) -> Tone {
+    match grade {
+        Grade::Go => Tone::Good,
+        Grade::Conditional => Tone::Caution,
+        _ => Tone::Bad,
+    }
+}
+
+/// What the standard deviation of a gas temperature consists of.
+fn budget(document: Document, gas: &Quality) -> Document {
+    let table = Table::new(["source", "standard deviation", "how"])
+        .row([
+            "all together, median".to_owned(),
+            with_unit(&rounded(gas.median_std_k, 3), "K"),
+            "that of the band".to_owned(),
+        ])
+        .row([
+            "the model's parameters".to_owned(),
+            with_unit(&rounded(gas.parameter_std_k, 2), "K"),
+            "their covariance, carried through the compensation; median".to_owned(),
+        ])
+        .row([
+            "noise, and what the readings do not determine".to_owned(),
+            "the rest, in squares".to_owned(),
+            "the smoother, with the prior of the gas".to_owned(),
+        ])
+        .row([
+            "model error".to_owned(),
+            format!("× {}", rounded(gas.widened_by, 3)),
+            "bands are multiplied by this, from how far readings are off what earlier ones led to expect".to_owned(),
+        ]);
+    document.table(table)
 }

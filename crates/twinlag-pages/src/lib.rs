@@ -9,11 +9,14 @@
 mod diagnosis;
 mod figures;
 mod gas;
+mod making;
 mod pictures;
+mod residual_figures;
 mod words;
 
 pub use diagnosis::{diagnosis_report, residual_picture};
 pub use gas::{gas_report, track_report};
-pub use pictures::{gas_picture, track_picture};
+pub use making::Making;
+pub use pictures::{gas_picture, readings_picture, track_picture};
 pub use twinlag_report::ReportError;
 pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words};

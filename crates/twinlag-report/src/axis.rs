@@ -54,6 +54,11 @@ impl Axis {
         Self { range: Some((low, high)), ..self }
     }
 
+    /// The range that was asked for.
+    pub(crate) fn given_range(&self) -> Option<(f64, f64)> {
+        self.range
+    }
+
     pub(crate) fn label(&self) -> &str {
         &self.label
     }

@@ -1,7 +1,7 @@
 //! Text that comes from users, in files that browsers read.
 
 /// What no page may hold, and marks of direction, which would turn what follows them.
-fn is_unprintable(c: char) -> bool {
+pub(crate) fn is_unprintable(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{fffe}' | '\u{ffff}')
 }
 

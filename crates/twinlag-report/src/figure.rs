@@ -13,35 +13,35 @@ use crate::surface_drawing::{bar_width, draw_surface};
 const TITLE_SIZE: u32 = 14;
 const FIGURE_TITLE_SIZE: u32 = 17;
 
-/// A panel of a figure: a [`Chart`] or a [`Surface`].
+/// A panel of a figure.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel(Kind);
-
-#[derive(Clone, Debug, PartialEq)]
-enum Kind {
+#[non_exhaustive]
+pub enum Panel {
+    /// Series on common axes.
     Chart(Chart),
+    /// A function of two parameters.
     Surface(Surface),
 }
 
 impl Panel {
     /// The names of its series, if it is a chart.
     fn series_names(&self) -> Option<Vec<&str>> {
-        match &self.0 {
-            Kind::Chart(chart) => Some(chart.series.iter().map(|s| s.name.as_str()).collect()),
-            Kind::Surface(_) => None,
+        match self {
+            Panel::Chart(chart) => Some(chart.series.iter().map(|s| s.name.as_str()).collect()),
+            Panel::Surface(_) => None,
         }
     }
 }
 
 impl From<Chart> for Panel {
     fn from(chart: Chart) -> Self {
-        Self(Kind::Chart(chart))
+        Self::Chart(chart)
     }
 }
 
 impl From<Surface> for Panel {
     fn from(surface: Surface) -> Self {
-        Self(Kind::Surface(surface))
+        Self::Surface(surface)
     }
 }
 
@@ -53,12 +53,13 @@ pub struct Figure {
     columns: usize,
     panel_px: (f64, f64),
     panels: Vec<Panel>,
+    is_live: bool,
 }
 
 impl Figure {
     /// A figure without panels; an empty title takes no room.
     pub fn new(title: impl Into<String>) -> Self {
-        Self { title: title.into(), columns: 0, panel_px: (440.0, 330.0), panels: Vec::new() }
+        Self { title: title.into(), columns: 0, panel_px: (440.0, 330.0), panels: Vec::new(), is_live: false }
     }
 
     /// Panels in a row. Without this, or with zero: up to three, as square as can be.
@@ -85,6 +86,43 @@ impl Figure {
         Self { panel_px: (width_px, height_px), ..self }
     }
 
+    /// Lets the reader of a page enlarge its traces, where the page may have a script.
+    #[must_use]
+    pub fn live(self) -> Self {
+        Self { is_live: true, ..self }
+    }
+
+    /// Its width, px.
+    pub(crate) fn width_px(&self) -> f64 {
+        self.panel_px.0 * self.columns_shown() as f64
+    }
+
+    fn columns_shown(&self) -> usize {
+        match self.columns {
+            0 => (self.panels.len() as f64).sqrt().ceil().min(3.0) as usize,
+            n => n.min(self.panels.len()),
+        }
+    }
+
+    pub(crate) fn panels(&self) -> &[Panel] {
+        &self.panels
+    }
+
+    /// The charts whose traces may be enlarged.
+    pub(crate) fn live_charts(&self) -> Vec<&Chart> {
+        let charts = self.panels.iter().filter_map(|panel| match panel {
+            Panel::Chart(chart) => Some(chart),
+            Panel::Surface(_) => None,
+        });
+        charts.filter(|_| self.is_live).collect()
+    }
+
+    /// Colours and markers by name.
+    pub(crate) fn styles(&self) -> Styles {
+        let names = self.panels.iter().filter_map(Panel::series_names);
+        Styles::new(&names.collect::<Vec<_>>())
+    }
+
     /// Adds a panel.
     #[must_use]
     pub fn panel(mut self, panel: impl Into<Panel>) -> Self {
@@ -105,20 +143,16 @@ impl Figure {
         if !(160.0..=1e4).contains(&width_px) || !(120.0..=1e4).contains(&height_px) {
             return Err(ReportError::PanelSize { width_px, height_px });
         }
-        let names = self.panels.iter().filter_map(Panel::series_names);
-        let styles = Styles::new(&names.collect::<Vec<_>>());
-        let columns = match self.columns {
-            0 => (self.panels.len() as f64).sqrt().ceil().min(3.0) as usize,
-            n => n.min(self.panels.len()),
-        };
+        let styles = self.styles();
+        let columns = self.columns_shown();
         let rows = self.panels.len().div_ceil(columns);
         let mut plans: Vec<Plan> =
-            self.panels.iter().map(|p| Plan::new(&p.0, self.panel_px, &styles)).collect::<Result<_, _>>()?;
+            self.panels.iter().map(|p| Plan::new(p, self.panel_px, &styles)).collect::<Result<_, _>>()?;
         // Aligned axes may leave less room than a panel alone: a legend that then hides data moves
         // above them, which takes room from its row, and so on; at most once for each panel.
         for _ in 0..plans.len() {
-            let crowded = (0..plans.len()).find_map(|k| match &self.panels[k].0 {
-                Kind::Chart(chart) if !plans[k].legend_above => {
+            let crowded = (0..plans.len()).find_map(|k| match &self.panels[k] {
+                Panel::Chart(chart) if !plans[k].legend_above => {
                     let frame = self.frame(&plans, columns, k);
                     let (legend, fits) = Legend::plan(chart, &styles, plans[k].limits, &frame);
                     (!fits).then(|| (k, legend.height_above(frame.width())))
@@ -140,13 +174,13 @@ impl Figure {
             let (left, top) = (column as f64 * width_px, head + row as f64 * height_px);
             let frame = self.frame(&plans, columns, k).moved(left, top);
             let letter = if self.panels.len() > 1 { format!("({}) ", letter(k)) } else { String::new() };
-            let title = format!("{letter}{}", panel.0.title());
+            let title = format!("{letter}{}", panel.title());
             if !title.is_empty() {
                 canvas.text((frame.left, top + 18.0), title.trim_end(), Text::new(TITLE_SIZE, Anchor::Start).bold());
             }
-            match &panel.0 {
-                Kind::Chart(chart) => draw_chart(&mut canvas, chart, plan.limits, &frame, &styles, plan.legend_above),
-                Kind::Surface(surface) => {
+            match panel {
+                Panel::Chart(chart) => draw_chart(&mut canvas, chart, plan.limits, &frame, &styles, plan.legend_above),
+                Panel::Surface(surface) => {
                     draw_surface(&mut canvas, surface, plan.limits, plan.value_limits, &frame, plan.margins.right);
                 }
             }
@@ -180,7 +214,7 @@ fn letter(k: usize) -> String {
     if k < 26 { last.to_string() } else { format!("{}{last}", letter(k / 26 - 1)) }
 }
 
-impl Kind {
+impl Panel {
     fn title(&self) -> &str {
         match self {
             Self::Chart(chart) => &chart.title,
@@ -207,10 +241,10 @@ struct Plan {
 }
 
 impl Plan {
-    fn new(kind: &Kind, (width, height): (f64, f64), styles: &Styles) -> Result<Self, ReportError> {
+    fn new(kind: &Panel, (width, height): (f64, f64), styles: &Styles) -> Result<Self, ReportError> {
         let (limits, value_limits, [x, y]) = match kind {
-            Kind::Chart(chart) => (chart.limits()?, (0.0, 1.0), [&chart.x, &chart.y]),
-            Kind::Surface(surface) => {
+            Panel::Chart(chart) => (chart.limits()?, (0.0, 1.0), [&chart.x, &chart.y]),
+            Panel::Surface(surface) => {
                 let [x, y, value] = surface.limits()?;
                 ([x, y], value, [&surface.x, &surface.y])
             }
@@ -225,8 +259,8 @@ impl Plan {
             .fold(0.0, f64::max);
         let left = 14.0 + widest + if y.label().is_empty() { 0.0 } else { 22.0 };
         let right = match kind {
-            Kind::Chart(_) => 18.0,
-            Kind::Surface(surface) => {
+            Panel::Chart(_) => 18.0,
+            Panel::Surface(surface) => {
                 heights.iter().map(|h| bar_width(&surface.value, value_limits, *h)).fold(0.0, f64::max)
             }
         };
@@ -235,7 +269,7 @@ impl Plan {
         let bottom = 14.0 + TICK_LINE_PX * lines as f64 + if x.label().is_empty() { 0.0 } else { 22.0 };
         let mut margins = Margins { left, right, top: 28.0, bottom };
         let mut legend_above = false;
-        if let Kind::Chart(chart) = kind {
+        if let Panel::Chart(chart) = kind {
             let frame = Frame { left, top: margins.top, right: width - right, bottom: height - bottom };
             let (legend, fits) = Legend::plan(chart, styles, limits, &frame);
             if !fits {

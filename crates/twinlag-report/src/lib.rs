@@ -5,9 +5,9 @@
 //! environment. It has error bars and intervals, logarithmic axes, reference lines, contour lines,
 //! one colour-blind-safe palette, and a legend that hides no data. Equal data give equal bytes, so
 //! figures can be kept under version control and compared. A [`Document`] puts figures, tables and
-//! text on a page that needs no network and no script; [`plus_minus`] and its like round the
-//! numbers. There is no interaction, nothing in three dimensions, and no filled contours. For
-//! those, or for another kind of chart, use [kuva](https://docs.rs/kuva).
+//! text on a page that needs no network; [`plus_minus`] and its like round the numbers. On a page
+//! that may have a script its traces can be enlarged. There is nothing in three dimensions, and no
+//! filled contours. For those, or for another kind of chart, use [kuva](https://docs.rs/kuva).
 //!
 //! ```
 //! use twinlag_report::{Axis, Chart, Figure, Mark, Reference, Series, Surface};
@@ -33,34 +33,42 @@
 
 mod axes;
 mod axis;
+mod block;
 mod canvas;
 mod chart;
 mod chart_drawing;
 mod contour;
+mod csv;
 mod decimate;
 mod document;
 mod error;
 mod escape;
 mod figure;
+mod inline;
+mod live;
 mod number;
 mod palette;
 mod styles;
 mod surface;
 mod surface_drawing;
+mod table;
 
 pub use axis::Axis;
+pub use block::{KeyNumber, Tone};
 pub use chart::{Chart, Reference, Series};
 pub use decimate::decimate;
-pub use document::{Document, Table};
+pub use document::Document;
 pub use error::ReportError;
 pub use figure::{Figure, Panel};
 pub use number::{between, plus_minus, probability, rounded};
 pub use palette::Colour;
 pub use surface::{Mark, Surface};
+pub use table::Table;
 
 /// Figures and documents may go to any thread, and be read by several.
 const _: () = {
     const fn is_send_and_sync<T: Send + Sync>() {}
-    is_send_and_sync::<(Axis, Chart, Colour, Document, Figure, Mark, Panel, Reference, ReportError, Series)>();
-    is_send_and_sync::<(Surface, Table)>();
+    is_send_and_sync::<(Axis, Chart, Colour, Document, Figure, KeyNumber, Mark, Panel, Reference, ReportError, Series)>(
+    );
+    is_send_and_sync::<(Surface, Table, Tone)>();
 };

@@ -1,9 +1,10 @@
 //! Why effects were added, and what the tests say before and after.
 
 use twinlag::cross_relation::TestName;
-use twinlag_report::{Document, Table, between, probability, rounded};
+use twinlag_report::{Document, ReportError, Table, between, probability, rounded};
 
 use super::Page;
+use crate::residual_figures::{autocorrelation_figures, quantile_figures};
 use crate::words::{ABSENT, grade, identifiers, parameter_in_words, place, question, unit, words, words_of};
 
 impl Page<'_> {
@@ -77,7 +78,7 @@ impl Page<'_> {
         document
     }
 
-    pub(super) fn tests(&self, document: Document) -> Document {
+    pub(super) fn tests(&self, document: Document) -> Result<Document, ReportError> {
         let models = self.columns();
         let mut names: Vec<TestName> = Vec::new();
         for test in models.iter().flat_map(|m| &m.answer.residual.tests) {
@@ -87,7 +88,7 @@ impl Page<'_> {
         }
         let document = document.heading("Tests of what is left over");
         if names.is_empty() {
-            return document.paragraph("No test could be made.");
+            return Ok(document.paragraph("No test could be made."));
         }
         let header = models.iter().flat_map(|m| [if self.changed { m.column } else { "statistic" }, "p-value"]);
         let mut table = Table::new(["test", "question"].into_iter().chain(header));
@@ -104,12 +105,24 @@ impl Page<'_> {
             });
             table = table.row([words_of(name.name()), question(name).into()].into_iter().chain(cells));
         }
-        document
+        let document = document
             .paragraph(
                 "Each test asks whether the residual is white noise of unit variance. The \
                  p-value is the probability of a statistic at least as extreme if it is, so a \
                  small one is evidence against the model.",
             )
-            .table(table.caption("Statistics, with their degrees of freedom, if any, in brackets."))
+            .table(table.caption("Statistics, with their degrees of freedom, if any, in brackets."));
+        let plotted = self.models();
+        let name = |k: usize| plotted[k].title();
+        let document =
+            document.side_by_side(autocorrelation_figures(&plotted).into_iter().enumerate().map(|(k, figure)| {
+                let text = "autocorrelation of the residual; of white noise 95 % of the values lie in the pale range.";
+                (figure, format!("{}: {text}", name(k)))
+            }))?;
+        document.side_by_side(quantile_figures(&plotted).into_iter().enumerate().map(|(k, figure)| {
+            let text = "quantiles of the residual against those of noise of unit variance; the dashed line is where they are equal, and \
+                        95 % of points lie in the pale range.";
+            (figure, format!("{}: {text}", name(k)))
+        }))
     }
 }

@@ -1,10 +1,10 @@
 //! What each value of the first time constant would make of the record: a table and a curve.
 
 use twinlag::diagnosis::{Held, IfKnown};
-use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table, rounded};
+use twinlag_report::{Axis, Document, Figure, ReportError, Series, Table, rounded};
 
 use super::Page;
-use crate::figures::{WIDTH_PX, chart};
+use crate::figures::{CHANNELS, WIDTH_PX, chart};
 use crate::words::{ABSENT, interval, parameter_in_words, short, with_unit, words};
 
 impl Page<'_> {
@@ -26,10 +26,10 @@ impl Page<'_> {
             ))
             .table(table(answer));
         let document = match figure(answer) {
-            Some(figure) => document.figure(
-                figure.to_svg()?,
+            Some(figure) => document.drawing(
+                figure,
                 format!("The time constant of {fitted} against that of {held}, with its 95 % interval."),
-            ),
+            )?,
             None => document,
         };
         Ok(document
@@ -85,6 +85,6 @@ fn figure(answer: &IfKnown<String>) -> Option<Figure> {
     let (x, y, low, high) = given.collect::<(Vec<f64>, Vec<f64>, Vec<f64>, Vec<f64>)>();
     let axes = [&answer.held, &answer.fitted]
         .map(|channel| Axis::logarithmic(format!("time constant of {} (s)", short(channel))));
-    let series = (!x.is_empty()).then(|| Series::points("", x, y).interval(low, high).colour(Colour::Blue));
+    let series = (!x.is_empty()).then(|| Series::points("", x, y).interval(low, high).colour(CHANNELS[1]));
     Some(Figure::new("").columns(1).panel_size(WIDTH_PX, 320.0).panel(chart("", axes, [series])?))
 }

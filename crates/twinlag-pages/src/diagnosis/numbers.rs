@@ -1,11 +1,11 @@
 //! Time constants, noise and errors, before and after.
 
-use twinlag::{IntervalMethod, LeftOutUnit, SensorEstimate};
-use twinlag_report::{Axis, Colour, Document, Figure, ReportError, Series, Table, rounded};
+use twinlag::{IntervalMethod, LeftOutUnit};
+use twinlag_report::{Axis, Document, Figure, ReportError, Series, Table, rounded};
 
 use super::{Column, Page};
-use crate::figures::{WIDTH_PX, chart};
-use crate::words::{ABSENT, apart, grade, interval, interval_of, seconds, sentence, short, with_unit};
+use crate::figures::{CHANNELS, WIDTH_PX, chart};
+use crate::words::{apart, grade, interval, interval_of, seconds, sentence, short, with_unit, words};
 
 impl Page<'_> {
     pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
@@ -40,26 +40,42 @@ impl Page<'_> {
             ));
         }
         if let Some(figure) = self.time_constant_figure() {
-            document = document.figure(figure.to_svg()?, "Both time constants with their 95 % intervals.");
+            document = document.drawing(
+                figure,
+                "Both time constants under each alternative, with their 95 % intervals: each model, and each cause that no record \
+                 distinguishes from one that was found.",
+            )?;
         }
         Ok(document)
     }
 
+    /// Time constants under each model, and under each cause that would look exactly the same.
     fn time_constant_figure(&self) -> Option<Figure> {
         let columns = self.columns();
+        let twins = || self.answer.effects.iter().flat_map(|effect| &effect.exact_twins);
         let mut figure = None;
         for k in 0..2 {
-            let of: Vec<&SensorEstimate> = columns.iter().map(|m| &m.answer.sensors[k]).collect();
-            let names = columns.iter().map(|m| match m.answer.sensors[k].time_constant_s {
-                Some(_) => m.name.to_owned(),
-                None => format!("{}: {ABSENT}", m.name),
+            let of_models = columns.iter().map(|m| {
+                let sensor = &m.answer.sensors[k];
+                (m.name.to_owned(), sensor.time_constant_s, sensor.interval_95_s)
             });
-            let values: Vec<f64> = of.iter().map(|t| t.time_constant_s.unwrap_or(f64::NAN)).collect();
+            let of_twins = twins().map(|twin| {
+                let tau = &twin.time_constants[k];
+                (format!("if it is {}", words(twin.of.effect)), Some(tau.value), tau.interval_95)
+            });
+            let all = of_models.chain(of_twins).filter(|(_, value, _)| value.is_some());
+            let of: Vec<(String, Option<f64>, Option<[f64; 2]>)> = all.collect();
+            // One alone has nothing to be compared with.
+            if of.len() < 2 {
+                continue;
+            }
+            let names = of.iter().map(|(name, ..)| name.clone());
+            let values: Vec<f64> = of.iter().map(|(_, value, _)| value.unwrap_or(f64::NAN)).collect();
             let (low, high): (Vec<f64>, Vec<f64>) =
-                of.iter().map(|t| t.interval_95_s.map_or((f64::NAN, f64::NAN), |[a, b]| (a, b))).unzip();
+                of.iter().map(|(.., ends)| ends.map_or((f64::NAN, f64::NAN), |[a, b]| (a, b))).unzip();
             let places: Vec<f64> = (0..values.len()).map(|i| i as f64).collect();
             let known = values.iter().any(|v| v.is_finite());
-            let series = known.then(|| Series::points("", places, values).interval(low, high).colour(Colour::Blue));
+            let series = known.then(|| Series::points("", places, values).interval(low, high).colour(CHANNELS[k]));
             let axes = [Axis::categories("", names), Axis::linear("time constant (s)")];
             if let Some(chart) = chart(short(&self.channels()[k]), axes, [series]) {
                 figure =

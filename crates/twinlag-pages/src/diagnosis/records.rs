@@ -2,10 +2,11 @@
 
 use twinlag::cross_relation::Z_975;
 use twinlag::{LeftOutUnit, OwnTimeConstant, RecordAnswer, TransferAnswer};
-use twinlag_report::{Axis, Colour, Document, Figure, Reference, ReportError, Series, Table, plus_minus, rounded};
+use twinlag_report::{Axis, Document, Figure, Reference, ReportError, Series, Table, plus_minus, rounded};
 
 use super::Page;
-use crate::figures::{WIDTH_PX, chart};
+use crate::figures::{CHANNELS, WIDTH_PX, chart};
+use crate::making::file_name;
 use crate::words::{ABSENT, contradictions_in_words, in_place, listed, short, with_unit};
 
 impl Page<'_> {
@@ -22,10 +23,10 @@ impl Page<'_> {
             )
             .table(self.record_table(&transfer));
         let document = match self.record_figure() {
-            Some(figure) => document.figure(
-                figure.to_svg()?,
+            Some(figure) => document.drawing(
+                figure,
                 "Both time constants as each record has them by itself, with 95 % intervals; the line is that of all records together.",
-            ),
+            )?,
             None => document,
         };
         Ok(contradictions_in_words(&self.answer.records).into_iter().fold(document, Document::warning))
@@ -48,7 +49,7 @@ impl Page<'_> {
             let found: Vec<String> = record.found_on_others.iter().map(in_place).collect();
             let agrees = record.agrees.map_or("not known", |agrees| if agrees { "yes" } else { "no" });
             [
-                record.source.clone(),
+                file_name(&record.source).to_owned(),
                 rounded(rms.before, 4),
                 rounded(rms.after, 4),
                 listed(&found),
@@ -86,7 +87,7 @@ impl Page<'_> {
                 let of = |own: &OwnTimeConstant| own.value_s + side * Z_975 * own.standard_error_s;
                 own.iter().map(of).collect::<Vec<f64>>()
             };
-            let series = Series::points("", places, end(0.0)).interval(end(-1.0), end(1.0)).colour(Colour::Blue);
+            let series = Series::points("", places, end(0.0)).interval(end(-1.0), end(1.0)).colour(CHANNELS[sensor]);
             let axes = [Axis::categories("", names), Axis::linear("time constant (s)")];
             if let Some(mut panel) = chart(short(channel), axes, [Some(series)]) {
                 if let Some(shared_s) = self.answer.last.sensors[sensor].time_constant_s {

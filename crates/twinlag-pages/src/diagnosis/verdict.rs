@@ -1,34 +1,75 @@
 //! What a diagnosis says in short: verdict, effects, the record.
 
-use twinlag::diagnosis::{Identifier, Value, Verdict};
+use twinlag::diagnosis::{Grade, Identifier, Judgement, Value, Verdict};
 use twinlag::{NamedEffect, NamedTwin, SensorEstimate};
-use twinlag_report::{Document, Table, rounded};
+use twinlag_report::{Document, KeyNumber, ReportError, Table, Tone, rounded};
 
 use super::Page;
+use crate::Making;
 use crate::gas::plausibility;
+use crate::residual_figures::reason_figure;
 use crate::words::{
-    apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence,
-    with_interval, with_unit, words,
+    ABSENT, apart, capital, grade, identifiers, interval, interval_of, listed, parameter, place, seconds, sentence,
+    short, with_interval, with_unit, words,
 };
 
 impl Page<'_> {
-    pub(super) fn verdict(&self, document: Document) -> Document {
+    /// The verdict in a sentence, the numbers that readers come for, and the picture that shows why.
+    pub(super) fn first_screen(&self, document: Document, making: &Making) -> Result<Document, ReportError> {
         let (answer, record) = (self.answer, self.record);
-        let mut document = document.heading("Verdict").lead(self.lead());
+        let samples = record.time_s.len();
+        let span_s = record.time_s.last().zip(record.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
+        let facts = [
+            format!("{samples} samples over {}", with_unit(&rounded(span_s, 4), "s")),
+            format!("channels {}", listed(self.channels())),
+        ];
+        let (tone, worth) = self.worth();
+        let mut document = document.byline(making.byline(&facts)).verdict(tone, worth, capital(&self.lead()));
         if answer.verdict != Verdict::Refused {
-            document = document.facts(self.graded());
+            document = document.key_numbers(self.key_numbers());
+        }
+        if let Some(figure) = reason_figure(&self.models()) {
+            document = document.drawing(figure, self.why())?;
         }
         // Why it was refused, or what to know before the numbers are used.
-        for remark in &answer.remarks {
-            document = document.warning(sentence(remark));
+        Ok(answer.remarks.iter().fold(document, |document, remark| document.warning(sentence(remark))))
+    }
+
+    /// What the picture on the first screen shows.
+    fn why(&self) -> String {
+        let of = if self.changed { "each model leaves" } else { "two first-order lags leave" };
+        format!("Why: what {of} over, in units of the noise. If it is noise alone, 95 % of it lies in the pale range.")
+    }
+
+    /// What the numbers are worth together, and the colour of that.
+    fn worth(&self) -> (Tone, &'static str) {
+        let grades = self.answer.last.grades();
+        if self.answer.verdict == Verdict::Refused || grades.iter().all(|grade| *grade == Grade::NoGo) {
+            (Tone::Bad, "No go.")
+        } else if grades.iter().all(|grade| *grade == Grade::Go) {
+            (Tone::Good, "Go.")
+        } else if grades.contains(&Grade::NoGo) {
+            (Tone::Caution, "In part: some numbers are not given.")
+        } else {
+            (Tone::Caution, "Conditional.")
         }
-        document = plausibility(document, &answer.last);
+    }
+
+    /// What was found, effect by effect.
+    pub(super) fn found(&self, document: Document) -> Document {
+        let answer = self.answer;
+        let mut document = plausibility(document.heading("What was found"), &answer.last);
         if answer.verdict == Verdict::Unexplained {
             document = document.paragraph(
                 "What to do: see below where in frequency and in time most of it lies, and look for what happens at the \
                  rig there. Time constants and gas temperature are biased by it to an extent that the record does not \
                  reveal.",
             );
+        } else if answer.effects.is_empty() {
+            document = document.paragraph(match answer.verdict {
+                Verdict::Refused => "Nothing was looked for.",
+                _ => "No effect beside the two lags.",
+            });
         }
         for found in &answer.effects {
             document = document.subheading(capital(&words(found.effect))).facts(facts(found));
@@ -36,45 +77,34 @@ impl Page<'_> {
                 document = masked(document, found);
             }
         }
-        let samples = record.time_s.len();
-        let span_s = record.time_s.last().zip(record.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
-        document.subheading("The record").facts([
-            ("Source", record.source.clone()),
-            ("Channels", listed(self.channels())),
-            ("Samples", format!("{samples}, over {}", with_unit(&rounded(span_s, 4), "s"))),
-        ])
+        document
     }
 
     /// Both time constants and their difference, with their intervals and grades.
-    fn graded(&self) -> Vec<(&'static str, String)> {
+    fn key_numbers(&self) -> Vec<KeyNumber> {
         let last = &self.answer.last;
-        let of = |sensor: &SensorEstimate| match sensor.time_constant_s {
-            Some(_) => format!(
-                "{}: {} ({}), {}",
-                sensor.channel,
-                seconds(sensor),
-                interval_of(sensor),
-                grade(&sensor.judgement)
-            ),
-            None => format!("{}: not given, {}", sensor.channel, sensor.judgement.because),
+        let key = |name: String, value: String, interval: String, judgement: &Judgement| {
+            let tone = match judgement.grade {
+                Grade::Go => Tone::Good,
+                Grade::Conditional => Tone::Caution,
+                _ => Tone::Bad,
+            };
+            let grade =
+                if judgement.grade == Grade::NoGo { format!("no-go: {}", judgement.because) } else { grade(judgement) };
+            let interval = if interval == ABSENT { String::new() } else { interval };
+            KeyNumber { name, value, interval, grade: (tone, grade) }
         };
+        let as_interval = |text: String| if text.contains(" to ") { format!("95 %: {text}") } else { text };
         let difference = &last.time_constant_difference_s;
-        let apart = match difference.value {
-            Some(_) => format!(
-                "{} ({}), {}",
-                apart(difference),
-                interval(difference.interval_95_s),
-                grade(&difference.judgement)
-            ),
-            None => format!("not given, {}", difference.judgement.because),
+        let name = if difference.includes_delay { "Total delay of the second channel" } else { "Difference" };
+        let of_sensor = |sensor: &SensorEstimate| {
+            let name = format!("Time constant of {}", short(&sensor.channel));
+            key(name, seconds(sensor), as_interval(interval_of(sensor)), &sensor.judgement)
         };
         let [first, second] = &last.sensors;
-        let name = if difference.includes_delay { "Total delay of the second channel" } else { "Difference" };
-        vec![
-            ("Time constant, with 95 % interval", of(first)),
-            ("Time constant, with 95 % interval", of(second)),
-            (name, apart),
-        ]
+        let of_difference =
+            key(name.into(), apart(difference), as_interval(interval(difference.interval_95_s)), &difference.judgement);
+        vec![of_sensor(first), of_sensor(second), of_difference]
     }
 
     fn lead(&self) -> String {
