@@ -52,6 +52,7 @@ fn features() -> Result<()> {
         "cargo",
         &["check", "--package", "twinlag-compensate", "--package", "twinlag-sensor", "--no-default-features"],
     )?;
+    step("without readers of binary files", "cargo", &["check", "--package", "twinlag-files", "--tests"])?;
     step(
         "without the random solvers",
         "cargo",

@@ -1,11 +1,12 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
-//! `cargo xtask bench`, `cargo xtask profile`.
+//! `cargo xtask bench`, `cargo xtask profile`, `cargo xtask report`.
 
 mod bench;
 mod ci;
 mod experiment;
 mod measured;
 mod profile;
+mod report;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -27,6 +28,9 @@ enum Task {
         /// Leaves the tests out: they have just been run.
         #[arg(long)]
         tested: bool,
+        /// Opens reports in a browser as well: that takes Chromium and Node.js.
+        #[arg(long)]
+        full: bool,
     },
     /// Runs every record of a folder of measured data and holds what is found against what is known of them.
     Measured {
@@ -55,17 +59,22 @@ enum Task {
     Bench(bench::Bench),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
+    /// Opens reports in a browser: console, accessibility, keyboard, print; needs Chromium and Node.js.
+    Report(report::Report),
 }
 
 fn main() -> ExitCode {
     // As the program does: benches measure what its users have.
     twinlag_memory::give_back_large();
     let result = match Arguments::parse().task {
-        Task::Ci { tested } => ci::run(tested),
+        Task::Ci { tested, full } => {
+            ci::run(tested).and_then(|()| if full { report::run(&report::Report::default()) } else { Ok(()) })
+        }
         Task::Measured { dir, campaigns, write } => measured::run(&dir, campaigns.as_deref(), write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
+        Task::Report(arguments) => report::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };
     match result {

@@ -11,9 +11,11 @@ use twinlag::record::{ColumnRef, Record, SamplingChoice, Selection, Unit};
 use twinlag::{
     Estimator, Hold, Intervals, Known, NoiseColour, Options, Plausibility, TypicalSensor, optimise::Optimiser,
 };
+use twinlag_files::Choice;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::profile::Profile;
 use crate::study::Study;
 
 /// Identifies the dynamics of two temperature sensors from their readings alone.
@@ -27,6 +29,7 @@ use crate::study::Study;
     version,
     after_help = "\
 Try it without a file:    twinlag demo
+See how a file is read:   twinlag inspect run.csv
 Analyse a logger file:    twinlag characterise run.csv
 Name the columns:         twinlag characterise run.csv --t1 'fine [°C]' --t2 'coarse [°C]'
 Find missing effects:     twinlag diagnose run.csv --report run.html
@@ -59,6 +62,7 @@ impl Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Estimate both time constants of a record, with intervals, noise levels and residual tests.
+    #[command(visible_alias = "characterize")]
     Characterise(Box<Characterise>),
     /// Find the physical effects that two first-order lags fail to describe, add them to the model,
     /// and compare the errors before and after.
@@ -69,6 +73,8 @@ pub(crate) enum Command {
     Track(Box<Track>),
     /// Simulate a record from the description of a rig: gas, sensors, noise, converter.
     Simulate(Simulate),
+    /// Show what is in a file and how it would be read, and save that as a profile for files like it.
+    Inspect(Box<Inspect>),
     /// Say what the next record would have to be for narrower intervals, or to distinguish two effects, from a rig or a diagnosis.
     Plan(Plan),
     /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the
@@ -148,6 +154,9 @@ pub(crate) struct Diagnose {
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
+    /// With --report: without a script, for print and mail; traces cannot be enlarged then.
+    #[arg(long = "static", requires = "report")]
+    pub(crate) is_static: bool,
     /// Save the model with its effects, for `--model` of other commands.
     #[arg(long, value_name = "JSON")]
     pub(crate) save: Option<PathBuf>,
@@ -186,6 +195,9 @@ pub(crate) struct Compensate {
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
+    /// With --report: without a script, for print and mail; traces cannot be enlarged then.
+    #[arg(long = "static", requires = "report")]
+    pub(crate) is_static: bool,
     /// Use a model written by `twinlag diagnose --save` instead of diagnosing this record; its
     /// effects stay fixed.
     #[arg(long, value_name = "JSON")]
@@ -240,6 +252,9 @@ pub(crate) struct Track {
     /// Write a report with pictures, as one self-contained HTML file.
     #[arg(long, value_name = "HTML")]
     pub(crate) report: Option<PathBuf>,
+    /// With --report: without a script, for print and mail; traces cannot be enlarged then.
+    #[arg(long = "static", requires = "report")]
+    pub(crate) is_static: bool,
     /// Use a model written by `twinlag diagnose --save`; its effects stay fixed, except a change of
     /// the time constants, which is what is tracked.
     #[arg(long, value_name = "JSON")]
@@ -347,9 +362,18 @@ pub(crate) struct Columns {
     /// ignored.
     #[arg(long, value_name = "SECONDS")]
     period: Option<f64>,
-    /// How to read the time stamps: auto, uniform (evenly spaced, whatever they say) or as-stamped.
-    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = sampling)]
-    sampling: SamplingChoice,
+    /// How to read the time stamps: auto, uniform (evenly spaced, whatever they say) or as-stamped [default: auto].
+    #[arg(long, value_name = "HOW", value_parser = sampling)]
+    sampling: Option<SamplingChoice>,
+    /// The sheet, channel group or data set to read, of a file that has several.
+    #[arg(long, value_name = "NAME")]
+    group: Option<String>,
+    /// Join channels of several groups: put all of them on the stamps of one, the others interpolated.
+    #[arg(long)]
+    join: bool,
+    /// Read the file as this profile says, which `twinlag inspect --save-profile` writes; other options here go before it.
+    #[arg(long, value_name = "TOML")]
+    profile: Option<PathBuf>,
 }
 
 fn time_unit(text: &str) -> Result<Unit, String> {
@@ -369,13 +393,9 @@ fn sampling(text: &str) -> Result<SamplingChoice, String> {
 }
 
 impl Columns {
-    /// Whether it was said which columns are the two sensors.
-    pub(crate) fn are_sensors_chosen(&self) -> bool {
-        self.t1.is_some() && self.t2.is_some()
-    }
-
-    pub(crate) fn selection(&self) -> Selection {
-        Selection {
+    /// What the options say, and where they say nothing what the profile says.
+    pub(crate) fn profile(&self) -> Result<Profile, Failure> {
+        let selection = Selection {
             time: self.time.clone(),
             time_unit: self.time_unit.clone(),
             t1: self.t1.clone(),
@@ -384,7 +404,13 @@ impl Columns {
             flow: self.flow.clone(),
             position: self.position.clone(),
             period_s: self.period,
-            sampling: self.sampling,
+            sampling: self.sampling.unwrap_or_default(),
+        };
+        let choice = Choice { group: self.group.clone(), join: self.join };
+        let said = Profile { selection, choice };
+        match &self.profile {
+            Some(path) => Ok(said.or(Profile::read(path)?)),
+            None => Ok(said),
         }
     }
 }
@@ -568,6 +594,31 @@ pub(crate) struct Simulate {
     #[arg(long, value_name = "N")]
     pub(crate) seed: Option<u64>,
     /// Overwrite the output if it exists.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+/// Show what is in a file and how it would be read.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Each column is listed with its unit, how many of its cells are missing, its range, and what it would be taken for. A line of
+blocks shows its course, from the first row to the last, each block the mean of its part. If the file cannot be read as it is,
+the reason stands below, with what to do; --time, --t1 and the other options below say it otherwise, and the saved profile
+repeats it for other files: twinlag diagnose run2.csv --profile logger.toml
+
+Exit codes: 0 the file can be read, 2 wrong usage, 3 it cannot be used as it is, 1 any other error.")]
+pub(crate) struct Inspect {
+    /// The file; `-` is standard input.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) columns: Columns,
+    /// Save how the file is read, for `--profile` of other commands.
+    #[arg(long, value_name = "TOML")]
+    pub(crate) save_profile: Option<PathBuf>,
+    /// Draw both temperatures over time, as one SVG file.
+    #[arg(long, value_name = "SVG")]
+    pub(crate) picture: Option<PathBuf>,
+    /// Overwrite output files that exist.
     #[arg(long)]
     pub(crate) force: bool,
 }

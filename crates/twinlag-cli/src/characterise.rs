@@ -1,11 +1,9 @@
 //! `twinlag characterise FILE...`.
 
-use std::fs::File;
-use std::io::stdin;
 use std::path::Path;
 
 use twinlag::diagnosis::{Grade, ModelError};
-use twinlag::record::{Record, Selection};
+use twinlag::record::Record;
 use twinlag::{Characterisation, Model, Options, Status};
 
 use crate::arguments::Characterise;
@@ -82,20 +80,4 @@ fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
         asked.push(answer.time_constant_difference_s.judgement.grade);
     }
     if answer.status == Status::Ok { grades::exit_code(&asked, &[], false, strict) } else { 4 }
-}
-
-fn read(file: &Path, selection: &Selection) -> Result<Record, Failure> {
-    if file == Path::new("-") {
-        Ok(Record::from_reader(stdin(), "standard input", selection)?)
-    } else {
-        Ok(Record::read(file, selection)?)
-    }
-}
-
-/// As [`read`], and shows how far it has come.
-pub(crate) fn read_watched(file: &Path, selection: &Selection, console: Console) -> Result<Record, Failure> {
-    let opened = std::fs::metadata(file).ok().filter(std::fs::Metadata::is_file).zip(File::open(file).ok());
-    let Some((about, opened)) = opened else { return read(file, selection) };
-    let progress = Progress::start(console, "reading".into());
-    Ok(Record::from_reader(progress.reading(opened, about.len()), &file.display().to_string(), selection)?)
 }

@@ -4,13 +4,15 @@ use twinlag::diagnosis::Verdict;
 use twinlag::{CompensateOptions, DiagnoseOptions, Options, Status};
 
 use crate::arguments::{Compensate, Trust};
-use crate::characterise::{model, read_watched};
+use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
+use crate::read::read_watched;
+use crate::report;
 
 pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure> {
     let views =
@@ -19,7 +21,7 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let to_stdout = output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
     let asked = command.input.method.options()?;
     let model = model_file.map(model).transpose()?;
-    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
+    let record = read_watched(&command.input.file, &command.input.columns.profile()?, console)?;
     print::notes(&record, console);
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
     let run = |characterise: Options| {
@@ -46,7 +48,8 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
         }
     }
     if let Some(path) = views.report {
-        let report = twinlag_pages::gas_report(&record, &answer, &output::command_line())?;
+        let report =
+            twinlag_pages::gas_report(&record, &answer, &report::making(&[&command.input.file], command.is_static))?;
         output::write(path, report)?;
     }
     print::compensation(&answer, &command.out, to_stdout, console)?;

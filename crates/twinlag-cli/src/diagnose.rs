@@ -14,6 +14,7 @@ use crate::grades;
 use crate::output;
 use crate::print;
 use crate::progress::Progress;
+use crate::report;
 use crate::several;
 
 pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
@@ -40,7 +41,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
         output::model(path, &answer.model())?;
     }
     if let Some(path) = &command.report {
-        output::write(path, &diagnosis_report(&record, &answer, &output::command_line())?)?;
+        output::write(path, &diagnosis_report(&record, &answer, &report::making(&files, command.is_static))?)?;
     }
     print::diagnosis(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))

@@ -1,7 +1,5 @@
 //! `twinlag explain NAME`: an effect, a status, a verdict, a grade or a test in plain words.
 
-use std::io::{Write, stdout};
-
 use serde::Serialize;
 use twinlag::cross_relation::TestName;
 use twinlag::diagnosis::{Identifier, NEVER_TESTABLE};
@@ -181,8 +179,7 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
             return Err(Failure::Usage(format!("nothing is called '{name}'; there are{list}")));
         }
         None if !console.json => {
-            writeln!(stdout(), "twinlag explain NAME, with one of{list}")
-                .map_err(|e| Failure::Other(format!("standard output: {e}")))?;
+            print::on_stdout(&format!("twinlag explain NAME, with one of{list}\n"))?;
             return Ok(0);
         }
         _ => {}
@@ -193,7 +190,7 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     }
     let texts: Vec<String> =
         found.iter().map(|e| format!("{} ({})\n  {}\n", e.name, e.kind, e.text.join("\n  "))).collect();
-    stdout().write_all(texts.concat().as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))?;
+    print::on_stdout(&texts.concat())?;
     Ok(0)
 }
 

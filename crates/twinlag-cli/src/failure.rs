@@ -3,6 +3,7 @@
 use std::fmt;
 
 use twinlag::record::{RecordError, Setting as ReaderSetting};
+use twinlag_files::FileError;
 use twinlag_pages::ReportError;
 
 use crate::settings::{options, reader_option};
@@ -61,6 +62,17 @@ impl From<twinlag::Error> for Failure {
             error if error.is_usage() => Self::Usage(explained(&error)),
             error => Self::File(explained(&error)),
         }
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
+        let option = match &error {
+            FileError::UnknownGroup { .. } | FileError::CannotJoin { .. } => "\n(option --group NAME)",
+            FileError::SeveralGroups { .. } => "\n(options --group NAME, --join)",
+            _ => "",
+        };
+        Self::File(format!("{error}{option}"))
     }
 }
 

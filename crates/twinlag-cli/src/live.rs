@@ -33,7 +33,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
         model: command.model.as_deref().map(model).transpose()?,
         change_per_root_s: command.change,
     };
-    let selection = command.input.columns.selection();
+    let selection = command.input.columns.profile()?.selection;
     let mut lines = Lines::open(&command.input.file)?;
     let table = lines.start(rows)?;
     let record = Record::from_table(&table, &selection)?;

@@ -18,15 +18,20 @@ mod explain;
 mod failure;
 mod grades;
 mod if_known;
+mod inspect;
 mod live;
 mod output;
 mod plan;
 mod print;
+mod profile;
 mod progress;
+mod read;
 mod records;
+mod report;
 mod settings;
 mod several;
 mod simulate;
+mod sparkline;
 mod study;
 mod track;
 
@@ -45,6 +50,7 @@ fn main() -> ExitCode {
         Command::Diagnose(command) => diagnose::run(&command, console),
         Command::Compensate(command) => compensate::run(&command, console),
         Command::Simulate(command) => simulate::run(&command, console),
+        Command::Inspect(command) => inspect::run(&command, console),
         Command::Plan(command) => plan::run(&command, console),
         Command::Track(command) => track::run(&command, console),
         Command::Study(command) => study::run(&command, console),

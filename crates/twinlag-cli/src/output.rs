@@ -106,7 +106,7 @@ pub(crate) fn data<T: ToString>(
 ) -> Result<(), Failure> {
     let cells = std::iter::once(last.0.to_owned()).chain(last.1.map(|cell| cell.to_string()));
     let written = |out: &mut dyn Write, name: &str| {
-        let mut rows = WithCells { out: BufWriter::new(out), cells, is_closed: false };
+        let mut rows = WithCells { out: UntilClosed::new(BufWriter::new(out)), cells };
         write_csv(&mut rows, columns, Decimals::Shortest).map_err(|error| match error {
             RecordError::CannotWrite { reason } => Failure::Other(format!("{name}: cannot be written: {reason}")),
             other => twinlag::Error::from(other).into(),
@@ -162,16 +162,46 @@ fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)
     Ok(Some((part, target)))
 }
 
+/// What is written until the reader has closed the pipe, having read enough; nothing after that.
+pub(crate) struct UntilClosed<W> {
+    out: W,
+    is_closed: bool,
+}
+
+impl<W: Write> UntilClosed<W> {
+    pub(crate) fn new(out: W) -> Self {
+        Self { out, is_closed: false }
+    }
+
+    fn unless_closed(&mut self, result: std::io::Result<()>) -> std::io::Result<()> {
+        self.is_closed |= result.as_ref().is_err_and(|e| e.kind() == ErrorKind::BrokenPipe);
+        if self.is_closed { Ok(()) } else { result }
+    }
+}
+
+impl<W: Write> Write for UntilClosed<W> {
+    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
+        if !self.is_closed {
+            let written = self.out.write_all(text);
+            self.unless_closed(written)?;
+        }
+        Ok(text.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        let flushed = self.out.flush();
+        self.unless_closed(flushed)
+    }
+}
+
 /// A table that gets a cell at the end of each row.
 struct WithCells<W, I> {
     out: W,
     cells: I,
-    /// Whether the reader has closed the pipe, having read enough.
-    is_closed: bool,
 }
 
-impl<W: Write, I: Iterator<Item = String>> WithCells<W, I> {
-    fn write_rows(&mut self, text: &[u8]) -> std::io::Result<()> {
+impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
+    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
         for part in text.split_inclusive(|byte| *byte == b'\n') {
             match part.strip_suffix(b"\n") {
                 Some(row) => {
@@ -181,27 +211,11 @@ impl<W: Write, I: Iterator<Item = String>> WithCells<W, I> {
                 None => self.out.write_all(part)?,
             }
         }
-        Ok(())
-    }
-
-    fn unless_closed(&mut self, result: std::io::Result<()>) -> std::io::Result<()> {
-        self.is_closed |= result.as_ref().is_err_and(|e| e.kind() == ErrorKind::BrokenPipe);
-        if self.is_closed { Ok(()) } else { result }
-    }
-}
-
-impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
-    fn write(&mut self, text: &[u8]) -> std::io::Result<usize> {
-        if !self.is_closed {
-            let written = self.write_rows(text);
-            self.unless_closed(written)?;
-        }
         Ok(text.len())
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
-        let flushed = self.out.flush();
-        self.unless_closed(flushed)
+        self.out.flush()
     }
 }
 
@@ -219,7 +233,12 @@ pub(crate) fn command_line() -> String {
             format!("'{}'", argument.replace('\'', "'\\''"))
         }
     };
-    std::env::args().map(quoted).collect::<Vec<_>>().join(" ")
+    // Where the program lies is nobody's business but the user's.
+    let program =
+        |path: String| Path::new(&path).file_name().map_or(path.clone(), |name| name.to_string_lossy().into_owned());
+    let mut arguments = std::env::args();
+    let first = arguments.next().map(program);
+    first.into_iter().chain(arguments).map(quoted).collect::<Vec<_>>().join(" ")
 }
 
 fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {
@@ -266,7 +285,7 @@ mod tests {
     fn each_row_gets_its_cell() {
         let mut out = Vec::new();
         let cells = ["grade", "go", "no-go"].map(str::to_owned).into_iter();
-        let mut rows = WithCells { out: &mut out, cells, is_closed: false };
+        let mut rows = WithCells { out: &mut out, cells };
         for piece in ["a,", "b\n1,2\n3", ",4", "\n"] {
             rows.write_all(piece.as_bytes()).expect("memory");
         }

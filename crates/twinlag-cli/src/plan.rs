@@ -1,6 +1,5 @@
 //! `twinlag plan RIG_OR_DIAGNOSIS`: what the next record would have to be.
 
-use std::io::{Write, stdout};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -47,7 +46,7 @@ pub(crate) fn run(command: &Command, console: Console) -> Result<u8, Failure> {
         print::json(&plan)?;
     } else {
         let text = text(&plan, &command.file);
-        stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))?;
+        print::on_stdout(&text)?;
     }
     Ok(if plan.status == PlanStatus::Ok { 0 } else { 4 })
 }

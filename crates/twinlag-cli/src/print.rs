@@ -17,6 +17,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades::{graded, reasons};
 use crate::if_known;
+use crate::output::UntilClosed;
 use crate::records;
 use crate::settings::usage;
 
@@ -24,7 +25,13 @@ use crate::settings::usage;
 pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Failure::Other(format!("the answer cannot be written as JSON: {e}")))?;
-    writeln!(stdout(), "{text}").map_err(|e| Failure::Other(format!("standard output: {e}")))
+    on_stdout(&(text + "\n"))
+}
+
+/// Prints an answer on standard output. A reader that has closed it has read enough.
+pub(crate) fn on_stdout(text: &str) -> Result<(), Failure> {
+    let written = UntilClosed::new(stdout()).write_all(text.as_bytes());
+    written.map_err(|e| Failure::Other(format!("standard output: {e}")))
 }
 
 /// Prints on standard error how the file was read.
@@ -38,15 +45,20 @@ pub(crate) fn notes(record: &Record, console: Console) {
 pub(crate) fn notes_of(record: &Record, source: Option<&str>, console: Console) {
     if !console.quiet {
         let of = source.map_or(String::new(), |source| format!("{source}: "));
-        for note in &record.notes {
-            let option = match note {
-                Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
-                Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
-                _ => String::new(),
-            };
-            eprintln!("note: {of}{note}{option}");
-        }
+        notes_in_words(record).for_each(|note| eprintln!("note: {of}{note}"));
     }
+}
+
+/// How a file was read, with the options that say it otherwise.
+pub(crate) fn notes_in_words(record: &Record) -> impl Iterator<Item = String> {
+    record.notes.iter().map(|note| {
+        let option = match note {
+            Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
+            Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
+            _ => String::new(),
+        };
+        format!("{note}{option}")
+    })
 }
 
 /// Prints a characterisation, as text or as JSON.
@@ -55,7 +67,7 @@ pub(crate) fn characterisation(answer: &Characterisation, console: Console) -> R
         return json(answer);
     }
     let text = text(answer);
-    stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
+    on_stdout(&text)
 }
 
 fn text(answer: &Characterisation) -> String {
@@ -180,7 +192,7 @@ pub(crate) fn diagnosis(answer: &Diagnosis, console: Console) -> Result<(), Fail
         return json(answer);
     }
     let text = diagnosis_text(answer);
-    stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")))
+    on_stdout(&text)
 }
 
 /// Prints a summary of the gas temperature, as text or as JSON. The text goes to standard error if
@@ -306,7 +318,7 @@ fn extremes(along: &Along) -> Option<[String; 2]> {
 /// Prints a summary of data: on standard output if the data are in a file, else on standard error.
 fn about(text: &str, to_stdout: bool, console: Console) -> Result<(), Failure> {
     if !to_stdout {
-        return stdout().write_all(text.as_bytes()).map_err(|e| Failure::Other(format!("standard output: {e}")));
+        return on_stdout(text);
     }
     if !console.quiet {
         eprint!("{text}");

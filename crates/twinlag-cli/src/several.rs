@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use twinlag::record::Record;
 
 use crate::arguments::Input;
-use crate::characterise::read_watched;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
+use crate::read::read_watched;
 
 /// The files of a command, the first of which is in its input; refused where one is named twice.
 pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a Path>, Failure> {
@@ -30,12 +30,15 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
 
 /// Reads all of them, and says how each was read; refused where one is a copy of another.
 pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<Vec<Record>, Failure> {
+    let profile = input.columns.profile()?;
+    let selection = &profile.selection;
+    let are_sensors_chosen = selection.t1.is_some() && selection.t2.is_some();
     let mut records = Vec::new();
     for file in files {
-        let mut record = read_watched(file, &input.columns.selection(), console)?;
+        let mut record = read_watched(file, &profile, console)?;
         let source = (files.len() > 1).then_some(record.source.as_str());
         print::notes_of(&record, source, console);
-        if let Some(first) = records.first().filter(|_| input.columns.are_sensors_chosen()) {
+        if let Some(first) = records.first().filter(|_| are_sensors_chosen) {
             named_as(&mut record, first, console);
         }
         records.push(record);

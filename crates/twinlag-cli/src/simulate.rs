@@ -10,7 +10,7 @@ use twinlag::signal::{Rig, Simulated};
 use crate::arguments::Simulate;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output;
+use crate::output::{self, UntilClosed};
 use crate::print;
 use crate::progress::Progress;
 
@@ -36,7 +36,7 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
         rig.simulate().map_err(|error| Failure::File(format!("{}: {error}", command.spec.display())))?
     };
     if to_stdout {
-        write(&mut stdout().lock(), &record)?;
+        write(&mut UntilClosed::new(stdout().lock()), &record)?;
     } else {
         output::replace(&command.out, |file| write(&mut BufWriter::new(file), &record))?;
     }

@@ -3,7 +3,7 @@
 use twinlag::{Status, TrackOptions};
 
 use crate::arguments::Track;
-use crate::characterise::{model, read_watched};
+use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
@@ -11,6 +11,8 @@ use crate::live;
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
+use crate::read::read_watched;
+use crate::report;
 
 pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref(), ..Views::default() };
@@ -24,7 +26,7 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         model: model_file.map(model).transpose()?,
         window_s: command.window,
     };
-    let record = read_watched(&command.input.file, &command.input.columns.selection(), console)?;
+    let record = read_watched(&command.input.file, &command.input.columns.profile()?, console)?;
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));
@@ -48,7 +50,8 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         }
     }
     if let Some(path) = views.report {
-        let report = twinlag_pages::track_report(&record, &answer, &output::command_line())?;
+        let report =
+            twinlag_pages::track_report(&record, &answer, &report::making(&[&command.input.file], command.is_static))?;
         output::write(path, report)?;
     }
     print::track(&answer, &command.out, to_stdout, console)?;

@@ -1,0 +1,67 @@
+//! Profiles: what to read from a file and how, as TOML.
+//!
+//! The keys are those of the options: `time`, `time_unit`, `t1`, `t2`, `reference`, `flow`, `position`, `period_s`, `sampling`, and under
+//! `[file]` `group` and `join`, for formats with several groups of channels.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use twinlag::record::Selection;
+use twinlag_files::Choice;
+
+use crate::failure::Failure;
+
+/// What to read, and how.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Profile {
+    pub(crate) selection: Selection,
+    pub(crate) choice: Choice,
+}
+
+/// The key of what chooses a group of channels.
+const FILE: &str = "file";
+
+/// What a profile says of a file with several groups.
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct OfFile {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    group: Option<String>,
+    join: bool,
+}
+
+impl Profile {
+    /// Reads a profile.
+    pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        let wrong = |what: String| Failure::File(format!("{}: {what}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("cannot be read: {e}")))?;
+        let parsed = || -> Result<Self, toml::de::Error> {
+            let mut keys: toml::Table = toml::from_str(&text)?;
+            let OfFile { group, join } = keys.remove(FILE).map_or(Ok(OfFile::default()), toml::Value::try_into)?;
+            Ok(Self { selection: keys.try_into()?, choice: Choice { group, join } })
+        };
+        parsed()
+            .map_err(|e| wrong(format!("expected a profile as `twinlag inspect FILE --save-profile` writes it: {e}")))
+    }
+
+    /// This profile, and where it says nothing what the other one says.
+    pub(crate) fn or(self, other: Self) -> Self {
+        let Self { selection, choice } = self;
+        let choice = Choice { group: choice.group.or(other.choice.group), join: choice.join || other.choice.join };
+        Self { selection: selection.or(other.selection), choice }
+    }
+
+    /// The text of the profile.
+    pub(crate) fn text(&self) -> Result<String, Failure> {
+        let wrong = |e: toml::ser::Error| Failure::Other(format!("the profile cannot be written as TOML: {e}"));
+        let mut keys = toml::Table::try_from(&self.selection).map_err(wrong)?;
+        let Choice { group, join } = self.choice.clone();
+        if group.is_some() || join {
+            keys.insert(FILE.into(), toml::Value::try_from(OfFile { group, join }).map_err(wrong)?);
+        }
+        let lines = toml::to_string(&keys).map_err(wrong)?;
+        Ok(format!(
+            "# How twinlag reads files like the one that this was made for: twinlag VERB FILE --profile THIS.\n{lines}"
+        ))
+    }
+}
