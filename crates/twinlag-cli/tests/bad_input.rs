@@ -529,7 +529,7 @@ fn no_command_no_file_and_unknown_options_are_wrong_usage() {
     for (arguments, word) in [
         (&[][..], "Usage"),
         (&["characterise"][..], "<FILE>"),
-        (&["characterize", "run.csv"][..], "characterise"),
+        (&["charakterise", "run.csv"][..], "characterise"),
         (&["characterise", "run.csv", "--gain"][..], "--gain"),
         (&["simulate", "rig.toml"][..], "--out"),
     ] {
