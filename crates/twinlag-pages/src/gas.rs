@@ -22,6 +22,7 @@ pub fn gas_report(record: &Record, answer: &Compensation, making: &Making) -> Re
     let document = document.byline(making.byline(&[samples(&answer.last)]));
     let tone = tone(answer.judgement.grade);
     let worth = format!("{}.", capital(&answer.judgement.grade.to_string()));
+    let document = cautions(document, &answer.last);
     let document = match &answer.gas {
         None => document.verdict(
             Tone::Bad,
@@ -44,7 +45,7 @@ pub fn gas_report(record: &Record, answer: &Compensation, making: &Making) -> Re
             ),
         ),
     };
-    let mut document = plausibility(cautions(document, &answer.last), &answer.last);
+    let mut document = plausibility(document, &answer.last);
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
@@ -118,8 +119,8 @@ pub fn track_report(record: &Record, answer: &Track, making: &Making) -> Result<
     let document = Document::new(format!("Time constants along {}", file_name(&record.source)));
     let document = document.byline(making.byline(&[samples(&answer.last)]));
     let grade_of = answer.judgement.grade;
-    let document = document.verdict(tone(grade_of), format!("{}.", capital(&grade_of.to_string())), lead);
-    let mut document = cautions(document, &answer.last);
+    let document = cautions(document, &answer.last);
+    let mut document = document.verdict(tone(grade_of), format!("{}.", capital(&grade_of.to_string())), lead);
     for warning in &answer.warnings {
         document = document.warning(sentence(warning));
     }
