@@ -4,7 +4,7 @@ mod common;
 
 use std::ops::ControlFlow;
 
-use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, readings_about, record, recovers, told, turbulence};
+use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
 use twinlag_diagnose::{
     Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Settings, Verdict, diagnose_records,
 };
@@ -208,26 +208,4 @@ fn one_record_of_a_single_tone_refuses_no_others() {
     let told = told(&joint.diagnosis);
     assert_eq!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
     recovers(&joint.diagnosis.last, TAU_S, &told);
-}
-
-/// One record in which a sensor is slower is the only one in a colder gas too: a time constant that goes with temperature explains it, and
-/// rests on that record.
-#[test]
-fn what_one_record_alone_shows_rests_on_it() {
-    let of = |seed: u64, mean_c: f64, tau_s: f64| {
-        let simulated = readings_about(seed, mean_c, turbulence(), |sensors| sensors[1].time_constant_s = tau_s);
-        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
-    };
-    let [_, tau_s] = TAU_S;
-    let joint = joint(&[
-        of(SEED, 250.0, tau_s),
-        of(SEED + 1, 250.0, tau_s),
-        of(SEED + 2, 250.0, tau_s),
-        of(SEED + 3, 80.0, 1.04 * tau_s),
-    ]);
-    let told = told(&joint.diagnosis);
-    let numbers = joint.diagnosis.effects.iter().flat_map(|effect| &effect.judgements);
-    let all = numbers.chain(&joint.diagnosis.judgements.time_constants);
-    assert!(all.clone().all(|judgement| judgement.grade != Grade::Go), "{told}");
-    assert_eq!(joint.records[3].agrees, None, "{told}");
 }

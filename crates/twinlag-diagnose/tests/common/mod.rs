@@ -33,22 +33,12 @@ pub(crate) fn ramps(seed: u64) -> Signal {
 
 /// The readings of the rig with whatever `change` does to its sensors.
 pub(crate) fn readings(seed: u64, signal: Signal, change: impl FnOnce(&mut [Sensor; 2])) -> Simulated {
-    readings_about(seed, 300.0, signal, change)
-}
-
-/// As [`readings`], of a gas of another mean temperature.
-pub(crate) fn readings_about(
-    seed: u64,
-    mean_c: f64,
-    signal: Signal,
-    change: impl FnOnce(&mut [Sensor; 2]),
-) -> Simulated {
     let mut sensors = [Sensor::new("T1", TAU_S[0]), Sensor::new("T2", TAU_S[1])];
     for sensor in &mut sensors {
         sensor.noise = Some(Noise::white(NOISE_K));
     }
     change(&mut sensors);
-    let rig = Rig::new(seed, Record::new(SAMPLES, PERIOD_S), Gas::new(mean_c, signal), sensors).expect("a valid rig");
+    let rig = Rig::new(seed, Record::new(SAMPLES, PERIOD_S), Gas::new(300.0, signal), sensors).expect("a valid rig");
     rig.simulate().expect("a rig of finite numbers")
 }
 
