@@ -30,8 +30,8 @@ pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<(Cow<'a, str>, &
     Ok((encoding.decode_without_bom_handling(body).0, encoding))
 }
 
-/// The encoding of bytes that are no UTF-8. Other encodings than these two are not guessed: the few letters of a header do not tell
-/// them apart (the same bytes are Chinese in GBK and Japanese in EUC-JP), and a wrong guess would lose the `°` of a unit.
+/// The encoding of bytes that are no UTF-8. Other encodings than these two are not guessed: the few letters of a header do not
+/// distinguish them (the same bytes are Chinese in GBK and Japanese in EUC-JP), and a wrong guess would lose the `°` of a unit.
 pub(crate) fn of_letters(bytes: &[u8]) -> &'static Encoding {
     let mut detector = EncodingDetector::new(Iso2022JpDetection::Deny);
     detector.feed(bytes, true);

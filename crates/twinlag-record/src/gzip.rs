@@ -1,4 +1,4 @@
-//! Files that are compressed by gzip, told by their first two bytes, not by their name.
+//! Files that are compressed by gzip, known by their first two bytes, not by their name.
 
 use std::io::{self, BufReader, Cursor, ErrorKind, Read};
 

@@ -18,7 +18,7 @@ fn cell(text: &str) -> String {
     if text.contains([',', '"', '\'']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text }
 }
 
-/// A number to seven digits, those of a picture; nothing for what is none.
+/// A number to seven digits, those of a picture; an empty cell for one that is not finite.
 fn number(value: Option<f64>) -> String {
     let Some(value) = value.filter(|value| value.is_finite()) else { return String::new() };
     let digits = value.abs().log10().floor();

@@ -150,7 +150,7 @@ impl Bins {
     }
 
     /// A trace as it is or, if it is long, the lowest and the highest value of each bin, in their order, at the beginning and in the
-    /// middle of the bin; a value that is none ends it.
+    /// middle of the bin; a missing value ends it.
     fn thinned(&self, x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         if x.len() <= MAX_POINTS {
             return (x.to_vec(), y.to_vec());
