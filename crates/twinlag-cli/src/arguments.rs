@@ -13,6 +13,7 @@ use twinlag::{
 };
 use twinlag_files::Choice;
 
+use crate::batch::Batch;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::profile::Profile;
@@ -36,6 +37,7 @@ Find missing effects:     twinlag diagnose run.csv --report run.html
 What a name means:        twinlag explain two-sensors
 Get the gas temperature:  twinlag compensate run.csv --out gas.csv
 Follow changing flow:     twinlag track run.csv --out tau.csv
+Many files, one table:    twinlag batch runs/ --out table.csv
 Plan the next record:     twinlag plan rig.toml
 Use it in a script:       twinlag characterise run.csv --json
 
@@ -75,6 +77,8 @@ pub(crate) enum Command {
     Simulate(Simulate),
     /// Show what is in a file and how it would be read, and save that as a profile for files like it.
     Inspect(Box<Inspect>),
+    /// Ask the same of many records on all processors: one table, files that cannot be used as rows.
+    Batch(Box<Batch>),
     /// Say what the next record would have to be for narrower intervals, or to distinguish two effects, from a rig or a diagnosis.
     Plan(Plan),
     /// Run a Monte-Carlo study of estimators from a plan, in shards if need be, and merge the
@@ -284,7 +288,7 @@ pub(crate) enum Trust {
     T2,
 }
 
-fn form(text: &str) -> Result<Form, String> {
+pub(crate) fn form(text: &str) -> Result<Form, String> {
     match (text, text.strip_prefix("lag:").map(str::parse)) {
         ("smoother", _) => Ok(Form::Smoother),
         ("filter", _) => Ok(Form::Filter),

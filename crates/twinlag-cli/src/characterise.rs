@@ -26,10 +26,26 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
     }
     let records = several::read(&files, &command.input, console)?;
     let given = command.model.as_deref().map(|path| Ok::<_, Failure>((path, model(path)?))).transpose()?;
-    let run = |options: Options| match (&records[..], &given) {
+    let run = |options: Options| ask(&records, given.as_ref().map(|(path, model)| (*path, model)), &options, console);
+    let plausibility = command.physics.plausibility(&records)?;
+    let answer = plausibility.answer(options, run, |answer| answer)?;
+    print::characterisation(&answer, console)?;
+    Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
+}
+
+/// What two lags say of a record or, without a model, of several of one rig.
+///
+/// - `given`: a model, with the file that it is from
+pub(crate) fn ask(
+    records: &[Record],
+    given: Option<(&Path, &Model)>,
+    options: &Options,
+    console: Console,
+) -> Result<Characterisation, Failure> {
+    match (records, given) {
         ([record], Some((path, model))) => {
             let _progress = Progress::start(console, format!("characterising {} samples", record.len()));
-            twinlag::characterise_with(record, model, &options).map_err(|e| match e {
+            twinlag::characterise_with(record, model, options).map_err(|e| match e {
                 twinlag::Error::ModelChannels { .. }
                 | twinlag::Error::ModelNumber { .. }
                 | twinlag::Error::Model(
@@ -38,13 +54,9 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
                 e => Failure::in_file(e, &record.source),
             })
         }
-        ([record], None) => characterise(record, &options, console),
-        (records, _) => characterise_records(records, &options, console),
-    };
-    let plausibility = command.physics.plausibility(&records)?;
-    let answer = plausibility.answer(options, run, |answer| answer)?;
-    print::characterisation(&answer, console)?;
-    Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
+        ([record], None) => characterise(record, options, console),
+        (records, _) => characterise_records(records, options, console),
+    }
 }
 
 pub(crate) fn model(path: &Path) -> Result<Model, Failure> {
@@ -74,7 +86,7 @@ fn characterise_records(records: &[Record], options: &Options, console: Console)
 }
 
 /// The exit code of a characterisation: it is asked for both time constants, and strictly for their difference as well.
-fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
+pub(crate) fn exit_code(answer: &Characterisation, strict: bool) -> u8 {
     let mut asked: Vec<Grade> = answer.sensors.iter().map(|sensor| sensor.judgement.grade).collect();
     if strict {
         asked.push(answer.time_constant_difference_s.judgement.grade);

@@ -1,7 +1,10 @@
 //! `twinlag compensate FILE --out OUT.csv`: the gas temperature with its standard deviation.
 
+use std::path::Path;
+
 use twinlag::diagnosis::Verdict;
-use twinlag::{CompensateOptions, DiagnoseOptions, Options, Status};
+use twinlag::record::Record;
+use twinlag::{CompensateOptions, Compensation, DiagnoseOptions, Options, Status};
 
 use crate::arguments::{Compensate, Trust};
 use crate::characterise::model;
@@ -31,15 +34,11 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
             form: command.form,
             trusted: usize::from(command.trust == Trust::T2),
         };
-        let progress = Progress::start(console, format!("compensating {} samples", record.len()));
-        twinlag::compensate_watched(&record, &options, &|task, done, total| progress.watch(task, done, total))
-            .map_err(|error| Failure::in_file(error, &record.source))
+        ask(&record, &options, console)
     };
     let answer = plausibility.answer(asked, run, |answer| &mut answer.last)?;
     if answer.status == Status::Ok {
-        let columns: [(&str, &[f64]); 3] =
-            [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
-        output::data(&command.out, to_stdout, &columns, ("grade", std::iter::repeat(answer.judgement.grade)))?;
+        write_gas(&answer, &command.out, to_stdout)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
         }
@@ -53,8 +52,28 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
         output::write(path, report)?;
     }
     print::compensation(&answer, &command.out, to_stdout, console)?;
+    Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
+}
+
+/// The gas temperature of a record.
+pub(crate) fn ask(record: &Record, options: &CompensateOptions, console: Console) -> Result<Compensation, Failure> {
+    let progress = Progress::start(console, format!("compensating {} samples", record.len()));
+    twinlag::compensate_watched(record, options, &|task, done, total| progress.watch(task, done, total))
+        .map_err(|error| Failure::in_file(error, &record.source))
+}
+
+/// Writes the gas temperature with its standard deviation and its grade.
+pub(crate) fn write_gas(answer: &Compensation, out: &Path, to_stdout: bool) -> Result<(), Failure> {
+    let columns: [(&str, &[f64]); 3] =
+        [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
+    output::data(out, to_stdout, &columns, ("grade", std::iter::repeat(answer.judgement.grade)))
+}
+
+/// The exit code of a compensation, which is asked for the gas temperature.
+pub(crate) fn exit_code(answer: &Compensation, strict: bool) -> u8 {
+    if answer.status != Status::Ok {
+        return 4;
+    }
     let is_partial = matches!(answer.verdict, Some(Verdict::PartlyExplained | Verdict::Unexplained));
-    let code = |strict| grades::exit_code(&[answer.judgement.grade], &[], is_partial, strict);
-    let code = grades::strictly(command.input.method.strict && answer.status == Status::Ok, code);
-    Ok(if answer.status == Status::Ok { code } else { 4 })
+    grades::exit_code(&[answer.judgement.grade], &[], is_partial, strict)
 }

@@ -26,10 +26,7 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     let records = several::read(&files, &command.input, console)?;
     let run = |characterise: Options| {
         let options = DiagnoseOptions { characterise, without: command.without.clone(), ..DiagnoseOptions::default() };
-        match &records[..] {
-            [record] => diagnose(record, &options, console),
-            records => diagnose_records(records, &options, console),
-        }
+        ask(&records, &options, console)
     };
     let plausibility = command.physics.plausibility(&records)?;
     let answer = plausibility.answer(characterise, run, |answer| &mut answer.last)?;
@@ -45,6 +42,14 @@ pub(crate) fn run(command: &Diagnose, console: Console) -> Result<u8, Failure> {
     }
     print::diagnosis(&answer, console)?;
     Ok(grades::strictly(command.input.method.strict, |strict| exit_code(&answer, strict)))
+}
+
+/// What the closed loop says of a record, or of several of one rig.
+pub(crate) fn ask(records: &[Record], options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {
+    match records {
+        [record] => diagnose(record, options, console),
+        records => diagnose_records(records, options, console),
+    }
 }
 
 fn diagnose_records(records: &[Record], options: &DiagnoseOptions, console: Console) -> Result<Diagnosis, Failure> {

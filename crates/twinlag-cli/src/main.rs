@@ -8,6 +8,7 @@
 //! 1 any other error.
 
 mod arguments;
+mod batch;
 mod characterise;
 mod columns;
 mod compensate;
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Command::Compensate(command) => compensate::run(&command, console),
         Command::Simulate(command) => simulate::run(&command, console),
         Command::Inspect(command) => inspect::run(&command, console),
+        Command::Batch(command) => batch::run(&command, console),
         Command::Plan(command) => plan::run(&command, console),
         Command::Track(command) => track::run(&command, console),
         Command::Study(command) => study::run(&command, console),

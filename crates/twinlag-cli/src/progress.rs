@@ -1,6 +1,6 @@
 //! Progress on standard error during long work.
 
-use std::io::{self, Read};
+use std::io::{self, IsTerminal, Read};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -88,6 +88,17 @@ impl Progress {
             bar.set_message(message());
         }
     }
+}
+
+/// A bar for work that consists of many equal pieces, with the time left; hidden where the program is to be quiet, and where standard
+/// error is no terminal.
+pub(crate) fn bar(console: Console) -> ProgressBar {
+    if console.quiet || !io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style =
+        ProgressStyle::with_template("{msg} {bar:40} {percent:>3} %, {eta} left").expect("the template is well formed");
+    ProgressBar::new(1).with_style(style)
 }
 
 /// Counts what is read.

@@ -8,6 +8,7 @@ use crate::arguments::Input;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
+use crate::profile::Profile;
 use crate::read::read_watched;
 
 /// The files of a command, the first of which is in its input; refused where one is named twice.
@@ -31,17 +32,28 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
 /// Reads all of them, and says how each was read; refused where one is a copy of another.
 pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<Vec<Record>, Failure> {
     let profile = input.columns.profile()?;
-    let selection = &profile.selection;
-    let are_sensors_chosen = selection.t1.is_some() && selection.t2.is_some();
     let mut records = Vec::new();
     for file in files {
-        let mut record = read_watched(file, &profile, console)?;
+        let record = read_watched(file, &profile, console)?;
         let source = (files.len() > 1).then_some(record.source.as_str());
         print::notes_of(&record, source, console);
-        if let Some(first) = records.first().filter(|_| are_sensors_chosen) {
-            named_as(&mut record, first, console);
-        }
         records.push(record);
+    }
+    of_one_rig(records, &profile, console)
+}
+
+/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one is a copy of
+/// another.
+pub(crate) fn of_one_rig(
+    mut records: Vec<Record>,
+    profile: &Profile,
+    console: Console,
+) -> Result<Vec<Record>, Failure> {
+    if profile.selection.t1.is_some()
+        && profile.selection.t2.is_some()
+        && let [first, others @ ..] = &mut records[..]
+    {
+        others.iter_mut().for_each(|record| named_as(record, first, console));
     }
     no_copies(&records)?;
     Ok(records)

@@ -5,12 +5,10 @@
 
 use std::ffi::OsStr;
 use std::fs;
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use twinlag_experiment::{Experiment, ExperimentError, Plan, Table, write};
 use twinlag_study::{Options, Shard, Study as _, StudyError};
@@ -18,6 +16,7 @@ use twinlag_study::{Options, Shard, Study as _, StudyError};
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
+use crate::progress;
 
 /// What to do with a Monte-Carlo study.
 #[derive(Debug, Subcommand)]
@@ -92,10 +91,7 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
         resume: run.resume,
         ..Options::default()
     };
-    let bar =
-        if console.quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(1) };
-    let style = ProgressStyle::with_template("{bar:40} {percent:>3} %, {eta} left");
-    bar.set_style(style.unwrap_or(ProgressStyle::default_bar()));
+    let bar = progress::bar(console).with_message("trials");
     let done = twinlag_study::run(&experiment, &options, |p| {
         bar.set_length(p.total);
         bar.set_position(p.done);

@@ -2,12 +2,13 @@
 //!
 //! For whoever shows an answer to people: what a diagnosis found and how well it is shown
 //! ([`diagnosis_report`]), a gas temperature with its band ([`gas_report`]), time constants along a
-//! record ([`track_report`]), and the pictures of each alone. A page computes nothing that an
+//! record ([`track_report`]), the summary of a batch ([`fleet_report`]), and the pictures of each alone. A page computes nothing that an
 //! answer says: every number on it is a field of the answer that it shows. Numbers alone need
 //! `twinlag`, and no crate of pictures; figures of other data need `twinlag-report`.
 
 mod diagnosis;
 mod figures;
+mod fleet;
 mod gas;
 mod making;
 mod pictures;
@@ -15,6 +16,7 @@ mod residual_figures;
 mod words;
 
 pub use diagnosis::{diagnosis_report, residual_picture};
+pub use fleet::fleet_report;
 pub use gas::{gas_report, track_report};
 pub use making::Making;
 pub use pictures::{gas_picture, readings_picture, track_picture};

@@ -122,7 +122,7 @@ impl Column {
 
     /// Decides what kind of column it is, from all of its cells.
     pub(crate) fn judge(&mut self) {
-        let texts = self.texts.places.len();
+        let texts = self.texts.len();
         let numbers = self.values.len() - self.missing - texts;
         let stamps = self.texts.iter().take(100).filter(|(_, text)| clock::parse(text).is_some()).count();
         self.kind = match numbers + texts {
@@ -144,6 +144,10 @@ pub(crate) struct Texts {
 }
 
 impl Texts {
+    pub(crate) fn len(&self) -> usize {
+        self.places.len()
+    }
+
     fn push(&mut self, row: usize, text: &str) {
         self.arena.push_str(text);
         self.places.push((row, self.arena.len()));

@@ -221,6 +221,29 @@ impl Table {
         })
     }
 
+    /// What stands in all rows of a column, if that is the same from the first to the last: a serial number, a name.
+    ///
+    /// - `index`: from 0. Panics if there is no such column.
+    ///
+    /// ```
+    /// use twinlag_record::Table;
+    ///
+    /// let table = Table::read(b"time,T1,serial\n0,20.1,TC-7\n1,20.2,TC-7\n", "run.csv")?;
+    /// assert_eq!(table.constant(2), Some("TC-7".to_owned()));
+    /// assert_eq!(table.constant(1), None);
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    pub fn constant(&self, index: usize) -> Option<String> {
+        let column = &self.columns[index];
+        let mut texts = column.texts.iter().map(|(_, text)| text);
+        if let Some(first) = texts.next() {
+            let is_in_all_rows = column.texts.len() == self.rows() && texts.all(|text| text == first);
+            return is_in_all_rows.then(|| first.to_owned());
+        }
+        let first = column.values.first().filter(|value| value.is_finite())?;
+        column.values.iter().all(|value| value == first).then(|| first.to_string())
+    }
+
     /// The index, from 0, of a column: by exact name, by name without unit, then both in any case;
     /// by number, unless a column has exactly that name.
     ///

@@ -91,6 +91,10 @@ impl Bench {
         fs::write(self.dir.join(file), content).expect("the target directory can be written");
     }
 
+    pub(crate) fn path(&self, file: &str) -> PathBuf {
+        self.dir.join(file)
+    }
+
     pub(crate) fn read(&self, file: &str) -> Vec<u8> {
         fs::read(self.dir.join(file)).expect("the program wrote this file")
     }

@@ -1,0 +1,40 @@
+//! What can keep a batch from running.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a batch could not run. A file that cannot be used is no error: it is a row.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum BatchError {
+    #[error("{what}: there is no such file or folder, and it is no pattern that a file fits")]
+    NothingFound { what: String },
+    #[error("{what}: this is no pattern of file names: {reason}")]
+    Pattern { what: String, reason: String },
+    #[error("{}: the folder cannot be listed: {reason}", path.display())]
+    CannotList { path: PathBuf, reason: String },
+    #[error(
+        "records are grouped by `folder`, by `column:NAME`, or by a pattern of file names in which {{rig}} stands once, \
+         such as '{{rig}}_*.csv'; got '{got}'"
+    )]
+    GroupBy { got: String },
+    #[error("{} is there from an earlier run: go on with it, or begin anew", path.display())]
+    Exists { path: PathBuf },
+    #[error(
+        "{} is of a run that was asked something else ({what} was {was}, and is {is} now): ask the same, or begin anew",
+        path.display()
+    )]
+    OtherQuestion { path: PathBuf, what: String, was: String, is: String },
+    #[error("{}, line {line}: expected a row of a batch: {reason}", path.display())]
+    Damaged { path: PathBuf, line: usize, reason: String },
+    #[error("{} is being written by another run", path.display())]
+    Busy { path: PathBuf },
+    #[error("{}: cannot be read: {reason}", path.display())]
+    Read { path: PathBuf, reason: String },
+    #[error("{}: cannot be written: {reason}", path.display())]
+    Write { path: PathBuf, reason: String },
+    #[error("the table cannot be written: {reason}")]
+    Table { reason: String },
+}

@@ -1,0 +1,234 @@
+//! The journal of a batch: what is done, line by line, so that a run that was killed goes on where it stopped.
+//!
+//! The first line says what was asked; each further one has the rows of a unit, with the size and the time of change of its files: a
+//! unit whose files have changed since is asked again. A line that was cut off in the middle is dropped.
+
+use std::collections::HashMap;
+use std::fs::{File, Metadata, TryLockError};
+use std::io::{BufRead, BufReader, Read as _, Seek, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::error::BatchError;
+use crate::group::Unit;
+use crate::row::Row;
+
+/// Name and number of the format.
+const SCHEMA: &str = "twinlag.batch-journal/1";
+
+/// How a run begins where there may be a journal of an earlier one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Begin {
+    /// Anew; a journal that is there is an error.
+    New,
+    /// Anew; a journal that is there is replaced.
+    Anew,
+    /// Where the journal ends, if there is one.
+    Resume,
+}
+
+/// What is done of a batch, on disk.
+#[derive(Debug)]
+pub struct Journal {
+    file: File,
+    path: PathBuf,
+    /// Where the next line goes.
+    end: u64,
+    done: HashMap<String, Done>,
+}
+
+/// Where the rows of a unit are, and of which files they are.
+#[derive(Debug)]
+struct Done {
+    at: u64,
+    bytes: usize,
+    stamps: Vec<Option<Stamp>>,
+}
+
+/// What shows that a file has changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Stamp {
+    bytes: u64,
+    modified_ns: i128,
+}
+
+/// The first line.
+#[derive(Serialize, Deserialize)]
+struct Header {
+    schema: String,
+    version: String,
+    asked: Value,
+}
+
+/// Any further line.
+#[derive(Serialize, Deserialize)]
+struct Entry<Rows> {
+    unit: String,
+    stamps: Vec<Option<Stamp>>,
+    rows: Rows,
+}
+
+impl Journal {
+    /// Opens the journal of a batch, which no other run may be writing.
+    ///
+    /// - `asked`: the question; a run that goes on has to ask the same, of the same version of this crate
+    ///
+    /// # Errors
+    /// [`BatchError::Exists`], [`BatchError::OtherQuestion`], [`BatchError::Damaged`], [`BatchError::Busy`], [`BatchError::Read`],
+    /// [`BatchError::Write`].
+    pub fn open(path: &Path, asked: &Value, begin: Begin) -> Result<Self, BatchError> {
+        let unwritable = |error: std::io::Error| BatchError::Write { path: path.to_owned(), reason: error.to_string() };
+        if begin == Begin::New && path.exists() {
+            return Err(BatchError::Exists { path: path.to_owned() });
+        }
+        let file =
+            File::options().read(true).write(true).create(true).truncate(false).open(path).map_err(unwritable)?;
+        match file.try_lock() {
+            // A file system without locks has one writer as far as can be known.
+            Ok(()) | Err(TryLockError::Error(_)) => {}
+            Err(TryLockError::WouldBlock) => return Err(BatchError::Busy { path: path.to_owned() }),
+        }
+        let header =
+            Header { schema: SCHEMA.to_owned(), version: env!("CARGO_PKG_VERSION").to_owned(), asked: asked.clone() };
+        let mut journal = Self { file, path: path.to_owned(), end: 0, done: HashMap::new() };
+        if begin == Begin::Resume {
+            journal.take_up(&header)?;
+        }
+        journal.file.set_len(journal.end).map_err(unwritable)?;
+        if journal.end == 0 {
+            journal.write_line(&header)?;
+        }
+        Ok(journal)
+    }
+
+    /// How many units are done whose files are as they were then.
+    pub fn count_done(&self, units: &[Unit]) -> usize {
+        units.iter().filter(|unit| self.is_done(unit)).count()
+    }
+
+    /// Whether a unit is done, and its files are as they were then.
+    pub(crate) fn is_done(&self, unit: &Unit) -> bool {
+        self.done.get(&unit.key()).is_some_and(|done| done.stamps == stamps(unit))
+    }
+
+    /// Puts down the rows of a unit.
+    ///
+    /// # Errors
+    /// [`BatchError::Write`].
+    pub(crate) fn append(&mut self, unit: &Unit, seen: Seen, rows: &[Row]) -> Result<(), BatchError> {
+        let (key, at) = (unit.key(), self.end);
+        self.write_line(&Entry { unit: key.clone(), stamps: seen.0.clone(), rows })?;
+        self.done.insert(key, Done { at, bytes: (self.end - at) as usize, stamps: seen.0 });
+        Ok(())
+    }
+
+    /// The rows of a unit; none of one that is not done.
+    ///
+    /// # Errors
+    /// [`BatchError::Read`].
+    pub fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError> {
+        let Some(done) = self.done.get(&unit.key()) else { return Ok(Vec::new()) };
+        let mut line = vec![0; done.bytes];
+        let mut read = || self.file.seek(SeekFrom::Start(done.at)).and_then(|_| self.file.read_exact(&mut line));
+        let wrong = |reason: String| BatchError::Read { path: self.path.clone(), reason };
+        read().map_err(|error| wrong(error.to_string()))?;
+        let entry: Entry<Vec<Row>> = serde_json::from_slice(&line).map_err(|error| wrong(error.to_string()))?;
+        Ok(entry.rows)
+    }
+
+    /// Reads what an earlier run has done.
+    fn take_up(&mut self, header: &Header) -> Result<(), BatchError> {
+        let unreadable =
+            |path: &Path, error: &std::io::Error| BatchError::Read { path: path.to_owned(), reason: error.to_string() };
+        let mut reader = BufReader::new(&self.file);
+        let mut text = Vec::new();
+        for line in 1.. {
+            text.clear();
+            reader.read_until(b'\n', &mut text).map_err(|error| unreadable(&self.path, &error))?;
+            if text.last() != Some(&b'\n') {
+                break;
+            }
+            let damaged = |error: serde_json::Error| BatchError::Damaged {
+                path: self.path.clone(),
+                line,
+                reason: error.to_string(),
+            };
+            if line == 1 {
+                let was: Header = serde_json::from_slice(&text).map_err(damaged)?;
+                was.expect_same(header, &self.path)?;
+            } else {
+                let entry: Entry<IgnoredAny> = serde_json::from_slice(&text).map_err(damaged)?;
+                let done = Done { at: self.end, bytes: text.len(), stamps: entry.stamps };
+                self.done.insert(entry.unit, done);
+            }
+            self.end += text.len() as u64;
+        }
+        Ok(())
+    }
+
+    /// Appends a line in one piece.
+    fn write_line(&mut self, line: &impl Serialize) -> Result<(), BatchError> {
+        let wrong = |reason: String| BatchError::Write { path: self.path.clone(), reason };
+        let mut text = serde_json::to_vec(line).map_err(|error| wrong(error.to_string()))?;
+        text.push(b'\n');
+        let mut write = || self.file.seek(SeekFrom::Start(self.end)).and_then(|_| self.file.write_all(&text));
+        write().map_err(|error| wrong(error.to_string()))?;
+        self.end += text.len() as u64;
+        Ok(())
+    }
+}
+
+impl Header {
+    /// Refuses to go on with another question.
+    fn expect_same(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
+        let differs = |what: &str, was: &Value, is: &Value| BatchError::OtherQuestion {
+            path: path.to_owned(),
+            what: what.to_owned(),
+            was: was.to_string(),
+            is: is.to_string(),
+        };
+        if (&self.schema, &self.version) != (&now.schema, &now.version) {
+            return Err(differs("the version", &self.version.as_str().into(), &now.version.as_str().into()));
+        }
+        if self.asked == now.asked {
+            return Ok(());
+        }
+        let (Value::Object(was), Value::Object(is)) = (&self.asked, &now.asked) else {
+            return Err(differs("the question", &self.asked, &now.asked));
+        };
+        let names = was.keys().chain(is.keys());
+        let other = names.filter(|name| was.get(*name) != is.get(*name)).map(String::as_str).next();
+        let other = other.unwrap_or("the order of the settings");
+        let of = |asked: &serde_json::Map<String, Value>| asked.get(other).cloned().unwrap_or(Value::Null);
+        Err(differs(other, &of(was), &of(is)))
+    }
+}
+
+/// The files of a unit as they were before they were read.
+pub(crate) struct Seen(Vec<Option<Stamp>>);
+
+impl Seen {
+    pub(crate) fn now(unit: &Unit) -> Self {
+        Self(stamps(unit))
+    }
+}
+
+/// What shows that a file of a unit has changed; `None` of one that is not there.
+fn stamps(unit: &Unit) -> Vec<Option<Stamp>> {
+    unit.files().iter().map(|file| file.metadata().ok().map(|about| Stamp::of(&about))).collect()
+}
+
+impl Stamp {
+    fn of(about: &Metadata) -> Self {
+        let modified_ns = about.modified().map_or(0, |at| match at.duration_since(UNIX_EPOCH) {
+            Ok(after) => after.as_nanos() as i128,
+            Err(before) => -(before.duration().as_nanos() as i128),
+        });
+        Self { bytes: about.len(), modified_ns }
+    }
+}

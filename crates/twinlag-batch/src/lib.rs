@@ -1,0 +1,58 @@
+//! Thousands of records of two temperature sensors asked the same question: one table, files that
+//! cannot be used as rows with their reason, restarts without loss.
+//!
+//! For whoever has a folder of logger files or a fleet of rigs. [`find`] lists the files,
+//! [`each`] or [`grouped`] says what is asked together, [`run`] asks it on all cores and keeps the
+//! answers in a [`Journal`], from which [`write_csv`] and [`write_parquet`] make the table and [`Fleet`]
+//! the summary. Neither depends on the number of threads or on how often a run was killed. No more
+//! is held in memory than the records that are being worked on and a line for each file. How a file
+//! is read is the caller's business; what is asked is in `twinlag`, which alone is the crate to take
+//! for a few records; studies of simulated records are those of `twinlag-study`.
+//!
+//! ```
+//! use twinlag::record::{Record, Selection};
+//! use twinlag_batch::{Answer, Begin, Journal, Options, Row, Unit, Verb, each, find, run, write_csv};
+//!
+//! let folder = tempfile::tempdir()?;
+//! std::fs::write(folder.path().join("empty.csv"), "")?;
+//! let units = each(find(&[folder.path().join("*.csv")])?);
+//!
+//! let characterise = |unit: &Unit| -> Vec<Row> {
+//!     let Unit::Record(file) = unit else { unreachable!("each file by itself") };
+//!     match Record::read(file, &Selection::default()) {
+//!         Err(error) => vec![Row::without_answer(unit, file, 3, &error.to_string())],
+//!         Ok(record) => match twinlag::characterise(&record, &twinlag::Options::default()) {
+//!             Err(error) => vec![Row::without_answer(unit, file, 3, &error.to_string())],
+//!             Ok(answer) => Row::of(unit, 0, &Answer::Characterisation(&answer)),
+//!         },
+//!     }
+//! };
+//! let asked = serde_json::json!({"verb": "characterise"});
+//! let mut journal = Journal::open(&folder.path().join("table.journal"), &asked, Begin::New)?;
+//! run(&units, &mut journal, &Options::default(), characterise, |_| {})?;
+//!
+//! let mut table = Vec::new();
+//! write_csv(&units, &mut journal, Verb::Characterise, &mut table)?;
+//! assert!(String::from_utf8(table)?.contains("empty.csv: the file is empty"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod find;
+mod fleet;
+mod group;
+mod journal;
+mod parquet;
+mod row;
+mod run;
+mod table;
+
+pub use error::BatchError;
+pub use find::find;
+pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};
+pub use group::{GroupBy, NamePattern, Unit, each, grouped, rig_by_path};
+pub use journal::{Begin, Journal};
+pub use parquet::write_parquet;
+pub use row::{Answer, Row, Verb};
+pub use run::{Options, Progress, map, run};
+pub use table::write_csv;

@@ -1,0 +1,148 @@
+//! Units on all cores.
+//!
+//! Each thread takes one unit after the other and works on it alone, so that no more records are in memory than there are threads.
+//! Rows go into the journal as they come; the table is made in the order of the units.
+
+use std::any::Any;
+use std::num::NonZeroUsize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::sync_channel;
+use std::thread;
+
+use rayon::ThreadPoolBuilder;
+
+use crate::error::BatchError;
+use crate::group::Unit;
+use crate::journal::{Journal, Seen};
+use crate::row::Row;
+
+/// How to run a batch. Nothing here changes a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// How many units are worked on at once; by default one for each processor. Threads that no unit is left for help within the
+    /// units.
+    pub threads: NonZeroUsize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { threads: thread::available_parallelism().unwrap_or(NonZeroUsize::MIN) }
+    }
+}
+
+/// How far a batch is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Units done, those of earlier runs included.
+    pub done: usize,
+    /// Units of the batch.
+    pub total: usize,
+}
+
+/// Asks `work` of every unit that is not done, and puts its rows into the journal. A unit on which it panics has a row that says so.
+///
+/// # Errors
+/// [`BatchError::Write`]; what was done before is in the journal.
+pub fn run(
+    units: &[Unit],
+    journal: &mut Journal,
+    options: &Options,
+    work: impl Fn(&Unit) -> Vec<Row> + Sync,
+    mut progress: impl FnMut(Progress),
+) -> Result<(), BatchError> {
+    let open: Vec<&Unit> = units.iter().filter(|unit| !journal.is_done(unit)).collect();
+    let mut state = Progress { done: units.len() - open.len(), total: units.len() };
+    progress(state);
+    let mut result = Ok(());
+    let answer = |unit: &&Unit| {
+        let seen = Seen::now(unit);
+        let rows = match unit {
+            Unit::WithoutRig { file, reason } => vec![Row::without_answer(unit, file, 3, reason)],
+            unit => catch_unwind(AssertUnwindSafe(|| work(unit))).unwrap_or_else(|panic| panicked(unit, &*panic)),
+        };
+        (seen, rows)
+    };
+    in_order_of_arrival(&open, options.threads, answer, |unit, (seen, rows)| {
+        state.done += 1;
+        progress(state);
+        result = journal.append(unit, seen, &rows);
+        result.is_ok()
+    });
+    result
+}
+
+/// `work` on every item, in parallel, in their order.
+///
+/// # Panics
+/// If `work` does.
+pub fn map<Item: Sync, Out: Send>(
+    items: &[Item],
+    options: &Options,
+    work: impl Fn(&Item) -> Out + Sync,
+    mut progress: impl FnMut(Progress),
+) -> Vec<Out> {
+    let places: Vec<usize> = (0..items.len()).collect();
+    let mut outs: Vec<Option<Out>> = items.iter().map(|_| None).collect();
+    let mut done = 0;
+    in_order_of_arrival(
+        &places,
+        options.threads,
+        |place| work(&items[*place]),
+        |place, out| {
+            outs[*place] = Some(out);
+            done += 1;
+            progress(Progress { done, total: items.len() });
+            true
+        },
+    );
+    outs.into_iter().map(|out| out.expect("each item has been worked on")).collect()
+}
+
+/// `work` on every item, on so many threads; `take` gets each result as it comes, on the calling thread, until it wants no more.
+fn in_order_of_arrival<Item: Sync, Out: Send>(
+    items: &[Item],
+    threads: NonZeroUsize,
+    work: impl Fn(&Item) -> Out + Sync,
+    mut take: impl FnMut(&Item, Out) -> bool,
+) {
+    let workers = threads.get().min(items.len());
+    let within = threads.get().checked_div(workers).unwrap_or(1);
+    let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
+    thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(workers);
+        for _ in 0..workers {
+            let sender = sender.clone();
+            let (next, is_over, work) = (&next, &is_over, &work);
+            scope.spawn(move || {
+                // What is parallel within a unit stays in it: a thread that waits would begin another unit else, and hold both.
+                let pool = ThreadPoolBuilder::new().num_threads(within).build().ok();
+                while !is_over.load(Ordering::Relaxed) {
+                    let place = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(item) = items.get(place) else { break };
+                    let out = pool.as_ref().map_or_else(|| work(item), |pool| pool.install(|| work(item)));
+                    if sender.send((place, out)).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        for (place, out) in receiver {
+            if !take(&items[place], out) {
+                is_over.store(true, Ordering::Relaxed);
+                break;
+            }
+        }
+    });
+}
+
+/// The row of a unit on which the work panicked.
+fn panicked(unit: &Unit, panic: &(dyn Any + Send)) -> Vec<Row> {
+    let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    let reason = format!("a fault of the program: {}", message.unwrap_or("it panicked without a message"));
+    vec![match unit {
+        Unit::Rig { name, files } => Row::rig_without_answer(name, files.len(), 1, &reason),
+        Unit::Record(file) | Unit::WithoutRig { file, .. } => Row::without_answer(unit, file, 1, &reason),
+    }]
+}

@@ -1,0 +1,488 @@
+//! `twinlag batch WHAT... --out TABLE`: many records in parallel, one table.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::panic;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+use twinlag::compensation::Form;
+use twinlag::diagnosis::Identifier;
+use twinlag::record::{ColumnRef, Record};
+use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
+use twinlag_batch::{
+    Answer, BatchError, Begin, Fleet, GroupBy, Journal, Row, Unit, Verb as RowVerb, each, find, grouped, map,
+    rig_by_path, run as run_units, write_csv, write_parquet,
+};
+use twinlag_pages::fleet_report;
+
+use crate::arguments::{Columns, Method, Physics, Trust, form};
+use crate::console::Console;
+use crate::failure::Failure;
+use crate::profile::Profile;
+use crate::progress;
+use crate::read::{read_watched, table_watched};
+use crate::{characterise, compensate, diagnose, output, print, report, several};
+
+/// What is asked of each record, or of each rig.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Verb {
+    #[value(alias = "characterize")]
+    Characterise,
+    Diagnose,
+    Compensate,
+}
+
+impl From<Verb> for RowVerb {
+    fn from(verb: Verb) -> Self {
+        match verb {
+            Verb::Characterise => Self::Characterise,
+            Verb::Diagnose => Self::Diagnose,
+            Verb::Compensate => Self::Compensate,
+        }
+    }
+}
+
+/// Ask the same of many records.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+WHAT is a folder (all files in it and below), a quoted pattern ('runs/**/*.csv'), or files. The table has a row for each record:
+both time constants with their intervals and grades, noise, what is left over; of a diagnosis the verdict, the effects and a
+column for each of their parameters. A file that cannot be used is a row with its reason; it stops nothing.
+
+--group-by takes the records of one rig together: all files of a folder (folder), those in which a column has the same value
+(column:serial), or those whose names agree in one part ('{rig}_run*.csv'). The table then has a row for each rig (level rig)
+and one for each of its records (level record), with what is left over when it is left out, and whether it agrees.
+
+What is done is kept in TABLE.journal. A run that was stopped goes on with --resume, and gives the same table; so does a run
+after files have been added or changed, which asks only of those.
+
+Exit codes: 0 the table is written, and at least one unit has an answer; 4 none has, though files were read; 3 no file can be
+used; 2 wrong usage; 1 any other error. Column exit_code has what the verb alone would have ended with.")]
+pub(crate) struct Batch {
+    /// Folders, quoted patterns, or files.
+    #[arg(required = true, value_name = "WHAT")]
+    what: Vec<PathBuf>,
+    /// What is asked of each.
+    #[arg(long, value_name = "VERB", default_value = "characterise")]
+    verb: Verb,
+    /// Write the table to this file, as text or as Parquet by its ending, .csv or .parquet; may be given twice.
+    #[arg(long, value_name = "TABLE", required = true)]
+    out: Vec<PathBuf>,
+    /// Write a summary with pictures, as one self-contained HTML file.
+    #[arg(long, value_name = "HTML")]
+    report: Option<PathBuf>,
+    /// With --report: without a script, for print and mail.
+    #[arg(long = "static", requires = "report")]
+    is_static: bool,
+    /// Take the records of one rig together: folder, column:NAME, or a pattern of file names with {rig} in it.
+    #[arg(long, value_name = "HOW")]
+    group_by: Option<GroupBy>,
+    /// With --verb compensate: write the gas temperature of each record into this folder.
+    #[arg(long, value_name = "FOLDER")]
+    gas: Option<PathBuf>,
+    /// Use a model written by `twinlag diagnose --save`, with --verb characterise or compensate.
+    #[arg(long, value_name = "JSON", conflicts_with = "group_by")]
+    model: Option<PathBuf>,
+    /// Leave this effect out; separate several by commas, or repeat the option.
+    #[arg(long, value_name = "EFFECT", value_delimiter = ',')]
+    without: Vec<Identifier>,
+    /// With --verb compensate: smoother, filter or lag:N, as of `twinlag compensate`.
+    #[arg(long, value_name = "FORM", default_value = "smoother", value_parser = form)]
+    form: Form,
+    /// With --verb compensate: the channel to trust where gain, offset or delay differ.
+    #[arg(long, value_name = "CHANNEL", default_value = "T1", ignore_case = true)]
+    trust: Trust,
+    /// Go on where an earlier run stopped; only files that were added or changed since are asked again.
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Number of records or rigs worked on at once; one per processor if left out. The table does not depend on it.
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+    /// Begin anew, and overwrite output files that exist.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    method: Method,
+    #[command(flatten)]
+    physics: Physics,
+}
+
+/// Within a batch, a record says nothing on its own.
+const SILENT: Console = Console { json: true, quiet: true };
+
+pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
+    let question = Question::of(command)?;
+    let journal_path = with_ending(&command.out[0], ".journal");
+    let files = command.files(&journal_path)?;
+    let options =
+        twinlag_batch::Options { threads: command.threads.unwrap_or(twinlag_batch::Options::default().threads) };
+    let begin = match (command.resume, command.force) {
+        (true, _) => Begin::Resume,
+        (_, true) => Begin::Anew,
+        _ => Begin::New,
+    };
+    let mut journal = Journal::open(&journal_path, &question.asked(), begin)?;
+    let units = question.units(files, &options, console);
+    let gas_files = question.gas_files(&units)?;
+
+    // What a panic says is in the row of its file.
+    panic::set_hook(Box::new(|_| {}));
+    let bar = progress::bar(console).with_message(question.unit_name());
+    let work = |unit: &Unit| question.rows(unit, &gas_files);
+    let done = run_units(&units, &mut journal, &options, work, |progress| {
+        bar.set_length(progress.total as u64);
+        bar.set_position(progress.done as u64);
+    });
+    bar.finish_and_clear();
+    let _ = panic::take_hook();
+    done?;
+
+    for out in &command.out {
+        output::replace(out, |file| {
+            if is_parquet(out) {
+                write_parquet(&units, &mut journal, question.verb.into(), file)?;
+            } else {
+                write_csv(&units, &mut journal, question.verb.into(), std::io::BufWriter::new(file))?;
+            }
+            Ok(())
+        })?;
+    }
+    let fleet = Fleet::of(&units, &mut journal)?;
+    if let Some(path) = &command.report {
+        let making = report::making(&[] as &[&Path], command.is_static);
+        let title = command.out[0].display().to_string();
+        let made_by = ["twinlag", env!("CARGO_PKG_VERSION")];
+        output::write(path, fleet_report(&fleet, &title, question.unit_name(), made_by, &making)?)?;
+    }
+    say(command, &question, &fleet, console)?;
+    Ok(match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
+        (0, 0, 0) => 3,
+        (0, 0, _) => 1,
+        (0, _, _) => 4,
+        _ => 0,
+    })
+}
+
+impl Batch {
+    /// The files that are asked, without what the batch itself writes.
+    fn files(&self, journal: &Path) -> Result<Vec<PathBuf>, Failure> {
+        if let Some(out) = self.out.iter().find(|out| !is_parquet(out) && !has_ending(out, "csv")) {
+            let text = format!("--out {}: expected a name that ends in .csv or .parquet", out.display());
+            return Err(Failure::Usage(text));
+        }
+        let outputs: Vec<(&str, &Path)> = self
+            .out
+            .iter()
+            .map(|path| ("--out", path.as_path()))
+            .chain(self.report.iter().map(|path| ("--report", path.as_path())))
+            .collect();
+        let is_of_earlier_run = journal.exists();
+        output::check(journal, &outputs, self.force || (self.resume && is_of_earlier_run))?;
+        let is_output = |file: &Path| {
+            output::is_same(file, journal) || outputs.iter().any(|(_, output)| output::is_same(file, output))
+        };
+        let (own, files): (Vec<_>, Vec<_>) = find(&self.what)?.into_iter().partition(|file| is_output(file));
+        match own.first() {
+            Some(file) if !is_of_earlier_run => Err(Failure::Usage(format!(
+                "{} is one of the records: choose another name for --out or --report",
+                file.display()
+            ))),
+            _ => Ok(files),
+        }
+    }
+}
+
+/// What is asked of each unit, whatever decides a cell of the table.
+struct Question<'a> {
+    verb: Verb,
+    profile: Profile,
+    options: Options,
+    physics: &'a Physics,
+    model: Option<(&'a Path, Model)>,
+    without: &'a [Identifier],
+    form: Form,
+    trust: Trust,
+    strict: bool,
+    group_by: Option<&'a GroupBy>,
+    gas: Option<&'a Path>,
+}
+
+impl<'a> Question<'a> {
+    fn of(command: &'a Batch) -> Result<Self, Failure> {
+        let usage = |text: &str| Err(Failure::Usage(text.to_owned()));
+        let verb = command.verb;
+        if verb == Verb::Compensate && command.group_by.is_some() {
+            return usage("--group-by with --verb compensate: the gas is each record's own; leave --group-by out");
+        }
+        if verb != Verb::Compensate && command.gas.is_some() {
+            return usage("--gas needs --verb compensate");
+        }
+        if verb == Verb::Diagnose && command.model.is_some() {
+            return usage(
+                "--model with --verb diagnose: a diagnosis finds the model; use --verb characterise or compensate",
+            );
+        }
+        if verb == Verb::Characterise && !command.without.is_empty() {
+            return usage("--without needs --verb diagnose or compensate: two lags have no effects");
+        }
+        let model =
+            command.model.as_deref().map(|path| Ok::<_, Failure>((path, characterise::model(path)?))).transpose()?;
+        let question = Self {
+            verb,
+            profile: command.columns.profile()?,
+            options: command.method.options()?,
+            physics: &command.physics,
+            model,
+            without: &command.without,
+            form: command.form,
+            trust: command.trust,
+            strict: command.method.strict,
+            group_by: command.group_by.as_ref(),
+            gas: command.gas.as_deref(),
+        };
+        // What is wrong with the options is wrong with every record.
+        question.physics.plausibility(&[])?;
+        Ok(question)
+    }
+
+    /// All of it, for the journal.
+    fn asked(&self) -> Value {
+        json!({
+            "verb": RowVerb::from(self.verb),
+            "group_by": self.group_by.map(ToString::to_string),
+            "profile": self.profile.text().unwrap_or_default(),
+            "options": self.options,
+            "physics": format!("{:?}", self.physics),
+            "model": self.model.as_ref().map(|(_, model)| model),
+            "without": self.without,
+            "form": self.form,
+            "trust": format!("{:?}", self.trust),
+            "strict": self.strict,
+            "gas": self.gas,
+        })
+    }
+
+    fn unit_name(&self) -> &'static str {
+        if self.group_by.is_some() { "rigs" } else { "records" }
+    }
+
+    fn units(&self, files: Vec<PathBuf>, options: &twinlag_batch::Options, console: Console) -> Vec<Unit> {
+        let Some(by) = self.group_by else { return each(files) };
+        let bar = progress::bar(console).with_message("reading the names of rigs");
+        let rig = |file: &PathBuf| rig_by_path(file, by).unwrap_or_else(|| self.rig_by_column(file, by));
+        let rigs = map(&files, options, rig, |progress| {
+            bar.set_length(progress.total as u64);
+            bar.set_position(progress.done as u64);
+        });
+        bar.finish_and_clear();
+        grouped(files, rigs)
+    }
+
+    fn rig_by_column(&self, file: &Path, by: &GroupBy) -> Result<String, String> {
+        let GroupBy::Column(name) = by else { return Err(format!("nothing is known of {by}")) };
+        let table = table_watched(file, &self.profile.choice, SILENT).map_err(|failure| failure.to_string())?;
+        let column = name.parse().unwrap_or_else(|_| ColumnRef::Name(name.clone()));
+        let index = table.find(&column).map_err(|error| error.to_string())?;
+        table.constant(index).ok_or_else(|| {
+            format!("column {name} is not the same in all rows, so it does not say which rig the record is of")
+        })
+    }
+
+    /// Where the gas temperature of each file goes: to its own path below the folder that all files share.
+    fn gas_files(&self, units: &[Unit]) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+        let Some(folder) = self.gas else { return Ok(BTreeMap::new()) };
+        let files: Vec<&Path> = units.iter().flat_map(Unit::files).map(PathBuf::as_path).collect();
+        let shared = files.iter().filter_map(|file| file.parent()).map(Path::to_owned).reduce(|a, b| shared(&a, &b));
+        let shared = shared.unwrap_or_default();
+        let mut gas_files = BTreeMap::new();
+        let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+        for file in files {
+            let gas = folder.join(file.strip_prefix(&shared).unwrap_or(file)).with_extension("gas.csv");
+            if let Some(other) = taken.insert(gas.clone(), file) {
+                return Err(Failure::Usage(format!(
+                    "{} and {} would have the same file of gas temperature, {}: run them apart",
+                    other.display(),
+                    file.display(),
+                    gas.display()
+                )));
+            }
+            gas_files.insert(file.to_owned(), gas);
+        }
+        Ok(gas_files)
+    }
+
+    /// The rows of a unit.
+    fn rows(&self, unit: &Unit, gas_files: &BTreeMap<PathBuf, PathBuf>) -> Vec<Row> {
+        match unit {
+            Unit::Rig { name, files } => self.rows_of_rig(unit, name, files),
+            unit => {
+                let file = &unit.files()[0];
+                let rows = self.read(file).and_then(|record| self.ask(unit, vec![record], gas_files.get(file)));
+                rows.unwrap_or_else(|failure| vec![without_answer(unit, file, &failure)])
+            }
+        }
+    }
+
+    fn rows_of_rig(&self, unit: &Unit, name: &str, files: &[PathBuf]) -> Vec<Row> {
+        let (mut records, mut rows) = (Vec::new(), Vec::new());
+        for file in files {
+            match self.read(file) {
+                Ok(record) => records.push(record),
+                Err(failure) => rows.push(without_answer(unit, file, &failure)),
+            }
+        }
+        let count = records.len();
+        let of_rig = if count == 0 {
+            vec![Row::rig_without_answer(name, 0, 3, "none of its files can be used")]
+        } else {
+            self.ask(unit, records, None).unwrap_or_else(|failure| {
+                vec![Row::rig_without_answer(name, count, failure.exit_code(), &failure.to_string())]
+            })
+        };
+        rows.splice(..0, of_rig);
+        // The rig first, which has no file.
+        rows.sort_by(|a, b| a.get_text("file").cmp(&b.get_text("file")));
+        rows
+    }
+
+    fn read(&self, file: &Path) -> Result<Record, Failure> {
+        read_watched(file, &self.profile, SILENT)
+    }
+
+    /// The rows of what the records of a unit answer.
+    fn ask(&self, unit: &Unit, records: Vec<Record>, gas_file: Option<&PathBuf>) -> Result<Vec<Row>, Failure> {
+        let records = several::of_one_rig(records, &self.profile, SILENT)?;
+        let plausibility = self.physics.plausibility(&records)?;
+        let options = self.options.clone();
+        let diagnose = |characterise| DiagnoseOptions {
+            characterise,
+            without: self.without.to_vec(),
+            ..DiagnoseOptions::default()
+        };
+        Ok(match self.verb {
+            Verb::Characterise => {
+                let model = self.model.as_ref().map(|(path, model)| (*path, model));
+                let run = |options: Options| characterise::ask(&records, model, &options, SILENT);
+                let answer: Characterisation = plausibility.answer(options, run, |answer| answer)?;
+                Row::of(unit, characterise::exit_code(&answer, self.strict), &Answer::Characterisation(&answer))
+            }
+            Verb::Diagnose => {
+                let run = |options: Options| diagnose::ask(&records, &diagnose(options), SILENT);
+                let answer: Diagnosis = plausibility.answer(options, run, |answer| &mut answer.last)?;
+                Row::of(unit, diagnose::exit_code(&answer, self.strict), &Answer::Diagnosis(&answer))
+            }
+            Verb::Compensate => {
+                let run = |options: Options| {
+                    let options = CompensateOptions {
+                        diagnose: diagnose(options),
+                        model: self.model.as_ref().map(|(_, model)| model.clone()),
+                        form: self.form,
+                        trusted: usize::from(self.trust == Trust::T2),
+                    };
+                    compensate::ask(&records[0], &options, SILENT)
+                };
+                let answer: Compensation = plausibility.answer(options, run, |answer| &mut answer.last)?;
+                let rows = Row::of(unit, compensate::exit_code(&answer, self.strict), &Answer::Compensation(&answer));
+                match gas_file.filter(|_| answer.gas.is_some()) {
+                    Some(path) => {
+                        write_gas(&answer, path)?;
+                        rows.into_iter().map(|row| row.with_gas_file(path)).collect()
+                    }
+                    None => rows,
+                }
+            }
+        })
+    }
+}
+
+fn write_gas(answer: &Compensation, path: &Path) -> Result<(), Failure> {
+    if let Some(folder) = path.parent() {
+        let wrong = |error| Failure::Other(format!("{}: cannot be created: {error}", folder.display()));
+        fs::create_dir_all(folder).map_err(wrong)?;
+    }
+    compensate::write_gas(answer, path, false)
+}
+
+fn without_answer(unit: &Unit, file: &Path, failure: &Failure) -> Row {
+    Row::without_answer(unit, file, failure.exit_code(), &failure.to_string())
+}
+
+/// The folder that holds both.
+fn shared(one: &Path, other: &Path) -> PathBuf {
+    one.components().zip(other.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}
+
+fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(ending);
+    name.into()
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|is| is.eq_ignore_ascii_case(ending))
+}
+
+fn is_parquet(path: &Path) -> bool {
+    has_ending(path, "parquet")
+}
+
+/// Says what came of it.
+fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console) -> Result<(), Failure> {
+    let counts = &fleet.units;
+    if console.json {
+        return print::json(&json!({
+            "schema": "twinlag.batch/1",
+            "out": command.out,
+            "units": question.unit_name(),
+            "answered": counts.answered,
+            "undetermined": counts.undetermined,
+            "unusable": counts.unusable,
+            "failed": counts.failed,
+            "unusable_files": fleet.unusable_files,
+            "contradicting_records": fleet.contradicting.len(),
+        }));
+    }
+    let names: Vec<String> = command.out.iter().map(|out| out.display().to_string()).collect();
+    let mut lines = vec![format!(
+        "{}: {} {}: {} answered, {} undetermined, {} unusable, {} failed",
+        names.join(", "),
+        counts.total(),
+        question.unit_name(),
+        counts.answered,
+        counts.undetermined,
+        counts.unusable,
+        counts.failed
+    )];
+    lines.extend(fleet.verdicts.iter().map(|(verdict, count)| format!("  {count} {verdict}")));
+    let reasons = fleet.reasons.iter().take(REASONS);
+    lines.extend(reasons.map(|reason| format!("  {} without an answer: {}", reason.count, reason.reason)));
+    if fleet.reasons.len() > REASONS {
+        lines.push(format!("  and {} other reasons: see column reason", fleet.reasons.len() - REASONS));
+    }
+    print::on_stdout(&(lines.join("\n") + "\n"))
+}
+
+/// Reasons that are said on the console.
+const REASONS: usize = 5;
+
+/// A batch whose outputs are there depends on how the program was called.
+impl From<BatchError> for Failure {
+    fn from(error: BatchError) -> Self {
+        let text = error.to_string();
+        match error {
+            BatchError::Exists { .. } => Self::Usage(format!("{text} (options --resume, --force)")),
+            BatchError::OtherQuestion { .. } => Self::Usage(format!("{text} (option --force)")),
+            BatchError::Pattern { .. } | BatchError::GroupBy { .. } => Self::Usage(text),
+            BatchError::NothingFound { .. } | BatchError::CannotList { .. } | BatchError::Damaged { .. } => {
+                Self::File(text)
+            }
+            _ => Self::Other(text),
+        }
+    }
+}

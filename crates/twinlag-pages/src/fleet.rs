@@ -1,0 +1,194 @@
+//! A batch as a page: how many answered, why others did not, both time constants of all of them, and which lie apart.
+
+use twinlag_batch::{Fleet, Member, MemberTau};
+use twinlag_report::{Axis, Chart, Document, Figure, KeyNumber, ReportError, Series, Table, Tone, between, rounded};
+
+use crate::Making;
+use crate::figures::{self, CHANNELS, chart};
+use crate::making::file_name;
+use crate::words::listed;
+
+/// Up to so many members each has its error bar; more of them would be a grey area.
+const MAX_ERROR_BARS: usize = 300;
+/// Members in the table of those that lie apart.
+const APART: usize = 10;
+/// Rows of the tables of reasons and of contradictions.
+const MAX_ROWS: usize = 50;
+/// A normal distribution's standard deviation over its median absolute deviation, and over the half width of its 95 % interval.
+const STD_OVER_MAD: f64 = 1.4826;
+const STD_OVER_HALF_95: f64 = 1.0 / 1.96;
+
+/// The summary of a batch: an HTML page that needs no other file. Equal summaries give equal bytes.
+///
+/// - `unit`: what was asked, in the plural: records, or rigs
+/// - `made_by`: the program, with its version
+///
+/// # Errors
+/// [`ReportError`] if something cannot be drawn.
+pub fn fleet_report(
+    fleet: &Fleet,
+    title: &str,
+    unit: &str,
+    made_by: [&str; 2],
+    making: &Making,
+) -> Result<String, ReportError> {
+    let counts = &fleet.units;
+    let tone = match () {
+        () if counts.answered == counts.total() => Tone::Good,
+        () if counts.answered > 0 => Tone::Caution,
+        () => Tone::Bad,
+    };
+    let grade = format!("{} of {}", counts.answered, counts.total());
+    let document = Document::new(format!("Batch {}", file_name(title)))
+        .byline(making.byline(&[format!("{} {unit}", counts.total())]))
+        .verdict(tone, grade, sentence(fleet, unit))
+        .key_numbers(keys(fleet));
+    let document = time_constants(document, fleet)?;
+    let document = found(document, fleet, unit);
+    let document = apart(document, fleet);
+    let document = contradictions(document, fleet);
+    let document = reasons(document, fleet);
+    let [program, version] = made_by;
+    Ok(making.page(&making.reproduction(document, program, version)))
+}
+
+fn sentence(fleet: &Fleet, unit: &str) -> String {
+    let counts = &fleet.units;
+    let mut parts = vec![format!("{} {unit} gave an answer", counts.answered)];
+    let rest = [
+        (counts.undetermined, "were read but do not determine what was asked"),
+        (counts.unusable, "cannot be used"),
+        (counts.failed, "met a fault of the program"),
+    ];
+    parts.extend(rest.into_iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
+    format!("{}.", listed(&parts))
+}
+
+/// Medians of both time constants, and how far members scatter.
+fn keys(fleet: &Fleet) -> Vec<KeyNumber> {
+    let key = |i: usize| {
+        let given = given(fleet, i);
+        let values: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
+        let value = median(values.clone())?;
+        let range = [quantile(values.clone(), 0.025)?, quantile(values, 0.975)?];
+        Some(KeyNumber {
+            name: format!("T{}, median of {}", i + 1, given.len()),
+            value: format!("{} s", rounded(value, 4)),
+            interval: format!("95 % of them {} s", between(range)),
+            grade: (Tone::Good, "of those given".to_owned()),
+        })
+    };
+    (0..2).filter_map(key).collect()
+}
+
+fn time_constants(document: Document, fleet: &Fleet) -> Result<Document, ReportError> {
+    let panel = |i: usize| -> Option<Chart> {
+        let given = given(fleet, i);
+        let place: Vec<f64> = given.iter().map(|(place, _)| (place + 1) as f64).collect();
+        let value: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
+        let [low, high] = [0, 1].map(|end| given.iter().map(|(_, tau)| tau.interval_95_s[end]).collect::<Vec<_>>());
+        let (axis, outside) = figures::robust_axis("time constant (s)", value.iter().copied());
+        let series = if given.len() <= MAX_ERROR_BARS {
+            Series::points("", place, value).interval(low, high)
+        } else {
+            Series::trace("", place, value)
+        };
+        let series = (!given.is_empty()).then(|| series.colour(CHANNELS[i]));
+        chart(format!("T{}{outside}", i + 1), [Axis::linear("in the order of the table"), axis], [series])
+    };
+    let panels: Vec<Chart> = (0..2).filter_map(panel).collect();
+    if panels.is_empty() {
+        return Ok(document);
+    }
+    let figure =
+        panels.into_iter().fold(Figure::new("").columns(1).panel_size(figures::WIDTH_PX, 220.0).live(), Figure::panel);
+    let bars = if fleet.members.len() <= MAX_ERROR_BARS { " Bars are 95 % intervals." } else { "" };
+    document.heading("Both time constants").drawing(
+        figure,
+        format!("Time constants that are given, in the order of the table.{bars} What is graded no-go is left out."),
+    )
+}
+
+fn found(document: Document, fleet: &Fleet, unit: &str) -> Document {
+    if fleet.verdicts.is_empty() {
+        return document;
+    }
+    let table = |counts: &[(String, usize)], what: &str| {
+        let row = |table: Table, (name, count): &(String, usize)| table.row([name.clone(), count.to_string()]);
+        counts.iter().take(MAX_ROWS).fold(Table::new([what, unit]), row)
+    };
+    let document = document.heading("What was found").table(table(&fleet.verdicts, "verdict"));
+    if fleet.effects.is_empty() { document } else { document.table(table(&fleet.effects, "effect")) }
+}
+
+/// Members whose time constants lie furthest from the median, in units of how far members scatter and of their own uncertainty.
+fn apart(document: Document, fleet: &Fleet) -> Document {
+    let mut distances: Vec<(f64, usize, &Member, MemberTau)> = Vec::new();
+    for i in 0..2 {
+        let given = given(fleet, i);
+        let logs: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s.ln()).collect();
+        let Some(middle) = median(logs.clone()) else { continue };
+        let spread = median(logs.iter().map(|log| (log - middle).abs()).collect()).unwrap_or(0.0) * STD_OVER_MAD;
+        distances.extend(given.iter().map(|(place, tau)| {
+            let own = 0.5 * (tau.interval_95_s[1] - tau.interval_95_s[0]) / tau.value_s * STD_OVER_HALF_95;
+            let distance = (tau.value_s.ln() - middle).abs() / spread.hypot(own).max(f64::MIN_POSITIVE);
+            (distance, i, &fleet.members[*place], *tau)
+        }));
+    }
+    if fleet.members.len() <= APART {
+        return document;
+    }
+    distances.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let row = |table: Table, (distance, i, member, tau): &(f64, usize, &Member, MemberTau)| {
+        table.row([
+            file_name(&member.name).to_owned(),
+            format!("T{}", i + 1),
+            format!("{} s", rounded(tau.value_s, 4)),
+            format!("{} s", between(tau.interval_95_s)),
+            rounded(*distance, 3),
+        ])
+    };
+    let header = ["name", "sensor", "time constant", "95 % interval", "distance"];
+    let table = distances.iter().take(APART).fold(Table::new(header), row);
+    document.heading("Which lie apart").table(table.caption(
+        "Time constants furthest from the median of their sensor. The distance is that of the logarithms, in units of the scatter of \
+         all of them and of the number's own standard error together.",
+    ))
+}
+
+fn contradictions(document: Document, fleet: &Fleet) -> Document {
+    if fleet.contradicting.is_empty() {
+        return document;
+    }
+    let row = |table: Table, (rig, file): &(String, String)| table.row([rig.as_str(), file_name(file)]);
+    let table = fleet.contradicting.iter().take(MAX_ROWS).fold(Table::new(["rig", "record"]), row);
+    document.heading("Records that contradict the others of their rig").table(table)
+}
+
+fn reasons(document: Document, fleet: &Fleet) -> Document {
+    if fleet.reasons.is_empty() {
+        return document;
+    }
+    let table = Table::new(["how many", "why, as the first of them says it"]);
+    let row = |table: Table, reason: &twinlag_batch::ReasonCount| {
+        table.row([reason.count.to_string(), reason.reason.clone()])
+    };
+    document.heading("What has no answer").table(fleet.reasons.iter().take(MAX_ROWS).fold(table, row))
+}
+
+/// Members that have a time constant, with their places.
+fn given(fleet: &Fleet, sensor: usize) -> Vec<(usize, MemberTau)> {
+    let members = fleet.members.iter().enumerate();
+    members.filter_map(|(place, member)| Some((place, member.tau[sensor]?))).collect()
+}
+
+fn median(values: Vec<f64>) -> Option<f64> {
+    quantile(values, 0.5)
+}
+
+/// The value below which that share of all lies; `None` without values.
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(values[(share * last as f64).round() as usize])
+}
