@@ -18,7 +18,7 @@ use crate::row::{Cells, Row, Verb};
 use crate::table::columns;
 
 /// Rows that are held until they are written.
-const GROUP_ROWS: usize = 4096;
+const GROUP_ROWS: usize = 512;
 
 impl From<ParquetError> for BatchError {
     fn from(error: ParquetError) -> Self {

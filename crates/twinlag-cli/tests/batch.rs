@@ -189,8 +189,10 @@ fn a_diagnosis_has_a_column_for_each_parameter() {
 
 #[test]
 fn what_cannot_be_asked_is_refused() {
+    fn batch<'a>(further: &[&'a str]) -> Vec<&'a str> {
+        [&["batch", "runs"], further].concat()
+    }
     let bench = fleet("refused");
-    let batch = |further: &[&str]| [&["batch", "runs"], further].concat();
     bench.refuses(2, &batch(&["--out", "table.txt"]), &["table.txt", ".csv or .parquet"]);
     bench.refuses(2, &batch(&["--out", "t.csv", "--group-by", "*.csv"]), &["{rig}"]);
     bench.refuses(2, &batch(&["--out", "t.csv", "--gas", "gas"]), &["--verb compensate"]);
