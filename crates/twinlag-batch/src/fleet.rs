@@ -44,6 +44,8 @@ impl Counts {
 pub struct ReasonCount {
     /// The reason as the first of them has it.
     pub reason: String,
+    /// The first of them.
+    pub first: String,
     /// How many have it.
     pub count: usize,
 }
@@ -106,9 +108,11 @@ impl Fleet {
             for row in &rows {
                 if let Some(reason) = reason_without_answer(row) {
                     let file = row.get_text("file").unwrap_or_default();
-                    let count = reasons
-                        .entry(kind(reason, file))
-                        .or_insert_with(|| ReasonCount { reason: without_file(reason, file), count: 0 });
+                    let count = reasons.entry(kind(reason, file)).or_insert_with(|| ReasonCount {
+                        reason: without_file(reason, file),
+                        first: file.to_owned(),
+                        count: 0,
+                    });
                     count.count += 1;
                 }
                 let is_file = row.get_text("level") == Some("record");

@@ -14,12 +14,13 @@ use twinlag::diagnosis::Identifier;
 use twinlag::record::{ColumnRef, Record};
 use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, GroupBy, Journal, Row, Unit, Verb as RowVerb, each, find, grouped, map,
-    rig_by_path, run as run_units, write_csv, write_parquet,
+    Answer, BatchError, Begin, Fleet, GroupBy, Journal, Member, MemberTau, Row, Unit, Verb as RowVerb, each, find,
+    grouped, map, rig_by_path, run as run_units, write_csv, write_parquet,
 };
 use twinlag_pages::fleet_report;
 
 use crate::arguments::{Columns, Method, Physics, Trust, form};
+use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::profile::Profile;
@@ -459,7 +460,10 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
         counts.unusable,
         counts.failed
     )];
-    lines.extend(fleet.verdicts.iter().map(|(verdict, count)| format!("  {count} {verdict}")));
+    lines.extend(members(fleet));
+    if fleet.members.len() > SHOWN {
+        lines.extend(fleet.verdicts.iter().map(|(verdict, count)| format!("  {count} {verdict}")));
+    }
     let reasons = fleet.reasons.iter().take(REASONS);
     lines.extend(reasons.map(|reason| format!("  {} without an answer: {}", reason.count, reason.reason)));
     if fleet.reasons.len() > REASONS {
@@ -468,8 +472,33 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
     print::on_stdout(&(lines.join("\n") + "\n"))
 }
 
-/// Reasons that are said on the console.
+/// Members that are shown one by one on the console.
+const SHOWN: usize = 20;
+/// Reasons that are said there.
 const REASONS: usize = 5;
+
+/// Both time constants of each member, where there are few.
+fn members(fleet: &Fleet) -> Vec<String> {
+    if fleet.members.is_empty() || fleet.members.len() > SHOWN {
+        return Vec::new();
+    }
+    let has_verdict = fleet.members.iter().any(|member| !member.verdict.is_empty());
+    let cells = |name: &str, taus: [String; 2], verdict: String| {
+        let verdict = Some(verdict).filter(|_| has_verdict);
+        [name.to_owned()].into_iter().chain(taus).chain(verdict).collect::<Vec<String>>()
+    };
+    let header = cells("", ["T1", "T2"].map(str::to_owned), "verdict".to_owned());
+    let row = |member: &Member| {
+        let taus = member.tau.map(|tau| match tau {
+            Some(MemberTau { value_s, interval_95_s: [low, high], .. }) => print::interval(value_s, low, high, " s"),
+            None => "not given".to_owned(),
+        });
+        let effects = if member.effects.is_empty() { String::new() } else { format!(": {}", member.effects) };
+        cells(&member.name, taus, format!("{}{effects}", member.verdict))
+    };
+    let rows: Vec<Vec<String>> = [header].into_iter().chain(fleet.members.iter().map(row)).collect();
+    columns(&rows, |_| true).into_iter().map(|line| format!("  {line}")).collect()
+}
 
 /// A batch whose outputs are there depends on how the program was called.
 impl From<BatchError> for Failure {

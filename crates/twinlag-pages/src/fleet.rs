@@ -169,9 +169,9 @@ fn reasons(document: Document, fleet: &Fleet) -> Document {
     if fleet.reasons.is_empty() {
         return document;
     }
-    let table = Table::new(["how many", "why, as the first of them says it"]);
+    let table = Table::new(["first file", "how many", "why, as the first of them says it"]);
     let row = |table: Table, reason: &twinlag_batch::ReasonCount| {
-        table.row([reason.count.to_string(), reason.reason.clone()])
+        table.row([file_name(&reason.first).to_owned(), reason.count.to_string(), reason.reason.clone()])
     };
     document.heading("What has no answer").table(fleet.reasons.iter().take(MAX_ROWS).fold(table, row))
 }
