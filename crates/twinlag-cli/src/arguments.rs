@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use twinlag::compensation::Form;
 use twinlag::convection::Flow;
 use twinlag::diagnosis::Identifier;
@@ -27,7 +28,7 @@ use crate::study::Study;
 #[derive(Debug, Parser)]
 #[command(
     name = "twinlag",
-    version,
+    version = env!("TWINLAG_VERSION"),
     after_help = "\
 Try it without a file:    twinlag demo
 See how a file is read:   twinlag inspect run.csv
@@ -40,6 +41,7 @@ Follow changing flow:     twinlag track run.csv --out tau.csv
 Many files, one table:    twinlag batch runs/ --out table.csv
 Plan the next record:     twinlag plan rig.toml
 Use it in a script:       twinlag characterise run.csv --json
+Keep options in a file:   twinlag diagnose run.csv --config lab.toml
 
 Exit codes: 0 answered, 2 wrong usage, 3 the file cannot be used, 4 the data cannot answer the question,
 75 try again (a shard of a study is missing), 1 any other error."
@@ -53,6 +55,9 @@ pub(crate) struct Arguments {
     /// Print no notes and no progress on standard error; errors are still printed.
     #[arg(long, global = true)]
     quiet: bool,
+    /// Take options from this file where the command line does not give them.
+    #[arg(long, global = true, value_name = "TOML")]
+    config: Option<PathBuf>,
 }
 
 impl Arguments {
@@ -90,6 +95,22 @@ pub(crate) enum Command {
     /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no
     /// file.
     Demo(Demo),
+    /// Print a script with which a shell completes commands and options.
+    #[command(after_help = "\
+bash:        twinlag completions bash > ~/.local/share/bash-completion/completions/twinlag
+zsh:         twinlag completions zsh > a file _twinlag in a folder of $fpath
+fish:        twinlag completions fish > ~/.config/fish/completions/twinlag.fish
+PowerShell:  twinlag completions powershell >> $PROFILE")]
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Write the manual as pages for `man`, one for each command.
+    Man {
+        /// The folder for the pages, created if necessary.
+        #[arg(long, value_name = "FOLDER")]
+        out: PathBuf,
+    },
 }
 
 /// Estimate both time constants of a record, or of several of one rig.
@@ -440,9 +461,9 @@ pub(crate) struct Method {
     noise_colour: NoiseColour,
     /// One of whitened, cross-relation, bias-compensated, normalised, hybrid,
     /// difference-equation-ls, difference-equation-tls, difference-equation-gtls.
-    #[arg(long, value_name = "NAME", default_value = "whitened")]
+    #[arg(long, value_name = "NAME", default_value = "whitened", help_heading = "Research")]
     estimator: Estimator,
-    #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt", help = optimisers())]
+    #[arg(long, value_name = "NAME", default_value = "levenberg-marquardt", help = optimisers(), help_heading = "Research")]
     optimiser: String,
     /// Also fit the calibration of channel 2 relative to channel 1: gain, offset or gain,offset.
     #[arg(long, value_name = "LIST")]
@@ -459,22 +480,22 @@ pub(crate) struct Method {
     known: Vec<Known>,
     /// Samples that the cross-relation, bias-compensated, normalised and hybrid estimators leave
     /// out at the start of each unbroken stretch.
-    #[arg(long, value_name = "K0")]
+    #[arg(long, value_name = "K0", help_heading = "Research")]
     discard: Option<usize>,
     /// How the gas is assumed to move between samples: auto, zero-order-hold, first-order-hold or
     /// bilinear.
-    #[arg(long, value_name = "HOW", default_value = "auto")]
+    #[arg(long, value_name = "HOW", default_value = "auto", help_heading = "Research")]
     hold: Hold,
     /// How to find 95 % intervals: auto (from standard errors, or from the profile of the cost
     /// where standard errors do not describe it), profile, or bootstrap (by repeating the estimate
     /// on simulated records).
-    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = ["auto", "profile", "bootstrap"])]
+    #[arg(long, value_name = "HOW", default_value = "auto", value_parser = ["auto", "profile", "bootstrap"], help_heading = "Research")]
     intervals: String,
     /// Number of simulated records of the bootstrap, at least 39 [default: 199].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Research")]
     replicates: Option<usize>,
     /// Seed of the bootstrap [default: 1].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Research")]
     seed: Option<u64>,
     /// Also print numbers that are graded no-go, each marked as such: they may be far off.
     #[arg(long, help_heading = "Grades")]

@@ -129,7 +129,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         _ => Begin::New,
     };
     let mut journal = Journal::open(&journal_path, &question.asked(), begin)?;
-    let units = question.units(files, &options, console);
+    let units = question.units(files, options, console);
     let gas_files = question.gas_files(&units)?;
 
     // What a panic says is in the row of its file.
@@ -273,11 +273,11 @@ impl<'a> Question<'a> {
         if self.group_by.is_some() { "rigs" } else { "records" }
     }
 
-    fn units(&self, files: Vec<PathBuf>, options: &twinlag_batch::Options, console: Console) -> Vec<Unit> {
+    fn units(&self, files: Vec<PathBuf>, options: twinlag_batch::Options, console: Console) -> Vec<Unit> {
         let Some(by) = self.group_by else { return each(files) };
         let bar = progress::bar(console).with_message("reading the names of rigs");
         let rig = |file: &PathBuf| rig_by_path(file, by).unwrap_or_else(|| self.rig_by_column(file, by));
-        let rigs = map(&files, options, rig, |progress| {
+        let rigs = map(&files, &options, rig, |progress| {
             bar.set_length(progress.total as u64);
             bar.set_position(progress.done as u64);
         });

@@ -6,6 +6,7 @@ use twinlag::record::{RecordError, Setting as ReaderSetting};
 use twinlag_files::FileError;
 use twinlag_pages::ReportError;
 
+use crate::excerpt::excerpt;
 use crate::settings::{options, reader_option};
 
 /// An error, by its exit code.
@@ -13,6 +14,12 @@ use crate::settings::{options, reader_option};
 pub(crate) enum Failure {
     Usage(String),
     File(String),
+    /// The file cannot be used, because of one line.
+    Line {
+        text: String,
+        /// The line as it stands in the file.
+        excerpt: String,
+    },
     Other(String),
     /// The data were read, but cannot answer the question.
     Undetermined(String),
@@ -24,11 +31,16 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
-            Self::File(_) => 3,
+            Self::File(_) | Self::Line { .. } => 3,
             Self::Other(_) => 1,
             Self::Undetermined(_) => 4,
             Self::NotYet(_) => 75,
         }
+    }
+
+    /// The line of the file that the message is about, to be shown below it.
+    pub(crate) fn excerpt(&self) -> Option<&str> {
+        if let Self::Line { excerpt, .. } = self { Some(excerpt) } else { None }
     }
 
     /// The failure of a verb on the record in `file`; a message about its readings begins with that name.
@@ -47,6 +59,7 @@ impl fmt::Display for Failure {
         match self {
             Self::Usage(text)
             | Self::File(text)
+            | Self::Line { text, .. }
             | Self::Other(text)
             | Self::Undetermined(text)
             | Self::NotYet(text) => f.write_str(text),
@@ -100,7 +113,10 @@ impl From<RecordError> for Failure {
             RecordError::BadPeriod { .. } | RecordError::TimeAndPeriod { .. } | RecordError::SameColumn { .. } => {
                 Self::Usage(text)
             }
-            _ => Self::File(text),
+            _ => match error.line().and_then(|(file, line)| excerpt(file, line)) {
+                Some(excerpt) => Self::Line { text, excerpt },
+                None => Self::File(text),
+            },
         }
     }
 }

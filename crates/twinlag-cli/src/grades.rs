@@ -1,5 +1,6 @@
 //! Grades on the console, and in the exit code.
 
+use anstyle::{AnsiColor, Effects};
 use twinlag::diagnosis::{Grade, Judgement};
 
 /// The exit code of an answer: 4 where what was asked for may not be used.
@@ -29,11 +30,22 @@ pub(crate) fn strictly(strict: bool, code: impl Fn(bool) -> u8) -> u8 {
 /// A number with its grade.
 pub(crate) fn graded(number: Option<String>, judgement: &Judgement) -> String {
     match (number, judgement.grade) {
-        (None, _) => "not given".into(),
-        (Some(number), Grade::Go) => format!("{number}  go"),
-        (Some(number), Grade::Conditional) => format!("{number}  conditional"),
-        (Some(number), _) => format!("{number}  NO-GO"),
+        (None, grade) => painted("not given", grade),
+        (Some(number), Grade::Go) => format!("{number}  {}", painted("go", Grade::Go)),
+        (Some(number), Grade::Conditional) => format!("{number}  {}", painted("conditional", Grade::Conditional)),
+        (Some(number), grade) => format!("{number}  {}", painted("NO-GO", grade)),
     }
+}
+
+/// Text in the colour of a grade. Where it is no terminal that it goes to, [`crate::print::on_stdout`] takes the colour out.
+pub(crate) fn painted(text: &str, grade: Grade) -> String {
+    let colour = match grade {
+        Grade::Go => AnsiColor::Green,
+        Grade::Conditional => AnsiColor::Yellow,
+        _ => AnsiColor::Red,
+    };
+    let style = colour.on_default().effects(Effects::BOLD);
+    format!("{style}{text}{style:#}")
 }
 
 /// Why numbers are not simply `go`, and what intervals cover beside noise, each reason once with the names of the numbers that it is of.

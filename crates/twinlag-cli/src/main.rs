@@ -12,15 +12,18 @@ mod batch;
 mod characterise;
 mod columns;
 mod compensate;
+mod config;
 mod console;
 mod demo;
 mod diagnose;
+mod excerpt;
 mod explain;
 mod failure;
 mod grades;
 mod if_known;
 mod inspect;
 mod live;
+mod manual;
 mod output;
 mod plan;
 mod print;
@@ -41,12 +44,24 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::arguments::{Arguments, Command};
+use crate::failure::Failure;
 
 fn main() -> ExitCode {
     twinlag_memory::give_back_large();
-    let arguments = Arguments::parse();
+    match run() {
+        Ok(code) => ExitCode::from(code),
+        Err(failure) => {
+            eprintln!("twinlag: {failure}");
+            failure.excerpt().iter().for_each(|line| eprintln!("{line}"));
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}
+
+fn run() -> Result<u8, Failure> {
+    let arguments = Arguments::parse_from(config::with_config(std::env::args_os().collect())?);
     let console = arguments.console();
-    let result = match arguments.command {
+    match arguments.command {
         Command::Characterise(command) => characterise::run(&command, console),
         Command::Diagnose(command) => diagnose::run(&command, console),
         Command::Compensate(command) => compensate::run(&command, console),
@@ -58,12 +73,7 @@ fn main() -> ExitCode {
         Command::Study(command) => study::run(&command, console),
         Command::Explain(command) => explain::run(&command, console),
         Command::Demo(command) => demo::run(&command, console),
-    };
-    match result {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            eprintln!("twinlag: {failure}");
-            ExitCode::from(failure.exit_code())
-        }
+        Command::Completions { shell } => manual::completions(shell),
+        Command::Man { out } => manual::pages(&out, console),
     }
 }

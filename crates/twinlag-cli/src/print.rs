@@ -3,6 +3,8 @@
 use std::io::{Write, stdout};
 use std::path::Path;
 
+use anstream::adapter::strip_str;
+use anstream::{AutoStream, ColorChoice};
 use serde::Serialize;
 use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Value, Verdict};
 use twinlag::estimate::IntervalBasis;
@@ -28,8 +30,13 @@ pub(crate) fn json(value: &impl Serialize) -> Result<(), Failure> {
     on_stdout(&(text + "\n"))
 }
 
-/// Prints an answer on standard output. A reader that has closed it has read enough.
+/// Prints an answer on standard output. A reader that has closed it has read enough. Colours are left to terminals, and obey
+/// `NO_COLOR` and `CLICOLOR_FORCE`.
 pub(crate) fn on_stdout(text: &str) -> Result<(), Failure> {
+    let text = match AutoStream::choice(&stdout()) {
+        ColorChoice::Never => strip_str(text).to_string(),
+        _ => text.to_owned(),
+    };
     let written = UntilClosed::new(stdout()).write_all(text.as_bytes());
     written.map_err(|e| Failure::Other(format!("standard output: {e}")))
 }

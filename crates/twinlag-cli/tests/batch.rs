@@ -105,7 +105,7 @@ fn only_what_is_new_or_changed_is_asked_again() {
     let batch = ["batch", "runs/*.csv", "--out", "table.csv", "--resume"];
     succeeds(&bench.run(&batch));
     let before = rows(&bench, "table.csv");
-    let lines = |bench: &Bench| bench.read("table.csv.journal").iter().filter(|byte| **byte == b'\n').count();
+    let lines = |bench: &Bench| String::from_utf8(bench.read("table.csv.journal")).expect("UTF-8").lines().count();
     assert_eq!(lines(&bench), 1 + 4);
     bench.write("runs/empty.csv", Trace { seed: 4, ..Trace::GOOD }.csv());
     bench.write("runs/c.csv", Trace { seed: 5, ..Trace::GOOD }.csv());

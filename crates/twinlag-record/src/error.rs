@@ -283,6 +283,44 @@ impl RecordError {
     }
 }
 
+impl RecordError {
+    /// The name of the file and the line in it that the message is about, from 1; `None` where it is about no line.
+    ///
+    /// ```
+    /// use twinlag_record::Table;
+    ///
+    /// let error = Table::read(b"time,T1,T2\n0,20,20\n1,21\n", "run.csv").expect_err("a cell is missing");
+    /// assert_eq!(error.line(), Some(("run.csv", 3)));
+    /// ```
+    pub fn line(&self) -> Option<(&str, usize)> {
+        match self {
+            Self::EncodingChanges { file, line }
+            | Self::OneColumn { file, line }
+            | Self::DecimalCommaBetweenCommas { file, line, .. }
+            | Self::WholeNumbersWithoutHeader { file, line, .. }
+            | Self::ThousandsOrDecimal { file, line, .. }
+            | Self::MixedDecimals { file, comma_line: line, .. }
+            | Self::CellCount { file, line, .. }
+            | Self::BadHeader { file, line, .. }
+            | Self::SecondMeasurement { file, line }
+            | Self::OpenQuote { file, line } => Some((file, *line)),
+            Self::NotANumber { file, at, .. }
+            | Self::TextColumn { file, at, .. }
+            | Self::BadFlow { file, at, .. }
+            | Self::BadPosition { file, at, .. }
+            | Self::NotATime { file, at, .. }
+            | Self::AmbiguousDate { file, at, .. }
+            | Self::MissingTime { file, at, .. }
+            | Self::TimeNotIncreasing { file, at, .. }
+            | Self::OutOfRange { file, at, .. } => match at {
+                Place::Line(line) => Some((file, *line)),
+                Place::Sample(_) => None,
+            },
+            _ => None,
+        }
+    }
+}
+
 fn example_of_columns(example: &[(Setting, usize)]) -> String {
     match example {
         [(_, first), (_, second)] => format!(", for example {first} and {second}"),

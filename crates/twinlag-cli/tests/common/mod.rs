@@ -108,9 +108,18 @@ impl Bench {
     }
 
     pub(crate) fn run_with_input(&self, arguments: &[&str], input: &[u8]) -> Answer {
+        self.run_with(arguments, input, &[])
+    }
+
+    pub(crate) fn run_in_environment(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Answer {
+        self.run_with(arguments, b"", variables)
+    }
+
+    fn run_with(&self, arguments: &[&str], input: &[u8], variables: &[(&str, &str)]) -> Answer {
         let mut child = Command::new(env!("CARGO_BIN_EXE_twinlag"))
             .args(arguments)
             .current_dir(&self.dir)
+            .envs(variables.iter().copied())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

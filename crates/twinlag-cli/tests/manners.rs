@@ -1,0 +1,72 @@
+//! What a program owes its users beside answers: its version, completions, a manual, options from a file, colours where they are
+//! wanted, the line that a message is about.
+
+mod common;
+
+use common::{Bench, Trace};
+
+#[test]
+fn options_come_from_a_file_where_the_command_line_does_not_give_them() {
+    let bench = Bench::with("config", "run.csv", Trace::GOOD.csv());
+    bench.write(
+        "lab.toml",
+        "known = [\"T1=0.12s\"]\nquiet = true\n[characterise]\nfree = \"offset\"\n[diagnose]\nwithout = \"delay\"\n",
+    );
+    let options = |further: &[&str]| {
+        let answer = bench.run(&[&["characterise", "run.csv", "--json", "--config", "lab.toml"], further].concat());
+        assert_eq!(answer.stderr, "", "{answer:#?}");
+        answer.json()["made_by"]["options"].clone()
+    };
+    let typed = bench.run(&["characterise", "run.csv", "--json", "--known", "T1=0.12s", "--free", "offset"]);
+    assert_eq!(options(&[]), typed.json()["made_by"]["options"]);
+    let other = bench.run(&["characterise", "run.csv", "--json", "--known", "T1=0.12s", "--free=gain"]);
+    assert_eq!(options(&["--free=gain"]), other.json()["made_by"]["options"]);
+}
+
+#[test]
+fn a_file_of_options_that_are_none_is_refused() {
+    let bench = Bench::with("wrong_config", "run.csv", Trace::GOOD.csv());
+    for (text, words) in [
+        ("fre = 1", &["lab.toml", "--fre"][..]),
+        ("[diagnose]\nform = 1", &["lab.toml", "[diagnose]", "--form"]),
+        ("[diagnoze]\n", &["lab.toml", "[diagnoze]"]),
+        ("free = {", &["lab.toml", "TOML"]),
+    ] {
+        bench.write("lab.toml", text);
+        bench.refuses(3, &["characterise", "run.csv", "--config", "lab.toml"], words);
+    }
+    bench.refuses(3, &["characterise", "run.csv", "--config", "none.toml"], &["none.toml", "cannot be read"]);
+}
+
+#[test]
+fn the_line_that_a_message_is_about_is_shown() {
+    let mut lines = Trace::GOOD.lines();
+    lines[7] = "0.07,warm,300".to_owned();
+    let bench = Bench::with("excerpt", "run.csv", lines.join("\n"));
+    bench.refuses(3, &["characterise", "run.csv"], &["line 8", "\n  8 | 0.07,warm,300\n"]);
+}
+
+#[test]
+fn colours_are_for_terminals() {
+    let bench = Bench::with("colours", "run.csv", Trace::GOOD.csv());
+    let plain = bench.run(&["characterise", "run.csv"]);
+    assert!(plain.stdout.contains("  go\n") && !plain.stdout.contains('\u{1b}'), "{plain:#?}");
+    let coloured = bench.run_in_environment(&["characterise", "run.csv"], &[("CLICOLOR_FORCE", "1")]);
+    assert!(coloured.stdout.contains("\u{1b}[1m\u{1b}[32mgo\u{1b}[0m"), "{coloured:#?}");
+    let without = bench.run_in_environment(&["characterise", "run.csv"], &[("CLICOLOR_FORCE", "1"), ("NO_COLOR", "1")]);
+    assert_eq!(without.stdout, plain.stdout);
+}
+
+#[test]
+fn shells_and_man_know_every_command() {
+    let bench = Bench::new("manual");
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let answer = bench.run(&["completions", shell]);
+        assert!(answer.code == 0 && answer.stdout.contains("save-profile"), "{answer:#?}");
+    }
+    assert_eq!(bench.run(&["man", "--out", "pages", "--quiet"]).code, 0);
+    for page in ["twinlag", "twinlag-batch", "twinlag-study-run"] {
+        let text = String::from_utf8(bench.read(&format!("pages/{page}.1"))).expect("UTF-8");
+        assert!(text.contains(".TH"), "{page}");
+    }
+}
