@@ -1,8 +1,9 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
-//! `cargo xtask bench`, `cargo xtask profile`, `cargo xtask report`.
+//! `cargo xtask bench`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
 
 mod bench;
 mod ci;
+mod dist;
 mod experiment;
 mod measured;
 mod profile;
@@ -59,6 +60,8 @@ enum Task {
     Bench(bench::Bench),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
+    /// Makes a release archive for a platform, the same to the byte whenever it is made.
+    Dist(dist::Dist),
     /// Opens reports in a browser: console, accessibility, keyboard, print; needs Chromium and Node.js.
     Report(report::Report),
 }
@@ -75,6 +78,7 @@ fn main() -> ExitCode {
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
+        Task::Dist(arguments) => dist::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };
     match result {

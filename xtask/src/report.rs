@@ -48,6 +48,7 @@ fn pages() -> Vec<(&'static str, Vec<&'static str>)> {
         ("several", vec!["diagnose", "offset.csv", "second.csv", "--t1", "T1", "--t2", "T2"]),
         ("gas", vec!["compensate", "offset.csv", "--reference", "Tref", "--out", "gas.csv"]),
         ("track", vec!["track", "good.csv", "--reference", "Tref", "--out", "tau.csv"]),
+        ("batch", vec!["batch", "good.csv", "offset.csv", "second.csv", "--out", "table.csv"]),
         ("nasty", vec!["diagnose", "nasty.csv", "--t1", NASTY, "--t2", NASTIER]),
     ]
 }
