@@ -196,8 +196,8 @@ pub(crate) struct Diagnose {
 /// Reconstruct the gas temperature of a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The output has the columns time_s, gas_C, gas_std_K and grade, with a row for every sample and, on an even grid, for every missing
-one. The standard deviation covers the noise, the high frequencies that the readings do not determine, and the uncertainty
+The output has the columns time_s, gas_C, gas_std_K and grade, then the dates and times of the file and what --keep names, with a
+row for every sample and, on an even grid, for every missing one. The standard deviation covers the noise, the high frequencies that the readings do not determine, and the uncertainty
 of the model's parameters.
 
 The model is the one that `twinlag diagnose` finds, or the one given with --model. The gas is assumed to keep fluctuating as
@@ -214,6 +214,9 @@ pub(crate) struct Compensate {
     /// Write the gas temperature to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
+    /// Write this column of the file as well, as it is; `all` for every one that is not read. Dates and times are kept in any case.
+    #[arg(long, value_name = "COL", value_delimiter = ',')]
+    pub(crate) keep: Vec<ColumnRef>,
     /// Draw the readings, the gas temperature with its band, and the spectra, as one SVG file.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,
@@ -250,8 +253,8 @@ pub(crate) struct Compensate {
 /// Follow both time constants along a record.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The output has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s, tau2_high_s and grade: each time
-constant with its pointwise 95 % band. Both time constants are assumed to change by the same factor, as they do when the flow
+The output has the columns time_s, tau1_s, tau1_low_s, tau1_high_s, tau2_s, tau2_low_s, tau2_high_s and grade, then the dates and
+times of the file and what --keep names: each time constant with its pointwise 95 % band. Both time constants are assumed to change by the same factor, as they do when the flow
 changes. Schwarz's criterion (BIC) chooses among a smooth change with as many coefficients as the record supports, a single
 step, and no change. Whether the ratio of the two stays constant is tested.
 
@@ -271,6 +274,9 @@ pub(crate) struct Track {
     /// Write the time constants to this file; `-` is standard output.
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
+    /// Write this column of the file as well, as it is; `all` for every one that is not read. Dates and times are kept in any case.
+    #[arg(long, conflicts_with = "live", value_name = "COL", value_delimiter = ',')]
+    pub(crate) keep: Vec<ColumnRef>,
     /// Draw both time constants with their bands, as one SVG file.
     #[arg(long, value_name = "SVG")]
     pub(crate) picture: Option<PathBuf>,

@@ -23,6 +23,7 @@ use crate::arguments::{Columns, Method, Physics, Trust, form};
 use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::keep::Kept;
 use crate::profile::Profile;
 use crate::progress;
 use crate::read::{read_watched, table_watched};
@@ -85,6 +86,9 @@ pub(crate) struct Batch {
     /// With --verb compensate: write the gas temperature of each record into this folder.
     #[arg(long, value_name = "FOLDER")]
     gas: Option<PathBuf>,
+    /// With --gas: write this column of each file as well, as it is; `all` for every one that is not read.
+    #[arg(long, value_name = "COL", value_delimiter = ',', requires = "gas")]
+    keep: Vec<ColumnRef>,
     /// Use a model written by `twinlag diagnose --save`, with --verb characterise or compensate.
     #[arg(long, value_name = "JSON", conflicts_with = "group_by")]
     model: Option<PathBuf>,
@@ -212,6 +216,7 @@ struct Question<'a> {
     strict: bool,
     group_by: Option<&'a GroupBy>,
     gas: Option<&'a Path>,
+    keep: &'a [ColumnRef],
 }
 
 impl<'a> Question<'a> {
@@ -246,6 +251,7 @@ impl<'a> Question<'a> {
             strict: command.method.strict,
             group_by: command.group_by.as_ref(),
             gas: command.gas.as_deref(),
+            keep: &command.keep,
         };
         // What is wrong with the options is wrong with every record.
         question.physics.plausibility(&[])?;
@@ -266,6 +272,7 @@ impl<'a> Question<'a> {
             "trust": format!("{:?}", self.trust),
             "strict": self.strict,
             "gas": self.gas,
+            "keep": self.keep.iter().map(ToString::to_string).collect::<Vec<_>>(),
         })
     }
 
@@ -392,7 +399,8 @@ impl<'a> Question<'a> {
                 let rows = Row::of(unit, compensate::exit_code(&answer, self.strict), &Answer::Compensation(&answer));
                 match gas_file.filter(|_| answer.gas.is_some()) {
                     Some(path) => {
-                        write_gas(&answer, path)?;
+                        let kept = Kept::of(&unit.files()[0], &self.profile, self.keep, &records[0], SILENT)?;
+                        write_gas(&answer, kept.as_ref(), path)?;
                         rows.into_iter().map(|row| row.with_gas_file(path)).collect()
                     }
                     None => rows,
@@ -402,12 +410,12 @@ impl<'a> Question<'a> {
     }
 }
 
-fn write_gas(answer: &Compensation, path: &Path) -> Result<(), Failure> {
+fn write_gas(answer: &Compensation, kept: Option<&Kept>, path: &Path) -> Result<(), Failure> {
     if let Some(folder) = path.parent() {
         let wrong = |error| Failure::Other(format!("{}: cannot be created: {error}", folder.display()));
         fs::create_dir_all(folder).map_err(wrong)?;
     }
-    compensate::write_gas(answer, path, false)
+    compensate::write_gas(answer, kept, path, false)
 }
 
 fn without_answer(unit: &Unit, file: &Path, failure: &Failure) -> Row {

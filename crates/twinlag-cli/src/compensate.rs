@@ -11,6 +11,7 @@ use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
+use crate::keep::{Kept, with_kept};
 use crate::output::{self, Views};
 use crate::print;
 use crate::progress::Progress;
@@ -38,7 +39,9 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     };
     let answer = plausibility.answer(asked, run, |answer| &mut answer.last)?;
     if answer.status == Status::Ok {
-        write_gas(&answer, &command.out, to_stdout)?;
+        let profile = command.input.columns.profile()?;
+        let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
+        write_gas(&answer, kept.as_ref(), &command.out, to_stdout)?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::gas_picture(&record, &answer)?)?;
         }
@@ -62,11 +65,18 @@ pub(crate) fn ask(record: &Record, options: &CompensateOptions, console: Console
         .map_err(|error| Failure::in_file(error, &record.source))
 }
 
-/// Writes the gas temperature with its standard deviation and its grade.
-pub(crate) fn write_gas(answer: &Compensation, out: &Path, to_stdout: bool) -> Result<(), Failure> {
+/// Writes the gas temperature with its standard deviation, its grade, and what is kept of the file.
+pub(crate) fn write_gas(
+    answer: &Compensation,
+    kept: Option<&Kept>,
+    out: &Path,
+    to_stdout: bool,
+) -> Result<(), Failure> {
     let columns: [(&str, &[f64]); 3] =
         [("time_s", &answer.time_s), ("gas_C", &answer.gas_c), ("gas_std_K", &answer.gas_std_k)];
-    output::data(out, to_stdout, &columns, ("grade", std::iter::repeat(answer.judgement.grade)))
+    let grades = answer.time_s.iter().map(|_| answer.judgement.grade.to_string());
+    let (header, cells) = with_kept("grade", grades, kept);
+    output::data(out, to_stdout, &columns, (&header, cells))
 }
 
 /// The exit code of a compensation, which is asked for the gas temperature.

@@ -22,6 +22,7 @@ mod failure;
 mod grades;
 mod if_known;
 mod inspect;
+mod keep;
 mod live;
 mod manual;
 mod output;

@@ -95,16 +95,16 @@ pub(crate) fn model(path: &Path, model: &Model) -> Result<(), Failure> {
     write(path, text.map_err(|e| Failure::Other(format!("the model cannot be written as JSON: {e}")))?)
 }
 
-/// Writes a table of numbers, row by row, to a file or to standard output, with one column more.
+/// Writes a table of numbers, row by row, to a file or to standard output, with text after each row.
 ///
-/// - `last`: the name of that column, and its cells
-pub(crate) fn data<T: ToString>(
+/// - `last`: what stands behind the names of the numbers, and behind each row
+pub(crate) fn data(
     out: &Path,
     to_stdout: bool,
     columns: &[(&str, &[f64])],
-    last: (&str, impl Iterator<Item = T>),
+    last: (&str, impl Iterator<Item = String>),
 ) -> Result<(), Failure> {
-    let cells = std::iter::once(last.0.to_owned()).chain(last.1.map(|cell| cell.to_string()));
+    let cells = std::iter::once(last.0.to_owned()).chain(last.1);
     let written = |out: &mut dyn Write, name: &str| {
         let mut rows = WithCells { out: UntilClosed::new(BufWriter::new(out)), cells };
         write_csv(&mut rows, columns, Decimals::Shortest).map_err(|error| match error {

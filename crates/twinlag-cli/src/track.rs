@@ -7,6 +7,7 @@ use crate::characterise::model;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::grades;
+use crate::keep::{Kept, with_kept};
 use crate::live;
 use crate::output::{self, Views};
 use crate::print;
@@ -44,7 +45,10 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
             ("tau2_low_s", &two.low_s),
             ("tau2_high_s", &two.high_s),
         ];
-        output::data(&command.out, to_stdout, &columns, ("grade", answer.grades.iter()))?;
+        let profile = command.input.columns.profile()?;
+        let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
+        let (header, cells) = with_kept("grade", answer.grades.iter().map(ToString::to_string), kept.as_ref());
+        output::data(&command.out, to_stdout, &columns, (&header, cells))?;
         if let Some(path) = views.picture {
             output::write(path, twinlag_pages::track_picture(&answer)?)?;
         }

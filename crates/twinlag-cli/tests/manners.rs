@@ -70,3 +70,41 @@ fn shells_and_man_know_every_command() {
         assert!(text.contains(".TH"), "{page}");
     }
 }
+
+/// A file with dates, a column that is not read, and a row that is missing in the middle.
+#[test]
+fn what_is_not_read_goes_to_the_output_as_it_is() {
+    let lines = Trace::GOOD.lines();
+    let row = |(k, line): (usize, &String)| match k {
+        0 => format!("when,{line},rpm,note"),
+        k => format!("2026-01-31 12:00:{:07.4},{line},{},\"a, {k}\"", 0.002 * (k - 1) as f64, 1500 + k),
+    };
+    let mut rows: Vec<String> = lines.iter().enumerate().map(row).collect();
+    rows.remove(1000);
+    let bench = Bench::with("keep", "run.csv", rows.join("\n"));
+    let time = ["--time", "when", "--t1", "T1", "--t2", "T2"];
+    let out = |further: &[&str]| {
+        let answer =
+            bench.run(&[&["compensate", "run.csv", "--out", "gas.csv", "--force"], &time[..], further].concat());
+        assert_eq!(answer.code, 0, "{answer:#?}");
+        String::from_utf8(bench.read("gas.csv")).expect("UTF-8").lines().map(str::to_owned).collect::<Vec<_>>()
+    };
+    let dates = out(&[]);
+    assert!(
+        dates[0] == "time_s,gas_C,gas_std_K,grade,when" && dates[1].ends_with(",2026-01-31 12:00:00.0000"),
+        "{:?}",
+        &dates[..2]
+    );
+    let all = out(&["--keep", "rpm,note"]);
+    assert_eq!(all[0], "time_s,gas_C,gas_std_K,grade,when,rpm,note");
+    for k in [1, 2, 999, 1001, 1900] {
+        assert!(all[k].ends_with(&format!(",{},\"a, {k}\"", 1500 + k)), "{}", all[k]);
+    }
+    // The sample that is missing has a gas temperature, and nothing else.
+    assert!(all[1000].ends_with(",,,"), "{}", all[1000]);
+    bench.refuses(
+        3,
+        &[&["compensate", "run.csv", "--out", "x.csv", "--keep", "load"], &time[..]].concat(),
+        &["no column 'load'"],
+    );
+}

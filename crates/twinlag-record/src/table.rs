@@ -221,6 +221,23 @@ impl Table {
         })
     }
 
+    /// A cell as text, a number in the shortest form that reads back the same; empty where it is missing.
+    ///
+    /// - `index`, `row`: from 0. Panics if there is no such column or row.
+    ///
+    /// ```
+    /// use twinlag_record::Table;
+    ///
+    /// let table = Table::read(b"when;T1;rpm\n2026-01-31 12:00;20,50;1500\n2026-01-31 12:01;20,75;\n", "run.csv")?;
+    /// assert_eq!([table.cell(0, 1), table.cell(1, 1), table.cell(2, 1)], ["2026-01-31 12:01", "20.75", ""]);
+    /// # Ok::<(), twinlag_record::RecordError>(())
+    /// ```
+    pub fn cell(&self, index: usize, row: usize) -> String {
+        let column = &self.columns[index];
+        let number = || Some(column.values[row]).filter(|value| value.is_finite()).map(|value| value.to_string());
+        column.text(row).map(str::to_owned).or_else(number).unwrap_or_default()
+    }
+
     /// What stands in all rows of a column, if that is the same from the first to the last: a serial number, a name.
     ///
     /// - `index`: from 0. Panics if there is no such column.

@@ -95,6 +95,7 @@ pub use error::Error;
 pub use options::Options;
 pub use plausibility::{Plausibility, TypicalSensor};
 pub use reference::AgainstReference;
+pub use rows::rows_of_samples;
 pub use setting::Setting;
 pub use verbs::{
     CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,

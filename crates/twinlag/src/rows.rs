@@ -57,6 +57,12 @@ impl RowOfSample {
     }
 }
 
+/// The row of a record that each sample of an answer's series is, such as of [`Compensation::time_s`](crate::Compensation::time_s);
+/// `None` of a sample that is missing in the record.
+pub fn rows_of_samples(record: &Record) -> Vec<Option<usize>> {
+    record.grid().without_short(MIN_STRETCH_SAMPLES).rows().collect()
+}
+
 /// Readings, and the row of the record that each is.
 pub(crate) struct Rows {
     pub(crate) observations: Observations,
