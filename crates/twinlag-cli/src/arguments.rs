@@ -18,6 +18,7 @@ use crate::batch::Batch;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::profile::Profile;
+use crate::schema;
 use crate::study::Study;
 
 /// Identifies the dynamics of two temperature sensors from their readings alone.
@@ -104,6 +105,11 @@ PowerShell:  twinlag completions powershell >> $PROFILE")]
     Completions {
         /// The shell.
         shell: Shell,
+    },
+    /// Print the JSON Schema of an answer.
+    Schema {
+        /// Which answer.
+        name: schema::Name,
     },
     /// Write the manual as pages for `man`, one for each command.
     Man {

@@ -33,6 +33,7 @@ mod progress;
 mod read;
 mod records;
 mod report;
+mod schema;
 mod settings;
 mod several;
 mod simulate;
@@ -75,6 +76,7 @@ fn run() -> Result<u8, Failure> {
         Command::Explain(command) => explain::run(&command, console),
         Command::Demo(command) => demo::run(&command, console),
         Command::Completions { shell } => manual::completions(shell),
+        Command::Schema { name } => schema::run(name),
         Command::Man { out } => manual::pages(&out, console),
     }
 }

@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 /// assert!((rough.density_k2_per_hz(2.0) / rough.density_k2_per_hz(0.0) - 0.5).abs() < 1e-12);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "std", derive(Serialize, Deserialize), serde(tag = "kind", rename_all = "kebab-case"))]
 pub enum Term {
     /// First-order noise (Ornstein and Uhlenbeck 1930), autocovariance `σ² exp(−2π f |t|)`: rough,
@@ -106,6 +107,7 @@ impl Term {
 /// The gas: a constant level and a sum of independent [`Term`]s about it.
 #[cfg(feature = "std")]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Prior {
     /// The level, °C.
     pub level_c: f64,

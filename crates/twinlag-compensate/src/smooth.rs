@@ -23,6 +23,7 @@ const STAGE_EVENTS: usize = 4096;
 
 /// Which readings an estimate may use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
     /// All readings of the record, once it is complete.

@@ -55,6 +55,7 @@ pub struct Expected {
 /// What another time constant would take, each with all else as it is: the range in which 95 % of such sensors would have it. `None`
 /// where the correlation does not reach so far.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct WouldTake {
     /// Diameters, m.

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 /// the level that was taken off the readings. What both channels share (a common gain, a common
 /// offset) cannot be seen without knowing the gas temperature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
     /// Time constant of sensor 1, s.

@@ -23,6 +23,7 @@ const PARTS: usize = 8;
 
 /// Scatter of an estimate between parts, in one way to cut the record.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Scatter {
     /// Standard error that the scatter makes, over the one that is stated: 1 on average if the model is right.
@@ -33,6 +34,7 @@ pub struct Scatter {
 
 /// Scatter of an estimate between parts of its record.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PartScatter {
     /// Between eight stretches along the record.

@@ -8,6 +8,7 @@ use twinlag_transform::sine_transform;
 
 /// What of a residual is tested; in text its name in kebab case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TestName {
@@ -62,6 +63,7 @@ impl fmt::Display for TestName {
 
 /// One test of the residual against white noise of unit variance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ResidualTest {
     /// What was tested.
     pub test: TestName,

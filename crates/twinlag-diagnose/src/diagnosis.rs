@@ -15,6 +15,7 @@ use crate::twins::ExactTwin;
 
 /// Whether the model is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Verdict {
@@ -68,6 +69,7 @@ pub struct Found {
 
 /// Neighbouring readings of one channel that are left out of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Masked {
     /// The first and the last of them: samples, counted from 0 through the stretches. In an answer on a record these are
@@ -103,6 +105,7 @@ impl Masked {
 
 /// One number before and after the effects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct BeforeAfter<T> {
     /// With two first-order lags.
     pub before: T,
@@ -113,6 +116,7 @@ pub struct BeforeAfter<T> {
 /// Errors before and after adding the effects. All but `chi2_per_dof` are computed on blocks used
 /// neither to choose effects nor to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct ErrorBudget {
     /// Energy of the whitened residual per degree of freedom, on the whole record.
@@ -127,6 +131,7 @@ pub struct ErrorBudget {
 
 /// The part of the residual that no effect explains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Unexplained {
     /// Description of the residual in words.
@@ -143,6 +148,7 @@ pub struct Unexplained {
 /// The detection limit of an effect that was not found; `Channel` is the place of a channel, 0 or
 /// 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Limit<Channel = usize> {
     /// The effect.

@@ -7,6 +7,7 @@ use crate::candidates::Candidate;
 
 /// Why an effect was added.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Evidence {
     /// Likelihood-ratio statistic, with the noise level free.

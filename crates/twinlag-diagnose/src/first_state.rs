@@ -14,6 +14,7 @@ const BEYOND_DOUBT_LOG_10: f64 = 9.0;
 
 /// What was taken of the first state of a slow body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum FirstStateChoice {
@@ -25,6 +26,7 @@ pub enum FirstStateChoice {
 
 /// The first state of a slow body. Both cases were tried.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct FirstState {
     /// What the numbers of the effect rest on.

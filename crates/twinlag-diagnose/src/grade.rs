@@ -18,6 +18,7 @@ use crate::naming::{hull, interval_95};
 
 /// Whether a number may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Grade {
@@ -394,6 +395,7 @@ pub(crate) fn rounded(deviations: f64) -> String {
 
 /// What an interval covers beside the noise of the readings. Its [`Display`](fmt::Display) is a clause for the reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Covered {
@@ -420,6 +422,7 @@ impl fmt::Display for Covered {
 
 /// The grade of a number, and why.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Judgement {
     /// Whether the number may be used.

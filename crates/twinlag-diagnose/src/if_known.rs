@@ -31,6 +31,7 @@ const SHORTEST_START_STEPS: f64 = 0.05;
 /// What each value of the first time constant would make of the record, where the record alone does not determine both; `Channel`
 /// is the place of a channel, 0 or 1, or its name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct IfKnown<Channel = usize> {
     /// The channel whose time constant is held.
@@ -45,6 +46,7 @@ pub struct IfKnown<Channel = usize> {
 
 /// The record with one time constant held.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Held<Channel = usize> {
     /// The value, s.
@@ -70,6 +72,7 @@ pub struct Held<Channel = usize> {
 
 /// An effect that was found, with its parameters where a time constant is held.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct HeldEffect<Channel = usize> {
     /// The effect.

@@ -13,6 +13,7 @@ use crate::remark::Remark;
 
 /// A change of the model, and why it was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "move", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Move {

@@ -36,6 +36,7 @@ use crate::error::EstimateError;
 ///
 /// A settings file may hold either that text or the three fields.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(try_from = "Written")]
 pub struct Known {
     /// Which one.
@@ -48,6 +49,7 @@ pub struct Known {
 
 /// How a known value may stand in a settings file.
 #[derive(Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged)]
 enum Written {
     Text(String),

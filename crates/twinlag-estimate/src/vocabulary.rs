@@ -11,6 +11,7 @@ use crate::error::EstimateError;
 
 /// The estimators, by the names that scripts use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Estimator {
@@ -88,6 +89,7 @@ impl FromStr for Estimator {
 
 /// What the gas is taken to do between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Hold {
     /// Constant, unless the record is much better explained by straight lines.
@@ -132,6 +134,7 @@ impl FromStr for Hold {
 
 /// What 95 % intervals are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Intervals {
     /// Standard errors, with noise multiplied by noise and the uncertainty of found levels in them;
@@ -146,6 +149,7 @@ pub enum Intervals {
 
 /// What noise is taken to be like.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseColour {
     /// Independent from sample to sample.
@@ -174,6 +178,7 @@ impl FromStr for NoiseColour {
 
 /// Where a noise level comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum NoiseSource {
@@ -215,6 +220,7 @@ impl Default for NoiseKnowledge {
 
 /// What 95 % intervals rest on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum IntervalBasis {
@@ -228,6 +234,7 @@ pub enum IntervalBasis {
 
 /// A seeded parametric bootstrap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Bootstrap {
     /// Simulated records, at least 39.

@@ -11,6 +11,7 @@ use crate::trace::Trace;
 
 /// A fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Value {
     /// Name of the number.
     pub name: String,
@@ -26,6 +27,7 @@ pub struct Value {
 
 /// A time constant.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct TimeConstant {
     /// The estimate, s; `None` where the record does not determine it.

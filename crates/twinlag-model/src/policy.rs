@@ -45,6 +45,7 @@ macro_rules! policy {
         /// energies are those of the whitened residual per residual, 1 for noise of the assumed
         /// levels; deviances are differences of `−2 ln L`.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
         #[serde(deny_unknown_fields, default)]
         pub struct Policy {
             $($(#[doc = $doc])+ pub $name: $kind,)+

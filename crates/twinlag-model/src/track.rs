@@ -59,6 +59,7 @@ pub enum Change {
 
 /// A step of both time constants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct ChangePoint {
     /// When, s.
@@ -73,6 +74,7 @@ pub struct ChangePoint {
 
 /// Whether the ratio of the time constants stays while they change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct RatioTest {
     /// Reduction of `−2 ln L` by a changing ratio.

@@ -15,6 +15,7 @@ use crate::solvers::{particle_swarm, simulated_annealing, simulated_annealing::S
 /// Tolerances of steps are in coordinates (`ln x`, or `x/typical`), those of values and gradients
 /// relative to the value at the start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum Optimiser {

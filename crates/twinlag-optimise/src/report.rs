@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// How a fit ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum End {
@@ -48,6 +49,7 @@ impl End {
 
 /// Work done by a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Evaluations {
     /// Calls for the value alone.
     pub values: u64,
@@ -105,6 +107,7 @@ pub struct Progress {
 
 /// One fit from one start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Fit {
     /// Name of the solver.
     pub optimiser: String,

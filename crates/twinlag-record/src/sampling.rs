@@ -13,6 +13,7 @@ use crate::selection::SamplingChoice;
 
 /// What the stamps are taken to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum SamplingKind {
@@ -28,6 +29,7 @@ pub enum SamplingKind {
 
 /// How the stamps lie in time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Sampling {
     /// Slope of the least-squares line through the stamps, gaps taken out; the median step if
     /// irregular.

@@ -10,6 +10,7 @@ use crate::rows::RowOfSample;
 
 /// How good the gas temperature is, measured against a trusted one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct AgainstReference {
     /// Root mean square error, K.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A setting of a verb. Errors carry it beside words that name no program's option, so that a
 /// program can add its own name for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Setting {

@@ -8,6 +8,7 @@ use crate::error::CompensateError;
 /// The parts in which a gas was learned: those of the likeliest prior first, and then others that were nearly as likely. Of
 /// [`crate::Learned`], for [`crate::learn_from`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(try_from = "Vec<Vec<Part>>", into = "Vec<Vec<Part>>")]
 pub struct GasParts(Vec<Vec<Part>>);
 

@@ -39,6 +39,7 @@ pub(super) struct Limits {
 
 /// One part of the gas's motion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Part {
     /// No part of the gas: what the variances of both channels' noise are multiplied by.

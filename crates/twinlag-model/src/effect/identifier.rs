@@ -189,6 +189,17 @@ impl<'de> Deserialize<'de> for Identifier {
     }
 }
 
+#[cfg(feature = "schema")]
+impl schemars::JsonSchema for Identifier {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Identifier".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({"type": "string", "enum": Self::ALL.map(Self::name)})
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -13,6 +13,7 @@ use crate::setting::Setting;
 
 /// Whether there is an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Status {
@@ -29,6 +30,7 @@ pub enum Status {
 
 /// A number with its uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Estimated {
     /// The estimate.
@@ -44,6 +46,7 @@ pub struct Estimated {
 
 /// Summary of the record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct RecordSummary {
     /// File or name.
@@ -86,6 +89,7 @@ impl RecordSummary {
 
 /// What is found of one sensor; `None` where the record does not determine it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct SensorEstimate {
     /// Name of the channel.
@@ -121,6 +125,7 @@ pub struct SensorEstimate {
 
 /// Estimate of a sensor's second lag.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct SecondLag {
     /// The estimate, s; `None` if no second lag is detected, or if it is not determined.
@@ -139,6 +144,7 @@ pub struct SecondLag {
 /// Relative calibration of channel 2 against channel 1: `y2 = gain · y1 + offset` at rest. `None`
 /// where not fitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct FreeParameters {
     /// Gain of channel 2 relative to channel 1.
@@ -150,6 +156,7 @@ pub struct FreeParameters {
 
 /// `time_constant_difference_s` of the schema.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Difference {
     /// `τ2 − τ1`, s; `None` where it is not determined, and where the best fit lies on a bound.
@@ -167,6 +174,7 @@ pub struct Difference {
 
 /// The residual of the fit, and its tests.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Residual {
     /// Energy of the whitened residual per degree of freedom: 1 where only noise of the stated
@@ -181,6 +189,7 @@ pub struct Residual {
 
 /// How the intervals were found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum IntervalMethod {
@@ -199,6 +208,7 @@ pub enum IntervalMethod {
 
 /// What made this answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct MadeBy {
     /// `twinlag`.
@@ -219,6 +229,7 @@ impl MadeBy {
 
 /// Both time constants of a record, with everything needed to judge and repeat them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Characterisation {
     /// `twinlag.characterisation/1`.

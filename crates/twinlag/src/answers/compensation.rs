@@ -12,6 +12,7 @@ use crate::reference::AgainstReference;
 
 /// How good a gas temperature is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Quality {
     /// Median of its standard deviation, K.
@@ -41,6 +42,7 @@ pub struct Quality {
 
 /// The gas temperature of a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Compensation {
     /// `twinlag.compensation/1`.
@@ -70,6 +72,7 @@ pub struct Compensation {
     pub verdict: Option<Verdict>,
     /// The effects in the model.
     #[serde(serialize_with = "explained")]
+    #[cfg_attr(feature = "schema", schemars(with = "Vec<crate::answers::diagnosis::Explained<'static>>"))]
     pub effects: Vec<NamedEffect>,
     /// The model.
     #[serde(rename = "final")]

@@ -13,6 +13,7 @@ use crate::answers::{
 
 /// A number of an effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct EffectNumber {
     /// Its name.
@@ -32,6 +33,7 @@ pub struct EffectNumber {
 
 /// An effect that was found, with the names of its channels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct NamedEffect {
     /// The effect.
@@ -95,6 +97,7 @@ impl NamedEffect {
 
 /// An effect that no record distinguishes from one that was found, and the numbers if it is the cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct NamedTwin {
     /// The twin, with its channel.
@@ -122,6 +125,7 @@ pub type NamedLimit = Limit<String>;
 /// Errors before and after adding the effects. All but the energy of the residual are computed on
 /// blocks used neither to choose effects nor to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct ErrorBeforeAfter {
     /// Errors that need no reference.
@@ -135,6 +139,7 @@ pub struct ErrorBeforeAfter {
 
 /// The answer of the closed loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Diagnosis {
     /// `twinlag.diagnosis/1`.
@@ -146,6 +151,7 @@ pub struct Diagnosis {
     /// Effects in the order in which they were added. In JSON each also has its `explanation` and
     /// its `advice`, which are the same in every record.
     #[serde(serialize_with = "explained")]
+    #[cfg_attr(feature = "schema", schemars(with = "Vec<Explained<'static>>"))]
     pub effects: Vec<NamedEffect>,
     /// Errors before and after.
     pub error: ErrorBeforeAfter,
@@ -252,7 +258,8 @@ impl Diagnosis {
 
 /// An effect with what is said of it in every record.
 #[derive(Serialize)]
-struct Explained<'a> {
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub(crate) struct Explained<'a> {
     #[serde(flatten)]
     found: &'a NamedEffect,
     explanation: &'static str,

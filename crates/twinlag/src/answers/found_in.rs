@@ -23,6 +23,7 @@ const PERIODS_IN_LAG: f64 = 3.0;
 
 /// The data that a model was found in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct FoundIn {
     /// File or name.

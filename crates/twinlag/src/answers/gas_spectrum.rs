@@ -15,6 +15,7 @@ const MAX_UNEVEN_SHARE: f64 = 1e-3;
 
 /// The power of a gas temperature in bands of a sixth of an octave.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct GasSpectrum {
     /// Mean temperature, °C.
@@ -26,6 +27,7 @@ pub struct GasSpectrum {
 
 /// The power of a gas temperature in a band.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct GasBand {
     /// Mean frequency, each weighted by its power, Hz.

@@ -11,6 +11,7 @@ use crate::options::Options;
 
 /// A model that was found in one record, to be used on others of the same rig.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Model {
     /// `twinlag.model/1`.
@@ -50,6 +51,7 @@ pub struct Model {
 
 /// An effect of a [`Model`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct ModelEffect {
     /// Its identifier.
@@ -62,6 +64,7 @@ pub struct ModelEffect {
 
 /// A number of an effect of a [`Model`]: there also where it may not be used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct ModelNumber {
     /// The number.

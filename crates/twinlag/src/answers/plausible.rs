@@ -5,6 +5,7 @@ use twinlag_convection::WouldTake;
 
 /// A time constant beside what was expected of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PlausibleTimeConstant {
     /// Name of the channel.

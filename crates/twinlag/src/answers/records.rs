@@ -7,6 +7,7 @@ use crate::answers::Characterisation;
 
 /// What is left out in turn, so that what is found has no part in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum LeftOutUnit {
@@ -18,6 +19,7 @@ pub enum LeftOutUnit {
 
 /// Errors on a record that had no part in finding the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct TransferError {
     /// Root mean square of the whitened residual.
@@ -31,6 +33,7 @@ pub struct TransferError {
 /// is carried to the one that was left out, where nothing is fitted but what belongs to a record. Of a single record the same of its
 /// blocks, to which the model is fitted, but not found again.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct TransferAnswer {
     /// Errors of all of them.
@@ -63,6 +66,7 @@ impl TransferError {
 
 /// An effect in its channel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct EffectInPlace {
     /// The effect.
@@ -79,6 +83,7 @@ impl EffectInPlace {
 
 /// A number that belongs to one record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct RecordNumber {
     /// The effect that it is of.
@@ -98,6 +103,7 @@ pub struct RecordNumber {
 
 /// A time constant that all records share, as one of them has it by itself, the rest of the model at its best.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct OwnTimeConstant {
     /// The estimate, s.
@@ -114,6 +120,7 @@ impl OwnTimeConstant {
 
 /// A number that all records share, and that this one contradicts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct DisagreementAnswer {
     /// The effect that it is of; `None` of a time constant.
@@ -157,6 +164,7 @@ impl DisagreementAnswer {
 
 /// One of several records of a rig beside the others.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct RecordAnswer {
     /// File or name.

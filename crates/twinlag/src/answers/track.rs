@@ -19,6 +19,7 @@ pub struct Along {
 
 /// Whether the ratio of the time constants stays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Ratio {
     /// Whether it does, as far as the record shows.
@@ -30,6 +31,7 @@ pub struct Ratio {
 
 /// How time constants change along a record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Track {
     /// `twinlag.track/1`.

@@ -27,6 +27,7 @@ const MAX_CHANGE_ERRORS: f64 = 5.0;
 /// assert!(fault.to_string().contains("1.40 times"));
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum GasFault {

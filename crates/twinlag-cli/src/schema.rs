@@ -1,0 +1,37 @@
+//! `twinlag schema NAME`: what the JSON of an answer looks like, as JSON Schema.
+
+use clap::ValueEnum;
+use schemars::generate::SchemaSettings;
+use twinlag::{Characterisation, Compensation, Diagnosis, Model, Track};
+
+use crate::failure::Failure;
+use crate::print;
+
+/// What can be described.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum Name {
+    /// The answer of `characterise`.
+    Characterisation,
+    /// The answer of `diagnose`.
+    Diagnosis,
+    /// The answer of `compensate`, without its series, which are in the file of `--out`.
+    Compensation,
+    /// The answer of `track`, without its series.
+    Track,
+    /// What `--save` writes.
+    Model,
+}
+
+/// Prints the schema, of draft 2020-12.
+pub(crate) fn run(name: Name) -> Result<u8, Failure> {
+    let generator = SchemaSettings::draft2020_12().for_serialize().into_generator();
+    let schema = match name {
+        Name::Characterisation => generator.into_root_schema_for::<Characterisation>(),
+        Name::Diagnosis => generator.into_root_schema_for::<Diagnosis>(),
+        Name::Compensation => generator.into_root_schema_for::<Compensation>(),
+        Name::Track => generator.into_root_schema_for::<Track>(),
+        Name::Model => generator.into_root_schema_for::<Model>(),
+    };
+    print::json(&schema)?;
+    Ok(0)
+}
