@@ -4,6 +4,7 @@
 fn documents_show_what_the_program_prints() {
     trycmd::TestCases::new()
         .case("../../README.md")
+        .case("../../docs/src/tutorial.md")
         .case("../../docs/src/guide.md")
         .case("../../docs/src/trades.md")
         .case("../../docs/src/batch.md")
