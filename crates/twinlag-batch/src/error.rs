@@ -13,8 +13,8 @@ pub enum BatchError {
     NothingFound { what: String },
     #[error("{what}: this is no pattern of file names: {reason}")]
     Pattern { what: String, reason: String },
-    #[error("{}: the folder cannot be listed: {reason}", path.display())]
-    CannotList { path: PathBuf, reason: String },
+    #[error("{}: there is no file in this folder", path.display())]
+    Empty { path: PathBuf },
     #[error(
         "records are grouped by `folder`, by `column:NAME`, or by a pattern of file names in which {{rig}} stands once, \
          such as '{{rig}}_*.csv'; got '{got}'"
@@ -23,10 +23,10 @@ pub enum BatchError {
     #[error("{} is there from an earlier run: go on with it, or begin anew", path.display())]
     Exists { path: PathBuf },
     #[error(
-        "{} is of a run that was asked something else ({what} was {was}, and is {is} now): ask the same, or begin anew",
+        "{} is of a run that was asked something else (it differs in {what}): ask the same, or begin anew",
         path.display()
     )]
-    OtherQuestion { path: PathBuf, what: String, was: String, is: String },
+    OtherQuestion { path: PathBuf, what: String },
     #[error("{}, line {line}: expected a row of a batch: {reason}", path.display())]
     Damaged { path: PathBuf, line: usize, reason: String },
     #[error("{} is being written by another run", path.display())]

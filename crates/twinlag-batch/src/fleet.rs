@@ -27,7 +27,8 @@ impl Counts {
         *match exit_code {
             Some(0.0) => &mut self.answered,
             Some(4.0) => &mut self.undetermined,
-            Some(3.0) => &mut self.unusable,
+            // 2: what was asked does not go for this file.
+            Some(3.0 | 2.0) => &mut self.unusable,
             _ => &mut self.failed,
         } += 1;
     }
@@ -58,6 +59,8 @@ pub struct MemberTau {
     pub value_s: f64,
     /// Its 95 % interval, s.
     pub interval_95_s: [f64; 2],
+    /// Whether it may be used without a condition.
+    pub is_go: bool,
 }
 
 /// A record, or a rig, that was asked.
@@ -82,7 +85,7 @@ pub struct Fleet {
     pub units: Counts,
     /// Files that cannot be used, those within rigs included.
     pub unusable_files: usize,
-    /// Why files cannot be used, or why units have no answer, the most frequent first.
+    /// Why files cannot be used, or why records and rigs have no answer, the most frequent first.
     pub reasons: Vec<ReasonCount>,
     /// Records that contradict the others of their rig: rig and file.
     pub contradicting: Vec<(String, String)>,
@@ -103,6 +106,7 @@ impl Fleet {
         let mut fleet = Self::default();
         let mut reasons: BTreeMap<String, ReasonCount> = BTreeMap::new();
         let (mut verdicts, mut effects) = (BTreeMap::new(), BTreeMap::new());
+        let is_grouped = !units.iter().any(|unit| matches!(unit, Unit::Record(_)));
         for unit in units {
             let rows = journal.rows(unit)?;
             for row in &rows {
@@ -116,7 +120,9 @@ impl Fleet {
                     count.count += 1;
                 }
                 let is_file = row.get_text("level") == Some("record");
-                fleet.unusable_files += usize::from(is_file && row.get_number("exit_code") == Some(3.0));
+                let is_unusable =
+                    matches!(row.get_number("exit_code"), Some(2.0 | 3.0)) && row.get_number("samples").is_none();
+                fleet.unusable_files += usize::from(is_file && is_unusable);
                 if row.get("agrees").and_then(serde_json::Value::as_bool) == Some(false) {
                     let cell = |column| row.get_text(column).unwrap_or_default().to_owned();
                     fleet.contradicting.push((cell("rig"), cell("file")));
@@ -127,7 +133,10 @@ impl Fleet {
                 Unit::Rig { .. } => row.get_text("level") == Some("rig"),
                 Unit::Record(_) | Unit::WithoutRig { .. } => true,
             });
-            fleet.units.add(of_unit.map_or(Some(3.0), |row| row.get_number("exit_code")));
+            // A file of which nothing says whose it is belongs to no rig.
+            if !(is_grouped && matches!(unit, Unit::WithoutRig { .. })) {
+                fleet.units.add(of_unit.map_or(Some(3.0), |row| row.get_number("exit_code")));
+            }
             let Some(row) = of_unit.filter(|row| row.get_number("samples").is_some()) else { continue };
             let member = Member::of(row);
             if !member.verdict.is_empty() {
@@ -152,15 +161,16 @@ impl Member {
         let tau = ["tau1", "tau2"].map(|tau| {
             let number = |column: &str| row.get_number(&format!("{tau}{column}"));
             let interval_95_s = [number("_low_s")?, number("_high_s")?];
-            Some(MemberTau { value_s: number("_s")?, interval_95_s })
+            let is_go = row.get_text(&format!("{tau}_grade")) == Some("go");
+            Some(MemberTau { value_s: number("_s")?, interval_95_s, is_go })
         });
         Self { name, tau, effects: text("effects"), verdict: text("verdict") }
     }
 }
 
-/// Why a row has no answer; `None` of one that was read.
+/// Why a row has no answer; `None` of one that has, and of one that rests on its rig.
 fn reason_without_answer(row: &Row) -> Option<&str> {
-    if row.get_number("samples").is_some() { None } else { row.get_text("reason") }
+    if row.get_number("exit_code") == Some(0.0) { None } else { row.get_text("reason") }
 }
 
 /// A reason without the name of the file that it begins with.

@@ -118,9 +118,14 @@ impl Unit {
     pub(crate) fn key(&self) -> String {
         match self {
             Self::Rig { name, .. } => format!("rig {name}"),
-            Self::Record(file) | Self::WithoutRig { file, .. } => format!("file {}", file.display()),
+            Self::Record(file) | Self::WithoutRig { file, .. } => format!("file {}", name_of(file)),
         }
     }
+}
+
+/// The name of a file as text that no other file has: what is no Unicode in it is written as its bytes.
+pub fn name_of(file: &Path) -> String {
+    file.to_str().map_or_else(|| format!("{file:?}").trim_matches('"').to_owned(), str::to_owned)
 }
 
 /// Each file by itself.

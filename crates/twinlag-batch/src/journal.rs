@@ -111,6 +111,11 @@ impl Journal {
         units.iter().filter(|unit| self.is_done(unit)).count()
     }
 
+    /// Has a unit asked again, since what it led to beside its rows is gone.
+    pub fn forget(&mut self, unit: &Unit) {
+        self.done.remove(&unit.key());
+    }
+
     /// Whether a unit is done, and its files are as they were then.
     pub(crate) fn is_done(&self, unit: &Unit) -> bool {
         self.done.get(&unit.key()).is_some_and(|done| done.stamps == stamps(unit))
@@ -186,27 +191,31 @@ impl Journal {
 impl Header {
     /// Refuses to go on with another question.
     fn expect_same(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
-        let differs = |what: &str, was: &Value, is: &Value| BatchError::OtherQuestion {
-            path: path.to_owned(),
-            what: what.to_owned(),
-            was: was.to_string(),
-            is: is.to_string(),
-        };
+        let differs = |what: &str| BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() };
         if (&self.schema, &self.version) != (&now.schema, &now.version) {
-            return Err(differs("the version", &self.version.as_str().into(), &now.version.as_str().into()));
+            return Err(differs("the version of the program"));
         }
-        if self.asked == now.asked {
-            return Ok(());
+        match difference(&self.asked, &now.asked) {
+            Some(what) => Err(differs(&what)),
+            None => Ok(()),
         }
-        let (Value::Object(was), Value::Object(is)) = (&self.asked, &now.asked) else {
-            return Err(differs("the question", &self.asked, &now.asked));
-        };
-        let names = was.keys().chain(is.keys());
-        let other = names.filter(|name| was.get(*name) != is.get(*name)).map(String::as_str).next();
-        let other = other.unwrap_or("the order of the settings");
-        let of = |asked: &serde_json::Map<String, Value>| asked.get(other).cloned().unwrap_or(Value::Null);
-        Err(differs(other, &of(was), &of(is)))
     }
+}
+
+/// The name of the first setting in which two questions differ, those within a setting behind it; `None` of equal ones.
+fn difference(was: &Value, is: &Value) -> Option<String> {
+    if was == is {
+        return None;
+    }
+    let (Value::Object(was), Value::Object(is)) = (was, is) else { return Some(String::new()) };
+    let names = was.keys().chain(is.keys());
+    names
+        .filter_map(|name| {
+            let of = |asked: &serde_json::Map<String, Value>| asked.get(name).cloned().unwrap_or(Value::Null);
+            let within = difference(&of(was), &of(is))?;
+            Some(if within.is_empty() { name.clone() } else { format!("{name}.{within}") })
+        })
+        .next()
 }
 
 /// The files of a unit as they were before they were read.

@@ -50,7 +50,7 @@ mod table;
 pub use error::BatchError;
 pub use find::find;
 pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};
-pub use group::{GroupBy, NamePattern, Unit, each, grouped, rig_by_path};
+pub use group::{GroupBy, NamePattern, Unit, each, grouped, name_of, rig_by_path};
 pub use journal::{Begin, Journal};
 pub use parquet::write_parquet;
 pub use row::{Answer, Row, Verb};

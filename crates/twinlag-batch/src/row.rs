@@ -13,7 +13,7 @@ use twinlag::{
     Status, TransferAnswer,
 };
 
-use crate::group::Unit;
+use crate::group::{Unit, name_of};
 
 /// What is asked of each unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -145,7 +145,7 @@ impl Row {
     /// - `file`: the file, or the rig's name where the rig as a whole has none
     /// - `exit_code`: what the program would have ended with on it
     pub fn without_answer(unit: &Unit, file: &Path, exit_code: u8, reason: &str) -> Self {
-        Self::of_file(unit, &file.display().to_string()).count("exit_code", exit_code.into()).text("reason", reason)
+        Self::of_file(unit, &name_of(file)).count("exit_code", exit_code.into()).text("reason", reason)
     }
 
     /// The row of a rig as a whole that has no answer.
@@ -167,7 +167,7 @@ impl Row {
         };
         let row = match unit {
             Unit::Rig { name, .. } => Self::of_rig(name, records.len().max(1)),
-            Unit::Record(file) | Unit::WithoutRig { file, .. } => Self::of_file(unit, &file.display().to_string()),
+            Unit::Record(file) | Unit::WithoutRig { file, .. } => Self::of_file(unit, &name_of(file)),
         };
         let row = row.count("exit_code", exit_code.into()).characterisation(last);
         let row = match answer {
@@ -182,7 +182,7 @@ impl Row {
     /// Says where the gas temperature was written to.
     #[must_use]
     pub fn with_gas_file(self, path: &Path) -> Self {
-        self.text("gas_file", &path.display().to_string())
+        self.text("gas_file", &name_of(path))
     }
 
     /// A cell of text; `None` where it is empty.
@@ -249,7 +249,7 @@ impl Row {
 
     fn characterisation(self, answer: &Characterisation) -> Self {
         let record = &answer.record;
-        let reason = if answer.status == Status::Ok { String::new() } else { answer.warnings.join("; ") };
+        let reason = why_not_ok(answer);
         let notes = answer.notes.join("; ");
         let [one, two] = &answer.sensors;
         let difference = &answer.time_constant_difference_s;
@@ -362,6 +362,17 @@ fn stem_and_unit(effect: &str, number: &EffectNumber) -> (String, String) {
     };
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     (format!("{effect}_{}", number.name).chars().map(plain).collect(), unit.chars().map(plain).collect())
+}
+
+/// Why an answer is not `ok`, and what else is to be said of it; empty of one that is.
+fn why_not_ok(answer: &Characterisation) -> String {
+    let first = match answer.status {
+        Status::Ok => return String::new(),
+        Status::AtBound => "the best fit lies on a bound".to_owned(),
+        Status::NotIdentifiable => format!("the record does not determine {}", answer.not_identifiable.join(", ")),
+        _ => "the residual is more than noise".to_owned(),
+    };
+    [first].iter().chain(&answer.warnings).map(String::as_str).collect::<Vec<_>>().join("; ")
 }
 
 /// The name that an answer has in JSON.

@@ -17,6 +17,9 @@ use crate::group::Unit;
 use crate::journal::{Journal, Seen};
 use crate::row::Row;
 
+/// Threads beyond this multiple of the processors only wait for each other.
+const MAX_THREADS_PER_PROCESSOR: usize = 4;
+
 /// How to run a batch. Nothing here changes a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -106,8 +109,10 @@ fn in_order_of_arrival<Item: Sync, Out: Send>(
     work: impl Fn(&Item) -> Out + Sync,
     mut take: impl FnMut(&Item, Out) -> bool,
 ) {
-    let workers = threads.get().min(items.len());
-    let within = threads.get().checked_div(workers).unwrap_or(1);
+    let processors = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN).get();
+    let threads = threads.get().min(MAX_THREADS_PER_PROCESSOR * processors);
+    let workers = threads.min(items.len());
+    let within = threads.checked_div(workers).unwrap_or(1);
     let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
     thread::scope(|scope| {
         let (sender, receiver) = sync_channel(workers);

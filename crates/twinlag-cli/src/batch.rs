@@ -118,6 +118,11 @@ pub(crate) struct Batch {
     physics: Physics,
 }
 
+/// How the files of gas temperatures end.
+const GAS_ENDING: &str = ".gas.csv";
+/// The column of the table that names them.
+const GAS_FILE: &str = "gas_file";
+
 /// Within a batch, a record says nothing on its own.
 const SILENT: Console = Console { json: true, quiet: true };
 
@@ -132,9 +137,22 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         (_, true) => Begin::Anew,
         _ => Begin::New,
     };
-    let mut journal = Journal::open(&journal_path, &question.asked(), begin)?;
     let units = question.units(files, options, console);
-    let gas_files = question.gas_files(&units)?;
+    let (units, gas_files) = question.gas_files(units)?;
+    let is_resumed = command.resume && journal_path.exists();
+    if let Some(gas) = gas_files.values().find(|gas| gas.exists()).filter(|_| !is_resumed && !command.force) {
+        return Err(Failure::Usage(format!(
+            "{} exists: choose another folder for --gas, or add --force",
+            gas.display()
+        )));
+    }
+    let mut journal = Journal::open(&journal_path, &question.asked(), begin)?;
+    for unit in &units {
+        let rows = journal.rows(unit)?;
+        if rows.iter().filter_map(|row| row.get_text(GAS_FILE)).any(|gas| !Path::new(gas).exists()) {
+            journal.forget(unit);
+        }
+    }
 
     // What a panic says is in the row of its file.
     panic::set_hook(Box::new(|_| {}));
@@ -193,14 +211,23 @@ impl Batch {
             output::is_same(file, journal) || outputs.iter().any(|(_, output)| output::is_same(file, output))
         };
         let (own, files): (Vec<_>, Vec<_>) = find(&self.what)?.into_iter().partition(|file| is_output(file));
-        match own.first() {
-            Some(file) if !is_of_earlier_run => Err(Failure::Usage(format!(
+        match own.iter().find(|file| !output::is_same(file, journal) && !is_of_batch(file)) {
+            Some(file) => Err(Failure::Usage(format!(
                 "{} is one of the records: choose another name for --out or --report",
                 file.display()
             ))),
-            _ => Ok(files),
+            None => Ok(files),
         }
     }
+}
+
+/// What the tables and the summary of a batch have in them, and no record has.
+const SIGNS: [&[u8]; 3] = [b"level,rig,file,exit_code", b"twinlag_batch", b"<!DOCTYPE html>"];
+
+/// Whether a file is a table or a summary that a batch has written.
+fn is_of_batch(file: &Path) -> bool {
+    let content = fs::read(file).unwrap_or_default();
+    SIGNS.iter().any(|sign| content.windows(sign.len()).any(|bytes| bytes == *sign))
 }
 
 /// What is asked of each unit, whatever decides a cell of the table.
@@ -302,27 +329,41 @@ impl<'a> Question<'a> {
         })
     }
 
-    /// Where the gas temperature of each file goes: to its own path below the folder that all files share.
-    fn gas_files(&self, units: &[Unit]) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
-        let Some(folder) = self.gas else { return Ok(BTreeMap::new()) };
-        let files: Vec<&Path> = units.iter().flat_map(Unit::files).map(PathBuf::as_path).collect();
-        let shared = files.iter().filter_map(|file| file.parent()).map(Path::to_owned).reduce(|a, b| shared(&a, &b));
-        let shared = shared.unwrap_or_default();
-        let mut gas_files = BTreeMap::new();
-        let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
-        for file in files {
-            let gas = folder.join(file.strip_prefix(&shared).unwrap_or(file)).with_extension("gas.csv");
-            if let Some(other) = taken.insert(gas.clone(), file) {
-                return Err(Failure::Usage(format!(
-                    "{} and {} would have the same file of gas temperature, {}: run them apart",
-                    other.display(),
-                    file.display(),
-                    gas.display()
-                )));
-            }
-            gas_files.insert(file.to_owned(), gas);
+    /// The units without the gas temperatures of an earlier run, and where those of each file go: to its own path below the folder that
+    /// all files share. Of two files that differ in their endings alone, those stay in the names.
+    fn gas_files(&self, units: Vec<Unit>) -> Result<(Vec<Unit>, BTreeMap<PathBuf, PathBuf>), Failure> {
+        let Some(folder) = self.gas else { return Ok((units, BTreeMap::new())) };
+        if folder.exists() && !folder.is_dir() {
+            return Err(Failure::Usage(format!("--gas {}: expected a folder, and this is a file", folder.display())));
         }
-        Ok(gas_files)
+        let files: Vec<&PathBuf> = units.iter().flat_map(Unit::files).collect();
+        // However they are named, paths from the root have no `..` in them.
+        let wholes: Vec<PathBuf> = files
+            .iter()
+            .map(|file| file.canonicalize().unwrap_or_else(|_| folder.join(file.file_name().unwrap_or_default())))
+            .collect();
+        let parents = wholes.iter().filter_map(|file| file.parent()).map(Path::to_owned);
+        let common = parents.reduce(|a, b| shared(&a, &b)).unwrap_or_default();
+        let below: Vec<&Path> = wholes.iter().map(|whole| whole.strip_prefix(&common).unwrap_or(whole)).collect();
+        let mut taken: BTreeMap<PathBuf, usize> = BTreeMap::new();
+        below.iter().for_each(|path| *taken.entry(path.with_extension("")).or_default() += 1);
+        let gas_files: BTreeMap<PathBuf, PathBuf> = files
+            .iter()
+            .zip(&below)
+            .map(|(file, path)| {
+                let stem = path.with_extension("");
+                let stem = if taken[&stem] > 1 { (*path).to_owned() } else { stem };
+                ((*file).clone(), with_ending(&folder.join(stem), GAS_ENDING))
+            })
+            .collect();
+        let is_gas = |unit: &Unit| {
+            let is_named_so = |file: &PathBuf| file.to_string_lossy().ends_with(GAS_ENDING);
+            unit.files()
+                .iter()
+                .any(|file| is_named_so(file) && gas_files.values().any(|gas| output::is_same(gas, file)))
+        };
+        let units = units.iter().filter(|unit| !is_gas(unit)).cloned().collect();
+        Ok((units, gas_files))
     }
 
     /// The rows of a unit.
@@ -360,6 +401,15 @@ impl<'a> Question<'a> {
     }
 
     fn read(&self, file: &Path) -> Result<Record, Failure> {
+        // Whoever opens a pipe or a device may wait for ever.
+        let about =
+            fs::metadata(file).map_err(|e| Failure::File(format!("{}: cannot be read: {e}", file.display())))?;
+        if !about.is_file() {
+            return Err(Failure::File(format!(
+                "{}: expected a file, found a folder, a pipe or a device",
+                file.display()
+            )));
+        }
         read_watched(file, &self.profile, SILENT)
     }
 
@@ -458,11 +508,12 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
         }));
     }
     let names: Vec<String> = command.out.iter().map(|out| out.display().to_string()).collect();
+    let unit = if counts.total() == 1 { question.unit_name().trim_end_matches('s') } else { question.unit_name() };
     let mut lines = vec![format!(
         "{}: {} {}: {} answered, {} undetermined, {} unusable, {} failed",
         names.join(", "),
         counts.total(),
-        question.unit_name(),
+        unit,
         counts.answered,
         counts.undetermined,
         counts.unusable,
@@ -477,6 +528,9 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
     if fleet.reasons.len() > REASONS {
         lines.push(format!("  and {} other reasons: see column reason", fleet.reasons.len() - REASONS));
     }
+    // Names of files are the user's, and may hold anything.
+    let plain = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let lines: Vec<String> = lines.iter().map(|line| line.chars().map(plain).collect()).collect();
     print::on_stdout(&(lines.join("\n") + "\n"))
 }
 
@@ -516,9 +570,7 @@ impl From<BatchError> for Failure {
             BatchError::Exists { .. } => Self::Usage(format!("{text} (options --resume, --force)")),
             BatchError::OtherQuestion { .. } => Self::Usage(format!("{text} (option --force)")),
             BatchError::Pattern { .. } | BatchError::GroupBy { .. } => Self::Usage(text),
-            BatchError::NothingFound { .. } | BatchError::CannotList { .. } | BatchError::Damaged { .. } => {
-                Self::File(text)
-            }
+            BatchError::NothingFound { .. } | BatchError::Empty { .. } | BatchError::Damaged { .. } => Self::File(text),
             _ => Self::Other(text),
         }
     }

@@ -12,7 +12,9 @@ use crate::words::listed;
 const MAX_ERROR_BARS: usize = 300;
 /// Members in the table of those that lie apart.
 const APART: usize = 10;
-/// Rows of the tables of reasons and of contradictions.
+/// Values from which a range of 95 % of them leaves some out.
+const MIN_FOR_QUANTILES: usize = 40;
+/// Rows of the table of members, and of those of reasons and of contradictions.
 const MAX_ROWS: usize = 50;
 /// A normal distribution's standard deviation over its median absolute deviation, and over the half width of its 95 % interval.
 const STD_OVER_MAD: f64 = 1.4826;
@@ -33,10 +35,12 @@ pub fn fleet_report(
     making: &Making,
 ) -> Result<String, ReportError> {
     let counts = &fleet.units;
-    let tone = match () {
-        () if counts.answered == counts.total() => Tone::Good,
-        () if counts.answered > 0 => Tone::Caution,
-        () => Tone::Bad,
+    let is_go = |member: &Member| member.tau.iter().all(|tau| tau.is_some_and(|tau| tau.is_go));
+    let is_whole = counts.answered == counts.total() && fleet.unusable_files == 0;
+    let tone = match counts.answered {
+        0 => Tone::Bad,
+        _ if is_whole && fleet.members.iter().all(is_go) => Tone::Good,
+        _ => Tone::Caution,
     };
     let grade = format!("{} of {}", counts.answered, counts.total());
     let document = Document::new(format!("Batch {}", file_name(title)))
@@ -44,6 +48,7 @@ pub fn fleet_report(
         .verdict(tone, grade, sentence(fleet, unit))
         .key_numbers(keys(fleet));
     let document = time_constants(document, fleet)?;
+    let document = each(document, fleet);
     let document = found(document, fleet, unit);
     let document = apart(document, fleet);
     let document = contradictions(document, fleet);
@@ -54,13 +59,18 @@ pub fn fleet_report(
 
 fn sentence(fleet: &Fleet, unit: &str) -> String {
     let counts = &fleet.units;
-    let mut parts = vec![format!("{} {unit} gave an answer", counts.answered)];
+    let mut parts = vec![format!("{} of {} {unit} gave an answer", counts.answered, counts.total())];
     let rest = [
-        (counts.undetermined, "were read but do not determine what was asked"),
-        (counts.unusable, "cannot be used"),
-        (counts.failed, "met a fault of the program"),
+        (counts.undetermined, "without what was asked, though read"),
+        (counts.unusable, "that cannot be used"),
+        (counts.failed, "with a fault of the program"),
     ];
-    parts.extend(rest.into_iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}")));
+    parts.extend(
+        rest.into_iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("there are {count} {what}")),
+    );
+    if fleet.unusable_files > counts.unusable {
+        parts.push(format!("files that cannot be used: {}", fleet.unusable_files));
+    }
     format!("{}.", listed(&parts))
 }
 
@@ -70,12 +80,19 @@ fn keys(fleet: &Fleet) -> Vec<KeyNumber> {
         let given = given(fleet, i);
         let values: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
         let value = median(values.clone())?;
-        let range = [quantile(values.clone(), 0.025)?, quantile(values, 0.975)?];
+        let (share, what) =
+            if values.len() < MIN_FOR_QUANTILES { (0.0, "all of them") } else { (0.025, "95 % of them") };
+        let range = [quantile(values.clone(), share)?, quantile(values, 1.0 - share)?];
+        let grade = if given.iter().all(|(_, tau)| tau.is_go) {
+            (Tone::Good, "go".to_owned())
+        } else {
+            (Tone::Caution, "some conditional".to_owned())
+        };
         Some(KeyNumber {
             name: format!("T{}, median of {}", i + 1, given.len()),
             value: format!("{} s", rounded(value, 4)),
-            interval: format!("95 % of them {} s", between(range)),
-            grade: (Tone::Good, "of those given".to_owned()),
+            interval: format!("{what} {} s", between(range)),
+            grade,
         })
     };
     (0..2).filter_map(key).collect()
@@ -87,14 +104,16 @@ fn time_constants(document: Document, fleet: &Fleet) -> Result<Document, ReportE
         let place: Vec<f64> = given.iter().map(|(place, _)| (place + 1) as f64).collect();
         let value: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
         let [low, high] = [0, 1].map(|end| given.iter().map(|(_, tau)| tau.interval_95_s[end]).collect::<Vec<_>>());
-        let (axis, outside) = figures::robust_axis("time constant (s)", value.iter().copied());
-        let series = if given.len() <= MAX_ERROR_BARS {
+        let has_bars = fleet.members.len() <= MAX_ERROR_BARS;
+        let ends = if has_bars { [&low[..], &high[..]].concat() } else { Vec::new() };
+        let (axis, outside) = figures::robust_axis("time constant (s)", value.iter().copied().chain(ends));
+        let series = if has_bars {
             Series::points("", place, value).interval(low, high)
         } else {
             Series::trace("", place, value)
         };
         let series = (!given.is_empty()).then(|| series.colour(CHANNELS[i]));
-        chart(format!("T{}{outside}", i + 1), [Axis::linear("in the order of the table"), axis], [series])
+        chart(format!("T{}{outside}", i + 1), [Axis::linear("number among those that were read"), axis], [series])
     };
     let panels: Vec<Chart> = (0..2).filter_map(panel).collect();
     if panels.is_empty() {
@@ -119,6 +138,27 @@ fn found(document: Document, fleet: &Fleet, unit: &str) -> Document {
     };
     let document = document.heading("What was found").table(table(&fleet.verdicts, "verdict"));
     if fleet.effects.is_empty() { document } else { document.table(table(&fleet.effects, "effect")) }
+}
+
+/// Each member with its numbers, where there are few.
+fn each(document: Document, fleet: &Fleet) -> Document {
+    if fleet.members.is_empty() || fleet.members.len() > MAX_ROWS {
+        return document;
+    }
+    let number = |tau: Option<MemberTau>| match tau {
+        Some(tau) => {
+            let condition = if tau.is_go { "" } else { ", conditional" };
+            format!("{} s ({}{condition})", rounded(tau.value_s, 4), between(tau.interval_95_s))
+        }
+        None => "not given".to_owned(),
+    };
+    let row = |table: Table, (place, member): (usize, &Member)| {
+        let [one, two] = member.tau.map(number);
+        let found = if member.effects.is_empty() { &member.verdict } else { &member.effects };
+        table.row([(place + 1).to_string(), file_name(&member.name).to_owned(), one, two, found.clone()])
+    };
+    let table = Table::new(["number", "name", "T1", "T2", "found"]);
+    document.table(fleet.members.iter().enumerate().fold(table, row).caption("Time constants with 95 % intervals"))
 }
 
 /// Members whose time constants lie furthest from the median, in units of how far members scatter and of their own uncertainty.
@@ -182,8 +222,11 @@ fn given(fleet: &Fleet, sensor: usize) -> Vec<(usize, MemberTau)> {
     members.filter_map(|(place, member)| Some((place, member.tau[sensor]?))).collect()
 }
 
-fn median(values: Vec<f64>) -> Option<f64> {
-    quantile(values, 0.5)
+/// The middle value, or the mean of both; `None` without values.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    Some(0.5 * (values[last / 2] + values[last.div_ceil(2)]))
 }
 
 /// The value below which that share of all lies; `None` without values.

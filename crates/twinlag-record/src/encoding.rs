@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use chardetng::{EncodingDetector, Iso2022JpDetection, Utf8Detection};
 use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-use crate::RecordError;
+use crate::{RecordError, sea_bird};
 
 /// The text of a file without its byte-order mark, and its encoding.
 ///
@@ -20,7 +20,8 @@ pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<(Cow<'a, str>, &
         return Ok((encoding.decode_with_bom_removal(bytes).0, encoding));
     }
     if let Some(offset) = bytes.iter().position(|&byte| byte == 0) {
-        return Err(RecordError::Binary { file: file.to_owned(), offset });
+        return Err(sea_bird::binary(&bytes[..offset], file)
+            .unwrap_or_else(|| RecordError::Binary { file: file.to_owned(), offset }));
     }
     let body = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     if let Ok(text) = std::str::from_utf8(body) {

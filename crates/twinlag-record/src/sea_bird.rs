@@ -23,6 +23,13 @@ pub(crate) fn layout(text: &str, file: &str) -> Option<Result<Layout, RecordErro
     is_cnv.then(|| read(text, file))
 }
 
+/// What a cast with rows in binary is refused with; `None` of a file that is no cast.
+///
+/// - `before`: what stands before the first byte that is no text
+pub(crate) fn binary(before: &[u8], file: &str) -> Option<RecordError> {
+    layout(&String::from_utf8_lossy(before), file)?.err()
+}
+
 fn read(text: &str, file: &str) -> Result<Layout, RecordError> {
     let wrong = |line: usize, expected: &'static str, found: &str| RecordError::BadHeader {
         file: file.to_owned(),

@@ -27,6 +27,8 @@ pub(crate) struct Wrapping {
     labels: Vec<String>,
     units: Vec<Unit>,
     delimiter: Delimiter,
+    /// Cells of a line without names; 0 where lines have names.
+    cells: usize,
 }
 
 impl Wrapping {
@@ -50,11 +52,12 @@ impl Wrapping {
             return None;
         }
         if !is_labelled {
-            let delimiter = sniff_delimiter(&payload).map_or(Delimiter::Comma, |split| split.delimiter);
-            return Some(Self { is_stamped, labels: Vec::new(), units: Vec::new(), delimiter });
+            let (delimiter, cells) =
+                sniff_delimiter(&payload).map_or((Delimiter::Comma, 0), |found| (found.delimiter, found.cells));
+            return Some(Self { is_stamped, labels: Vec::new(), units: Vec::new(), delimiter, cells });
         }
         let units = longest.iter().map(|pair| pair.unit.clone()).collect();
-        Some(Self { is_stamped, labels, units, delimiter: Delimiter::Semicolon })
+        Some(Self { is_stamped, labels, units, delimiter: Delimiter::Semicolon, cells: 0 })
     }
 
     /// The names and units of the columns, where each line has them.
@@ -69,7 +72,16 @@ impl Wrapping {
         lines(text).map(|(_, line)| self.unwrap(line)).collect::<Vec<_>>().join("\n")
     }
 
-    /// The cells of a line, and behind them its time of arrival. A line that is not wrapped stays as it is.
+    /// Whether a line between rows of numbers is text of another number of cells: what a sketch says as it starts, or of an error.
+    fn is_message(&self, payload: &str) -> bool {
+        let mut cells = Vec::new();
+        self.cells > 0
+            && is_text(payload, self.delimiter)
+            && split(payload, self.delimiter, &mut cells).is_ok()
+            && cells.len() != self.cells
+    }
+
+    /// The cells of a line, and behind them its time of arrival; empty of a message. A line that is not wrapped stays as it is.
     pub(crate) fn unwrap<'a>(&self, line: &'a str) -> Cow<'a, str> {
         let wrapped = stamped(line).filter(|_| self.is_stamped);
         if self.is_stamped && wrapped.is_none() {
@@ -85,7 +97,7 @@ impl Wrapping {
         let mut cells = if is_row {
             let value = |label: &String| pairs.iter().find(|pair| pair.label == label).map_or("", |pair| pair.value);
             self.labels.iter().map(value).collect::<Vec<_>>().join(&sign.to_string())
-        } else if payload.trim().is_empty() {
+        } else if payload.trim().is_empty() || self.is_message(payload) {
             return Cow::Borrowed("");
         } else {
             payload.trim_end().to_owned()

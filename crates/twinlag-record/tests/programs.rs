@@ -97,6 +97,8 @@ fn a_cast_that_is_cut_off_or_in_binary_is_refused_with_its_line() {
     let headless = SEA_BIRD.replace("*END*\r\n", "");
     assert_says(&refusal(&headless), &["Sea-Bird", "'*END*'", "line 20"]);
     assert_says(&refusal(&SEA_BIRD.replace("= ascii", "= binary")), &["line 19", "ASCII output", "binary"]);
+    let with_bytes = SEA_BIRD.replace("= ascii", "= binary") + "\0\0\u{1}";
+    assert_says(&refusal(&with_bytes), &["line 19", "ASCII output", "binary"]);
     assert_says(&refusal(&SEA_BIRD.replace("# name", "# nome")), &["line 20", "the columns"]);
     assert_says(&refusal(&SEA_BIRD.replace("name 3", "name 7")), &["line 11", "in order", "name 7"]);
 }
@@ -188,6 +190,19 @@ fn a_serial_log_is_read_with_the_time_of_arrival() {
         assert_is_the_rig(&got, 1e-12);
         assert_eq!(got.channels, ["T1", "T2"]);
     }
+}
+
+/// A sketch says that it has started, and of a sensor that did not answer.
+#[test]
+fn messages_of_a_serial_log_are_no_rows() {
+    let rows = body(|t, a, b| format!("12:00:{t:06.3} -> {a:.2},{b:.2}"));
+    let (first, rest) = rows.split_once('\n').expect("several rows");
+    let (second, rest) = rest.split_once('\n').expect("several rows");
+    let text = format!(
+        "11:59:59.801 -> DS18B20 ready\n11:59:59.901 -> Locating devices...Found 2 devices.\n{first}\n12:00:00.700 -> sensor read error\n{second}\n{rest}"
+    );
+    let [plain, noisy] = [rows.clone(), text].map(|text| record(&text));
+    assert_eq!((&noisy.time_s, &noisy.t1_c, &noisy.t2_c), (&plain.time_s, &plain.t1_c, &plain.t2_c));
 }
 
 #[test]
