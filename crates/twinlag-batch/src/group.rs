@@ -123,6 +123,7 @@ impl Unit {
     }
 }
 
+#[expect(clippy::unnecessary_debug_formatting, reason = "what is no Unicode would be replaced by one sign for all")]
 /// The name of a file as text that no other file has: what is no Unicode in it is written as its bytes.
 pub fn name_of(file: &Path) -> String {
     file.to_str().map_or_else(|| format!("{file:?}").trim_matches('"').to_owned(), str::to_owned)

@@ -208,14 +208,12 @@ fn difference(was: &Value, is: &Value) -> Option<String> {
         return None;
     }
     let (Value::Object(was), Value::Object(is)) = (was, is) else { return Some(String::new()) };
-    let names = was.keys().chain(is.keys());
-    names
-        .filter_map(|name| {
-            let of = |asked: &serde_json::Map<String, Value>| asked.get(name).cloned().unwrap_or(Value::Null);
-            let within = difference(&of(was), &of(is))?;
-            Some(if within.is_empty() { name.clone() } else { format!("{name}.{within}") })
-        })
-        .next()
+    let mut names = was.keys().chain(is.keys());
+    names.find_map(|name| {
+        let of = |asked: &serde_json::Map<String, Value>| asked.get(name).cloned().unwrap_or(Value::Null);
+        let within = difference(&of(was), &of(is))?;
+        Some(if within.is_empty() { name.clone() } else { format!("{name}.{within}") })
+    })
 }
 
 /// The files of a unit as they were before they were read.

@@ -80,7 +80,7 @@ fn each_record_is_a_row_with_the_numbers_of_the_verb() {
         assert!(row["reason"].contains(word) && row["tau1_s"].is_empty(), "{row:#?}");
     }
     let page = String::from_utf8(bench.read("page.html")).expect("UTF-8");
-    assert!(page.contains("3 records gave an answer and 2 cannot be used."));
+    assert!(page.contains("3 of 5 records gave an answer and there are 2 that cannot be used."));
 }
 
 /// The journal is cut in the middle of a line, as by a kill, with one thread before and two after.
@@ -115,11 +115,8 @@ fn only_what_is_new_or_changed_is_asked_again() {
     assert_eq!((after["runs/empty.csv"]["exit_code"].as_str(), after.len()), ("0", 5));
     assert_eq!(after["runs/a_1.csv"], before["runs/a_1.csv"]);
     // Another question has other answers.
-    bench.refuses(
-        2,
-        &["batch", "runs/*.csv", "--out", "table.csv", "--resume", "--free", "gain"],
-        &["options", "--force"],
-    );
+    let other = ["batch", "runs/*.csv", "--out", "table.csv", "--resume", "--free", "gain"];
+    bench.refuses(2, &other, &["it differs in options.free", "--force"]);
 }
 
 #[test]
@@ -170,6 +167,41 @@ fn gas_temperatures_go_to_a_folder() {
     succeeds(&bench.run(&["compensate", "runs/a_1.csv", "--out", "alone.csv"]));
     assert_eq!(bench.read("gas/a_1.gas.csv"), bench.read("alone.csv"));
     assert!(!bench.has("gas/empty.gas.csv"));
+    // What is gone is made again, and what is there is not replaced unasked.
+    let again = ["batch", "runs", "--verb", "compensate", "--gas", "gas", "--out", "table.csv"];
+    std::fs::remove_file(bench.path("gas/a_1.gas.csv")).expect("is there");
+    succeeds(&bench.run(&[&again[..], &["--resume"]].concat()));
+    assert_eq!(bench.read("gas/a_1.gas.csv"), bench.read("alone.csv"));
+    let elsewhere = ["batch", "runs", "--verb", "compensate", "--gas", "gas", "--out", "other.csv"];
+    bench.refuses(2, &elsewhere, &["a_1.gas.csv exists", "--force"]);
+}
+
+/// Whatever a path looks like, its gas goes below the folder; the gas of an earlier run is no record.
+#[test]
+fn gas_stays_below_its_folder() {
+    let bench = fleet("below");
+    let whole = bench.path("runs/below/b_1.csv");
+    let files = ["batch", "./runs/../runs/a_1.csv", whole.to_str().expect("UTF-8")];
+    let gas = ["--verb", "compensate", "--gas", "runs/gas"];
+    succeeds(&bench.run(&[&files[..], &gas, &["--out", "table.csv"]].concat()));
+    assert!(bench.has("runs/gas/a_1.gas.csv") && bench.has("runs/gas/below/b_1.gas.csv"));
+    succeeds(&bench.run(&[&["batch", "runs"], &gas[..], &["--out", "all.csv", "--force"]].concat()));
+    assert_eq!(rows(&bench, "all.csv").len(), 5);
+}
+
+#[test]
+fn what_cannot_be_opened_stops_nothing() {
+    let bench = fleet("unopened");
+    #[cfg(unix)]
+    for (link, to) in [("dangling.csv", "nowhere"), ("below/up", "..")] {
+        std::os::unix::fs::symlink(to, bench.path("runs").join(link)).expect("can be linked");
+    }
+    succeeds(&bench.run(&["batch", "runs", "./runs/a_1.csv", "--out", "table.csv", "--threads", "99999"]));
+    let rows = rows(&bench, "table.csv");
+    #[cfg(unix)]
+    assert!(rows["runs/dangling.csv"]["reason"].contains("cannot be read") && rows.len() == 7, "{rows:#?}");
+    std::fs::create_dir_all(bench.path("none")).expect("can be created");
+    bench.refuses(3, &["batch", "none", "--out", "t.csv"], &["none", "no file in this folder"]);
 }
 
 #[test]
@@ -198,10 +230,17 @@ fn what_cannot_be_asked_is_refused() {
     bench.refuses(2, &batch(&["--out", "t.csv", "--gas", "gas"]), &["--verb compensate"]);
     bench.refuses(2, &batch(&["--out", "runs/a_1.csv"]), &["exists"]);
     bench.refuses(2, &batch(&["--out", "runs/a_1.csv", "--force"]), &["one of the records"]);
+    bench.write("is_a_file", "");
+    bench.refuses(2, &batch(&["--out", "t.csv", "--verb", "compensate", "--gas", "is_a_file"]), &["expected a folder"]);
     bench.refuses(3, &["batch", "no*.csv", "--out", "t.csv"], &["no*.csv"]);
     assert!(!bench.has("t.csv") && !bench.has("t.csv.journal"));
     let none = bench.run(&["batch", "runs/empty.csv", "--out", "t.csv"]);
     assert_eq!(none.code, 3, "{none:#?}");
     assert_eq!(rows(&bench, "t.csv").len(), 1);
     bench.refuses(2, &["batch", "runs", "--out", "t.csv"], &["t.csv", "--force"]);
+    // A table that is there does not make a record its summary.
+    let report = ["batch", "runs", "--out", "t.csv", "--report", "runs/a_1.csv"];
+    for how in ["--resume", "--force"] {
+        bench.refuses(2, &[&report[..], &[how]].concat(), &["a_1.csv is one of the records"]);
+    }
 }
