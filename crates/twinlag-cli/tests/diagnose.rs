@@ -458,3 +458,25 @@ fn forget_time(value: &mut Value) {
         fields.values_mut().for_each(forget_time);
     }
 }
+
+/// The code of a digital sensor that did not answer, at the end of the record as well. Failed: neighbours on one side only were none, and
+/// a gas of minus 146 868 °C followed.
+#[test]
+fn wrong_readings_at_the_ends_of_a_record_are_found() {
+    let bench = Bench::simulated("spikes_at_the_ends", common::RIG);
+    let text = String::from_utf8(bench.read("run.csv")).expect("UTF-8");
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let last = lines.len() - 1;
+    for row in [300, 600, 900, last] {
+        let mut cells: Vec<&str> = lines[row].split(',').collect();
+        cells[2] = "-127.00";
+        lines[row] = cells.join(",");
+    }
+    bench.write("wrong.csv", lines.join("\n"));
+    let value = bench.run(&["diagnose", "wrong.csv", "--json"]).json();
+    let spikes = list(&value, "effects").iter().find(|effect| effect["effect"] == "spikes").expect("is found");
+    // Lines are counted from 1.
+    let first = |run: &Value| run["rows"][0].as_u64().expect("a line");
+    let masked: Vec<u64> = list(spikes, "masked").iter().map(first).collect();
+    assert_eq!(masked, [301, 601, 901, last as u64 + 1], "{spikes:#}");
+}

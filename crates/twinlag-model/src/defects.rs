@@ -97,8 +97,16 @@ fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
 
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
 /// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
-/// particular.
-pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, policy: &Policy) -> [Vec<usize>; 2] {
+/// particular. A single one in a channel may be anything.
+///
+/// - `known`: how many each channel has beside these
+pub(crate) fn spikes(
+    observations: &Observations,
+    parts: &[Part],
+    far: f64,
+    known: [usize; 2],
+    policy: &Policy,
+) -> [Vec<usize>; 2] {
     let mut out = [Vec::new(), Vec::new()];
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
@@ -111,26 +119,26 @@ pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, poli
             }
             let scores = scores(part, channel, n);
             let y = &stretch.reading_c[channel];
-            let beside: Vec<f64> = (0..n)
-                .map(|k| {
-                    if k < 2 || k + 2 >= n {
-                        return 0.0;
-                    }
-                    y[k] - (4.0 * (y[k - 1] + y[k + 1]) - y[k - 2] - y[k + 2]) / 6.0
-                })
-                .collect();
+            let beside: Vec<f64> = (0..n).map(|k| beside_neighbours(y, k)).collect();
             let scale = 1.4826 * median(beside.iter().map(|b| b.abs()).collect());
             let other = &stretch.reading_c[1 - channel];
             let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
             let mut slopes: Vec<f64> = (0..n).map(slope).collect();
             slopes.sort_unstable_by(f64::total_cmp);
             for k in 0..n {
-                let is_peak = (k.saturating_sub(2)..(k + 3).min(n)).all(|j| scores[j].abs() <= scores[k].abs());
+                let near = || k.saturating_sub(2)..(k + 3).min(n);
+                // At an end the residual shows less of a reading than of its neighbour.
+                let is_at_end = k < 2 || k + 2 >= n;
+                let (peaks, score) = if is_at_end {
+                    (&beside, near().map(|j| scores[j].abs()).fold(0.0, f64::max))
+                } else {
+                    (&scores, scores[k].abs())
+                };
+                let is_peak = near().all(|j| peaks[j].abs() <= peaks[k].abs());
                 let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
                 // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
-                let is_far = (scores[k].abs() > far && sticks_out > far)
-                    || (scores[k].abs() > policy.spike_residual_share * far
-                        && sticks_out > policy.spike_neighbour_factor * far);
+                let is_far = (score > far && sticks_out > far)
+                    || (score > policy.spike_residual_share * far && sticks_out > policy.spike_neighbour_factor * far);
                 if is_peak && is_far && !stretch.masked[channel][k] {
                     found.push(part.before + k);
                     ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
@@ -139,7 +147,7 @@ pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, poli
         }
         let m = found.len() as f64;
         let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
-        if found.len() >= 2
+        if found.len() + known[channel] >= 2
             && m < policy.most_spikes_share * observations.samples() as f64
             && related < policy.most_spike_rank_standard_errors
         {
@@ -147,6 +155,21 @@ pub(crate) fn spikes(observations: &Observations, parts: &[Part], far: f64, poli
         }
     }
     out
+}
+
+/// How far a reading is from what its neighbours lead to expect: a cubic through two on each side; at the ends of a stretch, where
+/// there are none on one side, a parabola through the next three, scaled so that white noise scatters as much.
+fn beside_neighbours(y: &[f64], k: usize) -> f64 {
+    /// Variances of both for noise of unit variance: `1 + 2 (4/6)² + 2 (1/6)²` and `1 + 9 + 9 + 1`.
+    const VARIANCES: [f64; 2] = [35.0 / 18.0, 20.0];
+    let beyond = |near: f64, next: f64, last: f64| {
+        (y[k] - 3.0 * near + 3.0 * next - last) * (VARIANCES[0] / VARIANCES[1]).sqrt()
+    };
+    match (k, y.len() - 1 - k) {
+        (2.., 2..) => y[k] - (4.0 * (y[k - 1] + y[k + 1]) - y[k - 2] - y[k + 2]) / 6.0,
+        (0 | 1, _) => beyond(y[k + 1], y[k + 2], y[k + 3]),
+        _ => beyond(y[k - 1], y[k - 2], y[k - 3]),
+    }
 }
 
 /// Masks `samples` of `channel`.

@@ -155,7 +155,8 @@ impl Prepared {
         for (round, far) in
             [policy.spike_standard_deviations, policy.further_spike_standard_deviations].into_iter().enumerate()
         {
-            let spikes = defects::spikes(&self.observations, &parts, far, policy);
+            let known = [0, 1].map(|i| self.spikes[i].len() + new[i].len());
+            let spikes = defects::spikes(&self.observations, &parts, far, known, policy);
             for i in 0..2 {
                 // Where there are some there are smaller ones.
                 if round == 0 || !new[i].is_empty() {

@@ -5,6 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use twinlag_compensate::{Readings, Rig};
 
+const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// Windows in which sensors are at rest, in units of all their time constants together.
 const WINDOW_LAGS: f64 = 5.0;
 /// Samples of a window, at least.
@@ -51,6 +52,14 @@ pub enum GasFault {
         #[serde(rename = "sensor_change_K")]
         sensor_change_k: f64,
     },
+    /// The gas is colder than anything can be.
+    BelowAbsoluteZero {
+        /// Where it is coldest, s.
+        time_s: f64,
+        /// What it is there, °C.
+        #[serde(rename = "gas_C")]
+        gas_c: f64,
+    },
     /// Readings are farther from their predictions than noise explains.
     Widened {
         /// How many times as far: what bands were multiplied by.
@@ -71,6 +80,9 @@ impl fmt::Display for GasFault {
                 "the gas temperature changes by {gas_change_k:.3} K within the faster sensor's time constant, and that \
                  sensor by {sensor_change_k:.3} K: no lag makes a reading move more than the gas"
             ),
+            Self::BelowAbsoluteZero { time_s, gas_c } => {
+                write!(f, "at {time_s:.4} s the gas temperature is {gas_c:.1} °C, below absolute zero")
+            }
             Self::Widened { factor } => {
                 write!(f, "readings deviate from their predictions {factor:.2} times as far as noise explains")
             }
@@ -91,7 +103,7 @@ pub(super) fn of(
 ) -> Vec<GasFault> {
     let seen = Seen { readings, rig, scale, gas_c, std_k };
     let widened = (widened_by > 1.0).then_some(GasFault::Widened { factor: widened_by });
-    [seen.far_at_rest(), seen.smoother(), widened].into_iter().flatten().collect()
+    [seen.far_at_rest(), seen.smoother(), seen.below_absolute_zero(), widened].into_iter().flatten().collect()
 }
 
 struct Seen<'a> {
@@ -162,6 +174,13 @@ impl Seen<'_> {
         Some((0.5 * (times[from] + times[to - 1]), nearer_k, allowed_k))
     }
 
+    fn below_absolute_zero(&self) -> Option<GasFault> {
+        let (coldest, gas_c) = self.gas_c.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
+        let limit_c = ABSOLUTE_ZERO_C - MAX_DEVIATIONS * self.std_k[coldest];
+        (*gas_c < limit_c)
+            .then(|| GasFault::BelowAbsoluteZero { time_s: self.readings.time_s()[coldest], gas_c: *gas_c })
+    }
+
     /// A lag passes no frequency more than the gas has it, `|H| ≤ 1`, so the mean square change over any time is no more than
     /// that of the gas. What the estimate leaves out of that is in its variance.
     fn smoother(&self) -> Option<GasFault> {
@@ -221,6 +240,17 @@ mod tests {
     /// Rests for 10 s, and swings from there on.
     fn gas() -> Vec<f64> {
         (0..4000).map(|k| 300.0 + if k < 1000 { 0.0 } else { 20.0 * (0.03 * f64::from(k - 1000)).sin() }).collect()
+    }
+
+    /// A wrong reading at the end that nothing has found makes such a gas.
+    #[test]
+    fn a_gas_below_absolute_zero_is_a_fault() {
+        let mut cold = gas();
+        cold[3990] = -1000.0;
+        let found = faults(&gas(), &cold);
+        let is_cold =
+            |fault: &GasFault| matches!(fault, GasFault::BelowAbsoluteZero { gas_c, .. } if *gas_c == -1000.0);
+        assert!(found.iter().any(is_cold), "{found:?}");
     }
 
     #[test]
