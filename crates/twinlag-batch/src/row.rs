@@ -225,7 +225,7 @@ impl Row {
         self
     }
 
-    /// A number; one that is not finite is none.
+    /// A number; one that is not finite gets no cell.
     fn number(mut self, column: &str, number: impl Into<Option<f64>>) -> Self {
         if let Some(number) = number.into().filter(|number| number.is_finite()) {
             self.cells.insert(column.to_owned(), number.into());
