@@ -83,6 +83,9 @@ fn make(target: &str, host: &str, build: &Path, out: &Path) -> Result<PathBuf> {
         entries.push((Path::new("completions").join(format!("twinlag.{shell}")), script.stdout, false));
     }
     let pages = build.join("man");
+    if pages.exists() {
+        fs::remove_dir_all(&pages)?;
+    }
     let status = Command::new(&here).args(["man", "--quiet", "--out"]).arg(&pages).status()?;
     ensure!(status.success(), "no manual");
     for page in fs::read_dir(&pages)? {

@@ -27,7 +27,7 @@ pub enum BatchError {
         path.display()
     )]
     OtherQuestion { path: PathBuf, what: String },
-    #[error("{}, line {line}: expected a row of a batch: {reason}", path.display())]
+    #[error("{}, line {line}: expected the journal of a batch: {reason}", path.display())]
     Damaged { path: PathBuf, line: usize, reason: String },
     #[error("{} is being written by another run", path.display())]
     Busy { path: PathBuf },

@@ -18,17 +18,17 @@ pub struct Counts {
     pub undetermined: usize,
     /// The file cannot be used.
     pub unusable: usize,
-    /// Anything else.
+    /// The program failed: a panic, or an output that cannot be written.
     pub failed: usize,
 }
 
 impl Counts {
-    fn add(&mut self, exit_code: Option<f64>) {
+    fn add(&mut self, exit_code: Option<u8>) {
         *match exit_code {
-            Some(0.0) => &mut self.answered,
-            Some(4.0) => &mut self.undetermined,
+            Some(0) => &mut self.answered,
+            Some(4) => &mut self.undetermined,
             // 2: what was asked does not go for this file.
-            Some(3.0 | 2.0) => &mut self.unusable,
+            Some(3 | 2) => &mut self.unusable,
             _ => &mut self.failed,
         } += 1;
     }
@@ -111,31 +111,27 @@ impl Fleet {
             let rows = journal.rows(unit)?;
             for row in &rows {
                 if let Some(reason) = reason_without_answer(row) {
-                    let file = row.get_text("file").unwrap_or_default();
-                    let count = reasons.entry(kind(reason, file)).or_insert_with(|| ReasonCount {
-                        reason: without_file(reason, file),
-                        first: file.to_owned(),
+                    let name = row.get_text("file").or(row.get_text("rig")).unwrap_or_default();
+                    let count = reasons.entry(kind(reason, name)).or_insert_with(|| ReasonCount {
+                        reason: without_file(reason, name),
+                        first: name.to_owned(),
                         count: 0,
                     });
                     count.count += 1;
                 }
-                let is_file = row.get_text("level") == Some("record");
-                let is_unusable =
-                    matches!(row.get_number("exit_code"), Some(2.0 | 3.0)) && row.get_number("samples").is_none();
-                fleet.unusable_files += usize::from(is_file && is_unusable);
+                fleet.unusable_files += usize::from(row.is_unread() && matches!(row.exit_code(), Some(2 | 3)));
                 if row.get("agrees").and_then(serde_json::Value::as_bool) == Some(false) {
                     let cell = |column| row.get_text(column).unwrap_or_default().to_owned();
                     fleet.contradicting.push((cell("rig"), cell("file")));
                 }
             }
-            // A rig of which no file can be used has no row of its own.
             let of_unit = rows.iter().find(|row| match unit {
                 Unit::Rig { .. } => row.get_text("level") == Some("rig"),
                 Unit::Record(_) | Unit::WithoutRig { .. } => true,
             });
             // A file of which nothing says whose it is belongs to no rig.
             if !(is_grouped && matches!(unit, Unit::WithoutRig { .. })) {
-                fleet.units.add(of_unit.map_or(Some(3.0), |row| row.get_number("exit_code")));
+                fleet.units.add(of_unit.and_then(Row::exit_code));
             }
             let Some(row) = of_unit.filter(|row| row.get_number("samples").is_some()) else { continue };
             let member = Member::of(row);
@@ -170,7 +166,8 @@ impl Member {
 
 /// Why a row has no answer; `None` of one that has, and of one that rests on its rig.
 fn reason_without_answer(row: &Row) -> Option<&str> {
-    if row.get_number("exit_code") == Some(0.0) { None } else { row.get_text("reason") }
+    let whys = ["reason", "tau1_because", "tau2_because", "gas_because"];
+    if row.exit_code() == Some(0) { None } else { whys.into_iter().find_map(|why| row.get_text(why)) }
 }
 
 /// A reason without the name of the file that it begins with.
@@ -180,7 +177,8 @@ fn without_file(reason: &str, file: &str) -> String {
 
 /// What reasons of one kind share: a number is like any other.
 fn kind(reason: &str, file: &str) -> String {
-    let text = without_file(reason, file).replace(file, "FILE");
+    let text = without_file(reason, file);
+    let text = if file.is_empty() { text } else { text.replace(file, "FILE") };
     let mut kind = String::new();
     for c in text.chars() {
         match c {
@@ -207,6 +205,7 @@ mod tests {
         let [one, other] = ["a.csv", "b/c.csv"].map(|file| (format!("{file}, line 12: expected 3 cells"), file));
         assert_eq!(kind(&one.0, one.1), kind(&other.0.replace("12", "7"), other.1));
         assert_eq!(without_file(&one.0, one.1), "line 12: expected 3 cells");
+        assert_eq!(kind("periods of 12 and 7 ms", ""), kind("periods of 3 and 100 ms", ""));
         assert_ne!(kind("a.csv: the file is empty", "a.csv"), kind("b.csv: one column", "b.csv"));
     }
 }

@@ -123,8 +123,8 @@ impl Unit {
     }
 }
 
-#[expect(clippy::unnecessary_debug_formatting, reason = "what is no Unicode would be replaced by one sign for all")]
 /// The name of a file as text that no other file has: what is no Unicode in it is written as its bytes.
+#[expect(clippy::unnecessary_debug_formatting, reason = "what is no Unicode would be replaced by one sign for all")]
 pub fn name_of(file: &Path) -> String {
     file.to_str().map_or_else(|| format!("{file:?}").trim_matches('"').to_owned(), str::to_owned)
 }
@@ -159,7 +159,7 @@ pub fn rig_by_path(file: &Path, by: &GroupBy) -> Option<Result<String, String>> 
         GroupBy::Column(_) => None,
         GroupBy::Folder => {
             let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            Some(Ok(folder.display().to_string()))
+            Some(Ok(name_of(folder)))
         }
         GroupBy::Name(pattern) => Some(
             pattern

@@ -14,11 +14,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::error::BatchError;
-use crate::group::Unit;
+use crate::group::{Unit, name_of};
 use crate::row::Row;
 
 /// Name and number of the format.
 const SCHEMA: &str = "twinlag.batch-journal/1";
+
+/// How every journal begins.
+const START: &str = "{\"schema\":\"twinlag.batch-journal/";
 
 /// How a run begins where there may be a journal of an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +50,7 @@ pub struct Journal {
 struct Done {
     at: u64,
     bytes: usize,
-    stamps: Vec<Option<Stamp>>,
+    stamps: Stamps,
 }
 
 /// What shows that a file has changed.
@@ -69,7 +72,7 @@ struct Header {
 #[derive(Serialize, Deserialize)]
 struct Entry<Rows> {
     unit: String,
-    stamps: Vec<Option<Stamp>>,
+    stamps: Stamps,
     rows: Rows,
 }
 
@@ -96,6 +99,7 @@ impl Journal {
         let header =
             Header { schema: SCHEMA.to_owned(), version: env!("CARGO_PKG_VERSION").to_owned(), asked: asked.clone() };
         let mut journal = Self { file, path: path.to_owned(), end: 0, done: HashMap::new() };
+        journal.expect_journal()?;
         if begin == Begin::Resume {
             journal.take_up(&header)?;
         }
@@ -104,11 +108,6 @@ impl Journal {
             journal.write_line(&header)?;
         }
         Ok(journal)
-    }
-
-    /// How many units are done whose files are as they were then.
-    pub fn count_done(&self, units: &[Unit]) -> usize {
-        units.iter().filter(|unit| self.is_done(unit)).count()
     }
 
     /// Has a unit asked again, since what it led to beside its rows is gone.
@@ -144,6 +143,19 @@ impl Journal {
         read().map_err(|error| wrong(error.to_string()))?;
         let entry: Entry<Vec<Row>> = serde_json::from_slice(&line).map_err(|error| wrong(error.to_string()))?;
         Ok(entry.rows)
+    }
+
+    /// Refuses to replace a file that is no journal.
+    fn expect_journal(&mut self) -> Result<(), BatchError> {
+        let mut start = Vec::new();
+        let read = (&self.file).take(START.len() as u64).read_to_end(&mut start);
+        read.and_then(|_| self.file.rewind())
+            .map_err(|error| BatchError::Read { path: self.path.clone(), reason: error.to_string() })?;
+        if START.as_bytes().starts_with(&start) {
+            return Ok(());
+        }
+        let reason = "it does not begin as a journal does".to_owned();
+        Err(BatchError::Damaged { path: self.path.clone(), line: 1, reason })
     }
 
     /// Reads what an earlier run has done.
@@ -217,7 +229,7 @@ fn difference(was: &Value, is: &Value) -> Option<String> {
 }
 
 /// The files of a unit as they were before they were read.
-pub(crate) struct Seen(Vec<Option<Stamp>>);
+pub(crate) struct Seen(Stamps);
 
 impl Seen {
     pub(crate) fn now(unit: &Unit) -> Self {
@@ -225,9 +237,12 @@ impl Seen {
     }
 }
 
-/// What shows that a file of a unit has changed; `None` of one that is not there.
-fn stamps(unit: &Unit) -> Vec<Option<Stamp>> {
-    unit.files().iter().map(|file| file.metadata().ok().map(|about| Stamp::of(&about))).collect()
+/// The name of each file of a unit, and what shows that it has changed; `None` of one that is not there.
+type Stamps = Vec<(String, Option<Stamp>)>;
+
+fn stamps(unit: &Unit) -> Stamps {
+    let stamp = |file: &PathBuf| file.metadata().ok().map(|about| Stamp::of(&about));
+    unit.files().iter().map(|file| (name_of(file), stamp(file))).collect()
 }
 
 impl Stamp {

@@ -15,7 +15,8 @@
 //!
 //! let folder = tempfile::tempdir()?;
 //! std::fs::write(folder.path().join("empty.csv"), "")?;
-//! let units = each(find(&[folder.path().join("*.csv")])?);
+//! let found = find(&[folder.path().join("*.csv")])?;
+//! let units = each(found.into_iter().map(|file| file.path).collect());
 //!
 //! let characterise = |unit: &Unit| -> Vec<Row> {
 //!     let Unit::Record(file) = unit else { unreachable!("each file by itself") };
@@ -48,7 +49,7 @@ mod run;
 mod table;
 
 pub use error::BatchError;
-pub use find::find;
+pub use find::{Found, find};
 pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};
 pub use group::{GroupBy, NamePattern, Unit, each, grouped, name_of, rig_by_path};
 pub use journal::{Begin, Journal};

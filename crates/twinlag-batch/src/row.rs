@@ -140,9 +140,8 @@ pub struct Row {
 }
 
 impl Row {
-    /// The row of a file, or of a whole rig, that has no answer.
+    /// The row of a file that has no answer.
     ///
-    /// - `file`: the file, or the rig's name where the rig as a whole has none
     /// - `exit_code`: what the program would have ended with on it
     pub fn without_answer(unit: &Unit, file: &Path, exit_code: u8, reason: &str) -> Self {
         Self::of_file(unit, &name_of(file)).count("exit_code", exit_code.into()).text("reason", reason)
@@ -150,10 +149,15 @@ impl Row {
 
     /// The row of a rig as a whole that has no answer.
     ///
-    /// - `records`: how many of its records can be used
+    /// - `records`: how many of its records were read
     pub fn rig_without_answer(name: &str, records: usize, exit_code: u8, reason: &str) -> Self {
         let row = Self::of_rig(name, records);
         row.count("exit_code", exit_code.into()).text("reason", reason)
+    }
+
+    /// The row of a record of which nothing is said but with its rig.
+    pub fn with_its_rig(unit: &Unit, file: &str, samples: usize, exit_code: u8) -> Self {
+        Self::of_file(unit, file).count("exit_code", exit_code.into()).count("samples", samples)
     }
 
     /// The rows of an answer: one of a record; of a rig one for it and one for each of its records.
@@ -193,6 +197,16 @@ impl Row {
     /// A cell with a number; `None` where it is empty.
     pub fn get_number(&self, column: &str) -> Option<f64> {
         self.cells.get(column)?.as_f64()
+    }
+
+    /// What the program would have ended with.
+    pub fn exit_code(&self) -> Option<u8> {
+        self.cells.get("exit_code")?.as_u64()?.try_into().ok()
+    }
+
+    /// Whether it is of a file that was not read.
+    pub(crate) fn is_unread(&self) -> bool {
+        self.get("samples").is_none() && self.get_text("level") == Some("record")
     }
 
     pub(crate) fn get(&self, column: &str) -> Option<&Value> {

@@ -23,8 +23,8 @@ const MAX_THREADS_PER_PROCESSOR: usize = 4;
 /// How to run a batch. Nothing here changes a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// How many units are worked on at once; by default one for each processor. Threads that no unit is left for help within the
-    /// units.
+    /// How many units are worked on at once; by default one for each processor. With fewer units than threads, the others help
+    /// within the units.
     pub threads: NonZeroUsize,
 }
 
@@ -147,7 +147,7 @@ fn panicked(unit: &Unit, panic: &(dyn Any + Send)) -> Vec<Row> {
     let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let reason = format!("a fault of the program: {}", message.unwrap_or("it panicked without a message"));
     vec![match unit {
-        Unit::Rig { name, files } => Row::rig_without_answer(name, files.len(), 1, &reason),
+        Unit::Rig { name, .. } => Row::rig_without_answer(name, 0, 1, &reason),
         Unit::Record(file) | Unit::WithoutRig { file, .. } => Row::without_answer(unit, file, 1, &reason),
     }]
 }

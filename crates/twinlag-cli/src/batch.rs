@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::num::NonZeroUsize;
 use std::panic;
 use std::path::{Path, PathBuf};
@@ -14,8 +15,8 @@ use twinlag::diagnosis::Identifier;
 use twinlag::record::{ColumnRef, Record};
 use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, GroupBy, Journal, Member, MemberTau, Row, Unit, Verb as RowVerb, each, find,
-    grouped, map, rig_by_path, run as run_units, write_csv, write_parquet,
+    Answer, BatchError, Begin, Fleet, Found, GroupBy, Journal, Member, MemberTau, Row, Unit, Verb as RowVerb, each,
+    find, grouped, map, name_of, rig_by_path, run as run_units, write_csv, write_parquet,
 };
 use twinlag_pages::fleet_report;
 
@@ -137,8 +138,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         (_, true) => Begin::Anew,
         _ => Begin::New,
     };
-    let units = question.units(files, options, console);
-    let (units, gas_files) = question.gas_files(units)?;
+    let gas_files = question.gas_files(&files)?;
     let is_resumed = command.resume && journal_path.exists();
     if let Some(gas) = gas_files.values().find(|gas| gas.exists()).filter(|_| !is_resumed && !command.force) {
         return Err(Failure::Usage(format!(
@@ -146,10 +146,15 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
             gas.display()
         )));
     }
-    let mut journal = Journal::open(&journal_path, &question.asked(), begin)?;
+    let files = files.into_iter().map(|file| file.path).collect();
+    let units = question.units(files, options, console);
+    let mut journal = Journal::open(&journal_path, &question.asked()?, begin)?;
     for unit in &units {
-        let rows = journal.rows(unit)?;
-        if rows.iter().filter_map(|row| row.get_text(GAS_FILE)).any(|gas| !Path::new(gas).exists()) {
+        // Its gas temperature goes elsewhere now, or is gone.
+        let gas = gas_files.get(&unit.files()[0]).map(|gas| name_of(gas));
+        let is_moved =
+            |row: &Row| row.get_text(GAS_FILE).is_some_and(|is| gas.as_deref() != Some(is) || !Path::new(is).exists());
+        if journal.rows(unit)?.iter().any(is_moved) {
             journal.forget(unit);
         }
     }
@@ -194,40 +199,56 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
 
 impl Batch {
     /// The files that are asked, without what the batch itself writes.
-    fn files(&self, journal: &Path) -> Result<Vec<PathBuf>, Failure> {
+    fn files(&self, journal: &Path) -> Result<Vec<Found>, Failure> {
         if let Some(out) = self.out.iter().find(|out| !is_parquet(out) && !has_ending(out, "csv")) {
             let text = format!("--out {}: expected a name that ends in .csv or .parquet", out.display());
             return Err(Failure::Usage(text));
         }
-        let outputs: Vec<(&str, &Path)> = self
-            .out
-            .iter()
-            .map(|path| ("--out", path.as_path()))
-            .chain(self.report.iter().map(|path| ("--report", path.as_path())))
-            .collect();
-        let is_of_earlier_run = journal.exists();
-        output::check(journal, &outputs, self.force || (self.resume && is_of_earlier_run))?;
+        let tables = self.out.iter().map(|path| ("--out", path.as_path()));
+        let outputs: Vec<(&str, &Path)> =
+            tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect();
+        let is_resumed = self.resume && journal.exists();
+        let others = outputs.iter().all(|(_, path)| !path.exists() || is_of_batch(path));
+        output::check(journal, &outputs, self.force || (is_resumed && others))?;
+        let gas = self.gas.as_ref().and_then(|folder| folder.canonicalize().ok());
+        let is_gas = |file: &Path| {
+            file.to_string_lossy().ends_with(GAS_ENDING)
+                && gas.as_ref().is_some_and(|gas| file.canonicalize().is_ok_and(|file| file.starts_with(gas)))
+        };
         let is_output = |file: &Path| {
             output::is_same(file, journal) || outputs.iter().any(|(_, output)| output::is_same(file, output))
         };
-        let (own, files): (Vec<_>, Vec<_>) = find(&self.what)?.into_iter().partition(|file| is_output(file));
-        match own.iter().find(|file| !output::is_same(file, journal) && !is_of_batch(file)) {
+        let found = find(&self.what)?;
+        let (own, files): (Vec<_>, Vec<_>) = found.into_iter().partition(|file| is_output(&file.path));
+        match own.iter().find(|file| !output::is_same(&file.path, journal) && !is_of_batch(&file.path)) {
             Some(file) => Err(Failure::Usage(format!(
                 "{} is one of the records: choose another name for --out or --report",
-                file.display()
+                file.path.display()
             ))),
-            None => Ok(files),
+            None => Ok(files.into_iter().filter(|file| !is_gas(&file.path)).collect()),
         }
     }
 }
 
-/// What the tables and the summary of a batch have in them, and no record has.
-const SIGNS: [&[u8]; 3] = [b"level,rig,file,exit_code", b"twinlag_batch", b"<!DOCTYPE html>"];
+/// Bytes at either end of a file by which a table or a summary of a batch is known.
+const SIGN_BYTES: u64 = 1 << 16;
 
 /// Whether a file is a table or a summary that a batch has written.
 fn is_of_batch(file: &Path) -> bool {
-    let content = fs::read(file).unwrap_or_default();
-    SIGNS.iter().any(|sign| content.windows(sign.len()).any(|bytes| bytes == *sign))
+    let ends = || -> std::io::Result<[Vec<u8>; 2]> {
+        let mut file = fs::File::open(file)?;
+        let [mut head, mut tail] = [Vec::new(), Vec::new()];
+        (&file).take(SIGN_BYTES).read_to_end(&mut head)?;
+        let length = file.metadata()?.len();
+        file.seek(SeekFrom::Start(length.saturating_sub(SIGN_BYTES)))?;
+        file.read_to_end(&mut tail)?;
+        Ok([head, tail])
+    };
+    let Ok([head, tail]) = ends() else { return false };
+    let has = |bytes: &[u8], sign: &str| bytes.windows(sign.len()).any(|window| window == sign.as_bytes());
+    head.starts_with(b"level,rig,file,exit_code")
+        || (head.starts_with(b"PAR1") && has(&tail, "twinlag_batch"))
+        || (head.starts_with(b"<!DOCTYPE html>") && has(&head, "<title>Batch "))
 }
 
 /// What is asked of each unit, whatever decides a cell of the table.
@@ -286,11 +307,12 @@ impl<'a> Question<'a> {
     }
 
     /// All of it, for the journal.
-    fn asked(&self) -> Value {
-        json!({
+    fn asked(&self) -> Result<Value, Failure> {
+        Ok(json!({
+            "program": env!("TWINLAG_VERSION"),
             "verb": RowVerb::from(self.verb),
             "group_by": self.group_by.map(ToString::to_string),
-            "profile": self.profile.text().unwrap_or_default(),
+            "profile": self.profile.text()?,
             "options": self.options,
             "physics": format!("{:?}", self.physics),
             "model": self.model.as_ref().map(|(_, model)| model),
@@ -300,7 +322,7 @@ impl<'a> Question<'a> {
             "strict": self.strict,
             "gas": self.gas,
             "keep": self.keep.iter().map(ToString::to_string).collect::<Vec<_>>(),
-        })
+        }))
     }
 
     fn unit_name(&self) -> &'static str {
@@ -321,7 +343,8 @@ impl<'a> Question<'a> {
 
     fn rig_by_column(&self, file: &Path, by: &GroupBy) -> Result<String, String> {
         let GroupBy::Column(name) = by else { return Err(format!("nothing is known of {by}")) };
-        let table = table_watched(file, &self.profile.choice, SILENT).map_err(|failure| failure.to_string())?;
+        let table = expect_file(file).and_then(|()| table_watched(file, &self.profile.choice, SILENT));
+        let table = table.map_err(|failure| failure.to_string())?;
         let column = name.parse().unwrap_or_else(|_| ColumnRef::Name(name.clone()));
         let index = table.find(&column).map_err(|error| error.to_string())?;
         table.constant(index).ok_or_else(|| {
@@ -329,41 +352,28 @@ impl<'a> Question<'a> {
         })
     }
 
-    /// The units without the gas temperatures of an earlier run, and where those of each file go: to its own path below the folder that
-    /// all files share. Of two files that differ in their endings alone, those stay in the names.
-    fn gas_files(&self, units: Vec<Unit>) -> Result<(Vec<Unit>, BTreeMap<PathBuf, PathBuf>), Failure> {
-        let Some(folder) = self.gas else { return Ok((units, BTreeMap::new())) };
+    /// Where the gas temperature of each file goes: below the folder for them to the path that the file has below the one by which it
+    /// was found.
+    fn gas_files(&self, files: &[Found]) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+        let Some(folder) = self.gas else { return Ok(BTreeMap::new()) };
         if folder.exists() && !folder.is_dir() {
             return Err(Failure::Usage(format!("--gas {}: expected a folder, and this is a file", folder.display())));
         }
-        let files: Vec<&PathBuf> = units.iter().flat_map(Unit::files).collect();
-        // However they are named, paths from the root have no `..` in them.
-        let wholes: Vec<PathBuf> = files
-            .iter()
-            .map(|file| file.canonicalize().unwrap_or_else(|_| folder.join(file.file_name().unwrap_or_default())))
-            .collect();
-        let parents = wholes.iter().filter_map(|file| file.parent()).map(Path::to_owned);
-        let common = parents.reduce(|a, b| shared(&a, &b)).unwrap_or_default();
-        let below: Vec<&Path> = wholes.iter().map(|whole| whole.strip_prefix(&common).unwrap_or(whole)).collect();
-        let mut taken: BTreeMap<PathBuf, usize> = BTreeMap::new();
-        below.iter().for_each(|path| *taken.entry(path.with_extension("")).or_default() += 1);
-        let gas_files: BTreeMap<PathBuf, PathBuf> = files
-            .iter()
-            .zip(&below)
-            .map(|(file, path)| {
-                let stem = path.with_extension("");
-                let stem = if taken[&stem] > 1 { (*path).to_owned() } else { stem };
-                ((*file).clone(), with_ending(&folder.join(stem), GAS_ENDING))
-            })
-            .collect();
-        let is_gas = |unit: &Unit| {
-            let is_named_so = |file: &PathBuf| file.to_string_lossy().ends_with(GAS_ENDING);
-            unit.files()
-                .iter()
-                .any(|file| is_named_so(file) && gas_files.values().any(|gas| output::is_same(gas, file)))
-        };
-        let units = units.iter().filter(|unit| !is_gas(unit)).cloned().collect();
-        Ok((units, gas_files))
+        let mut gas_files = BTreeMap::new();
+        let mut taken: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+        for Found { path, below, .. } in files {
+            let gas = with_ending(&folder.join(below), GAS_ENDING);
+            if let Some(other) = taken.insert(gas.clone(), path) {
+                return Err(Failure::Usage(format!(
+                    "{} and {} would have the same file of gas temperature, {}: name a folder that holds both",
+                    other.display(),
+                    path.display(),
+                    gas.display()
+                )));
+            }
+            gas_files.insert(path.clone(), gas);
+        }
+        Ok(gas_files)
     }
 
     /// The rows of a unit.
@@ -386,30 +396,29 @@ impl<'a> Question<'a> {
                 Err(failure) => rows.push(without_answer(unit, file, &failure)),
             }
         }
-        let count = records.len();
-        let of_rig = if count == 0 {
+        let read: Vec<(String, usize)> = records.iter().map(|record| (record.source.clone(), record.len())).collect();
+        let of_rig = if records.is_empty() {
             vec![Row::rig_without_answer(name, 0, 3, "none of its files can be used")]
         } else {
             self.ask(unit, records, None).unwrap_or_else(|failure| {
-                vec![Row::rig_without_answer(name, count, failure.exit_code(), &failure.to_string())]
+                vec![Row::rig_without_answer(name, read.len(), failure.exit_code(), &failure.to_string())]
             })
         };
-        rows.splice(..0, of_rig);
+        let exit_code = of_rig.iter().find_map(Row::exit_code).unwrap_or(1);
+        let has_row = |file: &str| of_rig.iter().any(|row| row.get_text("file") == Some(file));
+        rows.extend(
+            read.iter()
+                .filter(|(file, _)| !has_row(file))
+                .map(|(file, samples)| Row::with_its_rig(unit, file, *samples, exit_code)),
+        );
+        rows.extend(of_rig);
         // The rig first, which has no file.
         rows.sort_by(|a, b| a.get_text("file").cmp(&b.get_text("file")));
         rows
     }
 
     fn read(&self, file: &Path) -> Result<Record, Failure> {
-        // Whoever opens a pipe or a device may wait for ever.
-        let about =
-            fs::metadata(file).map_err(|e| Failure::File(format!("{}: cannot be read: {e}", file.display())))?;
-        if !about.is_file() {
-            return Err(Failure::File(format!(
-                "{}: expected a file, found a folder, a pipe or a device",
-                file.display()
-            )));
-        }
+        expect_file(file)?;
         read_watched(file, &self.profile, SILENT)
     }
 
@@ -460,6 +469,17 @@ impl<'a> Question<'a> {
     }
 }
 
+/// Refuses what is no file: whoever opens a pipe or a device may wait for ever.
+fn expect_file(file: &Path) -> Result<(), Failure> {
+    let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
+    let about = fs::metadata(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
+    match (about.is_file(), about.is_dir()) {
+        (true, _) => Ok(()),
+        (_, true) => Err(wrong("this folder cannot be listed".to_owned())),
+        _ => Err(wrong("expected a file, found a pipe or a device".to_owned())),
+    }
+}
+
 fn write_gas(answer: &Compensation, kept: Option<&Kept>, path: &Path) -> Result<(), Failure> {
     if let Some(folder) = path.parent() {
         let wrong = |error| Failure::Other(format!("{}: cannot be created: {error}", folder.display()));
@@ -470,11 +490,6 @@ fn write_gas(answer: &Compensation, kept: Option<&Kept>, path: &Path) -> Result<
 
 fn without_answer(unit: &Unit, file: &Path, failure: &Failure) -> Row {
     Row::without_answer(unit, file, failure.exit_code(), &failure.to_string())
-}
-
-/// The folder that holds both.
-fn shared(one: &Path, other: &Path) -> PathBuf {
-    one.components().zip(other.components()).take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
 }
 
 fn with_ending(path: &Path, ending: &str) -> PathBuf {

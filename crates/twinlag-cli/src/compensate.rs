@@ -25,7 +25,9 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let to_stdout = output::check_data(&command.input.file, model_file, &command.out, &views, command.force, console)?;
     let asked = command.input.method.options()?;
     let model = model_file.map(model).transpose()?;
-    let record = read_watched(&command.input.file, &command.input.columns.profile()?, console)?;
+    let profile = command.input.columns.profile()?;
+    let record = read_watched(&command.input.file, &profile, console)?;
+    Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;
     let run = |characterise: Options| {
@@ -39,7 +41,6 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     };
     let answer = plausibility.answer(asked, run, |answer| &mut answer.last)?;
     if answer.status == Status::Ok {
-        let profile = command.input.columns.profile()?;
         let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
         write_gas(&answer, kept.as_ref(), &command.out, to_stdout)?;
         if let Some(path) = views.picture {

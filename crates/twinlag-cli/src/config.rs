@@ -12,21 +12,36 @@
 use std::ffi::OsString;
 use std::path::Path;
 
-use clap::{Command, CommandFactory};
+use clap::{Arg, Command, CommandFactory};
 use toml::{Table, Value};
 
 use crate::arguments::Arguments;
 use crate::failure::Failure;
 
-/// The arguments with what the file of their `--config` adds; without that option as they are.
+/// The arguments with what the file of their `--config` adds; without that option as they are. Paths in the file are relative to the
+/// folder in which the program runs, as on the command line.
 pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>, Failure> {
-    let Some(file) = value_of(&arguments, "config") else { return Ok(arguments) };
+    let Some(file) = take_value(&mut arguments, "config") else { return Ok(arguments) };
     let file = Path::new(&file);
     let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
     let keys: Table = toml::from_str(&text).map_err(|error| wrong(format!("expected options as TOML: {error}")))?;
     let program = Arguments::command();
-    let Some(command) = command_of(&program, &arguments) else { return Ok(arguments) };
+    let globals: Vec<&str> = program.get_arguments().filter(|a| a.is_global_set()).filter_map(Arg::get_long).collect();
+    let has = |command: &Command, name: &str| has_option(command, name) || globals.contains(&name);
+    // Of a command within another, as `study run`, each has a name.
+    let mut path: Vec<(usize, &Command)> = Vec::new();
+    for (place, argument) in arguments.iter().enumerate().skip(1) {
+        let within = path.last().map_or(&program, |(_, command)| command);
+        match within.find_subcommand(argument) {
+            Some(command) => path.push((place, command)),
+            None if argument.to_string_lossy().starts_with('-') => {}
+            None => break,
+        }
+    }
+    let Some(&(place, command)) = path.last() else { return Ok(arguments) };
+    let is_asked = |named: &Command| path.iter().any(|(_, command)| command.get_name() == named.get_name());
+    let mut added = Vec::new();
     for (key, value) in &keys {
         match value {
             // Options of one command.
@@ -34,52 +49,64 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
                 let named = program.find_subcommand(key);
                 let named = named.ok_or_else(|| wrong(format!("expected the name of a command, found [{key}]")))?;
                 for (key, value) in own {
-                    if !has_option(named, key) {
+                    if !has(named, key) {
                         return Err(wrong(format!("[{}] has no option --{key}", named.get_name())));
                     }
-                    if named.get_name() == command.get_name() {
-                        add(&mut arguments, key, value).map_err(wrong)?;
+                    if is_asked(named) && has(command, key) {
+                        add(&mut added, &arguments, key, value).map_err(wrong)?;
                     }
                 }
             }
             value => {
-                if !program.get_subcommands().any(|command| has_option(command, key)) {
+                if !has(&program, key) {
                     return Err(wrong(format!("no command has an option --{key}")));
                 }
-                let is_own = matches!(keys.get(command.get_name()), Some(Value::Table(own)) if own.contains_key(key));
-                if has_option(command, key) && !is_own {
-                    add(&mut arguments, key, value).map_err(wrong)?;
+                let own = path.iter().filter_map(|(_, command)| keys.get(command.get_name())?.as_table());
+                let is_own = own.into_iter().any(|own| own.contains_key(key));
+                if has(command, key) && !is_own {
+                    add(&mut added, &arguments, key, value).map_err(wrong)?;
                 }
             }
         }
     }
+    arguments.splice(place + 1..place + 1, added);
     Ok(arguments)
 }
 
-/// The command that the arguments name.
-fn command_of<'a>(program: &'a Command, arguments: &[OsString]) -> Option<&'a Command> {
-    arguments.iter().skip(1).find_map(|argument| program.find_subcommand(argument))
-}
-
+/// Whether a command, or one within it, has an option of that name.
 fn has_option(command: &Command, name: &str) -> bool {
-    command.get_arguments().any(|argument| argument.get_long() == Some(name)) || ["json", "quiet"].contains(&name)
+    command.get_arguments().any(|argument| argument.get_long() == Some(name))
+        || command.get_subcommands().any(|within| has_option(within, name))
 }
 
-/// The value that an option has on the command line; empty for one that needs no value.
-fn value_of(arguments: &[OsString], name: &str) -> Option<OsString> {
+/// Takes an option with its value out of the arguments; an empty value where there is none.
+fn take_value(arguments: &mut Vec<OsString>, name: &str) -> Option<OsString> {
     let option = format!("--{name}");
-    arguments.iter().enumerate().find_map(|(place, argument)| {
+    let with_value = format!("{option}=");
+    let place = arguments.iter().position(|argument| {
         let argument = argument.to_string_lossy();
-        if *argument == option {
-            return Some(arguments.get(place + 1).cloned().unwrap_or_default());
-        }
-        argument.strip_prefix(&format!("{option}=")).map(OsString::from)
+        *argument == option || argument.starts_with(&with_value)
+    })?;
+    let taken = arguments.remove(place);
+    match taken.to_string_lossy().strip_prefix(&with_value) {
+        Some(value) => Some(value.into()),
+        None if place < arguments.len() => Some(arguments.remove(place)),
+        None => Some(OsString::new()),
+    }
+}
+
+/// Whether an option is on the command line.
+fn is_given(arguments: &[OsString], name: &str) -> bool {
+    let option = format!("--{name}");
+    arguments.iter().any(|argument| {
+        let argument = argument.to_string_lossy();
+        *argument == option || argument.starts_with(&format!("{option}="))
     })
 }
 
 /// Adds an option with its value or its values, unless it is given already.
-fn add(arguments: &mut Vec<OsString>, name: &str, value: &Value) -> Result<(), String> {
-    if value_of(arguments, name).is_some() {
+fn add(added: &mut Vec<OsString>, given: &[OsString], name: &str, value: &Value) -> Result<(), String> {
+    if is_given(given, name) {
         return Ok(());
     }
     let mut put = |value: &Value| {
@@ -88,11 +115,11 @@ fn add(arguments: &mut Vec<OsString>, name: &str, value: &Value) -> Result<(), S
             Value::Integer(_) | Value::Float(_) => value.to_string(),
             other => return Err(format!("{name}: expected a text, a number, true, or a list of these, found {other}")),
         };
-        arguments.push(format!("--{name}={text}").into());
+        added.push(format!("--{name}={text}").into());
         Ok(())
     };
     match value {
-        Value::Boolean(true) => arguments.push(format!("--{name}").into()),
+        Value::Boolean(true) => added.push(format!("--{name}").into()),
         Value::Boolean(false) => {}
         Value::Array(values) => values.iter().try_for_each(put)?,
         value => put(value)?,

@@ -13,7 +13,7 @@ impl Console {
     /// Prints a line on standard error, unless the program is to be quiet.
     pub(crate) fn note(self, text: impl FnOnce() -> String) {
         if !self.quiet {
-            eprintln!("{}", text());
+            anstream::eprintln!("{}", text());
         }
     }
 }

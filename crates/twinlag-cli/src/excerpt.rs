@@ -22,7 +22,7 @@ pub(crate) fn excerpt(file: &str, line: usize) -> Option<String> {
     }
     let mut bytes = Vec::new();
     reader.take(MAX_LINE_BYTES).read_until(b'\n', &mut bytes).ok()?;
-    let text = String::from_utf8_lossy(&bytes).replace('\t', " ");
+    let text = String::from_utf8(bytes).ok()?.replace('\t', " ");
     let text = text.trim_end();
     if text.is_empty() || text.chars().any(char::is_control) {
         return None;

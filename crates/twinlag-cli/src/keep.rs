@@ -1,5 +1,6 @@
 //! Columns of a file that go to an output as they are: its dates and times of day, and what `--keep` names.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use twinlag::record::{ColumnRef, Kind, Record, Table};
@@ -22,6 +23,17 @@ pub(crate) struct Kept {
 }
 
 impl Kept {
+    /// Refuses names of columns that the file does not have, before any work.
+    pub(crate) fn check(
+        file: &Path,
+        profile: &Profile,
+        named: &[ColumnRef],
+        record: &Record,
+        console: Console,
+    ) -> Result<(), Failure> {
+        if named.is_empty() { Ok(()) } else { Self::of(file, profile, named, record, console).map(drop) }
+    }
+
     /// Reads the file once more; `None` where there is nothing to keep, as of what came from a pipe.
     ///
     /// - `named`: the columns to keep beside dates and times, or `all`
@@ -32,10 +44,10 @@ impl Kept {
         record: &Record,
         console: Console,
     ) -> Result<Option<Self>, Failure> {
-        if file == Path::new("-") {
+        if !file.metadata().is_ok_and(|about| about.is_file()) {
             return match named {
                 [] => Ok(None),
-                _ => Err(Failure::Usage("--keep needs a file: standard input cannot be read twice".into())),
+                _ => Err(Failure::Usage(format!("--keep: {} is no file, and cannot be read twice", file.display()))),
             };
         }
         let table = table_watched(file, &profile.choice, console)?;
@@ -54,12 +66,8 @@ impl Kept {
                 columns.push(table.find(name)?);
             }
         }
-        let mut seen = Vec::new();
-        columns.retain(|column| {
-            let is_new = !seen.contains(column);
-            seen.push(*column);
-            is_new
-        });
+        let mut seen = HashSet::new();
+        columns.retain(|column| seen.insert(*column));
         if columns.is_empty() {
             return Ok(None);
         }

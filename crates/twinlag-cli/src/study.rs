@@ -143,7 +143,7 @@ fn say(console: Console, object: &serde_json::Value, text: impl FnOnce() -> Stri
         print::json(object)
     } else {
         if !console.quiet {
-            eprintln!("{}", text());
+            anstream::eprintln!("{}", text());
         }
         Ok(())
     }

@@ -27,7 +27,9 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         model: model_file.map(model).transpose()?,
         window_s: command.window,
     };
-    let record = read_watched(&command.input.file, &command.input.columns.profile()?, console)?;
+    let profile = command.input.columns.profile()?;
+    let record = read_watched(&command.input.file, &profile, console)?;
+    Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let answer = {
         let progress = Progress::start(console, format!("tracking {} samples", record.len()));
@@ -45,7 +47,6 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
             ("tau2_low_s", &two.low_s),
             ("tau2_high_s", &two.high_s),
         ];
-        let profile = command.input.columns.profile()?;
         let kept = Kept::of(&command.input.file, &profile, &command.keep, &record, console)?;
         let (header, cells) = with_kept("grade", answer.grades.iter().map(ToString::to_string), kept.as_ref());
         output::data(&command.out, to_stdout, &columns, (&header, cells))?;

@@ -136,7 +136,9 @@ fn records_of_one_rig_are_asked_together() {
     assert_eq!(record["left_out_rms_after"].parse::<f64>().expect("a number"), left_out);
     assert!(record["tau1_s"].is_empty());
     assert_eq!(rows["runs/a_words.csv"]["rig"], "a");
-    assert_eq!(rows["b"]["records"], "1");
+    // Every file is somewhere, a single record of a rig as well.
+    assert_eq!((&rows["b"]["records"][..], &rows["runs/below/b_1.csv"]["rig"][..]), ("1", "b"));
+    assert_eq!(rows.len(), 2 + 5);
     assert!(rows["runs/empty.csv"]["reason"].contains("{rig}_*.csv"));
 }
 
@@ -163,17 +165,17 @@ fn gas_temperatures_go_to_a_folder() {
     let bench = fleet("gas");
     succeeds(&bench.run(&["batch", "runs", "--verb", "compensate", "--gas", "gas", "--out", "table.csv"]));
     let rows = rows(&bench, "table.csv");
-    assert_eq!(rows["runs/below/b_1.csv"]["gas_file"], "gas/below/b_1.gas.csv");
+    assert_eq!(rows["runs/below/b_1.csv"]["gas_file"], "gas/below/b_1.csv.gas.csv");
     succeeds(&bench.run(&["compensate", "runs/a_1.csv", "--out", "alone.csv"]));
-    assert_eq!(bench.read("gas/a_1.gas.csv"), bench.read("alone.csv"));
-    assert!(!bench.has("gas/empty.gas.csv"));
+    assert_eq!(bench.read("gas/a_1.csv.gas.csv"), bench.read("alone.csv"));
+    assert!(!bench.has("gas/empty.csv.gas.csv"));
     // What is gone is made again, and what is there is not replaced unasked.
     let again = ["batch", "runs", "--verb", "compensate", "--gas", "gas", "--out", "table.csv"];
-    std::fs::remove_file(bench.path("gas/a_1.gas.csv")).expect("is there");
+    std::fs::remove_file(bench.path("gas/a_1.csv.gas.csv")).expect("is there");
     succeeds(&bench.run(&[&again[..], &["--resume"]].concat()));
-    assert_eq!(bench.read("gas/a_1.gas.csv"), bench.read("alone.csv"));
+    assert_eq!(bench.read("gas/a_1.csv.gas.csv"), bench.read("alone.csv"));
     let elsewhere = ["batch", "runs", "--verb", "compensate", "--gas", "gas", "--out", "other.csv"];
-    bench.refuses(2, &elsewhere, &["a_1.gas.csv exists", "--force"]);
+    bench.refuses(2, &elsewhere, &["a_1.csv.gas.csv exists", "--force"]);
 }
 
 /// Whatever a path looks like, its gas goes below the folder; the gas of an earlier run is no record.
@@ -184,9 +186,17 @@ fn gas_stays_below_its_folder() {
     let files = ["batch", "./runs/../runs/a_1.csv", whole.to_str().expect("UTF-8")];
     let gas = ["--verb", "compensate", "--gas", "runs/gas"];
     succeeds(&bench.run(&[&files[..], &gas, &["--out", "table.csv"]].concat()));
-    assert!(bench.has("runs/gas/a_1.gas.csv") && bench.has("runs/gas/below/b_1.gas.csv"));
+    assert!(bench.has("runs/gas/a_1.csv.gas.csv") && bench.has("runs/gas/b_1.csv.gas.csv"));
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("nowhere", bench.path("runs/dangling.csv")).expect("can be linked");
     succeeds(&bench.run(&[&["batch", "runs"], &gas[..], &["--out", "all.csv", "--force"]].concat()));
-    assert_eq!(rows(&bench, "all.csv").len(), 5);
+    let all = rows(&bench, "all.csv");
+    assert_eq!(all["runs/below/b_1.csv"]["gas_file"], "runs/gas/below/b_1.csv.gas.csv");
+    assert!(all.keys().all(|file| !file.contains("gas")), "{:?}", all.keys());
+    // Two records of one name, each found by itself.
+    bench.write("runs/below/a_1.csv", Trace { seed: 6, ..Trace::GOOD }.csv());
+    let same = ["batch", "runs/a_1.csv", "runs/below/a_1.csv", "--verb", "compensate", "--gas", "g", "--out", "t.csv"];
+    bench.refuses(2, &same, &["the same file of gas temperature"]);
 }
 
 #[test]
@@ -240,7 +250,12 @@ fn what_cannot_be_asked_is_refused() {
     bench.refuses(2, &["batch", "runs", "--out", "t.csv"], &["t.csv", "--force"]);
     // A table that is there does not make a record its summary.
     let report = ["batch", "runs", "--out", "t.csv", "--report", "runs/a_1.csv"];
-    for how in ["--resume", "--force"] {
-        bench.refuses(2, &[&report[..], &[how]].concat(), &["a_1.csv is one of the records"]);
-    }
+    bench.refuses(2, &[&report[..], &["--force"]].concat(), &["a_1.csv is one of the records"]);
+    bench.refuses(2, &[&report[..], &["--resume"]].concat(), &["a_1.csv exists"]);
+    bench.write("notes.html", "<!DOCTYPE html><title>Notes</title>");
+    bench.refuses(
+        2,
+        &["batch", "runs", "--out", "t.csv", "--report", "notes.html", "--resume"],
+        &["notes.html exists"],
+    );
 }

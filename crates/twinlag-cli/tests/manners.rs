@@ -21,6 +21,9 @@ fn options_come_from_a_file_where_the_command_line_does_not_give_them() {
     assert_eq!(options(&[]), typed.json()["made_by"]["options"]);
     let other = bench.run(&["characterise", "run.csv", "--json", "--known", "T1=0.12s", "--free=gain"]);
     assert_eq!(options(&["--free=gain"]), other.json()["made_by"]["options"]);
+    // Behind `--` there are files alone.
+    let apart = bench.run(&["--config=lab.toml", "characterise", "--json", "--", "run.csv"]);
+    assert_eq!(apart.json()["made_by"]["options"], typed.json()["made_by"]["options"]);
 }
 
 #[test]

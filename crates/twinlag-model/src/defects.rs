@@ -125,24 +125,26 @@ pub(crate) fn spikes(
             let slope = |k: usize| (other[(k + 3).min(n - 1)] - other[k.saturating_sub(3)]).abs();
             let mut slopes: Vec<f64> = (0..n).map(slope).collect();
             slopes.sort_unstable_by(f64::total_cmp);
-            for k in 0..n {
-                let near = || k.saturating_sub(2)..(k + 3).min(n);
-                // At an end the residual shows less of a reading than of its neighbour.
-                let is_at_end = k < 2 || k + 2 >= n;
-                let (peaks, score) = if is_at_end {
-                    (&beside, near().map(|j| scores[j].abs()).fold(0.0, f64::max))
-                } else {
-                    (&scores, scores[k].abs())
-                };
-                let is_peak = near().all(|j| peaks[j].abs() <= peaks[k].abs());
+            let near = |k: usize| k.saturating_sub(2)..(k + 3).min(n);
+            let is_far = |score: f64, k: usize| {
                 let sticks_out = beside[k].abs() / scale.max(f64::MIN_POSITIVE);
                 // The other sensor's noise may hide in the residual what is plain among the reading's neighbours.
-                let is_far = (score > far && sticks_out > far)
-                    || (score > policy.spike_residual_share * far && sticks_out > policy.spike_neighbour_factor * far);
-                if is_peak && is_far && !stretch.masked[channel][k] {
-                    found.push(part.before + k);
-                    ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
-                }
+                (score > far && sticks_out > far)
+                    || (score > policy.spike_residual_share * far && sticks_out > policy.spike_neighbour_factor * far)
+            };
+            let peaks = |values: &[f64], k: usize| near(k).all(|j| values[j].abs() <= values[k].abs());
+            let inner: Vec<usize> = (2..n - 2).filter(|&k| peaks(&scores, k) && is_far(scores[k].abs(), k)).collect();
+            // At an end the residual shows less of a reading than of its neighbour, and a wrong neighbour makes it stand out.
+            let outer = [0, 1, n - 2, n - 1].into_iter().filter(|&k| {
+                let score = near(k).map(|j| scores[j].abs()).fold(0.0, f64::max);
+                let is_beside_one = inner.iter().any(|other| other.abs_diff(k) <= 3);
+                peaks(&beside, k) && is_far(score, k) && !is_beside_one
+            });
+            let mut of_part: Vec<usize> = inner.iter().copied().chain(outer).collect();
+            of_part.sort_unstable();
+            for k in of_part.into_iter().filter(|&k| !stretch.masked[channel][k]) {
+                found.push(part.before + k);
+                ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
             }
         }
         let m = found.len() as f64;
@@ -157,8 +159,8 @@ pub(crate) fn spikes(
     out
 }
 
-/// How far a reading is from what its neighbours lead to expect: a cubic through two on each side; at the ends of a stretch, where
-/// there are none on one side, a parabola through the next three, scaled so that white noise scatters as much.
+/// How far a reading is from what its neighbours lead to expect: a cubic through two on each side; of the two readings at each end of
+/// a stretch, a parabola through the next three inwards, scaled so that white noise scatters as much.
 fn beside_neighbours(y: &[f64], k: usize) -> f64 {
     /// Variances of both for noise of unit variance: `1 + 2 (4/6)² + 2 (1/6)²` and `1 + 9 + 9 + 1`.
     const VARIANCES: [f64; 2] = [35.0 / 18.0, 20.0];

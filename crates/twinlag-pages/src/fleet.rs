@@ -63,7 +63,7 @@ fn sentence(fleet: &Fleet, unit: &str) -> String {
     let rest = [
         (counts.undetermined, "without what was asked, though read"),
         (counts.unusable, "that cannot be used"),
-        (counts.failed, "with a fault of the program"),
+        (counts.failed, "with another error"),
     ];
     parts.extend(
         rest.into_iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("there are {count} {what}")),

@@ -25,7 +25,7 @@ impl fmt::Display for Program {
         f.write_str(match self {
             Self::SeaBird => "a Sea-Bird .cnv file",
             Self::LabView => "a LabVIEW measurement file",
-            Self::Serial => "the log of a serial monitor or plotter, whose messages between the rows are left out",
+            Self::Serial => "the log of a serial monitor or plotter",
         })
     }
 }
