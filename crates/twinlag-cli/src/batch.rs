@@ -208,8 +208,11 @@ impl Batch {
         let outputs: Vec<(&str, &Path)> =
             tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect();
         let is_resumed = self.resume && journal.exists();
-        let others = outputs.iter().all(|(_, path)| !path.exists() || is_of_batch(path));
-        output::check(journal, &outputs, self.force || (is_resumed && others))?;
+        output::check(journal, &outputs, true)?;
+        let may_go = |path: &Path| self.force || !path.exists() || (is_resumed && is_of_batch(path));
+        if let Some((_, path)) = outputs.iter().find(|(_, path)| !may_go(path)) {
+            return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
+        }
         let gas = self.gas.as_ref().and_then(|folder| folder.canonicalize().ok());
         let is_gas = |file: &Path| {
             file.to_string_lossy().ends_with(GAS_ENDING)

@@ -69,7 +69,8 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
             }
         }
     }
-    arguments.splice(place + 1..place + 1, added);
+    let behind = place + 1;
+    arguments.splice(behind..behind, added);
     Ok(arguments)
 }
 
