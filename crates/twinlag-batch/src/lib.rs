@@ -34,7 +34,7 @@
 //!
 //! let mut table = Vec::new();
 //! write_csv(&units, &mut journal, Verb::Characterise, &mut table)?;
-//! assert!(String::from_utf8(table)?.contains("empty.csv: the file is empty"));
+//! assert!(String::from_utf8(table)?.contains("empty.csv: is empty"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
