@@ -289,7 +289,7 @@ impl RecordError {
     /// ```
     /// use twinlag_record::Table;
     ///
-    /// let error = Table::read(b"time,T1,T2\n0,20,20\n1,21\n", "run.csv").expect_err("a cell is missing");
+    /// let error = Table::read(b"time,T1,T2\n0,20,20\n1,21\n2,22,21\n", "run.csv").expect_err("a cell is missing");
     /// assert_eq!(error.line(), Some(("run.csv", 3)));
     /// ```
     pub fn line(&self) -> Option<(&str, usize)> {
