@@ -1,8 +1,8 @@
 //! Thousands of records of two temperature sensors asked the same question: one table, files that
 //! cannot be used as rows with their reason, restarts without loss.
 //!
-//! For whoever has a folder of logger files or a fleet of rigs. [`find`] lists the files,
-//! [`each`] or [`grouped`] says what is asked together, [`run`] asks it on all cores and keeps the
+//! For whoever has a folder of logger files or a fleet of rigs. [`find()`] lists the files,
+//! [`each`] or [`grouped`] says what is asked together, [`run()`] asks it on all cores and keeps the
 //! answers in a [`Journal`], from which [`write_csv`] and [`write_parquet`] make the table and [`Fleet`]
 //! the summary. Neither depends on the number of threads or on how often a run was killed. No more
 //! is held in memory than the records that are being worked on and a line for each file. How a file
