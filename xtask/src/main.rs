@@ -1,10 +1,11 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
-//! `cargo xtask bench`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
+//! `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
 
 mod bench;
 mod ci;
 mod dist;
 mod experiment;
+mod fleet;
 mod measured;
 mod profile;
 mod report;
@@ -58,6 +59,8 @@ enum Task {
     Experiment(experiment::Task),
     /// Times the fits, beside what a user would otherwise write where Python with SciPy is at hand.
     Bench(bench::Bench),
+    /// Simulates a fleet of records of many rigs, one file in ten damaged, to measure `twinlag batch` on.
+    Fleet(fleet::Fleet),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
     /// Makes a release archive for a platform, the same to the byte whenever it is made.
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Task::Measured { dir, campaigns, write } => measured::run(&dir, campaigns.as_deref(), write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
+        Task::Fleet(arguments) => fleet::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
         Task::Dist(arguments) => dist::run(&arguments),

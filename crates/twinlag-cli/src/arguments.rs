@@ -12,7 +12,6 @@ use twinlag::record::{ColumnRef, Record, SamplingChoice, Selection, Unit};
 use twinlag::{
     Estimator, Hold, Intervals, Known, NoiseColour, Options, Plausibility, TypicalSensor, optimise::Optimiser,
 };
-use twinlag_files::Choice;
 
 use crate::batch::Batch;
 use crate::console::Console;
@@ -405,7 +404,7 @@ pub(crate) struct Columns {
     /// The sheet, channel group or data set to read, of a file that has several.
     #[arg(long, value_name = "NAME")]
     group: Option<String>,
-    /// Join channels of several groups: put all of them on the stamps of one, the others interpolated.
+    /// Join channels of several groups: put all of them on the stamps of the slowest, or of --group, the others interpolated.
     #[arg(long)]
     join: bool,
     /// Read the file as this profile says, which `twinlag inspect --save-profile` writes; other options here go before it.
@@ -443,8 +442,7 @@ impl Columns {
             period_s: self.period,
             sampling: self.sampling.unwrap_or_default(),
         };
-        let choice = Choice { group: self.group.clone(), join: self.join };
-        let said = Profile { selection, choice };
+        let said = Profile { selection, group: self.group.clone(), join: self.join };
         match &self.profile {
             Some(path) => Ok(said.or(Profile::read(path)?)),
             None => Ok(said),

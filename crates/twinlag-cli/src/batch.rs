@@ -9,6 +9,8 @@ use std::panic;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Value, json};
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
@@ -346,7 +348,7 @@ impl<'a> Question<'a> {
 
     fn rig_by_column(&self, file: &Path, by: &GroupBy) -> Result<String, String> {
         let GroupBy::Column(name) = by else { return Err(format!("nothing is known of {by}")) };
-        let table = expect_file(file).and_then(|()| table_watched(file, &self.profile.choice, SILENT));
+        let table = expect_file(file).and_then(|()| table_watched(file, &self.profile.choice(), SILENT));
         let table = table.map_err(|failure| failure.to_string())?;
         let column = name.parse().unwrap_or_else(|_| ColumnRef::Name(name.clone()));
         let index = table.find(&column).map_err(|error| error.to_string())?;
@@ -509,21 +511,44 @@ fn is_parquet(path: &Path) -> bool {
     has_ending(path, "parquet")
 }
 
+/// The answer, as JSON.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct BatchAnswer {
+    /// `twinlag.batch/1`.
+    schema: &'static str,
+    /// The tables.
+    out: Vec<PathBuf>,
+    /// What each was asked of: `records` or `rigs`.
+    units: &'static str,
+    /// Units with an answer.
+    answered: usize,
+    /// Units of which nothing is determined.
+    undetermined: usize,
+    /// Units of which no file can be used.
+    unusable: usize,
+    /// Units on which the program failed.
+    failed: usize,
+    /// Files that cannot be used.
+    unusable_files: usize,
+    /// Records that contradict the others of their rig.
+    contradicting_records: usize,
+}
+
 /// Says what came of it.
 fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console) -> Result<(), Failure> {
     let counts = &fleet.units;
     if console.json {
-        return print::json(&json!({
-            "schema": "twinlag.batch/1",
-            "out": command.out,
-            "units": question.unit_name(),
-            "answered": counts.answered,
-            "undetermined": counts.undetermined,
-            "unusable": counts.unusable,
-            "failed": counts.failed,
-            "unusable_files": fleet.unusable_files,
-            "contradicting_records": fleet.contradicting.len(),
-        }));
+        return print::json(&BatchAnswer {
+            schema: "twinlag.batch/1",
+            out: command.out.clone(),
+            units: question.unit_name(),
+            answered: counts.answered,
+            undetermined: counts.undetermined,
+            unusable: counts.unusable,
+            failed: counts.failed,
+            unusable_files: fleet.unusable_files,
+            contradicting_records: fleet.contradicting.len(),
+        });
     }
     let names: Vec<String> = command.out.iter().map(|out| out.display().to_string()).collect();
     let unit = if counts.total() == 1 { question.unit_name().trim_end_matches('s') } else { question.unit_name() };

@@ -1,5 +1,6 @@
 //! `twinlag inspect FILE`: what is in a file, and how it would be read.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use twinlag::record::{ColumnRef, Kind, Record, Sampling, Selection, Table};
 
@@ -14,29 +15,42 @@ use crate::read::table_watched;
 use crate::sparkline::sparkline;
 
 /// The answer, as JSON.
-#[derive(Debug, Serialize)]
-struct Inspection {
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Inspection {
+    /// `twinlag.inspection/1`.
     schema: &'static str,
+    /// The file.
     file: String,
+    /// Rows of the table.
     rows: usize,
+    /// Its columns.
     columns: Vec<ColumnAbout>,
     /// How the file would be read; `null` where it is not clear which columns are meant.
     selection: Option<Selection>,
+    /// What the record would be; `null` where the file cannot be read as it is.
     record: Option<RecordAbout>,
     /// Why it cannot be read as it is.
     problem: Option<String>,
+    /// What was taken for what, and what was left out.
     notes: Vec<String>,
 }
 
 /// What is in a column.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct ColumnAbout {
+    /// Its number, from 1.
     number: usize,
+    /// Its name, without the unit.
     name: String,
+    /// Its unit; empty if none is stated.
     unit: String,
+    /// `numbers`, `dates or times`, `text` or `empty`.
     kind: &'static str,
+    /// Cells without a value.
     missing: usize,
+    /// The smallest of its numbers.
     minimum: Option<f64>,
+    /// The largest of its numbers.
     maximum: Option<f64>,
     /// `time`, `T1`, `T2`, `reference`, `flow` or `position`.
     taken_as: Option<&'static str>,
@@ -45,12 +59,17 @@ struct ColumnAbout {
 }
 
 /// What the record would be.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, JsonSchema)]
 struct RecordAbout {
+    /// Samples.
     samples: usize,
+    /// From the first to the last sample, s.
     length_s: f64,
+    /// How the stamps lie in time.
     sampling: Sampling,
+    /// Rows in which a reading is missing.
     missing: usize,
+    /// Stretches without a gap.
     stretches: usize,
 }
 
@@ -59,14 +78,15 @@ pub(crate) fn run(command: &Inspect, console: Console) -> Result<u8, Failure> {
     let outputs: Vec<_> =
         named.iter().filter_map(|(option, path)| path.as_deref().map(|path| (*option, path))).collect();
     output::check(&command.file, &outputs, command.force)?;
-    let Profile { selection: said, choice } = command.columns.profile()?;
-    let table = table_watched(&command.file, &choice, console)?;
+    let profile = command.columns.profile()?;
+    let said = &profile.selection;
+    let table = table_watched(&command.file, &profile.choice(), console)?;
     let (file, rows) = (table.source().to_owned(), table.rows());
-    let selection = table.resolved(&said).ok();
+    let selection = table.resolved(said).ok();
     let about = about_columns(&table, selection.as_ref());
     let table_notes: Vec<String> = table.notes().iter().map(ToString::to_string).collect();
     // With the options of the caller: what is guessed is noted as such.
-    let record = Record::from_owned(table, &said);
+    let record = Record::from_owned(table, said);
     let (record, problem) = match record {
         Ok(record) => (Some(record), None),
         Err(error) => (None, Some(Failure::from(error))),
@@ -94,7 +114,7 @@ pub(crate) fn run(command: &Inspect, console: Console) -> Result<u8, Failure> {
         return problem.map_or(Ok(3), |problem| Ok(problem.exit_code()));
     };
     if let (Some(path), Some(selection)) = (&command.save_profile, &answer.selection) {
-        let profile = Profile { selection: selection.clone(), choice };
+        let profile = Profile { selection: selection.clone(), ..profile };
         output::write(path, profile.text()?)?;
     }
     if let Some(path) = &command.picture {

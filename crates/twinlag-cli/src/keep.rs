@@ -50,7 +50,7 @@ impl Kept {
                 _ => Err(Failure::Usage(format!("--keep: {} is no file, and cannot be read twice", file.display()))),
             };
         }
-        let table = table_watched(file, &profile.choice, console)?;
+        let table = table_watched(file, &profile.choice(), console)?;
         if table.rows() != record.len() {
             return Err(Failure::File(format!("{}: it has changed while it was read", file.display())));
         }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use twinlag::signal::Rig;
 use twinlag::{Diagnosis, Model};
 use twinlag_pages::parameter_in_words;
@@ -16,6 +16,23 @@ use crate::failure::Failure;
 use crate::print::{self, digits};
 use crate::progress::Progress;
 use crate::simulate;
+
+/// The answer, as JSON.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(crate) enum PlanAnswer {
+    /// What records are expected to give.
+    Planned(Box<Plan>),
+    /// Why there is nothing to plan with.
+    NotPlanned {
+        /// `twinlag.plan/1`.
+        schema: String,
+        /// `not-identifiable`.
+        status: PlanStatus,
+        /// Why.
+        because: String,
+    },
+}
 
 pub(crate) fn run(command: &Command, console: Console) -> Result<u8, Failure> {
     let subject = Subject::read(&command.file)?;
@@ -33,22 +50,24 @@ pub(crate) fn run(command: &Command, console: Console) -> Result<u8, Failure> {
             let example = format!("--known {channel}.time_constant_s=0.5");
             let error = PlanError::NoTimeConstant { channel };
             if console.json {
-                let because = error.to_string();
-                print::json(
-                    &json!({"schema": Plan::SCHEMA, "status": PlanStatus::NotIdentifiable, "because": because}),
-                )?;
+                print::json(&PlanAnswer::NotPlanned {
+                    schema: Plan::SCHEMA.to_owned(),
+                    status: PlanStatus::NotIdentifiable,
+                    because: error.to_string(),
+                })?;
             }
             return Err(Failure::Undetermined(format!("{}: {error} (for example {example})", command.file.display())));
         }
         Err(error) => return Err(Failure::File(format!("{}: {error}", command.file.display()))),
     };
+    let code = if plan.status == PlanStatus::Ok { 0 } else { 4 };
     if console.json {
-        print::json(&plan)?;
+        print::json(&PlanAnswer::Planned(Box::new(plan)))?;
     } else {
         let text = text(&plan, &command.file);
         print::on_stdout(&text)?;
     }
-    Ok(if plan.status == PlanStatus::Ok { 0 } else { 4 })
+    Ok(code)
 }
 
 /// What is planned for.

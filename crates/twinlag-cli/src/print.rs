@@ -234,6 +234,7 @@ fn compensation_text(answer: &Compensation, out: &Path) -> String {
         lines.push(String::new());
         let written = format!("written to {}, {} samples", out.display(), answer.gas_c.len());
         lines.push(format!("gas temperature: {}", graded(Some(written), &answer.judgement)));
+        lines.extend(reasons([("gas temperature".to_owned(), &answer.judgement)], "  "));
         lines.push(format!("  standard deviation {} K (median)", digits(gas.median_std_k, 3)));
         lines.push(format!(
             "  of which {} K from the uncertainty of the model's parameters",

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use twinlag::record::Selection;
+use twinlag::record::{ColumnRef, Selection};
 use twinlag_files::Choice;
 
 use crate::failure::Failure;
@@ -15,7 +15,10 @@ use crate::failure::Failure;
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Profile {
     pub(crate) selection: Selection,
-    pub(crate) choice: Choice,
+    /// The group of channels, by name, of a file with several.
+    pub(crate) group: Option<String>,
+    /// Whether the groups of channels are joined.
+    pub(crate) join: bool,
 }
 
 /// The key of what chooses a group of channels.
@@ -38,26 +41,38 @@ impl Profile {
         let parsed = || -> Result<Self, toml::de::Error> {
             let mut keys: toml::Table = toml::from_str(&text)?;
             let OfFile { group, join } = keys.remove(FILE).map_or(Ok(OfFile::default()), toml::Value::try_into)?;
-            Ok(Self { selection: keys.try_into()?, choice: Choice { group, join } })
+            Ok(Self { selection: keys.try_into()?, group, join })
         };
         parsed()
             .map_err(|e| wrong(format!("expected a profile as `twinlag inspect FILE --save-profile` writes it: {e}")))
     }
 
+    /// What to take of a file with several groups of channels: where no group is named, the one with the sensors that are.
+    pub(crate) fn choice(&self) -> Choice {
+        let name = |column: &ColumnRef| match column {
+            ColumnRef::Name(name) => Some(name.clone()),
+            ColumnRef::Number(_) => None,
+        };
+        let channels = [&self.selection.t1, &self.selection.t2].into_iter().flatten().filter_map(name).collect();
+        Choice { group: self.group.clone(), channels, join: self.join }
+    }
+
     /// This profile, and where it says nothing what the other one says.
     pub(crate) fn or(self, other: Self) -> Self {
-        let Self { selection, choice } = self;
-        let choice = Choice { group: choice.group.or(other.choice.group), join: choice.join || other.choice.join };
-        Self { selection: selection.or(other.selection), choice }
+        Self {
+            selection: self.selection.or(other.selection),
+            group: self.group.or(other.group),
+            join: self.join || other.join,
+        }
     }
 
     /// The text of the profile.
     pub(crate) fn text(&self) -> Result<String, Failure> {
         let wrong = |e: toml::ser::Error| Failure::Other(format!("the profile cannot be written as TOML: {e}"));
         let mut keys = toml::Table::try_from(&self.selection).map_err(wrong)?;
-        let Choice { group, join } = self.choice.clone();
-        if group.is_some() || join {
-            keys.insert(FILE.into(), toml::Value::try_from(OfFile { group, join }).map_err(wrong)?);
+        if self.group.is_some() || self.join {
+            let of_file = OfFile { group: self.group.clone(), join: self.join };
+            keys.insert(FILE.into(), toml::Value::try_from(of_file).map_err(wrong)?);
         }
         let lines = toml::to_string(&keys).map_err(wrong)?;
         Ok(format!(

@@ -17,7 +17,7 @@ const HEAD_BYTES: u64 = 4096;
 
 /// Reads what the profile says from a file, and shows how far it has come; `-` is standard input.
 pub(crate) fn read_watched(file: &Path, profile: &Profile, console: Console) -> Result<Record, Failure> {
-    Ok(Record::from_owned(table_watched(file, &profile.choice, console)?, &profile.selection)?)
+    Ok(Record::from_owned(table_watched(file, &profile.choice(), console)?, &profile.selection)?)
 }
 
 /// Reads all columns of a file, and shows how far it has come; `-` is standard input, which is text.

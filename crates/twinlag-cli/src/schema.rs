@@ -4,8 +4,13 @@ use clap::ValueEnum;
 use schemars::generate::SchemaSettings;
 use twinlag::{Characterisation, Compensation, Diagnosis, Model, Track};
 
+use crate::batch::BatchAnswer;
 use crate::failure::Failure;
+use crate::inspect::Inspection;
+use crate::plan::PlanAnswer;
 use crate::print;
+use crate::simulate::Simulation;
+use crate::study::{StudyAnswer, StudyPart};
 
 /// What can be described.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -20,6 +25,18 @@ pub(crate) enum Name {
     Track,
     /// What `--save` writes.
     Model,
+    /// The answer of `inspect`.
+    Inspection,
+    /// The answer of `batch`; its table is described in the book.
+    Batch,
+    /// The answer of `plan`.
+    Plan,
+    /// The answer of `simulate`.
+    Simulation,
+    /// The answer of `study run` and `study merge`.
+    Study,
+    /// The answer of `study run` with --shard.
+    StudyPart,
 }
 
 /// Prints the schema, of draft 2020-12.
@@ -31,6 +48,12 @@ pub(crate) fn run(name: Name) -> Result<u8, Failure> {
         Name::Compensation => generator.into_root_schema_for::<Compensation>(),
         Name::Track => generator.into_root_schema_for::<Track>(),
         Name::Model => generator.into_root_schema_for::<Model>(),
+        Name::Inspection => generator.into_root_schema_for::<Inspection>(),
+        Name::Batch => generator.into_root_schema_for::<BatchAnswer>(),
+        Name::Plan => generator.into_root_schema_for::<PlanAnswer>(),
+        Name::Simulation => generator.into_root_schema_for::<Simulation>(),
+        Name::Study => generator.into_root_schema_for::<StudyAnswer>(),
+        Name::StudyPart => generator.into_root_schema_for::<StudyPart>(),
     };
     print::json(&schema)?;
     Ok(0)

@@ -1,9 +1,11 @@
 //! `twinlag simulate SPEC.toml --out OUT.csv`.
 
 use std::io::{BufWriter, Write, stdout};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
 use twinlag::record::{Decimals, write_csv};
 use twinlag::signal::{Rig, Simulated};
 
@@ -13,6 +15,30 @@ use crate::failure::Failure;
 use crate::output::{self, UntilClosed};
 use crate::print;
 use crate::progress::Progress;
+
+/// The answer, as JSON.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct Simulation {
+    /// `twinlag.simulation/1`.
+    schema: &'static str,
+    /// The file of the record.
+    out: PathBuf,
+    /// Samples.
+    samples: usize,
+    /// Names of the channels.
+    channels: [String; 2],
+    /// The rig, with the keys of its file.
+    rig: Value,
+    /// What made it.
+    made_by: Program,
+}
+
+/// A program and its version.
+#[derive(Serialize, JsonSchema)]
+struct Program {
+    program: &'static str,
+    version: &'static str,
+}
 
 pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
     let to_stdout = command.out == Path::new("-");
@@ -41,14 +67,14 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
         output::replace(&command.out, |file| write(&mut BufWriter::new(file), &record))?;
     }
     if console.json {
-        print::json(&json!({
-            "schema": "twinlag.simulation/1",
-            "out": command.out,
-            "samples": record.time_s.len(),
-            "channels": record.channels,
-            "rig": rig,
-            "made_by": {"program": "twinlag", "version": env!("CARGO_PKG_VERSION")},
-        }))?;
+        print::json(&Simulation {
+            schema: "twinlag.simulation/1",
+            out: command.out.clone(),
+            samples: record.time_s.len(),
+            channels: record.channels.clone(),
+            rig: serde_json::to_value(&rig).map_err(|error| Failure::Other(error.to_string()))?,
+            made_by: Program { program: "twinlag", version: env!("CARGO_PKG_VERSION") },
+        })?;
     } else if !to_stdout && !console.quiet {
         eprintln!(
             "{}: {} samples, {} s apart",

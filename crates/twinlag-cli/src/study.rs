@@ -9,8 +9,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use serde_json::json;
-use twinlag_experiment::{Experiment, ExperimentError, Plan, Table, write};
+use schemars::JsonSchema;
+use serde::Serialize;
+use twinlag_experiment::{Experiment, ExperimentError, Plan, Row, Table, write};
 use twinlag_study::{Options, Shard, Study as _, StudyError};
 
 use crate::console::Console;
@@ -47,6 +48,30 @@ pub(crate) struct Run {
     /// Number of threads; one per processor if left out. The result does not depend on it.
     #[arg(long)]
     threads: Option<std::num::NonZeroUsize>,
+}
+
+/// The answer of a study, as JSON.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct StudyAnswer {
+    /// `twinlag.study/1`.
+    schema: &'static str,
+    /// The folder of the results.
+    out: PathBuf,
+    /// Trials in all cells.
+    trials: u64,
+    /// A row for each cell, method and sensor: columns as in results.csv.
+    rows: Vec<Row>,
+}
+
+/// The answer of a shard, as JSON.
+#[derive(Serialize, JsonSchema)]
+pub(crate) struct StudyPart {
+    /// `twinlag.study-part/1`.
+    schema: &'static str,
+    /// The part.
+    part: PathBuf,
+    /// Which shard of how many, from 0.
+    shard: String,
 }
 
 pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
@@ -100,9 +125,8 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
     bar.finish_and_clear();
     done?;
     if run.shard.is_some() {
-        say(console, &json!({"schema": "twinlag.study-part/1", "part": part, "shard": shard.to_string()}), || {
-            format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display())
-        })?;
+        let text = format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display());
+        say(console, &StudyPart { schema: "twinlag.study-part/1", part, shard: shard.to_string() }, &text)?;
         return Ok(0);
     }
     merge(&run.out, console)
@@ -127,9 +151,8 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     let table = Table::of(&experiment, &results)?;
     write(&plan, &table, dir)?;
     let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
-    say(console, &json!({"schema": "twinlag.study/1", "out": dir, "trials": trials, "rows": table.rows}), || {
-        format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len())
-    })?;
+    let text = format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len());
+    say(console, &StudyAnswer { schema: "twinlag.study/1", out: dir.to_owned(), trials, rows: table.rows }, &text)?;
     Ok(0)
 }
 
@@ -138,12 +161,12 @@ fn is_part(path: &Path) -> bool {
     name.starts_with("part-") && path.extension() == Some(OsStr::new("json"))
 }
 
-fn say(console: Console, object: &serde_json::Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
+fn say(console: Console, answer: &impl Serialize, text: &str) -> Result<(), Failure> {
     if console.json {
-        print::json(object)
+        print::json(answer)
     } else {
         if !console.quiet {
-            anstream::eprintln!("{}", text());
+            anstream::eprintln!("{text}");
         }
         Ok(())
     }

@@ -8,5 +8,6 @@ fn documents_show_what_the_program_prints() {
         .case("../../docs/src/guide.md")
         .case("../../docs/src/trades.md")
         .case("../../docs/src/batch.md")
+        .case("../../docs/src/reference.md")
         .case("../../docs/src/closed-loop.md");
 }

@@ -31,16 +31,39 @@ fn fits(schema: &Validator, answer: &Value) {
     assert!(errors.is_empty(), "{errors:#?}");
 }
 
-/// A rig with an offset, and one of a single tone, which is refused.
-#[test]
-fn answers_are_as_their_schemas_say() {
-    let bench = Bench::simulated("answers", common::RIG);
+/// A few trials of one method.
+const STUDY: &str = r#"
+name = "mine"
+title = "A few trials"
+seed = 1
+trials = 20
+block = 10
+samples = [300]
+noise_percent = [5]
+[[gases]]
+name = "sine"
+gas = { kind = "sine", mean_c = 50.5, amplitude_k = 16.5, frequency_hz = 10.0, hold = "zero-order" }
+[[methods]]
+name = "whitened"
+estimator = "whitened"
+"#;
+
+/// With `tone.csv`, a record of a single tone.
+fn with_tone(test: &str) -> Bench {
+    let bench = Bench::simulated(test, common::RIG);
     let tone = common::RIG
         .replace("kind = \"turbulence\"", "kind = \"sine\"")
         .replace("std_k = 15.0\ncorner_hz = 0.5\ncutoff_hz = 45.0", "amplitude_k = 15.0\nfrequency_hz = 0.5");
     bench.write("tone.toml", tone);
     let simulated = bench.run(&["simulate", "tone.toml", "--out", "tone.csv"]);
     assert_eq!(simulated.code, 0, "{simulated:#?}");
+    bench
+}
+
+/// A rig with an offset, and one of a single tone, which is refused.
+#[test]
+fn answers_are_as_their_schemas_say() {
+    let bench = with_tone("answers");
     let characterisation = schema(&bench, "characterisation");
     let diagnosis = schema(&bench, "diagnosis");
     for file in ["run.csv", "tone.csv"] {
@@ -56,6 +79,32 @@ fn answers_are_as_their_schemas_say() {
     let model: Value = serde_json::from_slice(&bench.read("gas.json")).expect("JSON");
     fits(&schema(&bench, "model"), &model);
     fits(&schema(&bench, "track"), &bench.run(&["track", "run.csv", "--out", "tau.csv", "--json"]).json());
+}
+
+/// What is no estimate: a file and a file that cannot be read, a batch, plans, a simulation, a study and its part.
+#[test]
+fn answers_of_the_other_verbs_are_as_their_schemas_say() {
+    let bench = with_tone("others");
+    bench.write("one.csv", "time_s,T1\n0,20\n1,21\n2,20\n3,22\n");
+    let inspection = schema(&bench, "inspection");
+    fits(&inspection, &bench.run(&["inspect", "run.csv", "--json", "--t1", "T1", "--time-unit", "s"]).json());
+    let unusable = bench.run(&["inspect", "one.csv", "--json"]);
+    assert_eq!(unusable.code, 3, "{unusable:#?}");
+    fits(&inspection, &unusable.json());
+    fits(&schema(&bench, "batch"), &bench.run(&["batch", "run.csv", "one.csv", "--out", "t.csv", "--json"]).json());
+    let simulated = bench.run(&["simulate", "rig.toml", "--out", "again.csv", "--json"]);
+    fits(&schema(&bench, "simulation"), &simulated.json());
+    let plan = schema(&bench, "plan");
+    fits(&plan, &bench.run(&["plan", "rig.toml", "--json"]).json());
+    bench.write("tone.json", bench.run(&["diagnose", "tone.csv", "--json"]).stdout);
+    let not_planned = bench.run(&["plan", "tone.json", "--json"]);
+    assert_eq!(not_planned.code, 4, "{not_planned:#?}");
+    fits(&plan, &not_planned.json());
+    bench.write("study.toml", STUDY);
+    let run = |shard: &str| bench.run(&["study", "run", "study.toml", "--out", "study", "--shard", shard, "--json"]);
+    fits(&schema(&bench, "study-part"), &run("0/2").json());
+    assert_eq!(run("1/2").code, 0);
+    fits(&schema(&bench, "study"), &bench.run(&["study", "merge", "study", "--json"]).json());
 }
 
 /// A schema that takes anything would take every answer.

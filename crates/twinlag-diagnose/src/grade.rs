@@ -141,6 +141,13 @@ pub enum Reason {
         /// Probability of such a change of their ratio if it stays.
         p_value: f64,
     },
+    /// One sensor has an effect that no reading would show if both had it.
+    OfOneAlone {
+        /// The effect.
+        effect: Identifier,
+        /// The name of the channel.
+        channel: String,
+    },
     /// The estimator has a bias that noise makes.
     Biased,
     /// A check of the number itself finds a fault.
@@ -353,6 +360,13 @@ impl fmt::Display for Reason {
                 "the ratio of both time constants changes along the record (p = {p_value:.0e}), so the two sensors do not \
                  follow one flow, or the model lacks an effect that looks like it"
             ),
+            Self::OfOneAlone { effect, channel } => {
+                write!(
+                    f,
+                    "right if only {channel} has the {effect} that was found: no reading shows {}",
+                    effect.about().unseen
+                )
+            }
             Self::Biased => f.write_str("right if the noise is negligible: it biases this estimator"),
             Self::Fault { what, .. } => f.write_str(what),
             Self::Follows { from, because, .. } => write!(f, "it follows from {from}: {because}"),

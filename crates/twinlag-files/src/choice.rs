@@ -1,6 +1,6 @@
 //! Which group of a file is meant: the one that the caller names, else the only one that can be.
 
-use crate::contents::Group;
+use crate::contents::{Channel, Group};
 use crate::error::{FileError, Listing};
 use crate::format::Format;
 use crate::series::{Opened, is_temperature, is_time};
@@ -14,9 +14,13 @@ pub struct Choice {
     /// The sheet, channel group or group of datasets, by name. With `join`, the one whose stamps
     /// are kept.
     pub group: Option<String>,
+    /// Channels that are wanted, by name. Where no group is named, the only one that has all of
+    /// them is taken; which channels are read does not depend on it.
+    pub channels: Vec<String>,
     /// Puts the channels of all groups with a temperature, or of all if none has one, on the stamps
-    /// of one: the others are interpolated linearly between neighbouring samples, never beyond
-    /// their ends, never across an invalid sample or a step of more than five times the median one.
+    /// of one, by default of the one with the fewest samples in a second: the others are
+    /// interpolated linearly between neighbouring samples, never beyond their ends, never across an
+    /// invalid sample or a step of more than five times the median one.
     pub join: bool,
 }
 
@@ -39,18 +43,48 @@ pub(crate) fn choose(
         };
     }
     let usable: Vec<usize> = (0..groups.len()).filter(|&group| is_usable(&groups[group])).collect();
-    let with_sensors: Vec<usize> =
-        usable.iter().copied().filter(|&group| temperatures(&groups[group]) >= SENSORS).collect();
-    match (&usable[..], &with_sensors[..]) {
-        ([], _) => Err(FileError::NoGroup { file, format, groups: listing(opened, |_| true) }),
-        ([group], _) => Ok((*group, None)),
-        (all, [group]) if !choice.join => {
-            let why = format!("the only one of {} groups with two temperatures or more", all.len());
-            Ok((*group, Some(why)))
+    let only = |which: &dyn Fn(&Group) -> bool| {
+        let mut fitting = usable.iter().copied().filter(|&group| which(&groups[group]));
+        fitting.next().filter(|_| fitting.next().is_none())
+    };
+    let of_several = |has: &str| Some(format!("the only one of {} groups with {has}", usable.len()));
+    match usable[..] {
+        [] => Err(FileError::NoGroup { file, format, groups: listing(opened, |_| true) }),
+        [group] => Ok((group, None)),
+        _ if choice.join => Ok(slowest(opened)),
+        _ => {
+            let wanted =
+                if choice.channels.is_empty() { None } else { only(&|group| has_all(group, &choice.channels)) };
+            if let Some(group) = wanted {
+                let names: Vec<String> = choice.channels.iter().map(|name| format!("'{name}'")).collect();
+                return Ok((group, of_several(&names.join(" and "))));
+            }
+            match only(&|group| temperatures(group) >= SENSORS) {
+                Some(group) => Ok((group, of_several("two temperatures or more"))),
+                None => Err(FileError::SeveralGroups { file, groups: listing(opened, is_usable) }),
+            }
         }
-        ([first, ..], with_sensors) if choice.join => Ok((*with_sensors.first().unwrap_or(first), None)),
-        _ => Err(FileError::SeveralGroups { file, groups: listing(opened, is_usable) }),
     }
+}
+
+/// Of the groups that are joined, the one with the longest period: between the samples of another, its channels would be straight
+/// lines and no readings. The first where that is not known of all.
+fn slowest(opened: &mut dyn Opened) -> (usize, Option<String>) {
+    let joined = joined(opened.groups());
+    let periods_s: Option<Vec<f64>> = joined.iter().map(|&group| opened.period_s(group)).collect();
+    let Some(periods_s) = periods_s else { return (joined[0], None) };
+    let longest_s = periods_s.iter().copied().fold(0.0, f64::max);
+    let group = periods_s.iter().position(|period_s| *period_s == longest_s).map_or(joined[0], |at| joined[at]);
+    let is_alone = periods_s.iter().any(|period_s| *period_s < longest_s);
+    (group, is_alone.then(|| "the one with the fewest samples in a second".to_owned()))
+}
+
+/// Whether each of these is the name of a channel.
+fn has_all(group: &Group, names: &[String]) -> bool {
+    let is_called = |channel: &Channel, name: &str| {
+        [channel.name.clone(), channel.to_string()].iter().any(|own| own.to_lowercase() == name.to_lowercase())
+    };
+    names.iter().all(|name| group.channels.iter().any(|channel| is_called(channel, name)))
 }
 
 /// The groups whose channels are joined: those with a temperature, or all if none has one.

@@ -11,6 +11,9 @@ use crate::series::{Loaded, Series, Values};
 /// one is a pause. The same as of gaps in an irregular record.
 const MAX_MEDIAN_STEPS: f64 = 5.0;
 
+/// Steps of one time base that one of another may span at the same rate, jitter included: chosen.
+const MAX_STEPS_OF_ONE_RATE: f64 = 1.5;
+
 /// A time base in seconds from an instant, if the file states one.
 #[derive(Debug)]
 pub(crate) struct Base {
@@ -68,7 +71,7 @@ impl Base {
         if let Some(pair) = samples.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
             return Err(format!("its stamps do not rise, at {} s", pair[1].0));
         }
-        let longest_s = MAX_MEDIAN_STEPS * median_step(&samples);
+        let longest_s = MAX_MEDIAN_STEPS * median(samples.windows(2).map(|pair| pair[1].0 - pair[0].0));
         let mut next = 0;
         let mut last_s = f64::NEG_INFINITY;
         let at = |(start_s, start): (f64, f64), (end_s, end): (f64, f64), time_s: f64| {
@@ -94,6 +97,13 @@ impl Base {
         Ok(taken.collect())
     }
 
+    /// How many steps of this base one of another spans, to a hundredth, if it is more than one and a half.
+    pub(crate) fn steps_between_samples_of(&self, other: &Self) -> Option<f64> {
+        let [mine_s, its_s] = [self, other].map(|base| median(base.time_s.windows(2).map(|pair| pair[1] - pair[0])));
+        let steps = its_s / mine_s;
+        (steps.is_finite() && steps > MAX_STEPS_OF_ONE_RATE).then_some((100.0 * steps).round() / 100.0)
+    }
+
     /// Whether both are counted from stated instants, or neither.
     pub(crate) fn has_start(&self) -> bool {
         self.start_ns.is_some()
@@ -108,13 +118,14 @@ fn is_time_base(series: &Series) -> bool {
     }
 }
 
-fn median_step(samples: &[(f64, f64)]) -> f64 {
-    let mut steps: Vec<f64> = samples.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-    if steps.is_empty() {
+/// The value in the middle of those that are known, 0 of none.
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.filter(|value| !value.is_nan()).collect();
+    if values.is_empty() {
         return 0.0;
     }
-    let middle = steps.len() / 2;
-    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 #[cfg(test)]

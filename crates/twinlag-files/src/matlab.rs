@@ -115,10 +115,6 @@ fn describe(array: &Array) -> Variable {
 }
 
 impl Opened for Matlab {
-    fn version(&self) -> String {
-        String::new()
-    }
-
     fn groups(&self) -> &[Group] {
         &self.arranged.groups
     }

@@ -111,7 +111,7 @@ impl Opened for Mdf4 {
 }
 
 fn describe(channels: &ChannelGroup, start_ns: i64, number: usize) -> Group {
-    let name = Some(channels.acquisition_name.trim()).filter(|name| !name.is_empty());
+    let name = [channels.acquisition_name.trim(), text_of(&channels.comment)].into_iter().find(|name| !name.is_empty());
     let of_channel = |channel: &MdfChannel| Channel {
         name: channel.name.clone(),
         unit: channel.unit.trim().to_owned(),
@@ -124,6 +124,13 @@ fn describe(channels: &ChannelGroup, start_ns: i64, number: usize) -> Group {
         period_s: None,
         start_ns: Some(start_ns),
     }
+}
+
+/// A comment of one line, by itself or as the text `TX` of XML; empty where it is more than that.
+fn text_of(comment: &str) -> &str {
+    let inner = comment.split_once("<TX>").and_then(|(_, rest)| rest.split_once("</TX>"));
+    let text = inner.map_or(comment, |(text, _)| text).trim();
+    if text.contains(['\n', '<', '&']) { "" } else { text }
 }
 
 fn obstacle(channel: &MdfChannel, is_bus_event: bool) -> Option<String> {
@@ -199,5 +206,19 @@ pub(crate) fn fault(error: Mf4Error) -> Fault {
             "export it as MDF 4.10 without this, or as CSV",
         ),
         _ => Fault::damaged("what the format prescribes", text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_comment_of_one_line_is_a_name() {
+        assert_eq!(text_of("gas side"), "gas side");
+        assert_eq!(text_of("<CGcomment>\n<TX>gas side</TX>\n</CGcomment>"), "gas side");
+        for more in ["", "one\ntwo", "<CGcomment><e>7</e></CGcomment>", "<TX>a &amp; b</TX>"] {
+            assert_eq!(text_of(more), "");
+        }
     }
 }

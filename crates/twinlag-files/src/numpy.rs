@@ -202,10 +202,6 @@ fn values(archive: &mut Archive, array: &Array) -> Result<Values, Fault> {
 }
 
 impl Opened for Numpy {
-    fn version(&self) -> String {
-        String::new()
-    }
-
     fn groups(&self) -> &[Group] {
         &self.arranged.groups
     }

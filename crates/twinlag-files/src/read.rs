@@ -158,6 +158,13 @@ impl Reading {
                 its_group.name,
                 groups[group].name,
             ));
+            if let Some(steps) = mine.steps_between_samples_of(&base) {
+                loaded.notes.push(format!(
+                    "group '{}' has one sample for {steps} of group '{}': between them are straight lines and no readings, \
+                     which no model of a sensor explains; join on the stamps of group '{0}' instead",
+                    its_group.name, groups[group].name,
+                ));
+            }
         }
         Ok(())
     }

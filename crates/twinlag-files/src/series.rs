@@ -7,8 +7,10 @@ use crate::fault::Fault;
 
 /// A file whose metadata are read and whose samples are read as they are asked for.
 pub(crate) trait Opened {
-    /// The version of the format, and what wrote the file where that is known.
-    fn version(&self) -> String;
+    /// The version of the format, and what wrote the file, where these are known.
+    fn version(&self) -> String {
+        String::new()
+    }
 
     /// The groups, each on one time base.
     fn groups(&self) -> &[Group];

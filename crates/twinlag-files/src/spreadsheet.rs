@@ -40,10 +40,6 @@ pub(crate) fn open(input: Input, format: Format) -> Result<Box<dyn Opened>, Faul
 }
 
 impl Opened for Workbook {
-    fn version(&self) -> String {
-        String::new()
-    }
-
     fn groups(&self) -> &[Group] {
         &self.groups
     }

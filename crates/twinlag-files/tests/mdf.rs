@@ -18,7 +18,8 @@ fn conversions_and_invalidation_bits_are_applied() {
 fn the_group_with_two_temperatures_is_taken_from_a_compressed_file() {
     let table = check("groups.mf4", &Choice::default());
     assert!(notes(&table).contains("group 'gas', the only one of 2 groups"), "{}", notes(&table));
-    let speed = read(path("groups.mf4"), &Choice { group: Some("engine".to_owned()), join: false }).expect("chosen");
+    let speed =
+        read(path("groups.mf4"), &Choice { group: Some("engine".to_owned()), ..Choice::default() }).expect("chosen");
     assert_eq!((speed.rows(), speed.columns()[1].name()), (80, "speed"));
 }
 
@@ -29,10 +30,30 @@ fn temperatures_in_groups_of_their_own_are_listed_and_joined_only_when_asked() {
     let text = error.to_string();
     assert!(text.contains("'ECU1': 40 rows, period 0.0078125 s") && text.contains("T2 [°C]"), "{text}");
     assert!(text.contains("choose one by its name") && text.contains("joined on the stamps of one"), "{text}");
-    let table = check("apart.mf4", &Choice { join: true, group: None });
+    let on_the_faster = Choice { join: true, group: Some("ECU1".to_owned()), ..Choice::default() };
+    let table = check("apart.mf4", &on_the_faster);
     assert!(notes(&table).contains("'T2' of group 'ECU2' interpolated linearly to the stamps of group 'ECU1'"));
-    let error = read(path("apart.mf4"), &Choice { group: Some("ECU3".to_owned()), join: false }).expect_err("no such");
+    assert!(notes(&table).contains("group 'ECU2' has one sample for 2 of group 'ECU1'"), "{}", notes(&table));
+    let table = read(path("apart.mf4"), &Choice { join: true, ..Choice::default() }).expect("joined");
+    assert_eq!(table.rows(), 18);
+    assert!(notes(&table).contains("group 'ECU2', the one with the fewest samples in a second"), "{}", notes(&table));
+    assert!(!notes(&table).contains("has one sample for"), "{}", notes(&table));
+    let error =
+        read(path("apart.mf4"), &Choice { group: Some("ECU3".to_owned()), ..Choice::default() }).expect_err("no such");
     assert!(error.to_string().contains("no group 'ECU3'; choose one of these by its name"), "{error}");
+}
+
+#[test]
+fn the_group_is_taken_that_alone_has_the_channels() {
+    let with = |names: &[&str]| {
+        let channels = names.iter().map(|name| (*name).to_owned()).collect();
+        read(path("apart.mf4"), &Choice { channels, ..Choice::default() })
+    };
+    for name in ["T2", "t2", "T2 [°C]"] {
+        let table = with(&[name]).expect("one group has it");
+        assert!(notes(&table).contains(&format!("group 'ECU2', the only one of 2 groups with '{name}'")));
+    }
+    assert!(matches!(with(&["T1", "T2"]), Err(FileError::SeveralGroups { .. })));
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn a_channel_of_stamps_is_the_time() {
 
 #[test]
 fn counts_that_are_still_to_be_scaled_are_refused() {
-    let error = read(path("unscaled.tdms"), &Choice { group: Some("daq".to_owned()), join: false });
+    let error = read(path("unscaled.tdms"), &Choice { group: Some("daq".to_owned()), ..Choice::default() });
     let text = error.expect_err("counts are no temperatures").to_string();
     assert!(
         text.contains("channel 'T1' of group 'daq' has counts that are still to be scaled (Thermocouple)"),

@@ -8,6 +8,7 @@ use twinlag::signal::{Gas, MultiTone, Rig, Sensor, Signal, SignalError, Tone};
 
 /// A change of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case", tag = "kind")]
 #[non_exhaustive]
 pub enum Change {

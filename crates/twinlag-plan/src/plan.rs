@@ -16,6 +16,7 @@ const CLEAR_STANDARD_DEVIATIONS: f64 = 2.0;
 
 /// What a plan is of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Source {
@@ -27,6 +28,7 @@ pub enum Source {
 
 /// A number that a record is expected to determine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PlannedNumber {
     /// Its name: `time_constant_s` of a sensor, `time_constant_difference_s`, or the parameter of an effect.
@@ -47,6 +49,7 @@ pub struct PlannedNumber {
 
 /// An effect that might be taken for another one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PlannedRival {
     /// The effect that the rig has.
@@ -69,6 +72,7 @@ pub struct PlannedRival {
 
 /// What is expected of one record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct PlannedRecord {
     /// The change; `None` of the record as it is.
@@ -87,6 +91,7 @@ pub struct PlannedRecord {
 
 /// Whether the record as it is determines both time constants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum PlanStatus {
     /// It does.
@@ -97,6 +102,7 @@ pub enum PlanStatus {
 
 /// What the next record would have to be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]
 pub struct Plan {
     /// `twinlag.plan/1`.

@@ -53,8 +53,8 @@ pub(crate) const TEMPERATURE: [&str; 21] = [
     "therm",
     "温度",
 ];
-/// Never T1 or T2, whatever else is there.
-const APART: [&str; 15] = [
+/// Never T1 or T2, whatever else is there: what is wanted or trusted, and how uncertain something is.
+const APART: [&str; 20] = [
     "ref",
     "tref",
     "reference",
@@ -70,6 +70,11 @@ const APART: [&str; 15] = [
     "sollwert",
     "target",
     "setpt",
+    "std",
+    "stddev",
+    "sd",
+    "sigma",
+    "uncertainty",
 ];
 /// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
 const GAS: [&str; 2] = ["gas", "tgas"];

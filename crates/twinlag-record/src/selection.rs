@@ -10,6 +10,7 @@ use crate::unit::Unit;
 
 /// A column, by name or by number from 1.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "expected the name of a column, or its number from 1")]
 pub enum ColumnRef {
     /// From 1, from the left. A column with exactly this name goes before.
@@ -42,6 +43,7 @@ impl fmt::Display for ColumnRef {
 
 /// How the stamps are to be understood.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SamplingChoice {
     /// Judge by the stamps.
@@ -84,6 +86,7 @@ pub enum SamplingChoice {
 /// # Ok::<(), twinlag_record::RecordError>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(default, deny_unknown_fields)]
 pub struct Selection {
     /// The time column.
@@ -91,6 +94,7 @@ pub struct Selection {
     pub time: Option<ColumnRef>,
     /// The unit of a time column of numbers, [`Unit::Time`]; it goes before the one in the header.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "write_unit", deserialize_with = "read_unit")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub time_unit: Option<Unit>,
     /// The first sensor.
     #[serde(skip_serializing_if = "Option::is_none")]

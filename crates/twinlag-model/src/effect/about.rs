@@ -47,6 +47,8 @@ pub struct About {
     pub is_streamable: bool,
     /// Whether both sensors are first-order lags of the gas with it as without it.
     pub leaves_lags: bool,
+    /// Whether the gas temperature moves with what both sensors have of it, which no reading shows.
+    pub moves_gas: bool,
     /// Every form in which it may be added to a model of a record.
     pub candidates: fn(&Context) -> Vec<Shared>,
     /// The effect with the parameters that it was found with in another record.
@@ -77,6 +79,7 @@ impl About {
             follows_gas: false,
             is_streamable: false,
             leaves_lags: false,
+            moves_gas: false,
             candidates,
             restore: |known, context| Ok(described_by(known, (known.effect.about().candidates)(context))),
         }
@@ -170,6 +173,13 @@ impl About {
     #[must_use]
     pub const fn leaving_lags(mut self) -> Self {
         self.leaves_lags = true;
+        self
+    }
+
+    /// The gas temperature moves with what both sensors have of it, which no reading shows: its third text says what that is.
+    #[must_use]
+    pub const fn moving_gas(mut self) -> Self {
+        self.moves_gas = true;
         self
     }
 

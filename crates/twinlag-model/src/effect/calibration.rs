@@ -26,6 +26,7 @@ pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     .imitating(&["radiation", "drift"])
     .at_rest()
     .leaving_lags()
+    .moving_gas()
     .streamable()
     .restored_by(restore);
 

@@ -22,7 +22,8 @@ pub(crate) static ABOUT: About = About::new("delay", 5, candidates)
         "a delay that both channels share",
     )
     .imitating(&["second-order", "slow-mode"])
-    .turning_phases();
+    .turning_phases()
+    .moving_gas();
 
 /// Usual delays: as a share of the faster time constant, as of a second lag, and in sample periods. Chosen.
 const USUAL_SHARE: f64 = 0.3;

@@ -18,7 +18,8 @@ pub(crate) static ABOUT: About = About::new("drift", 12, candidates)
     )
     .imitating(&["calibration", "slow-mode", "coloured-noise", "input-mismatch"])
     .imitating_rest()
-    .leaving_lags();
+    .leaving_lags()
+    .moving_gas();
 
 struct Drift {
     seat: Seat,

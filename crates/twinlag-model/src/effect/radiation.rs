@@ -18,6 +18,7 @@ pub(crate) static ABOUT: About = About::new("radiation", 11, candidates)
     )
     .imitating(&["calibration", "temperature-dependent-time-constant"])
     .imitating_rest()
+    .moving_gas()
     .restored_by(restore);
 
 struct Radiation {

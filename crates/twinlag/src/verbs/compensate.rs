@@ -1,10 +1,10 @@
 //! The gas temperature of a record with its standard deviation.
 
 use twinlag_compensate::{Form, bandwidth_hz};
-use twinlag_diagnose::{Grade, Judgement, Masked, ModelFit, Reason, Trace, Verdict};
+use twinlag_diagnose::{Grade, Identifier, Judgement, Masked, ModelFit, Reason, Trace, Verdict};
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, Compensation, Model, NamedEffect, Quality, Status};
+use crate::answers::{Characterisation, Compensation, Model, ModelEffect, NamedEffect, Quality, Status};
 use crate::bands::{Banded, GasFault, Reconstruction, median};
 use crate::error::Error;
 use crate::reference::Reference;
@@ -78,7 +78,7 @@ pub fn compensate_watched(
     watch: Watch<'_>,
 ) -> Result<Compensation, Error> {
     let Modelled { last, mut fit, verdict, effects, warnings, model } = Modelled::of(record, options, watch)?;
-    let judgement = judged(&last, verdict);
+    let judgement = judged(&last, verdict, &model.effects, options.trusted);
     let mut out = Compensation {
         schema: Compensation::SCHEMA.into(),
         status: Status::NotIdentifiable,
@@ -116,12 +116,21 @@ pub fn compensate_watched(
     Ok(out)
 }
 
-/// The judgement of a gas temperature by the model `last`.
-fn judged(last: &Characterisation, verdict: Option<Verdict>) -> Judgement {
+/// The judgement of a gas temperature by the model `last` with `effects`.
+fn judged(last: &Characterisation, verdict: Option<Verdict>, effects: &[ModelEffect], trusted: usize) -> Judgement {
     if verdict == Some(Verdict::Refused) {
         return Judgement::of(&[Reason::Refused]);
     }
-    following_both(&last.record.channels, last.sensors.each_ref().map(|sensor| &sensor.judgement))
+    let channels = &last.record.channels;
+    let of_lags = following_both(channels, last.sensors.each_ref().map(|sensor| &sensor.judgement));
+    let of_one_alone = effects.iter().filter(|effect| effect.effect.about().moves_gas).map(|effect| {
+        // These the gas temperature leaves in the other channel than the trusted one, whichever they were fitted in.
+        let is_relative = [Identifier::CALIBRATION, Identifier::DELAY].contains(&effect.effect);
+        let fitted_in = effect.channel.clone().filter(|_| !is_relative);
+        let channel = fitted_in.unwrap_or_else(|| channels[1 - trusted].clone());
+        Reason::OfOneAlone { effect: effect.effect, channel }
+    });
+    of_one_alone.fold(of_lags, |judgement, reason| judgement.and(&reason))
 }
 
 /// Writes the gas temperature into the answer.
@@ -141,7 +150,7 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, best_effort: boo
     let is_said = |fault: &&GasFault| matches!(fault, GasFault::Widened { .. });
     out.warnings.extend(found.faults.iter().filter(|fault| !is_said(fault)).map(ToString::to_string));
     out.warnings.push(
-        "errors that both sensors share (a gain, an offset, a delay, a second lag) remain in the \
+        "errors that both sensors share (gain, offset, radiation, drift, delay, a second lag, a slow mode) remain in the \
          gas temperature, and no band covers them"
             .into(),
     );

@@ -1,7 +1,7 @@
 //! What a file holds, and what is made of it.
 //!
 //! ```text
-//! cargo run --release -p twinlag-files --features formats --example inspect -- FILE [GROUP]
+//! cargo run --release -p twinlag-files --features formats --example contents -- FILE [GROUP]
 //! ```
 
 use std::error::Error;
@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{} ({})", held.format, held.version);
     held.groups.iter().for_each(|group| println!("  {group}"));
     let start = Instant::now();
-    let table = read(&file, &Choice { group: arguments.next(), join: false })?;
+    let table = read(&file, &Choice { group: arguments.next(), ..Choice::default() })?;
     println!("{} columns of {} rows in {:.2} s", table.columns().len(), table.rows(), start.elapsed().as_secs_f64());
     table.notes().iter().for_each(|note| println!("  {note}"));
     Ok(())
