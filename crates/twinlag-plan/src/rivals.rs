@@ -61,15 +61,19 @@ impl Rival {
     /// This rival on another record.
     pub(crate) fn on(&self, expected: &Expected) -> Self {
         let own = &expected.fitted;
-        let other = &self.fitted.model.effects[self.index];
-        // Effects are made for a record: its means and its length are in them.
-        let effect = like(other, expected).unwrap_or_else(|| other.clone());
-        let model = own.model.replaced(self.index, effect);
         let mut theta = self.fitted.theta.clone();
         for (i, tau_s) in theta.iter_mut().take(2).enumerate() {
             *tau_s *= own.theta[i] / self.beside_tau_s[i];
         }
-        Self::of(expected, self.index, finished(expected, &model, &[theta, self.restarted(&model, own)]))
+        let of = |effect: Shared| {
+            let model = own.model.replaced(self.index, effect);
+            Self::of(expected, self.index, finished(expected, &model, &[theta.clone(), self.restarted(&model, own)]))
+        };
+        let other = &self.fitted.model.effects[self.index];
+        // Effects are made for a record: its means and its length are in them. Of those that differ in nothing else, such as in the
+        // temperature of which a crosstalk adds nothing, the closest is the rival.
+        let closest = like(other, expected).into_iter().map(&of).min_by(|a, b| a.known_noise.total_cmp(&b.known_noise));
+        closest.unwrap_or_else(|| of(other.clone()))
     }
 
     /// The model's own numbers, and the first start of the rival's effect.
@@ -81,11 +85,12 @@ impl Rival {
     }
 }
 
-/// The effect of the same kind, channel and parameters, made for the record of `expected`.
-fn like(effect: &Shared, expected: &Expected) -> Option<Shared> {
+/// Effects of the same kind, channel and parameters, made for the record of `expected`.
+fn like(effect: &Shared, expected: &Expected) -> Vec<Shared> {
     let names = |e: &Shared| e.parameters().iter().map(|p| p.name).collect::<Vec<_>>();
-    let all = candidates(&[effect.identifier()], &expected.prepared.context);
-    all.into_iter().rfind(|other| other.channel() == effect.channel() && names(other) == names(effect))
+    let mut all = candidates(&[effect.identifier()], &expected.prepared.context);
+    all.retain(|other| other.channel() == effect.channel() && names(other) == names(effect));
+    all
 }
 
 /// The best fit of a model from any of some starts.
