@@ -248,7 +248,7 @@ fn place(run: &Run, folder: &Path) -> Result<PathBuf> {
 fn options(run: &Run, out: &Path) -> Result<Options> {
     let checkpoint = match (run.check, run.shard) {
         (true, _) => None,
-        (_, Some(shard)) => Some(out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()))),
+        (_, Some(shard)) => Some(out.join(shard.file_name())),
         _ => Some(out.join("checkpoint.json")),
     };
     if checkpoint.is_some() {

@@ -1,16 +1,18 @@
 //! A fleet of records of many rigs, some of them damaged: what `twinlag batch` is measured on.
 
-use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use rayon::prelude::*;
+use twinlag::record::{Decimals, write_csv};
 use twinlag::signal::{Rig, Simulated};
 
-/// One file in so many is damaged.
+/// One file in this many is damaged.
 const DAMAGED_EVERY: usize = 10;
+/// Fractional part of the golden ratio: its multiples spread evenly over [0, 1).
+const GOLDEN_SHARE: f64 = 0.618_033_988_749_895;
 /// Records of one rig.
 const FILES_PER_RIG: usize = 10;
 
@@ -32,7 +34,7 @@ pub(crate) fn run(fleet: &Fleet) -> Result<()> {
         let folder = fleet.dir.join(format!("rig-{:04}", number / FILES_PER_RIG));
         fs::create_dir_all(&folder)?;
         let record = rig(number, fleet.samples)?.simulate()?;
-        let text = text(&record);
+        let text = text(&record)?;
         let is_damaged = number % DAMAGED_EVERY == DAMAGED_EVERY - 1;
         let text = if is_damaged { damaged(&text, number / DAMAGED_EVERY) } else { text };
         write(&folder.join(format!("run-{:02}.csv", number % FILES_PER_RIG)), &text)
@@ -41,9 +43,9 @@ pub(crate) fn run(fleet: &Fleet) -> Result<()> {
 
 /// The rig of a file: ten files have one pair of time constants, and each its own gas and noise.
 fn rig(number: usize, samples: usize) -> Result<Rig> {
-    let turn = (number / FILES_PER_RIG) as f64;
+    let rig_number = (number / FILES_PER_RIG) as f64;
     // Time constants of the rigs spread evenly over a factor of two, whatever their number.
-    let spread = 2.0_f64.powf((turn * 0.618_033_988_749_895).fract());
+    let spread = 2.0_f64.powf((rig_number * GOLDEN_SHARE).fract());
     let text = format!(
         r#"
         seed = {number}
@@ -69,13 +71,12 @@ fn rig(number: usize, samples: usize) -> Result<Rig> {
     toml::from_str(&text).context("the rig of the fleet")
 }
 
-/// As a logger writes it, with five digits.
-fn text(record: &Simulated) -> String {
-    let mut text = "time_s,T1,T2\n".to_owned();
-    for ((time_s, t1_c), t2_c) in record.time_s.iter().zip(&record.t1_c).zip(&record.t2_c) {
-        writeln!(text, "{time_s:.3},{t1_c:.3},{t2_c:.3}").expect("a string takes everything");
-    }
-    text
+/// As a logger writes it, to three decimals.
+fn text(record: &Simulated) -> Result<String> {
+    let columns = [("time_s", &record.time_s[..]), ("T1", &record.t1_c), ("T2", &record.t2_c)];
+    let mut bytes = Vec::new();
+    write_csv(&mut bytes, &columns, Decimals::Fixed(3))?;
+    Ok(String::from_utf8(bytes)?)
 }
 
 /// What is wrong with a damaged file: nothing in it, one column, text for numbers, time that runs back, three rows.

@@ -13,7 +13,7 @@ pub enum BatchError {
     NothingFound { what: String },
     #[error("{what}: this is no pattern of file names: {reason}")]
     Pattern { what: String, reason: String },
-    #[error("{}: there is no file in this folder", path.display())]
+    #[error("{}: no file in this folder or below, hidden ones left out; name another folder", path.display())]
     Empty { path: PathBuf },
     #[error(
         "records are grouped by `folder`, by `column:NAME`, or by a pattern of file names in which {{rig}} stands once, \
@@ -27,9 +27,14 @@ pub enum BatchError {
         path.display()
     )]
     OtherQuestion { path: PathBuf, what: String },
-    #[error("{}, line {line}: expected the journal of a batch: {reason}", path.display())]
+    #[error(
+        "{}, line {line}: expected the journal of a batch: {reason}; begin anew, or choose another table",
+        path.display()
+    )]
     Damaged { path: PathBuf, line: usize, reason: String },
-    #[error("{} is being written by another run", path.display())]
+    #[error("{}: expected the journal of a batch, got a file that does not begin as one; choose another table", path.display())]
+    NoJournal { path: PathBuf },
+    #[error("{} is being written by another run; wait until it ends, or choose another table", path.display())]
     Busy { path: PathBuf },
     #[error("{}: cannot be read: {reason}", path.display())]
     Read { path: PathBuf, reason: String },

@@ -13,7 +13,7 @@ use crate::error::BatchError;
 pub struct Found {
     /// Its path.
     pub path: PathBuf,
-    /// Its path below the folder, or below what is no pattern, by which it was found; of a file that was named, its name.
+    /// Path relative to the folder searched, or to the folders before a pattern's first wildcard; of a named file, its file name.
     pub below: PathBuf,
 }
 

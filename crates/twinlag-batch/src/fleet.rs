@@ -3,33 +3,35 @@
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
+use twinlag::diagnosis::Grade;
+
 use crate::error::BatchError;
 use crate::group::Unit;
 use crate::journal::Journal;
-use crate::row::Row;
+use crate::outcome::Outcome;
+use crate::row::{Row, TAU, graded_columns};
 
-/// How units ended, by the exit code that the program would have had on each.
+/// How many units ended how.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Counts {
-    /// Answered.
+    /// Number of those with [`Outcome::Answered`].
     pub answered: usize,
-    /// Read, but the data do not answer the question.
+    /// Number of those with [`Outcome::Undetermined`].
     pub undetermined: usize,
-    /// The file cannot be used.
+    /// Number of those with [`Outcome::Unusable`] or [`Outcome::NotApplicable`].
     pub unusable: usize,
-    /// The program failed: a panic, or an output that cannot be written.
+    /// Number of those with [`Outcome::Failed`].
     pub failed: usize,
 }
 
 impl Counts {
-    fn add(&mut self, exit_code: Option<u8>) {
-        *match exit_code {
-            Some(0) => &mut self.answered,
-            Some(4) => &mut self.undetermined,
-            // 2: what was asked does not go for this file.
-            Some(3 | 2) => &mut self.unusable,
-            _ => &mut self.failed,
+    fn add(&mut self, outcome: Outcome) {
+        *match outcome {
+            Outcome::Answered => &mut self.answered,
+            Outcome::Undetermined => &mut self.undetermined,
+            Outcome::Unusable | Outcome::NotApplicable => &mut self.unusable,
+            Outcome::Failed => &mut self.failed,
         } += 1;
     }
 
@@ -111,7 +113,7 @@ impl Fleet {
             let rows = journal.rows(unit)?;
             for row in &rows {
                 if let Some(reason) = reason_without_answer(row) {
-                    let name = row.get_text("file").or(row.get_text("rig")).unwrap_or_default();
+                    let name = row.name();
                     let count = reasons.entry(kind(reason, name)).or_insert_with(|| ReasonCount {
                         reason: without_file(reason, name),
                         first: name.to_owned(),
@@ -119,26 +121,27 @@ impl Fleet {
                     });
                     count.count += 1;
                 }
-                fleet.unusable_files += usize::from(row.is_unread() && matches!(row.exit_code(), Some(2 | 3)));
+                let is_unusable = matches!(row.outcome(), Some(Outcome::Unusable | Outcome::NotApplicable));
+                fleet.unusable_files += usize::from(row.is_unread() && is_unusable);
                 if row.get("agrees").and_then(serde_json::Value::as_bool) == Some(false) {
                     let cell = |column| row.get_text(column).unwrap_or_default().to_owned();
                     fleet.contradicting.push((cell("rig"), cell("file")));
                 }
             }
             let of_unit = rows.iter().find(|row| match unit {
-                Unit::Rig { .. } => row.get_text("level") == Some("rig"),
+                Unit::Rig { .. } => row.is_of_rig(),
                 Unit::Record(_) | Unit::WithoutRig { .. } => true,
             });
             // A file of which nothing says whose it is belongs to no rig.
             if !(is_grouped && matches!(unit, Unit::WithoutRig { .. })) {
-                fleet.units.add(of_unit.and_then(Row::exit_code));
+                fleet.units.add(of_unit.and_then(Row::outcome).unwrap_or(Outcome::Failed));
             }
             let Some(row) = of_unit.filter(|row| row.get_number("samples").is_some()) else { continue };
             let member = Member::of(row);
             if !member.verdict.is_empty() {
                 *verdicts.entry(member.verdict.clone()).or_default() += 1;
             }
-            for effect in member.effects.split("; ").filter(|effect| !effect.is_empty()) {
+            for effect in row.effect_names() {
                 *effects.entry(effect.to_owned()).or_default() += 1;
             }
             fleet.members.push(member);
@@ -152,22 +155,27 @@ impl Fleet {
 
 impl Member {
     fn of(row: &Row) -> Self {
-        let text = |column| row.get_text(column).unwrap_or_default().to_owned();
-        let name = if row.get_text("level") == Some("rig") { text("rig") } else { text("file") };
-        let tau = ["tau1", "tau2"].map(|tau| {
-            let number = |column: &str| row.get_number(&format!("{tau}{column}"));
-            let interval_95_s = [number("_low_s")?, number("_high_s")?];
-            let is_go = row.get_text(&format!("{tau}_grade")) == Some("go");
-            Some(MemberTau { value_s: number("_s")?, interval_95_s, is_go })
+        let text = |column| row.in_words(column).unwrap_or_default().into_owned();
+        let tau = TAU.map(|tau| {
+            let [value, low, high, grade, _] = graded_columns(tau).map(|(name, _)| name);
+            let is_go = row.get_text(&grade) == Some(&Grade::Go.to_string());
+            let interval_95_s = [row.get_number(&low)?, row.get_number(&high)?];
+            Some(MemberTau { value_s: row.get_number(&value)?, interval_95_s, is_go })
         });
-        Self { name, tau, effects: text("effects"), verdict: text("verdict") }
+        Self { name: row.name().to_owned(), tau, effects: text("effects"), verdict: text("verdict") }
     }
 }
 
 /// Why a row has no answer; `None` of one that has, and of one that rests on its rig.
 fn reason_without_answer(row: &Row) -> Option<&str> {
-    let whys = ["reason", "tau1_because", "tau2_because", "gas_because"];
-    if row.exit_code() == Some(0) { None } else { whys.into_iter().find_map(|why| row.get_text(why)) }
+    if row.outcome() == Some(Outcome::Answered) {
+        return None;
+    }
+    let [one, two] = TAU.map(|tau| {
+        let [.., (because, _)] = graded_columns(tau);
+        because
+    });
+    ["reason", &one, &two, "gas_because"].into_iter().find_map(|why| row.get_text(why))
 }
 
 /// A reason without the name of the file that it begins with.
@@ -175,7 +183,7 @@ fn without_file(reason: &str, file: &str) -> String {
     reason.strip_prefix(file).map_or(reason, |rest| rest.trim_start_matches([':', ',', ' '])).to_owned()
 }
 
-/// What reasons of one kind share: a number is like any other.
+/// A reason with its file name and numbers replaced, equal for reasons of one kind.
 fn kind(reason: &str, file: &str) -> String {
     let text = without_file(reason, file);
     let text = if file.is_empty() { text } else { text.replace(file, "FILE") };

@@ -8,21 +8,21 @@ use regex::Regex;
 
 use crate::error::BatchError;
 
-/// What the rig of a record is known by.
+/// What the rig of a record is known by: the folder that its file lies in, a column, or a part of the file's name.
 #[derive(Clone, Debug)]
-#[non_exhaustive]
-pub enum GroupBy {
-    /// The folder that its file lies in.
+pub struct GroupBy(By);
+
+#[derive(Clone, Debug)]
+enum By {
     Folder,
     /// A column of this name, the same from its first row to its last.
     Column(String),
-    /// A part of the file's name.
     Name(NamePattern),
 }
 
 /// A pattern of file names that says which part is the name of the rig.
 #[derive(Clone, Debug)]
-pub struct NamePattern {
+struct NamePattern {
     text: String,
     regex: Regex,
 }
@@ -31,36 +31,57 @@ impl FromStr for GroupBy {
     type Err = BatchError;
 
     /// `folder`, `column:NAME`, or a pattern: `{rig}` stands for the name of the rig, as short as it can be, `*` for anything and `?`
-    /// for one character, none of them across folders. A pattern with a `/` is of the path's end, any other of the file's name.
+    /// for one character, none of them across folders. A pattern with a `/` is matched against the end of the path, any other against
+    /// the file name.
     ///
     /// ```
     /// use std::path::Path;
     /// use twinlag_batch::GroupBy;
     ///
-    /// let GroupBy::Name(pattern) = "{rig}_run*.csv".parse()? else { panic!("a pattern") };
-    /// assert_eq!(pattern.rig(Path::new("2024/boiler-3_run07.csv")), Some("boiler-3".to_owned()));
-    /// assert_eq!(pattern.rig(Path::new("2024/readme.txt")), None);
+    /// let by: GroupBy = "{rig}_run*.csv".parse()?;
+    /// let rig = |file: &str| by.rig(Path::new(file), |column| Err(format!("no column {column}")));
+    /// assert_eq!(rig("2024/boiler-3_run07.csv"), Ok("boiler-3".to_owned()));
+    /// assert!(rig("2024/readme.txt").is_err());
     /// assert!("*.csv".parse::<GroupBy>().is_err());
     /// # Ok::<(), twinlag_batch::BatchError>(())
     /// ```
     fn from_str(text: &str) -> Result<Self, BatchError> {
         if text == "folder" {
-            return Ok(Self::Folder);
+            return Ok(Self(By::Folder));
         }
         match text.strip_prefix("column:") {
             Some("") => Err(BatchError::GroupBy { got: text.to_owned() }),
-            Some(name) => Ok(Self::Column(name.to_owned())),
-            None => Ok(Self::Name(NamePattern::new(text)?)),
+            Some(name) => Ok(Self(By::Column(name.to_owned()))),
+            None => Ok(Self(By::Name(NamePattern::new(text)?))),
         }
     }
 }
 
 impl std::fmt::Display for GroupBy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Folder => f.write_str("folder"),
-            Self::Column(name) => write!(f, "column:{name}"),
-            Self::Name(pattern) => f.write_str(&pattern.text),
+        match &self.0 {
+            By::Folder => f.write_str("folder"),
+            By::Column(name) => write!(f, "column:{name}"),
+            By::Name(pattern) => f.write_str(&pattern.text),
+        }
+    }
+}
+
+impl GroupBy {
+    /// The name of the rig of a file, or why nothing says which it is.
+    ///
+    /// - `of_column`: the value of the column of this name, for which the file has to be read, or why it does not name a rig; asked only
+    ///   where the rig is known by a column
+    pub fn rig(&self, file: &Path, of_column: impl FnOnce(&str) -> Result<String, String>) -> Result<String, String> {
+        match &self.0 {
+            By::Folder => {
+                let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+                Ok(name_of(folder))
+            }
+            By::Column(name) => of_column(name),
+            By::Name(pattern) => pattern
+                .rig(file)
+                .ok_or_else(|| format!("its name does not fit {self}, so nothing says which rig it is of")),
         }
     }
 }
@@ -75,7 +96,7 @@ impl NamePattern {
     }
 
     /// The name of the rig; `None` where the file's name does not fit.
-    pub fn rig(&self, file: &Path) -> Option<String> {
+    fn rig(&self, file: &Path) -> Option<String> {
         let is_of_path = self.text.contains('/');
         let whole = if is_of_path { file.as_os_str() } else { file.file_name()? };
         let path = whole.to_string_lossy().replace('\\', "/");
@@ -151,20 +172,4 @@ pub fn grouped(files: Vec<PathBuf>, rigs: Vec<Result<String, String>>) -> Vec<Un
         }
     }
     by_rig.into_iter().map(|(name, files)| Unit::Rig { name, files }).chain(without).collect()
-}
-
-/// The rig of a file by its folder or its name; `None` where that is by a column, for which the file has to be read.
-pub fn rig_by_path(file: &Path, by: &GroupBy) -> Option<Result<String, String>> {
-    match by {
-        GroupBy::Column(_) => None,
-        GroupBy::Folder => {
-            let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            Some(Ok(name_of(folder)))
-        }
-        GroupBy::Name(pattern) => Some(
-            pattern
-                .rig(file)
-                .ok_or_else(|| format!("its name does not fit {}, so nothing says which rig it is of", pattern.text)),
-        ),
-    }
 }

@@ -18,7 +18,7 @@ use crate::group::{Unit, name_of};
 use crate::row::Row;
 
 /// Name and number of the format.
-const SCHEMA: &str = "twinlag.batch-journal/1";
+const SCHEMA: &str = "twinlag.batch-journal/2";
 
 /// How every journal begins.
 const START: &str = "{\"schema\":\"twinlag.batch-journal/";
@@ -27,11 +27,11 @@ const START: &str = "{\"schema\":\"twinlag.batch-journal/";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Begin {
-    /// Anew; a journal that is there is an error.
-    New,
-    /// Anew; a journal that is there is replaced.
-    Anew,
-    /// Where the journal ends, if there is one.
+    /// With a new journal; one that is there is an error.
+    Create,
+    /// With a new journal; one that is there is replaced.
+    Replace,
+    /// Where the journal ends, if there is one; with a new one otherwise.
     Resume,
 }
 
@@ -82,11 +82,11 @@ impl Journal {
     /// - `asked`: the question; a run that goes on has to ask the same, of the same version of this crate
     ///
     /// # Errors
-    /// [`BatchError::Exists`], [`BatchError::OtherQuestion`], [`BatchError::Damaged`], [`BatchError::Busy`], [`BatchError::Read`],
-    /// [`BatchError::Write`].
+    /// [`BatchError::Exists`], [`BatchError::NoJournal`], [`BatchError::OtherQuestion`], [`BatchError::Damaged`], [`BatchError::Busy`],
+    /// [`BatchError::Read`], [`BatchError::Write`].
     pub fn open(path: &Path, asked: &Value, begin: Begin) -> Result<Self, BatchError> {
         let unwritable = |error: std::io::Error| BatchError::Write { path: path.to_owned(), reason: error.to_string() };
-        if begin == Begin::New && path.exists() {
+        if begin == Begin::Create && path.exists() {
             return Err(BatchError::Exists { path: path.to_owned() });
         }
         let file =
@@ -113,6 +113,11 @@ impl Journal {
     /// Has a unit asked again, since what it led to beside its rows is gone.
     pub fn forget(&mut self, unit: &Unit) {
         self.done.remove(&unit.key());
+    }
+
+    /// How many units it holds that are not among these, which are those of a whole batch.
+    pub fn other_units(&self, units: &[Unit]) -> usize {
+        self.done.len() - units.iter().filter(|unit| self.done.contains_key(&unit.key())).count()
     }
 
     /// Whether a unit is done, and its files are as they were then.
@@ -151,11 +156,8 @@ impl Journal {
         let read = (&self.file).take(START.len() as u64).read_to_end(&mut start);
         read.and_then(|_| self.file.rewind())
             .map_err(|error| BatchError::Read { path: self.path.clone(), reason: error.to_string() })?;
-        if START.as_bytes().starts_with(&start) {
-            return Ok(());
-        }
-        let reason = "it does not begin as a journal does".to_owned();
-        Err(BatchError::Damaged { path: self.path.clone(), line: 1, reason })
+        let is_journal = START.as_bytes().starts_with(&start);
+        if is_journal { Ok(()) } else { Err(BatchError::NoJournal { path: self.path.clone() }) }
     }
 
     /// Reads what an earlier run has done.
@@ -208,13 +210,15 @@ impl Header {
             return Err(differs("the version of the program"));
         }
         match difference(&self.asked, &now.asked) {
+            Some(what) if what.is_empty() => Err(differs("the whole question")),
             Some(what) => Err(differs(&what)),
             None => Ok(()),
         }
     }
 }
 
-/// The name of the first setting in which two questions differ, those within a setting behind it; `None` of equal ones.
+/// The name of the first setting in which two questions differ, those within a setting behind it; empty where they have no settings,
+/// `None` of equal ones.
 fn difference(was: &Value, is: &Value) -> Option<String> {
     if was == is {
         return None;

@@ -11,7 +11,7 @@
 //!
 //! ```
 //! use twinlag::record::{Record, Selection};
-//! use twinlag_batch::{Answer, Begin, Journal, Options, Row, Unit, Verb, each, find, run, write_csv};
+//! use twinlag_batch::{Answer, Begin, Journal, Outcome, Row, Unit, Verb, each, find, run, write_csv};
 //!
 //! let folder = tempfile::tempdir()?;
 //! std::fs::write(folder.path().join("empty.csv"), "")?;
@@ -21,16 +21,16 @@
 //! let characterise = |unit: &Unit| -> Vec<Row> {
 //!     let Unit::Record(file) = unit else { unreachable!("each file by itself") };
 //!     match Record::read(file, &Selection::default()) {
-//!         Err(error) => vec![Row::without_answer(unit, file, 3, &error.to_string())],
+//!         Err(error) => vec![Row::without_answer(unit, file, Outcome::Unusable, &error.to_string())],
 //!         Ok(record) => match twinlag::characterise(&record, &twinlag::Options::default()) {
-//!             Err(error) => vec![Row::without_answer(unit, file, 3, &error.to_string())],
-//!             Ok(answer) => Row::of(unit, 0, &Answer::Characterisation(&answer)),
+//!             Err(error) => vec![Row::without_answer(unit, file, Outcome::Unusable, &error.to_string())],
+//!             Ok(answer) => Row::of(unit, Outcome::Answered, &Answer::Characterisation(&answer)),
 //!         },
 //!     }
 //! };
 //! let asked = serde_json::json!({"verb": "characterise"});
-//! let mut journal = Journal::open(&folder.path().join("table.journal"), &asked, Begin::New)?;
-//! run(&units, &mut journal, &Options::default(), characterise, |_| {})?;
+//! let mut journal = Journal::open(&folder.path().join("table.journal"), &asked, Begin::Create)?;
+//! run(&units, &mut journal, None, characterise, |_| {})?;
 //!
 //! let mut table = Vec::new();
 //! write_csv(&units, &mut journal, Verb::Characterise, &mut table)?;
@@ -43,6 +43,7 @@ mod find;
 mod fleet;
 mod group;
 mod journal;
+mod outcome;
 mod parquet;
 mod row;
 mod run;
@@ -51,9 +52,10 @@ mod table;
 pub use error::BatchError;
 pub use find::{Found, find};
 pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};
-pub use group::{GroupBy, NamePattern, Unit, each, grouped, name_of, rig_by_path};
+pub use group::{GroupBy, Unit, each, grouped, name_of};
 pub use journal::{Begin, Journal};
+pub use outcome::Outcome;
 pub use parquet::write_parquet;
 pub use row::{Answer, Row, Verb};
-pub use run::{Options, Progress, map, run};
-pub use table::write_csv;
+pub use run::{Progress, map, run};
+pub use table::{is_table, write_csv};

@@ -1,12 +1,15 @@
 //! The table of a batch as Parquet: the columns of the delimited text, with their types; an empty cell is null.
 
+use std::fs::File;
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::types::{Type, TypePtr};
 use serde_json::Value;
@@ -17,8 +20,10 @@ use crate::journal::Journal;
 use crate::row::{Cells, Row, Verb};
 use crate::table::columns;
 
-/// Rows that are held until they are written.
+/// Rows that are held until they are written together; chosen, so that few megabytes are held, however long the table is.
 const GROUP_ROWS: usize = 512;
+/// The name of the schema, by which a table is known.
+const SCHEMA: &str = "twinlag_batch";
 
 impl From<ParquetError> for BatchError {
     fn from(error: ParquetError) -> Self {
@@ -54,6 +59,12 @@ pub fn write_parquet(
     Ok(())
 }
 
+/// Whether a file is a table that [`write_parquet`] has written.
+pub(crate) fn is_parquet_table(path: &Path) -> bool {
+    let table = File::open(path).ok().and_then(|file| SerializedFileReader::new(file).ok());
+    table.is_some_and(|table| table.metadata().file_metadata().schema().name() == SCHEMA)
+}
+
 fn schema(columns: &[(String, Cells)]) -> Result<TypePtr, ParquetError> {
     let field = |(name, cells): &(String, Cells)| {
         let (physical, logical) = match cells {
@@ -66,7 +77,7 @@ fn schema(columns: &[(String, Cells)]) -> Result<TypePtr, ParquetError> {
         Ok(Arc::new(builder.with_logical_type(logical).build()?))
     };
     let fields = columns.iter().map(field).collect::<Result<Vec<_>, ParquetError>>()?;
-    Ok(Arc::new(Type::group_type_builder("twinlag_batch").with_fields(fields).build()?))
+    Ok(Arc::new(Type::group_type_builder(SCHEMA).with_fields(fields).build()?))
 }
 
 fn write_group(
@@ -78,10 +89,9 @@ fn write_group(
     for (name, cells) in columns {
         let column = group.next_column()?.expect("the schema has the same columns");
         let values = rows.iter().map(|row| row.get(name));
+        let texts = rows.iter().map(|row| row.in_words(name));
         match cells {
-            Cells::Text => {
-                write_column::<ByteArrayType>(column, values.map(|value| Some(ByteArray::from(value?.as_str()?))))
-            }
+            Cells::Text => write_column::<ByteArrayType>(column, texts.map(|text| Some(ByteArray::from(&*text?)))),
             Cells::Count => write_column::<Int64Type>(column, values.map(|value| value?.as_i64())),
             Cells::Number => write_column::<DoubleType>(column, values.map(|value| value?.as_f64())),
             Cells::Truth => write_column::<BoolType>(column, values.map(|value| value.and_then(Value::as_bool))),

@@ -3,6 +3,7 @@
 //! A row has only the cells that its answer has; the table has the columns of its verb, in the order of [`Verb::columns`], and after
 //! them those of the effects' parameters, which depend on what was found.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -14,6 +15,7 @@ use twinlag::{
 };
 
 use crate::group::{Unit, name_of};
+use crate::outcome::Outcome;
 
 /// What is asked of each unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,12 +51,12 @@ pub(crate) enum Cells {
     Truth,
 }
 
-/// Columns of every table: what was asked of, and how that ended.
-const OF_ALL: [(&str, Cells); 18] = [
-    ("level", Cells::Text),
-    ("rig", Cells::Text),
-    ("file", Cells::Text),
-    ("exit_code", Cells::Count),
+/// The first columns of every table, by which it is known: what the row is of, and how the question ended.
+const FIRST: [(&str, Cells); 4] =
+    [("level", Cells::Text), ("rig", Cells::Text), ("file", Cells::Text), ("exit_code", Cells::Count)];
+
+/// The columns of every table behind the first ones: the status of the answer, the record, its noise, and what is left over.
+const OF_ALL: [(&str, Cells); 14] = [
     ("status", Cells::Text),
     ("reason", Cells::Text),
     ("records", Cells::Count),
@@ -71,11 +73,13 @@ const OF_ALL: [(&str, Cells); 18] = [
     ("left_out_rms_after", Cells::Number),
 ];
 
-/// Time constants and their difference, with their unit; each has what [`Row::graded`] adds.
-const GRADED: [Quantity<'static>; 3] = [("tau1", "_s"), ("tau2", "_s"), ("tau_difference", "_s")];
-
 /// A number by the beginning of its columns' names, and the unit at their ends.
 type Quantity<'a> = (&'a str, &'a str);
+
+/// Both time constants.
+pub(crate) const TAU: [Quantity<'static>; 2] = [("tau1", "_s"), ("tau2", "_s")];
+/// The difference of the time constants.
+const TAU_DIFFERENCE: Quantity<'static> = ("tau_difference", "_s");
 
 const OF_DIAGNOSIS: [(&str, Cells); 6] = [
     ("verdict", Cells::Text),
@@ -105,19 +109,25 @@ const NOTES: (&str, Cells) = ("notes", Cells::Text);
 impl Verb {
     /// The columns that a table of its answers always has, in order, with what they hold.
     pub(crate) fn columns(self) -> Vec<(String, Cells)> {
-        let graded = GRADED.into_iter().flat_map(graded_columns);
+        let graded = TAU.into_iter().chain([TAU_DIFFERENCE]).flat_map(graded_columns);
         let own: &[_] = match self {
             Self::Characterise => &[],
             Self::Diagnose => &OF_DIAGNOSIS,
             Self::Compensate => &OF_COMPENSATION,
         };
         let named = |(name, cells): &(&str, Cells)| ((*name).to_owned(), *cells);
-        OF_ALL.iter().map(named).chain(graded).chain(own.iter().map(named)).chain([named(&NOTES)]).collect()
+        let of_all = FIRST.iter().chain(&OF_ALL).map(named);
+        of_all.chain(graded).chain(own.iter().map(named)).chain([named(&NOTES)]).collect()
     }
 }
 
-/// The columns of a number with its interval and its grade.
-fn graded_columns((stem, unit): Quantity<'_>) -> [(String, Cells); 5] {
+/// The names of the first columns of every table.
+pub(crate) fn first_columns() -> [&'static str; 4] {
+    FIRST.map(|(name, _)| name)
+}
+
+/// The columns of a number: itself, both ends of its interval, its grade, and why that is not `go`.
+pub(crate) fn graded_columns((stem, unit): Quantity<'_>) -> [(String, Cells); 5] {
     [
         (format!("{stem}{unit}"), Cells::Number),
         (format!("{stem}_low{unit}"), Cells::Number),
@@ -141,29 +151,24 @@ pub struct Row {
 
 impl Row {
     /// The row of a file that has no answer.
-    ///
-    /// - `exit_code`: what the program would have ended with on it
-    pub fn without_answer(unit: &Unit, file: &Path, exit_code: u8, reason: &str) -> Self {
-        Self::of_file(unit, &name_of(file)).count("exit_code", exit_code.into()).text("reason", reason)
+    pub fn without_answer(unit: &Unit, file: &Path, outcome: Outcome, reason: &str) -> Self {
+        Self::of_file(unit, &name_of(file)).ended(outcome).text("reason", reason)
     }
 
     /// The row of a rig as a whole that has no answer.
     ///
     /// - `records`: how many of its records were read
-    pub fn rig_without_answer(name: &str, records: usize, exit_code: u8, reason: &str) -> Self {
-        let row = Self::of_rig(name, records);
-        row.count("exit_code", exit_code.into()).text("reason", reason)
+    pub fn rig_without_answer(name: &str, records: usize, outcome: Outcome, reason: &str) -> Self {
+        Self::of_rig(name, records).ended(outcome).text("reason", reason)
     }
 
-    /// The row of a record of which nothing is said but with its rig.
-    pub fn with_its_rig(unit: &Unit, file: &str, samples: usize, exit_code: u8) -> Self {
-        Self::of_file(unit, file).count("exit_code", exit_code.into()).count("samples", samples)
+    /// The row of a record that was read and is answered for only as part of its rig.
+    pub fn with_its_rig(unit: &Unit, file: &str, samples: usize, outcome: Outcome) -> Self {
+        Self::of_file(unit, file).ended(outcome).count("samples", samples)
     }
 
     /// The rows of an answer: one of a record; of a rig one for it and one for each of its records.
-    ///
-    /// - `exit_code`: what the program would have ended with
-    pub fn of(unit: &Unit, exit_code: u8, answer: &Answer<'_>) -> Vec<Self> {
+    pub fn of(unit: &Unit, outcome: Outcome, answer: &Answer<'_>) -> Vec<Self> {
         let (last, records) = match answer {
             Answer::Characterisation(answer) => (*answer, &answer.records),
             Answer::Diagnosis(answer) => (&answer.last, &answer.records),
@@ -173,13 +178,13 @@ impl Row {
             Unit::Rig { name, .. } => Self::of_rig(name, records.len().max(1)),
             Unit::Record(file) | Unit::WithoutRig { file, .. } => Self::of_file(unit, &name_of(file)),
         };
-        let row = row.count("exit_code", exit_code.into()).characterisation(last);
+        let row = row.ended(outcome).characterisation(last);
         let row = match answer {
             Answer::Characterisation(_) => row.free(last),
             Answer::Diagnosis(answer) => row.diagnosis(answer),
             Answer::Compensation(answer) => row.compensation(answer),
         };
-        let of_record = |record: &RecordAnswer| Self::of_file(unit, &record.source).record(record, exit_code);
+        let of_record = |record: &RecordAnswer| Self::of_file(unit, &record.source).ended(outcome).record(record);
         std::iter::once(row).chain(records.iter().map(of_record)).collect()
     }
 
@@ -189,24 +194,59 @@ impl Row {
         self.text("gas_file", &name_of(path))
     }
 
-    /// A cell of text; `None` where it is empty.
-    pub fn get_text(&self, column: &str) -> Option<&str> {
-        self.cells.get(column)?.as_str()
+    /// The name of the file that it is of; `None` of a rig.
+    pub fn file(&self) -> Option<&str> {
+        self.get_text("file")
     }
 
-    /// A cell with a number; `None` where it is empty.
-    pub fn get_number(&self, column: &str) -> Option<f64> {
-        self.cells.get(column)?.as_f64()
+    /// The name of the file that the gas temperature was written to.
+    pub fn gas_file(&self) -> Option<&str> {
+        self.get_text("gas_file")
     }
 
-    /// What the program would have ended with.
-    pub fn exit_code(&self) -> Option<u8> {
-        self.cells.get("exit_code")?.as_u64()?.try_into().ok()
+    /// How the question ended; `None` where the row does not say so.
+    pub fn outcome(&self) -> Option<Outcome> {
+        let exit_code = self.cells.get("exit_code")?.as_u64()?.try_into().ok()?;
+        Some(Outcome::of_exit_code(exit_code))
+    }
+
+    /// The name of the file or of the rig that it is of.
+    pub(crate) fn name(&self) -> &str {
+        self.file().or(self.get_text("rig")).unwrap_or_default()
+    }
+
+    /// The effects that were found, in words.
+    pub(crate) fn effect_names(&self) -> impl Iterator<Item = &str> {
+        self.get("effects").into_iter().flat_map(texts)
+    }
+
+    /// Whether it is of a rig as a whole.
+    pub(crate) fn is_of_rig(&self) -> bool {
+        self.get_text("level") == Some("rig")
     }
 
     /// Whether it is of a file that was not read.
     pub(crate) fn is_unread(&self) -> bool {
-        self.get("samples").is_none() && self.get_text("level") == Some("record")
+        self.get("samples").is_none() && !self.is_of_rig()
+    }
+
+    /// A cell of text; `None` where it is empty.
+    pub(crate) fn get_text(&self, column: &str) -> Option<&str> {
+        self.cells.get(column)?.as_str()
+    }
+
+    /// A cell with a number; `None` where it is empty.
+    pub(crate) fn get_number(&self, column: &str) -> Option<f64> {
+        self.cells.get(column)?.as_f64()
+    }
+
+    /// A cell as text, as the table has it; `None` where it is empty.
+    pub(crate) fn in_words(&self, column: &str) -> Option<Cow<'_, str>> {
+        Some(match self.cells.get(column)? {
+            Value::String(text) => text.into(),
+            several @ Value::Array(_) => texts(several).collect::<Vec<_>>().join("; ").into(),
+            value => value.to_string().into(),
+        })
     }
 
     pub(crate) fn get(&self, column: &str) -> Option<&Value> {
@@ -227,9 +267,21 @@ impl Row {
         Self::default().text("level", "rig").text("rig", name).count("records", records)
     }
 
+    fn ended(self, outcome: Outcome) -> Self {
+        self.count("exit_code", outcome.exit_code().into())
+    }
+
     fn text(mut self, column: &str, text: &str) -> Self {
         if !text.is_empty() {
             self.cells.insert(column.to_owned(), text.into());
+        }
+        self
+    }
+
+    /// Several texts in one cell.
+    fn texts(mut self, column: &str, texts: Vec<String>) -> Self {
+        if !texts.is_empty() {
+            self.cells.insert(column.to_owned(), texts.into());
         }
         self
     }
@@ -283,8 +335,8 @@ impl Row {
             .number("chi2_per_dof", answer.residual.chi2_per_dof)
             .text("notes", &notes);
         let row = row.left_out(answer.transfer);
-        let row = tau(tau(row, GRADED[0], one), GRADED[1], two);
-        row.graded(GRADED[2], difference.value, difference.interval_95_s, &difference.judgement)
+        let row = tau(tau(row, TAU[0], one), TAU[1], two);
+        row.graded(TAU_DIFFERENCE, difference.value, difference.interval_95_s, &difference.judgement)
     }
 
     /// What is left on records, or blocks, that had no part in the fit.
@@ -342,20 +394,18 @@ impl Row {
             Some(channel) => format!("{} in {channel}", found.effect),
             None => found.effect.to_string(),
         };
-        let named: Vec<String> = effects.iter().map(in_words).collect();
         let parameters = effects.iter().flat_map(|found| {
             let effect = found.effect.to_string().replace('-', "_") + &place(&found.fitted_in);
             found.parameters.iter().map(move |number| (stem_and_unit(&effect, number), number))
         });
-        parameters.fold(self.text("effects", &named.join("; ")), |row, ((stem, unit), number)| {
+        parameters.fold(self.texts("effects", effects.iter().map(in_words).collect()), |row, ((stem, unit), number)| {
             row.graded((&stem, &unit), number.value, number.interval_95, &number.judgement)
         })
     }
 
-    fn record(self, record: &RecordAnswer, exit_code: u8) -> Self {
+    fn record(self, record: &RecordAnswer) -> Self {
         let error = record.error.held_out_normalised_rms;
         let mut row = self
-            .count("exit_code", exit_code.into())
             .count("samples", record.samples)
             .number("noise1_std_K", record.noise_std_k[0])
             .number("noise2_std_K", record.noise_std_k[1])
@@ -389,7 +439,26 @@ fn why_not_ok(answer: &Characterisation) -> String {
     [first].iter().chain(&answer.warnings).map(String::as_str).collect::<Vec<_>>().join("; ")
 }
 
-/// The name that an answer has in JSON.
+/// The name of an enum's value in JSON.
 fn name(of: impl Serialize) -> String {
     serde_json::to_value(of).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// The texts of a cell with several.
+fn texts(cell: &Value) -> impl Iterator<Item = &str> {
+    cell.as_array().into_iter().flatten().filter_map(Value::as_str)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Row;
+
+    /// As text, the effects are joined by what the name of a channel may hold as well.
+    #[test]
+    fn an_effect_is_one_whatever_its_channel_is_called() {
+        let row = Row::default().texts("effects", ["delay in a; b", "drift"].map(str::to_owned).to_vec());
+        let read: Row = serde_json::from_str(&serde_json::to_string(&row).expect("JSON")).expect("a row");
+        assert_eq!(read.effect_names().collect::<Vec<_>>(), ["delay in a; b", "drift"]);
+        assert_eq!(read.in_words("effects").as_deref(), Some("delay in a; b; drift"));
+    }
 }

@@ -15,24 +15,11 @@ use rayon::ThreadPoolBuilder;
 use crate::error::BatchError;
 use crate::group::Unit;
 use crate::journal::{Journal, Seen};
+use crate::outcome::Outcome;
 use crate::row::Row;
 
-/// Threads beyond this multiple of the processors only wait for each other.
+/// Threads for each processor, at most; chosen, since more of them wait for each other, and each holds a record.
 const MAX_THREADS_PER_PROCESSOR: usize = 4;
-
-/// How to run a batch. Nothing here changes a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Options {
-    /// How many units are worked on at once; by default one for each processor. With fewer units than threads, the others help
-    /// within the units.
-    pub threads: NonZeroUsize,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { threads: thread::available_parallelism().unwrap_or(NonZeroUsize::MIN) }
-    }
-}
 
 /// How far a batch is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,12 +32,15 @@ pub struct Progress {
 
 /// Asks `work` of every unit that is not done, and puts its rows into the journal. A unit on which it panics has a row that says so.
 ///
+/// - `threads`: how many units are worked on at once, `None` for one for each processor; no cell depends on it. With fewer units than
+///   threads, the others help within the units
+///
 /// # Errors
 /// [`BatchError::Write`]; what was done before is in the journal.
 pub fn run(
     units: &[Unit],
     journal: &mut Journal,
-    options: &Options,
+    threads: Option<NonZeroUsize>,
     work: impl Fn(&Unit) -> Vec<Row> + Sync,
     mut progress: impl FnMut(Progress),
 ) -> Result<(), BatchError> {
@@ -61,12 +51,12 @@ pub fn run(
     let answer = |unit: &&Unit| {
         let seen = Seen::now(unit);
         let rows = match unit {
-            Unit::WithoutRig { file, reason } => vec![Row::without_answer(unit, file, 3, reason)],
+            Unit::WithoutRig { file, reason } => vec![Row::without_answer(unit, file, Outcome::Unusable, reason)],
             unit => catch_unwind(AssertUnwindSafe(|| work(unit))).unwrap_or_else(|panic| panicked(unit, &*panic)),
         };
         (seen, rows)
     };
-    in_order_of_arrival(&open, options.threads, answer, |unit, (seen, rows)| {
+    in_order_of_arrival(&open, threads, answer, |unit, (seen, rows)| {
         state.done += 1;
         progress(state);
         result = journal.append(unit, seen, &rows);
@@ -75,13 +65,15 @@ pub fn run(
     result
 }
 
-/// `work` on every item, in parallel, in their order.
+/// What `work` returns for every item, in their order, computed in parallel.
+///
+/// - `threads`: how many items are worked on at once, `None` for one for each processor
 ///
 /// # Panics
 /// If `work` does.
 pub fn map<Item: Sync, Out: Send>(
     items: &[Item],
-    options: &Options,
+    threads: Option<NonZeroUsize>,
     work: impl Fn(&Item) -> Out + Sync,
     mut progress: impl FnMut(Progress),
 ) -> Vec<Out> {
@@ -90,7 +82,7 @@ pub fn map<Item: Sync, Out: Send>(
     let mut done = 0;
     in_order_of_arrival(
         &places,
-        options.threads,
+        threads,
         |place| work(&items[*place]),
         |place, out| {
             outs[*place] = Some(out);
@@ -105,12 +97,12 @@ pub fn map<Item: Sync, Out: Send>(
 /// `work` on every item, on so many threads; `take` gets each result as it comes, on the calling thread, until it wants no more.
 fn in_order_of_arrival<Item: Sync, Out: Send>(
     items: &[Item],
-    threads: NonZeroUsize,
+    threads: Option<NonZeroUsize>,
     work: impl Fn(&Item) -> Out + Sync,
     mut take: impl FnMut(&Item, Out) -> bool,
 ) {
-    let processors = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN).get();
-    let threads = threads.get().min(MAX_THREADS_PER_PROCESSOR * processors);
+    let processors = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    let threads = threads.unwrap_or(processors).get().min(MAX_THREADS_PER_PROCESSOR * processors.get());
     let workers = threads.min(items.len());
     let within = threads.checked_div(workers).unwrap_or(1);
     let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -120,7 +112,8 @@ fn in_order_of_arrival<Item: Sync, Out: Send>(
             let sender = sender.clone();
             let (next, is_over, work) = (&next, &is_over, &work);
             scope.spawn(move || {
-                // What is parallel within a unit stays in it: a thread that waits would begin another unit else, and hold both.
+                // What is parallel within a unit stays in it: otherwise a waiting thread would begin another unit and hold the records
+                // of both.
                 let pool = ThreadPoolBuilder::new().num_threads(within).build().ok();
                 while !is_over.load(Ordering::Relaxed) {
                     let place = next.fetch_add(1, Ordering::Relaxed);
@@ -147,7 +140,7 @@ fn panicked(unit: &Unit, panic: &(dyn Any + Send)) -> Vec<Row> {
     let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     let reason = format!("a fault of the program: {}", message.unwrap_or("it panicked without a message"));
     vec![match unit {
-        Unit::Rig { name, .. } => Row::rig_without_answer(name, 0, 1, &reason),
-        Unit::Record(file) | Unit::WithoutRig { file, .. } => Row::without_answer(unit, file, 1, &reason),
+        Unit::Rig { name, .. } => Row::rig_without_answer(name, 0, Outcome::Failed, &reason),
+        Unit::Record(file) | Unit::WithoutRig { file, .. } => Row::without_answer(unit, file, Outcome::Failed, &reason),
     }]
 }

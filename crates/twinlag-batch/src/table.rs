@@ -1,14 +1,15 @@
 //! The table of a batch: which columns it has, and its rows as delimited text.
 
 use std::collections::BTreeSet;
-use std::io::Write;
-
-use serde_json::Value;
+use std::fs::File;
+use std::io::{Read as _, Write};
+use std::path::Path;
 
 use crate::error::BatchError;
 use crate::group::Unit;
 use crate::journal::Journal;
-use crate::row::{Cells, Row, Verb, cells_of_parameter};
+use crate::parquet::is_parquet_table;
+use crate::row::{Cells, Verb, cells_of_parameter, first_columns};
 
 /// The columns of a table: those of its verb, then those of the parameters that were found, by name.
 pub(crate) fn columns(units: &[Unit], journal: &mut Journal, verb: Verb) -> Result<Vec<(String, Cells)>, BatchError> {
@@ -39,16 +40,17 @@ pub fn write_csv(units: &[Unit], journal: &mut Journal, verb: Verb, out: impl Wr
     table.write_record(columns.iter().map(|(name, _)| name)).map_err(wrong)?;
     for unit in units {
         for row in journal.rows(unit)? {
-            table.write_record(columns.iter().map(|(name, _)| cell(&row, name))).map_err(wrong)?;
+            table
+                .write_record(columns.iter().map(|(name, _)| row.in_words(name).unwrap_or_default().into_owned()))
+                .map_err(wrong)?;
         }
     }
     table.flush().map_err(|error| BatchError::Table { reason: error.to_string() })
 }
 
-fn cell(row: &Row, column: &str) -> String {
-    match row.get(column) {
-        None => String::new(),
-        Some(Value::String(text)) => text.clone(),
-        Some(value) => value.to_string(),
-    }
+/// Whether a file is a table that [`write_csv`] or [`write_parquet`](crate::write_parquet) has written. One that cannot be read is not.
+pub fn is_table(path: &Path) -> bool {
+    let (want, mut start) = (first_columns().join(","), Vec::new());
+    let read = File::open(path).and_then(|file| file.take(want.len() as u64).read_to_end(&mut start));
+    read.is_ok() && (start == want.as_bytes() || is_parquet_table(path))
 }

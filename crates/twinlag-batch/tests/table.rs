@@ -9,7 +9,7 @@ use serde_json::json;
 use twinlag::Options as Question;
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, Journal, Options, Row, Unit, Verb, each, run, write_csv, write_parquet,
+    Answer, BatchError, Begin, Fleet, Journal, Outcome, Row, Unit, Verb, each, is_table, run, write_csv, write_parquet,
 };
 
 /// Two first-order lags of a pseudo-random gas that is constant from sample to sample, with noise of a tenth of a kelvin.
@@ -44,13 +44,13 @@ fn record(seed: u64) -> Record {
 fn rows_of(unit: &Unit) -> Vec<Row> {
     let file = &unit.files()[0];
     match file.to_str() {
-        Some("empty") => vec![Row::without_answer(unit, file, 3, "empty: 0 \"rows\", expected some")],
+        Some("empty") => vec![Row::without_answer(unit, file, Outcome::Unusable, "empty: 0 \"rows\", expected some")],
         Some("broken") => panic!("on purpose"),
         name => {
             let seed = name.and_then(|name| name.parse().ok()).expect("a number");
             let question = Question::default().free("gain").expect("a name");
             let answer = twinlag::characterise(&record(seed), &question).expect("can be asked");
-            Row::of(unit, 0, &Answer::Characterisation(&answer))
+            Row::of(unit, Outcome::Answered, &Answer::Characterisation(&answer))
         }
     }
 }
@@ -62,8 +62,8 @@ fn units() -> Vec<Unit> {
 #[test]
 fn text_and_parquet_have_the_same_cells() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut journal = Journal::open(&folder.path().join("journal"), &json!({}), Begin::New).expect("a new one");
-    run(&units(), &mut journal, &Options::default(), rows_of, |_| {}).expect("can be written");
+    let mut journal = Journal::open(&folder.path().join("journal"), &json!({}), Begin::Create).expect("a new one");
+    run(&units(), &mut journal, None, rows_of, |_| {}).expect("can be written");
     let mut text = Vec::new();
     write_csv(&units(), &mut journal, Verb::Characterise, &mut text).expect("memory");
     let path = folder.path().join("table.parquet");
@@ -101,23 +101,46 @@ fn text_and_parquet_have_the_same_cells() {
     assert!(fleet.reasons.iter().any(|reason| reason.reason.contains("on purpose") && reason.first == "broken"));
 }
 
+/// The metadata of the larger table in Parquet are longer than 64 KiB, in which a table was looked for once.
+#[test]
+fn a_table_is_known_whatever_its_length() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [csv, parquet, other] = ["table.csv", "table.parquet", "other"].map(|name| folder.path().join(name));
+    for (count, name) in [(1, "short"), (12_000, "long")] {
+        let units = each((0..count).map(|number| format!("{number}").into()).collect());
+        let mut journal = Journal::open(&folder.path().join(name), &json!({}), Begin::Create).expect("a new one");
+        let empty = |unit: &Unit| vec![Row::without_answer(unit, &unit.files()[0], Outcome::Unusable, "is empty")];
+        run(&units, &mut journal, None, empty, |_| {}).expect("can be written");
+        let create = |path: &Path| File::create(path).expect("a file");
+        write_csv(&units, &mut journal, Verb::Diagnose, create(&csv)).expect("can be written");
+        write_parquet(&units, &mut journal, Verb::Diagnose, create(&parquet)).expect("can be written");
+        assert!(is_table(&csv) && is_table(&parquet), "{name}");
+    }
+    for text in ["level,rig", "PAR1 twinlag_batch"] {
+        std::fs::write(&other, text).expect("can be written");
+        assert!(!is_table(&other), "{text}");
+    }
+}
+
 #[test]
 fn a_journal_that_does_not_fit_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("journal");
     let open = |path: &Path, asked: i32, begin| Journal::open(path, &json!({"verb": asked, "known": {"T1": 1}}), begin);
-    let first = open(&path, 1, Begin::New).expect("a new one");
+    let first = open(&path, 1, Begin::Create).expect("a new one");
     assert!(matches!(open(&path, 1, Begin::Resume), Err(BatchError::Busy { .. })));
     drop(first);
-    assert!(matches!(open(&path, 1, Begin::New), Err(BatchError::Exists { .. })));
+    assert!(matches!(open(&path, 1, Begin::Create), Err(BatchError::Exists { .. })));
     let other = open(&path, 2, Begin::Resume).expect_err("another question");
     assert!(matches!(&other, BatchError::OtherQuestion { what, .. } if what == "verb"), "{other}");
     open(&path, 1, Begin::Resume).expect("the same question");
+    let whole = Journal::open(&path, &json!("another"), Begin::Resume).expect_err("another question");
+    assert!(whole.to_string().contains("it differs in the whole question"), "{whole}");
     // What is no journal is not replaced, whatever is asked.
     let notes = folder.path().join("notes");
     std::fs::write(&notes, "my notes\n").expect("can be written");
-    for begin in [Begin::Resume, Begin::Anew] {
-        assert!(matches!(open(&notes, 1, begin), Err(BatchError::Damaged { line: 1, .. })));
+    for begin in [Begin::Resume, Begin::Replace] {
+        assert!(matches!(open(&notes, 1, begin), Err(BatchError::NoJournal { .. })));
     }
     assert_eq!(std::fs::read_to_string(&notes).expect("is there"), "my notes\n");
 }

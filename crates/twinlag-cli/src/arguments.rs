@@ -404,7 +404,7 @@ pub(crate) struct Columns {
     /// The sheet, channel group or data set to read, of a file that has several.
     #[arg(long, value_name = "NAME")]
     group: Option<String>,
-    /// Join channels of several groups: put all of them on the stamps of the slowest, or of --group, the others interpolated.
+    /// Join channels of several groups: put all of them on the stamps of the one with the lowest sampling rate, or of --group, the others interpolated.
     #[arg(long)]
     join: bool,
     /// Read the file as this profile says, which `twinlag inspect --save-profile` writes; other options here go before it.

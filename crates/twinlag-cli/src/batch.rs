@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::fs;
-use std::io::{Read as _, Seek as _, SeekFrom};
+use std::io::Read as _;
 use std::num::NonZeroUsize;
 use std::panic;
 use std::path::{Path, PathBuf};
@@ -17,16 +17,17 @@ use twinlag::diagnosis::Identifier;
 use twinlag::record::{ColumnRef, Record};
 use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, Found, GroupBy, Journal, Member, MemberTau, Row, Unit, Verb as RowVerb, each,
-    find, grouped, map, name_of, rig_by_path, run as run_units, write_csv, write_parquet,
+    Answer, BatchError, Begin, Fleet, Found, GroupBy, Journal, Member, MemberTau, Outcome, Row, Unit, Verb as RowVerb,
+    each, find, grouped, is_table, map, name_of, run as run_units, write_csv, write_parquet,
 };
-use twinlag_pages::fleet_report;
+use twinlag_pages::{fleet_report, is_fleet_report};
 
 use crate::arguments::{Columns, Method, Physics, Trust, form};
 use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::keep::Kept;
+use crate::output::Output;
 use crate::profile::Profile;
 use crate::progress;
 use crate::read::{read_watched, table_watched};
@@ -123,8 +124,6 @@ pub(crate) struct Batch {
 
 /// How the files of gas temperatures end.
 const GAS_ENDING: &str = ".gas.csv";
-/// The column of the table that names them.
-const GAS_FILE: &str = "gas_file";
 
 /// Within a batch, a record says nothing on its own.
 const SILENT: Console = Console { json: true, quiet: true };
@@ -133,12 +132,10 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     let question = Question::of(command)?;
     let journal_path = with_ending(&command.out[0], ".journal");
     let files = command.files(&journal_path)?;
-    let options =
-        twinlag_batch::Options { threads: command.threads.unwrap_or(twinlag_batch::Options::default().threads) };
     let begin = match (command.resume, command.force) {
         (true, _) => Begin::Resume,
-        (_, true) => Begin::Anew,
-        _ => Begin::New,
+        (_, true) => Begin::Replace,
+        _ => Begin::Create,
     };
     let gas_files = question.gas_files(&files)?;
     let is_resumed = command.resume && journal_path.exists();
@@ -149,13 +146,22 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         )));
     }
     let files = files.into_iter().map(|file| file.path).collect();
-    let units = question.units(files, options, console);
+    let units = question.units(files, command.threads, console);
     let mut journal = Journal::open(&journal_path, &question.asked()?, begin)?;
+    match journal.other_units(&units) {
+        0 => {}
+        count => console.note(|| {
+            let (units, journal) = (question.unit_name(), journal_path.display());
+            format!(
+                "not asked for now, and left out of the table: {count} of the earlier run's {units}, kept in {journal}"
+            )
+        }),
+    }
     for unit in &units {
         // Its gas temperature goes elsewhere now, or is gone.
         let gas = gas_files.get(&unit.files()[0]).map(|gas| name_of(gas));
         let is_moved =
-            |row: &Row| row.get_text(GAS_FILE).is_some_and(|is| gas.as_deref() != Some(is) || !Path::new(is).exists());
+            |row: &Row| row.gas_file().is_some_and(|is| gas.as_deref() != Some(is) || !Path::new(is).exists());
         if journal.rows(unit)?.iter().any(is_moved) {
             journal.forget(unit);
         }
@@ -165,7 +171,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     panic::set_hook(Box::new(|_| {}));
     let bar = progress::bar(console).with_message(question.unit_name());
     let work = |unit: &Unit| question.rows(unit, &gas_files);
-    let done = run_units(&units, &mut journal, &options, work, |progress| {
+    let done = run_units(&units, &mut journal, command.threads, work, |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     });
@@ -175,12 +181,15 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
 
     for out in &command.out {
         output::replace(out, |file| {
-            if is_parquet(out) {
-                write_parquet(&units, &mut journal, question.verb.into(), file)?;
+            let written = if is_parquet(out) {
+                write_parquet(&units, &mut journal, question.verb.into(), file)
             } else {
-                write_csv(&units, &mut journal, question.verb.into(), std::io::BufWriter::new(file))?;
-            }
-            Ok(())
+                write_csv(&units, &mut journal, question.verb.into(), std::io::BufWriter::new(file))
+            };
+            written.map_err(|error| match error {
+                BatchError::Table { .. } => Failure::Other(format!("{}: {error}", out.display())),
+                error => error.into(),
+            })
         })?;
     }
     let fleet = Fleet::of(&units, &mut journal)?;
@@ -191,12 +200,13 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         output::write(path, fleet_report(&fleet, &title, question.unit_name(), made_by, &making)?)?;
     }
     say(command, &question, &fleet, console)?;
-    Ok(match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
-        (0, 0, 0) => 3,
-        (0, 0, _) => 1,
-        (0, _, _) => 4,
-        _ => 0,
-    })
+    let outcome = match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
+        (0, 0, 0) => Outcome::Unusable,
+        (0, 0, _) => Outcome::Failed,
+        (0, _, _) => Outcome::Undetermined,
+        _ => Outcome::Answered,
+    };
+    Ok(outcome.exit_code())
 }
 
 impl Batch {
@@ -207,14 +217,12 @@ impl Batch {
             return Err(Failure::Usage(text));
         }
         let tables = self.out.iter().map(|path| ("--out", path.as_path()));
-        let outputs: Vec<(&str, &Path)> =
+        let outputs: Vec<Output<'_>> =
             tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect();
         let is_resumed = self.resume && journal.exists();
         output::check(journal, &outputs, true)?;
-        let may_go = |path: &Path| self.force || !path.exists() || (is_resumed && is_of_batch(path));
-        if let Some((_, path)) = outputs.iter().find(|(_, path)| !may_go(path)) {
-            return Err(Failure::Usage(format!("{} exists: choose another name, or add --force", path.display())));
-        }
+        let others: Vec<_> = outputs.iter().copied().filter(|(_, path)| !(is_resumed && is_of_batch(path))).collect();
+        output::check(journal, &others, self.force)?;
         let gas = self.gas.as_ref().and_then(|folder| folder.canonicalize().ok());
         let is_gas = |file: &Path| {
             file.to_string_lossy().ends_with(GAS_ENDING)
@@ -235,25 +243,14 @@ impl Batch {
     }
 }
 
-/// Bytes at either end of a file by which a table or a summary of a batch is known.
-const SIGN_BYTES: u64 = 1 << 16;
+/// First bytes of a file by which a summary of a batch is known.
+const HEAD_BYTES: u64 = 1 << 16;
 
 /// Whether a file is a table or a summary that a batch has written.
 fn is_of_batch(file: &Path) -> bool {
-    let ends = || -> std::io::Result<[Vec<u8>; 2]> {
-        let mut file = fs::File::open(file)?;
-        let [mut head, mut tail] = [Vec::new(), Vec::new()];
-        (&file).take(SIGN_BYTES).read_to_end(&mut head)?;
-        let length = file.metadata()?.len();
-        file.seek(SeekFrom::Start(length.saturating_sub(SIGN_BYTES)))?;
-        file.read_to_end(&mut tail)?;
-        Ok([head, tail])
-    };
-    let Ok([head, tail]) = ends() else { return false };
-    let has = |bytes: &[u8], sign: &str| bytes.windows(sign.len()).any(|window| window == sign.as_bytes());
-    head.starts_with(b"level,rig,file,exit_code")
-        || (head.starts_with(b"PAR1") && has(&tail, "twinlag_batch"))
-        || (head.starts_with(b"<!DOCTYPE html>") && has(&head, "<title>Batch "))
+    let mut head = Vec::new();
+    let read = fs::File::open(file).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+    read.is_ok() && (is_fleet_report(&head) || is_table(file))
 }
 
 /// What is asked of each unit, whatever decides a cell of the table.
@@ -334,11 +331,11 @@ impl<'a> Question<'a> {
         if self.group_by.is_some() { "rigs" } else { "records" }
     }
 
-    fn units(&self, files: Vec<PathBuf>, options: twinlag_batch::Options, console: Console) -> Vec<Unit> {
+    fn units(&self, files: Vec<PathBuf>, threads: Option<NonZeroUsize>, console: Console) -> Vec<Unit> {
         let Some(by) = self.group_by else { return each(files) };
         let bar = progress::bar(console).with_message("reading the names of rigs");
-        let rig = |file: &PathBuf| rig_by_path(file, by).unwrap_or_else(|| self.rig_by_column(file, by));
-        let rigs = map(&files, &options, rig, |progress| {
+        let rig = |file: &PathBuf| by.rig(file, |column| self.rig_by_column(file, column));
+        let rigs = map(&files, threads, rig, |progress| {
             bar.set_length(progress.total as u64);
             bar.set_position(progress.done as u64);
         });
@@ -346,19 +343,17 @@ impl<'a> Question<'a> {
         grouped(files, rigs)
     }
 
-    fn rig_by_column(&self, file: &Path, by: &GroupBy) -> Result<String, String> {
-        let GroupBy::Column(name) = by else { return Err(format!("nothing is known of {by}")) };
+    fn rig_by_column(&self, file: &Path, name: &str) -> Result<String, String> {
         let table = expect_file(file).and_then(|()| table_watched(file, &self.profile.choice(), SILENT));
         let table = table.map_err(|failure| failure.to_string())?;
-        let column = name.parse().unwrap_or_else(|_| ColumnRef::Name(name.clone()));
+        let column = name.parse().unwrap_or_else(|_| ColumnRef::Name(name.to_owned()));
         let index = table.find(&column).map_err(|error| error.to_string())?;
         table.constant(index).ok_or_else(|| {
             format!("column {name} is not the same in all rows, so it does not say which rig the record is of")
         })
     }
 
-    /// Where the gas temperature of each file goes: below the folder for them to the path that the file has below the one by which it
-    /// was found.
+    /// The file of each record's gas temperature: in the `--gas` folder, under its record's relative path with [`GAS_ENDING`] appended.
     fn gas_files(&self, files: &[Found]) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
         let Some(folder) = self.gas else { return Ok(BTreeMap::new()) };
         if folder.exists() && !folder.is_dir() {
@@ -403,22 +398,22 @@ impl<'a> Question<'a> {
         }
         let read: Vec<(String, usize)> = records.iter().map(|record| (record.source.clone(), record.len())).collect();
         let of_rig = if records.is_empty() {
-            vec![Row::rig_without_answer(name, 0, 3, "none of its files can be used")]
+            vec![Row::rig_without_answer(name, 0, Outcome::Unusable, "none of its files can be used")]
         } else {
             self.ask(unit, records, None).unwrap_or_else(|failure| {
-                vec![Row::rig_without_answer(name, read.len(), failure.exit_code(), &failure.to_string())]
+                vec![Row::rig_without_answer(name, read.len(), outcome(&failure), &failure.to_string())]
             })
         };
-        let exit_code = of_rig.iter().find_map(Row::exit_code).unwrap_or(1);
-        let has_row = |file: &str| of_rig.iter().any(|row| row.get_text("file") == Some(file));
+        let outcome = of_rig.iter().find_map(Row::outcome).unwrap_or(Outcome::Failed);
+        let has_row = |file: &str| of_rig.iter().any(|row| row.file() == Some(file));
         rows.extend(
             read.iter()
                 .filter(|(file, _)| !has_row(file))
-                .map(|(file, samples)| Row::with_its_rig(unit, file, *samples, exit_code)),
+                .map(|(file, samples)| Row::with_its_rig(unit, file, *samples, outcome)),
         );
         rows.extend(of_rig);
         // The rig first, which has no file.
-        rows.sort_by(|a, b| a.get_text("file").cmp(&b.get_text("file")));
+        rows.sort_by(|a, b| a.file().cmp(&b.file()));
         rows
     }
 
@@ -442,12 +437,14 @@ impl<'a> Question<'a> {
                 let model = self.model.as_ref().map(|(path, model)| (*path, model));
                 let run = |options: Options| characterise::ask(&records, model, &options, SILENT);
                 let answer: Characterisation = plausibility.answer(options, run, |answer| answer)?;
-                Row::of(unit, characterise::exit_code(&answer, self.strict), &Answer::Characterisation(&answer))
+                let outcome = Outcome::of_exit_code(characterise::exit_code(&answer, self.strict));
+                Row::of(unit, outcome, &Answer::Characterisation(&answer))
             }
             Verb::Diagnose => {
                 let run = |options: Options| diagnose::ask(&records, &diagnose(options), SILENT);
                 let answer: Diagnosis = plausibility.answer(options, run, |answer| &mut answer.last)?;
-                Row::of(unit, diagnose::exit_code(&answer, self.strict), &Answer::Diagnosis(&answer))
+                let outcome = Outcome::of_exit_code(diagnose::exit_code(&answer, self.strict));
+                Row::of(unit, outcome, &Answer::Diagnosis(&answer))
             }
             Verb::Compensate => {
                 let run = |options: Options| {
@@ -460,7 +457,8 @@ impl<'a> Question<'a> {
                     compensate::ask(&records[0], &options, SILENT)
                 };
                 let answer: Compensation = plausibility.answer(options, run, |answer| &mut answer.last)?;
-                let rows = Row::of(unit, compensate::exit_code(&answer, self.strict), &Answer::Compensation(&answer));
+                let outcome = Outcome::of_exit_code(compensate::exit_code(&answer, self.strict));
+                let rows = Row::of(unit, outcome, &Answer::Compensation(&answer));
                 match gas_file.filter(|_| answer.gas.is_some()) {
                     Some(path) => {
                         let kept = Kept::of(&unit.files()[0], &self.profile, self.keep, &records[0], SILENT)?;
@@ -480,7 +478,7 @@ fn expect_file(file: &Path) -> Result<(), Failure> {
     let about = fs::metadata(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
     match (about.is_file(), about.is_dir()) {
         (true, _) => Ok(()),
-        (_, true) => Err(wrong("this folder cannot be listed".to_owned())),
+        (_, true) => Err(wrong("this folder cannot be listed: check its permissions".to_owned())),
         _ => Err(wrong("expected a file, found a pipe or a device".to_owned())),
     }
 }
@@ -494,7 +492,11 @@ fn write_gas(answer: &Compensation, kept: Option<&Kept>, path: &Path) -> Result<
 }
 
 fn without_answer(unit: &Unit, file: &Path, failure: &Failure) -> Row {
-    Row::without_answer(unit, file, failure.exit_code(), &failure.to_string())
+    Row::without_answer(unit, file, outcome(failure), &failure.to_string())
+}
+
+fn outcome(failure: &Failure) -> Outcome {
+    Outcome::of_exit_code(failure.exit_code())
 }
 
 fn with_ending(path: &Path, ending: &str) -> PathBuf {
@@ -511,26 +513,26 @@ fn is_parquet(path: &Path) -> bool {
     has_ending(path, "parquet")
 }
 
-/// The answer, as JSON.
+/// What `twinlag batch` prints with --json.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct BatchAnswer {
     /// `twinlag.batch/1`.
     schema: &'static str,
-    /// The tables.
+    /// Files of the table.
     out: Vec<PathBuf>,
-    /// What each was asked of: `records` or `rigs`.
+    /// `records` or `rigs`: what one answer is for.
     units: &'static str,
-    /// Units with an answer.
+    /// Number of records or rigs that answered.
     answered: usize,
-    /// Units of which nothing is determined.
+    /// Number of records or rigs that were read, but of which at least one number that was asked for may not be used.
     undetermined: usize,
-    /// Units of which no file can be used.
+    /// Number of records or rigs whose files cannot be used, or to which what was asked does not apply.
     unusable: usize,
-    /// Units on which the program failed.
+    /// Number of records or rigs with another error, such as an output that cannot be written.
     failed: usize,
-    /// Files that cannot be used.
+    /// Number of files that cannot be used, or to which what was asked does not apply, those of rigs included.
     unusable_files: usize,
-    /// Records that contradict the others of their rig.
+    /// Number of records that contradict the others of their rig.
     contradicting_records: usize,
 }
 
@@ -577,9 +579,9 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
     print::on_stdout(&(lines.join("\n") + "\n"))
 }
 
-/// Members that are shown one by one on the console.
+/// Members up to which each is shown on the console; chosen, so that they fit on one screen.
 const SHOWN: usize = 20;
-/// Reasons that are said there.
+/// Reasons that are shown on the console, the most frequent; chosen, so that they fit on one screen with the members.
 const REASONS: usize = 5;
 
 /// Both time constants of each member, where there are few.
@@ -613,7 +615,10 @@ impl From<BatchError> for Failure {
             BatchError::Exists { .. } => Self::Usage(format!("{text} (options --resume, --force)")),
             BatchError::OtherQuestion { .. } => Self::Usage(format!("{text} (option --force)")),
             BatchError::Pattern { .. } | BatchError::GroupBy { .. } => Self::Usage(text),
-            BatchError::NothingFound { .. } | BatchError::Empty { .. } | BatchError::Damaged { .. } => Self::File(text),
+            BatchError::Damaged { .. } => Self::File(format!("{text} (option --force)")),
+            BatchError::NothingFound { .. } | BatchError::Empty { .. } | BatchError::NoJournal { .. } => {
+                Self::File(text)
+            }
             _ => Self::Other(text),
         }
     }

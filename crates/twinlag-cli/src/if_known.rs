@@ -1,7 +1,7 @@
 //! What each value of the first time constant would make of the record, as a table.
 
 use twinlag::diagnosis::{Held, IfKnown};
-use twinlag_pages::parameter_in_words;
+use twinlag_pages::{parameter_in_words, unit_suffix};
 
 use crate::columns::columns;
 use crate::print::{decimals_of, digits};
@@ -29,7 +29,7 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
         parameters
             .take(MAX_PARAMETERS)
             .map(|p| {
-                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+                let unit = unit_suffix(&p.unit);
                 (parameter_in_words(&p.name), format!("{}{unit}", digits(p.value, 3)))
             })
             .collect()

@@ -14,7 +14,7 @@ use crate::profile::Profile;
 use crate::read::table_watched;
 use crate::sparkline::sparkline;
 
-/// The answer, as JSON.
+/// What `twinlag inspect` prints with --json.
 #[derive(Debug, Serialize, JsonSchema)]
 pub(crate) struct Inspection {
     /// `twinlag.inspection/1`.
@@ -23,13 +23,13 @@ pub(crate) struct Inspection {
     file: String,
     /// Rows of the table.
     rows: usize,
-    /// Its columns.
+    /// Columns of the table, from the left.
     columns: Vec<ColumnAbout>,
     /// How the file would be read; `null` where it is not clear which columns are meant.
     selection: Option<Selection>,
     /// What the record would be; `null` where the file cannot be read as it is.
     record: Option<RecordAbout>,
-    /// Why it cannot be read as it is.
+    /// Why the file cannot be read as it is; `null` where it can.
     problem: Option<String>,
     /// What was taken for what, and what was left out.
     notes: Vec<String>,
@@ -48,9 +48,9 @@ struct ColumnAbout {
     kind: &'static str,
     /// Cells without a value.
     missing: usize,
-    /// The smallest of its numbers.
+    /// The smallest of its numbers; `null` where it has none.
     minimum: Option<f64>,
-    /// The largest of its numbers.
+    /// The largest of its numbers; `null` where it has none.
     maximum: Option<f64>,
     /// `time`, `T1`, `T2`, `reference`, `flow` or `position`.
     taken_as: Option<&'static str>,
@@ -61,7 +61,7 @@ struct ColumnAbout {
 /// What the record would be.
 #[derive(Debug, Serialize, JsonSchema)]
 struct RecordAbout {
-    /// Samples.
+    /// Number of samples.
     samples: usize,
     /// From the first to the last sample, s.
     length_s: f64,
@@ -165,7 +165,7 @@ fn about_record(record: &Record) -> RecordAbout {
 
 fn in_words(answer: &Inspection) -> String {
     let mut rows =
-        vec![["", "name", "unit", "missing", "from", "to", "taken as", "course"].map(str::to_owned).to_vec()];
+        vec![["", "name", "unit", "missing", "min", "max", "taken as", "course"].map(str::to_owned).to_vec()];
     for column in &answer.columns {
         let number = |value: Option<f64>| value.map_or(String::new(), |value| digits(value, 5));
         let ends = match column.kind {

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use twinlag::signal::Rig;
 use twinlag::{Diagnosis, Model};
-use twinlag_pages::parameter_in_words;
+use twinlag_pages::{parameter_in_words, unit_suffix};
 use twinlag_plan::{Plan, PlanError, PlanStatus, PlannedNumber, PlannedRecord, PlannedRival, Source};
 
 use crate::arguments::Plan as Command;
@@ -17,7 +17,7 @@ use crate::print::{self, digits};
 use crate::progress::Progress;
 use crate::simulate;
 
-/// The answer, as JSON.
+/// What `twinlag plan` prints with --json.
 #[derive(Serialize, JsonSchema)]
 #[serde(untagged)]
 pub(crate) enum PlanAnswer {
@@ -177,7 +177,7 @@ fn name(number: &PlannedNumber) -> String {
 }
 
 fn assumed(number: &PlannedNumber) -> String {
-    let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
+    let unit = unit_suffix(&number.unit);
     match number.standard_error {
         Some(error) => format!("{}: {}{unit} ± {}{unit}", name(number), digits(number.value, 4), digits(error, 2)),
         None => format!("{}: {}{unit}, not determined", name(number), digits(number.value, 4)),

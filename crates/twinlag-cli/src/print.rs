@@ -13,7 +13,7 @@ use twinlag::{
     Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NamedTwin, NoiseSource, SecondLag,
     SensorEstimate, Status, Track,
 };
-use twinlag_pages::{parameter_in_words, plausibility_in_words};
+use twinlag_pages::{parameter_in_words, plausibility_in_words, unit_suffix};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -402,7 +402,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         ));
     }
     for p in effect.parameters.iter().take(MAX_PARAMETERS) {
-        let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+        let unit = unit_suffix(&p.unit);
         let number = p.value.map(|value| match p.interval_95 {
             Some([low, high]) => interval(value, low, high, &unit),
             None => format!("{}{unit}", digits(value, 4)),
@@ -435,7 +435,7 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
 /// What the numbers are if an exact twin is the cause.
 fn twin_line(twin: &NamedTwin) -> String {
     let number = |number: &Value| {
-        let unit = if number.unit == "1" { String::new() } else { format!(" {}", number.unit) };
+        let unit = unit_suffix(&number.unit);
         let Some([low, high]) = number.interval_95 else {
             return format!("{} {}{unit}", number.name, digits(number.value, 4));
         };

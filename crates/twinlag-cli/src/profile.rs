@@ -47,7 +47,7 @@ impl Profile {
             .map_err(|e| wrong(format!("expected a profile as `twinlag inspect FILE --save-profile` writes it: {e}")))
     }
 
-    /// What to take of a file with several groups of channels: where no group is named, the one with the sensors that are.
+    /// Which group to read. If none is named, the group that alone has the channels named as T1 and T2.
     pub(crate) fn choice(&self) -> Choice {
         let name = |column: &ColumnRef| match column {
             ColumnRef::Name(name) => Some(name.clone()),

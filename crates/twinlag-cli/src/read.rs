@@ -1,19 +1,16 @@
 //! Files to records, with progress.
 
 use std::fs::{File, Metadata};
-use std::io::{Read, stdin};
+use std::io::stdin;
 use std::path::Path;
 
 use twinlag::record::{Record, Table};
-use twinlag_files::{Choice, Format};
+use twinlag_files::Choice;
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::profile::Profile;
 use crate::progress::Progress;
-
-/// Bytes of a file by which its format is known.
-const HEAD_BYTES: u64 = 4096;
 
 /// Reads what the profile says from a file, and shows how far it has come; `-` is standard input.
 pub(crate) fn read_watched(file: &Path, profile: &Profile, console: Console) -> Result<Record, Failure> {
@@ -28,15 +25,8 @@ pub(crate) fn table_watched(file: &Path, choice: &Choice, console: Console) -> R
     let opened = std::fs::metadata(file).ok().filter(Metadata::is_file).zip(File::open(file).ok());
     let Some((about, opened)) = opened else { return Ok(Table::from_path(file)?) };
     let progress = Progress::start(console, "reading".into());
-    if is_binary(file) {
+    if twinlag_files::is_binary(file) {
         return Ok(twinlag_files::read(file, choice)?);
     }
     Ok(Table::from_reader(progress.reading(opened, about.len()), &file.display().to_string())?)
-}
-
-/// Whether the first bytes are those of a format that is no text.
-pub(crate) fn is_binary(file: &Path) -> bool {
-    let mut head = Vec::new();
-    let read = File::open(file).and_then(|opened| opened.take(HEAD_BYTES).read_to_end(&mut head));
-    read.is_ok() && Format::of(&head).is_some()
 }

@@ -1,7 +1,7 @@
 //! What each of several records has for itself, as a table.
 
 use twinlag::{Characterisation, Diagnosis, EffectInPlace, LeftOutUnit, OwnTimeConstant, RecordAnswer, SensorEstimate};
-use twinlag_pages::{contradictions_in_words, parameter_in_words};
+use twinlag_pages::{contradictions_in_words, parameter_in_words, unit_suffix};
 
 use crate::columns::columns;
 use crate::print::{digits, interval};
@@ -108,7 +108,7 @@ fn in_place(EffectInPlace { effect, channel, .. }: &EffectInPlace) -> String {
 /// Numbers of the record alone.
 fn own(record: &RecordAnswer) -> Vec<String> {
     let number = |own: &twinlag::RecordNumber| {
-        let unit = if own.unit == "1" { String::new() } else { format!(" {}", own.unit) };
+        let unit = unit_suffix(&own.unit);
         let value = match own.interval_95 {
             Some([low, high]) => interval(own.value, low, high, &unit),
             None => format!("{}{unit}", digits(own.value, 4)),

@@ -16,43 +16,38 @@ use crate::output::{self, UntilClosed};
 use crate::print;
 use crate::progress::Progress;
 
-/// The answer, as JSON.
+/// What `twinlag simulate` prints with --json.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct Simulation {
     /// `twinlag.simulation/1`.
     schema: &'static str,
-    /// The file of the record.
+    /// File of the record.
     out: PathBuf,
-    /// Samples.
+    /// Number of samples.
     samples: usize,
     /// Names of the channels.
     channels: [String; 2],
-    /// The rig, with the keys of its file.
+    /// Description of the rig, with the keys of its file.
     rig: Value,
-    /// What made it.
+    /// Program that made the record.
     made_by: Program,
 }
 
 /// A program and its version.
 #[derive(Serialize, JsonSchema)]
 struct Program {
+    /// Name of the program.
     program: &'static str,
+    /// Version of the program.
     version: &'static str,
 }
 
 pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
-    let to_stdout = command.out == Path::new("-");
-    if to_stdout && console.json {
-        return Err(Failure::Usage("--out - and --json both need standard output: name a file".into()));
-    }
-    let out = command.out.display();
     if output::is_same(&command.spec, &command.out) {
-        return Err(Failure::Usage(format!("{out} is the rig itself: choose another name")));
+        return Err(Failure::Usage(format!("{} is the rig itself: choose another name", command.out.display())));
     }
-    if !to_stdout && !command.force && command.out.exists() {
-        let text = format!("{out}: exists already; name another file, or overwrite it with --force");
-        return Err(Failure::Usage(text));
-    }
+    let views = output::Views::default();
+    let to_stdout = output::check_data(&command.spec, None, &command.out, &views, command.force, console)?;
     let mut rig = read(&command.spec)?;
     if let Some(seed) = command.seed {
         rig = rig.with_seed(seed);
@@ -75,13 +70,9 @@ pub(crate) fn run(command: &Simulate, console: Console) -> Result<u8, Failure> {
             rig: serde_json::to_value(&rig).map_err(|error| Failure::Other(error.to_string()))?,
             made_by: Program { program: "twinlag", version: env!("CARGO_PKG_VERSION") },
         })?;
-    } else if !to_stdout && !console.quiet {
-        eprintln!(
-            "{}: {} samples, {} s apart",
-            command.out.display(),
-            record.time_s.len(),
-            rig.record().sample_period_s
-        );
+    } else if !to_stdout {
+        let (out, period_s) = (command.out.display(), rig.record().sample_period_s);
+        console.note(|| format!("{out}: {} samples, {period_s} s apart", record.time_s.len()));
     }
     Ok(0)
 }

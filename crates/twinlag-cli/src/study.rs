@@ -50,27 +50,27 @@ pub(crate) struct Run {
     threads: Option<std::num::NonZeroUsize>,
 }
 
-/// The answer of a study, as JSON.
+/// What `twinlag study run` and `twinlag study merge` print with --json.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct StudyAnswer {
     /// `twinlag.study/1`.
     schema: &'static str,
-    /// The folder of the results.
+    /// Folder of the results.
     out: PathBuf,
-    /// Trials in all cells.
+    /// Number of trials in all cells together.
     trials: u64,
-    /// A row for each cell, method and sensor: columns as in results.csv.
+    /// A row for each cell, method and sensor, with the columns of results.csv.
     rows: Vec<Row>,
 }
 
-/// The answer of a shard, as JSON.
+/// What `twinlag study run --shard` prints with --json.
 #[derive(Serialize, JsonSchema)]
 pub(crate) struct StudyPart {
     /// `twinlag.study-part/1`.
     schema: &'static str,
-    /// The part.
+    /// File of the shard's results.
     part: PathBuf,
-    /// Which shard of how many, from 0.
+    /// Index of the shard, from 0, and number of shards, as in `0/3`.
     shard: String,
 }
 
@@ -108,7 +108,7 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
         }
     }
     let shard = run.shard.unwrap_or(Shard::WHOLE);
-    let part = run.out.join(format!("part-{}-of-{}.json", shard.index(), shard.of()));
+    let part = run.out.join(shard.file_name());
     let options = Options {
         threads: run.threads.unwrap_or(Options::default().threads),
         shard,
@@ -126,7 +126,7 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
     done?;
     if run.shard.is_some() {
         let text = format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display());
-        say(console, &StudyPart { schema: "twinlag.study-part/1", part, shard: shard.to_string() }, &text)?;
+        say(console, &StudyPart { schema: "twinlag.study-part/1", part, shard: shard.to_string() }, text)?;
         return Ok(0);
     }
     merge(&run.out, console)
@@ -152,24 +152,20 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     write(&plan, &table, dir)?;
     let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
     let text = format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len());
-    say(console, &StudyAnswer { schema: "twinlag.study/1", out: dir.to_owned(), trials, rows: table.rows }, &text)?;
+    say(console, &StudyAnswer { schema: "twinlag.study/1", out: dir.to_owned(), trials, rows: table.rows }, text)?;
     Ok(0)
 }
 
 fn is_part(path: &Path) -> bool {
-    let name = path.file_name().and_then(OsStr::to_str).unwrap_or("");
-    name.starts_with("part-") && path.extension() == Some(OsStr::new("json"))
+    path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name).is_some()
 }
 
-fn say(console: Console, answer: &impl Serialize, text: &str) -> Result<(), Failure> {
+fn say(console: Console, answer: &impl Serialize, text: String) -> Result<(), Failure> {
     if console.json {
-        print::json(answer)
-    } else {
-        if !console.quiet {
-            anstream::eprintln!("{text}");
-        }
-        Ok(())
+        return print::json(answer);
     }
+    console.note(|| text);
+    Ok(())
 }
 
 impl From<ExperimentError> for Failure {

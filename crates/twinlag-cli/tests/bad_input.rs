@@ -893,7 +893,7 @@ fn an_existing_file_is_not_overwritten_unless_forced() {
     let bench = Bench::with("exists", "rig.toml", RIG);
     bench.write("out.csv", "precious");
     let arguments = ["simulate", "rig.toml", "--out", "out.csv"];
-    bench.refuses(2, &arguments, &["out.csv", "exists already", "name another file", "--force"]);
+    bench.refuses(2, &arguments, &["out.csv exists", "choose another name", "--force"]);
     assert_eq!(bench.read("out.csv"), b"precious");
     let answer = bench.run(&[&arguments[..], &["--force"]].concat());
     assert_eq!((answer.code, answer.stdout.as_str()), (0, ""), "{answer:#?}");

@@ -114,6 +114,12 @@ fn only_what_is_new_or_changed_is_asked_again() {
     let after = rows(&bench, "table.csv");
     assert_eq!((after["runs/empty.csv"]["exit_code"].as_str(), after.len()), ("0", 5));
     assert_eq!(after["runs/a_1.csv"], before["runs/a_1.csv"]);
+    // Fewer files are a smaller table.
+    let fewer = bench.run(&["batch", "runs/a_*.csv", "--out", "table.csv", "--resume"]);
+    assert!(fewer.stderr.contains("2 of the earlier run's records"), "{fewer:#?}");
+    assert_eq!(rows(&bench, "table.csv").len(), 3);
+    let again = bench.run(&batch);
+    assert!(!again.stderr.contains("earlier run") && rows(&bench, "table.csv") == after, "{again:#?}");
     // Another question has other answers.
     let other = ["batch", "runs/*.csv", "--out", "table.csv", "--resume", "--free", "gain"];
     bench.refuses(2, &other, &["it differs in options.free", "--force"]);

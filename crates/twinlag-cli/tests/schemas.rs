@@ -81,7 +81,7 @@ fn answers_are_as_their_schemas_say() {
     fits(&schema(&bench, "track"), &bench.run(&["track", "run.csv", "--out", "tau.csv", "--json"]).json());
 }
 
-/// What is no estimate: a file and a file that cannot be read, a batch, plans, a simulation, a study and its part.
+/// Answers that are no estimates: inspections of a readable and an unreadable file, a batch, plans, a simulation, a study and its part.
 #[test]
 fn answers_of_the_other_verbs_are_as_their_schemas_say() {
     let bench = with_tone("others");

@@ -136,6 +136,19 @@ pub fn accepts(model: &Model, effect: &Shared) -> bool {
     !is_excluded && !determines.any(|freedom| determined.contains(&freedom))
 }
 
+/// Whether `model` has the effect in the other channel alone, and could take it in place of that. Of effects that turn phases: of
+/// others that both channels have, only the difference shows.
+fn is_in_other_channel(model: &Model, effect: &Shared) -> bool {
+    let same: Vec<usize> =
+        (0..model.effects.len()).filter(|&i| model.effects[i].identifier() == effect.identifier()).collect();
+    let [other] = same[..] else { return false };
+    let channels = [effect.channel(), model.effects[other].channel()];
+    effect.about().turns_phases
+        && channels.iter().all(Option::is_some)
+        && channels[0] != channels[1]
+        && accepts(&model.without(other), effect)
+}
+
 /// What a search works on.
 pub(crate) struct Search<'a> {
     prepared: &'a Prepared,
@@ -193,6 +206,14 @@ impl<'a> Search<'a> {
     /// The candidates that `model` lacks and can take.
     pub(crate) fn candidates(&self, model: &Model) -> Vec<Shared> {
         candidates(self.allowed, &self.context).into_iter().filter(|c| accepts(model, c)).collect()
+    }
+
+    /// The candidates that `model` lacks and can take, and those that turn phases in one channel where it has the same effect in the
+    /// other: the search names each effect once, and both sensors may have it.
+    pub(crate) fn unseen_candidates(&self, model: &Model) -> Vec<Shared> {
+        let mut all = candidates(self.allowed, &self.context);
+        all.retain(|candidate| accepts(model, candidate) || is_in_other_channel(model, candidate));
+        all
     }
 
     /// What `work` makes of each of the items, in their order.

@@ -89,7 +89,8 @@ pub(crate) fn conclude(
     let around = is_whole.then(|| search.around(&state.current)).transpose()?;
     if let Some(around) = &around {
         let half = half_intervals(&last, &found, &with_effects);
-        circumstances.hide(&search.hidden(around, &state.far, &half));
+        let named = with_effects.model.effects.iter().map(|effect| effect.identifier()).collect();
+        circumstances.hide(&search.hidden(around, &state.far, &half), named);
     }
     // What is left over may hide an effect of any size.
     let limits = around.as_ref().map_or_else(Vec::new, |around| search.limits(around));

@@ -105,6 +105,8 @@ pub enum Reason {
     Hidden {
         /// These effects, the likeliest first. All others like them together are improbable.
         effects: Vec<Identifier>,
+        /// Those of them that the model has in one sensor: it is the other one that may have them unseen.
+        in_other_sensor: Vec<Identifier>,
     },
     /// The best fit lies on a bound of it.
     OnBound,
@@ -201,8 +203,11 @@ pub enum Reason {
 
 impl Reason {
     /// That these effects may be there unseen; nothing where there are none.
-    pub(crate) fn hidden(effects: &[Identifier]) -> Option<Self> {
-        (!effects.is_empty()).then(|| Self::Hidden { effects: effects.to_vec() })
+    ///
+    /// - `named`: effects of the model
+    pub(crate) fn hidden(effects: &[Identifier], named: &[Identifier]) -> Option<Self> {
+        let in_other_sensor = effects.iter().copied().filter(|effect| named.contains(effect)).collect();
+        (!effects.is_empty()).then(|| Self::Hidden { effects: effects.to_vec(), in_other_sensor })
     }
 
     /// The best grade that a number can have with it.
@@ -328,11 +333,11 @@ impl fmt::Display for Reason {
                 f.write_str(&self.of_records())
             }
             Self::Cause { effect, channel } => right_with(f, *effect, *channel),
-            Self::Hidden { effects } => write!(
+            Self::Hidden { effects, in_other_sensor } => write!(
                 f,
                 "right if there is no {} of a usual size: the record would hardly show one, and it would move this number out of \
                  its interval",
-                listed(effects)
+                listed(effects, in_other_sensor)
             ),
             Self::OnBound => f.write_str("the best fit lies on a bound of it, so it is no estimate"),
             Self::Contradicted { what, deviations, grade } => {
@@ -363,7 +368,7 @@ impl fmt::Display for Reason {
             Self::OfOneAlone { effect, channel } => {
                 write!(
                     f,
-                    "right if only {channel} has the {effect} that was found: no reading shows {}",
+                    "right if only {channel} has the error named {effect}: no reading shows {}",
                     effect.about().unseen
                 )
             }
@@ -393,9 +398,13 @@ impl fmt::Display for Reason {
     }
 }
 
-/// Names of effects for the reader: `delay, slow-mode or radiation`.
-fn listed(effects: &[Identifier]) -> String {
-    let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+/// Names of effects for the reader: `delay, slow-mode in the other sensor or radiation`.
+fn listed(effects: &[Identifier], in_other_sensor: &[Identifier]) -> String {
+    let name = |effect: &Identifier| {
+        let place = if in_other_sensor.contains(effect) { " in the other sensor" } else { "" };
+        format!("{effect}{place}")
+    };
+    let names: Vec<String> = effects.iter().map(name).collect();
     match names.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} or {last}", others.join(", ")),
         _ => names.concat(),
@@ -777,11 +786,17 @@ mod tests {
 
     #[test]
     fn a_condition_names_every_effect_that_it_takes() {
-        assert_eq!(Reason::hidden(&[]), None);
-        let said = |effects: &[Identifier]| Reason::hidden(effects).expect("there are some").to_string();
+        assert_eq!(Reason::hidden(&[], &[Identifier::DELAY]), None);
+        let said = |effects: &[Identifier]| {
+            Reason::hidden(effects, &[Identifier::SECOND_ORDER]).expect("there are some").to_string()
+        };
         assert!(said(&[Identifier::DELAY]).starts_with("right if there is no delay of a usual size: "));
         let all = [Identifier::DELAY, Identifier::SLOW_MODE, Identifier::RADIATION];
         assert!(said(&all).starts_with("right if there is no delay, slow-mode or radiation of a usual size: "));
+        let one = [Identifier::DELAY, Identifier::SECOND_ORDER];
+        assert!(
+            said(&one).starts_with("right if there is no delay or second-order in the other sensor of a usual size: ")
+        );
     }
 
     /// An excess of 8 makes intervals three times as long, by a factor or by a distance.

@@ -192,28 +192,30 @@ impl Search<'_> {
     /// - `half`: half the intervals; `None` of a number that has none
     pub(crate) fn hidden(&self, around: &Around<'_>, far: &[Candidate], half: &[Option<f64>]) -> Vec<Vec<Identifier>> {
         let mut hidden = self.near(around);
-        let all: Vec<&Shared> = around.sized.iter().filter(|effect| is_broad(effect)).collect();
-        hidden
-            .extend(far.iter().filter_map(|c| unseen_afar(around.fitted, c, self.prior_probability(&c.effect, &all))));
+        hidden.extend(
+            far.iter().filter_map(|c| unseen_afar(around.fitted, c, self.prior_probability(&c.effect, around))),
+        );
         decisive(&hidden, half, self.policy.hidden_effect_probability)
     }
 
     /// The effects that a model lacks, where its time constants are.
     fn near(&self, around: &Around<'_>) -> Vec<Hidden> {
-        let all: Vec<&Shared> = around.sized.iter().filter(|effect| is_broad(effect)).collect();
         let lacking = around.lacking.iter().filter(|lacking| is_broad(&lacking.effect));
-        let prior = |effect: &Shared| self.prior_probability(effect, &all);
+        let prior = |effect: &Shared| self.prior_probability(effect, around);
         lacking.flat_map(|lacking| unseen_near(around.fitted, lacking, prior(&lacking.effect))).collect()
     }
 
-    /// How probable `effect` is beforehand: each kind of effect among `all` is as probable as any other, but for those that turn
-    /// phases, and the places and forms that it may have share that.
-    fn prior_probability(&self, effect: &Shared, all: &[&Shared]) -> f64 {
-        let kind = |i: usize| all[i].identifier();
-        let kinds = (0..all.len()).filter(|i| (0..*i).all(|other| kind(other) != kind(*i))).count();
-        let forms = (0..all.len()).filter(|i| kind(*i) == effect.identifier()).count();
+    /// How probable `effect` is beforehand: each kind of effect that the model lacks is as probable as any other, but for those that
+    /// turn phases, and the places and forms that it may have share that. One that the model has in one sensor is in the other one as
+    /// probable as a kind that it lacks.
+    fn prior_probability(&self, effect: &Shared, around: &Around<'_>) -> f64 {
+        let is_named = |kind: Identifier| around.fitted.model.effects.iter().any(|e| e.identifier() == kind);
+        let kinds: Vec<Identifier> = around.sized.iter().filter(|e| is_broad(e)).map(|e| e.identifier()).collect();
+        let forms = kinds.iter().filter(|kind| **kind == effect.identifier()).count();
+        let is_new = |i: usize| !is_named(kinds[i]) && !kinds[..i].contains(&kinds[i]);
+        let lacking = (0..kinds.len()).filter(|&i| is_new(i)).count();
         let factor = if effect.about().turns_phases { self.policy.prior_phase_factor } else { 1.0 };
-        factor * self.policy.prior_effect_probability / (kinds.max(1) * forms.max(1)) as f64
+        factor * self.policy.prior_effect_probability / (lacking.max(1) * forms.max(1)) as f64
     }
 }
 

@@ -35,6 +35,8 @@ pub struct Circumstances<'a> {
     pub hidden: [Vec<Identifier>; 3],
     /// Effects that may be there unseen and would move the number, for each parameter of the effects in the model.
     pub hidden_from_parameters: Vec<Vec<Identifier>>,
+    /// Effects of the model. Where one of them may be there unseen, it is in the other sensor.
+    pub named: Vec<Identifier>,
     /// The numbers that decide.
     pub policy: &'a Policy,
 }
@@ -51,11 +53,15 @@ impl<'a> Circumstances<'a> {
     pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
         let (causes, hidden_from_parameters) = ([None; 3], Vec::new());
         let hidden = std::array::from_fn(|_| Vec::new());
-        Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, policy }
+        let named = Vec::new();
+        Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, named, policy }
     }
 
     /// Puts down the effects that may be there unseen: for both time constants, their difference, and each parameter.
-    pub(crate) fn hide(&mut self, hidden: &[Vec<Identifier>]) {
+    ///
+    /// - `named`: effects of the model
+    pub(crate) fn hide(&mut self, hidden: &[Vec<Identifier>], named: Vec<Identifier>) {
+        self.named = named;
         self.hidden = [0, 1, 2].map(|i| hidden[i].clone());
         self.hidden_from_parameters = hidden[3..].to_vec();
     }
@@ -109,7 +115,7 @@ impl<'a> Circumstances<'a> {
         };
         let most_s = self.policy.longest_given_share * self.span_s;
         let cause = self.causes[index].map(|(effect, channel)| Reason::Cause { effect, channel });
-        let hidden = Reason::hidden(&self.hidden[index]);
+        let hidden = Reason::hidden(&self.hidden[index], &self.named);
         let mut own: Vec<Reason> = cause.into_iter().chain(hidden).collect();
         if value.abs() > most_s {
             own.push(Reason::TooLong { most_s });

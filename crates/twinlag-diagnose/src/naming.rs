@@ -206,7 +206,9 @@ pub(crate) fn judge_effect(
     };
     let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
     // Both time constants come first in a model.
-    let hidden = |index: usize| Reason::hidden(circumstances.hidden_from_parameters.get(range.start - 2 + index)?);
+    let hidden = |index: usize| {
+        Reason::hidden(circumstances.hidden_from_parameters.get(range.start - 2 + index)?, &circumstances.named)
+    };
     let basis = circumstances.whole_basis();
     let cause =
         (!found.alternatives.is_empty()).then_some(Reason::Cause { effect: found.effect, channel: found.fitted_in });

@@ -97,7 +97,7 @@ impl Search<'_> {
         let normal = model.normal_equations(theta, self.observations, self.selection, None);
         let second = model.second_derivatives(theta, self.observations, self.selection, &normal, &[]);
         let point = Point { fitted, lin: &lin, normal: &normal, second: &second, is_enough };
-        let all = self.candidates(model);
+        let all = self.unseen_candidates(model);
         let sized: Vec<(&Shared, usize)> = all
             .iter()
             .filter(|effect| !effect.is_noise())

@@ -6,7 +6,8 @@ use std::ops::ControlFlow;
 
 use common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
 use twinlag_diagnose::{
-    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Settings, Verdict, diagnose_records,
+    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Policy, Settings, Verdict,
+    diagnose_records,
 };
 use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Tone, Turbulence};
 
@@ -103,6 +104,8 @@ fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
     let told = told(&joint.diagnosis);
     let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
     assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+    let rms = joint.records[2].left_out.normalised_rms.after;
+    assert!(rms > 1.0 + Policy::default().left_out_rms_margin, "{rms}");
     // Its time constant and theirs, each within four standard errors.
     let [of_t2] = &joint.records[2].disagreements[..] else { panic!("{:?}", joint.records[2].disagreements) };
     let Contradicted { own, others, others_error, .. } = of_t2.values;

@@ -4,8 +4,8 @@
 mod common;
 
 use common::{TAU_S, found, record};
-use twinlag_diagnose::{Diagnosis, Identifier, Observations, Settings, Stretch, Verdict, diagnose};
-use twinlag_signal::{Gas, Mismatch, Noise, Record, Rig, Sensor, Signal, Turbulence};
+use twinlag_diagnose::{Diagnosis, Grade, Identifier, Observations, Settings, Stretch, Verdict, diagnose};
+use twinlag_signal::{Gas, Mismatch, Noise, Record, Rig, Sensor, Signal, SlowMode, Turbulence};
 
 /// Failed: a gain of 1.03 beside an offset of −0.1 K, at 300 °C, was given as 1.0296667 with an interval of seven digits, and so was the
 /// share of the crosstalk that would look the same. Of an interval twice as wide the truth is outside once in ten thousand times.
@@ -95,5 +95,28 @@ fn a_mismatch_of_the_gas_leaves_no_bias() {
             let mean: f64 = sum / count;
             assert!(mean.abs() < 3.0 / f64::sqrt(count), "{channel}: {mean} standard errors in {count} records");
         }
+    }
+}
+
+/// Failed: each sensor has a slow mode, of which one accounts for the residual of both; its share and the
+/// time constants, eighteen standard errors off, were go, since the search names each effect once.
+#[test]
+fn a_slow_mode_is_right_if_the_other_sensor_has_none() {
+    let modes = [(0.02, 0.5), (0.05, 5.0)].map(|(fraction, time_constant_s)| SlowMode { fraction, time_constant_s });
+    for seed in 1..=2 {
+        let mut sensors = [Sensor::new("T1", 0.08), Sensor::new("T2", 0.35)];
+        for (sensor, mode) in sensors.iter_mut().zip(modes) {
+            (sensor.noise, sensor.slow_mode) = (Some(Noise::white(0.1)), Some(mode));
+        }
+        let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 1.0, cutoff_hz: 15.0 });
+        let rig = Rig::new(seed, Record::new(3000, 0.01), Gas::new(400.0, gas), sensors).expect("a rig");
+        let simulated = rig.simulate().expect("a record");
+        let stretch = Stretch::new(simulated.time_s, [simulated.t1_c, simulated.t2_c]);
+        let diagnosis = found(&Observations::new(vec![stretch], Some(0.01)).expect("a record"));
+        let [effect] = &diagnosis.effects[..] else { panic!("{:#?}", diagnosis.effects) };
+        assert_eq!(effect.effect, Identifier::SLOW_MODE);
+        let share = &effect.judgements[0];
+        assert_eq!(share.grade, Grade::Conditional, "{share:?}");
+        assert!(share.because.contains("slow-mode in the other sensor"), "{share:?}");
     }
 }

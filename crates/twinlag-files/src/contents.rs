@@ -29,7 +29,7 @@ pub struct Group {
     pub rows: usize,
     /// The channels, in the order of the file.
     pub channels: Vec<Channel>,
-    /// From row to row, where the file states it.
+    /// Sample period, s: as the file states it, else the mean of its stamps where they are cheap to read.
     pub period_s: Option<f64>,
     /// The instant from which its time counts, in nanoseconds since 1970-01-01, UTC, where the file
     /// states it.
@@ -82,7 +82,7 @@ impl fmt::Display for Group {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "'{}': {} rows", self.name, self.rows)?;
         if let Some(period_s) = self.period_s {
-            write!(f, ", period {period_s} s")?;
+            write!(f, ", period {} s", significant(period_s))?;
         }
         if let Some(start) = self.start_ns.and_then(|ns| Timestamp::from_nanosecond(ns.into()).ok()) {
             write!(f, ", from {start}")?;
@@ -95,4 +95,9 @@ impl fmt::Display for Group {
             more => write!(f, " and {more} more"),
         }
     }
+}
+
+/// A number to nine digits: stamps that are multiples of a decimal period are not of its double.
+fn significant(value: f64) -> f64 {
+    format!("{value:.8e}").parse().unwrap_or(value)
 }

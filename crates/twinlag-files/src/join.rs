@@ -11,8 +11,8 @@ use crate::series::{Loaded, Series, Values};
 /// one is a pause. The same as of gaps in an irregular record.
 const MAX_MEDIAN_STEPS: f64 = 5.0;
 
-/// Steps of one time base that one of another may span at the same rate, jitter included: chosen.
-const MAX_STEPS_OF_ONE_RATE: f64 = 1.5;
+/// Ratio of two sample periods up to which both are of one rate: chosen, between equal rates and twice as fast.
+const MAX_PERIOD_RATIO_OF_ONE_RATE: f64 = 1.5;
 
 /// A time base in seconds from an instant, if the file states one.
 #[derive(Debug)]
@@ -97,14 +97,15 @@ impl Base {
         Ok(taken.collect())
     }
 
-    /// How many steps of this base one of another spans, to a hundredth, if it is more than one and a half.
-    pub(crate) fn steps_between_samples_of(&self, other: &Self) -> Option<f64> {
+    /// The median sample period of another base over that of this one, to a hundredth, where that is more than
+    /// [`MAX_PERIOD_RATIO_OF_ONE_RATE`].
+    pub(crate) fn faster_than(&self, other: &Self) -> Option<f64> {
         let [mine_s, its_s] = [self, other].map(|base| median(base.time_s.windows(2).map(|pair| pair[1] - pair[0])));
-        let steps = its_s / mine_s;
-        (steps.is_finite() && steps > MAX_STEPS_OF_ONE_RATE).then_some((100.0 * steps).round() / 100.0)
+        let ratio = its_s / mine_s;
+        (ratio.is_finite() && ratio > MAX_PERIOD_RATIO_OF_ONE_RATE).then_some((100.0 * ratio).round() / 100.0)
     }
 
-    /// Whether both are counted from stated instants, or neither.
+    /// Whether the file states the instant from which it counts.
     pub(crate) fn has_start(&self) -> bool {
         self.start_ns.is_some()
     }

@@ -52,6 +52,12 @@ pub fn contents_of_bytes(bytes: Vec<u8>, source: &str) -> Result<Contents, FileE
     contents_of_input(Input::Bytes(bytes), source)
 }
 
+/// Whether the first bytes of a file are those of a format that is no text.
+pub fn is_binary(path: impl AsRef<Path>) -> bool {
+    let head = Input::Path(path.as_ref().to_owned()).head();
+    head.is_ok_and(|head| Format::of(&head).is_some())
+}
+
 fn of_path(path: &Path) -> Result<(Input, String), FileError> {
     let file = path.display().to_string();
     if path.is_dir() {
@@ -100,6 +106,25 @@ impl Reading {
             return Err(FileError::NotBuiltIn { file, format, feature: format.feature() });
         };
         self.guarded(|| open(input, self.format))
+    }
+
+    /// The group to take, with the reason if it was not the only one. Periods take time to read, and are read where they count.
+    fn choose(&self, opened: &mut dyn Opened, choice: &Choice) -> Result<(usize, Option<String>), FileError> {
+        if !choice.join
+            && let Ok(chosen) = choose(opened.groups(), choice, &self.file, self.format)
+        {
+            return Ok(chosen);
+        }
+        choose(&self.groups(opened)?, choice, &self.file, self.format)
+    }
+
+    /// The groups with their periods.
+    fn groups(&self, opened: &mut dyn Opened) -> Result<Vec<Group>, FileError> {
+        self.guarded(|| {
+            let periods_s: Vec<_> = (0..opened.groups().len()).map(|group| opened.period_s(group)).collect();
+            let groups = opened.groups().iter().cloned().zip(periods_s);
+            Ok(groups.map(|(group, period_s)| Group { period_s, ..group }).collect())
+        })
     }
 
     fn load(&self, opened: &mut dyn Opened, group: usize) -> Result<Loaded, FileError> {
@@ -158,10 +183,10 @@ impl Reading {
                 its_group.name,
                 groups[group].name,
             ));
-            if let Some(steps) = mine.steps_between_samples_of(&base) {
+            if let Some(ratio) = mine.faster_than(&base) {
                 loaded.notes.push(format!(
-                    "group '{}' has one sample for {steps} of group '{}': between them are straight lines and no readings, \
-                     which no model of a sensor explains; join on the stamps of group '{0}' instead",
+                    "group '{}' has one sample for every {ratio} of group '{}': the values in between are interpolated, not read, and \
+                     no model of a sensor explains them; name group '{0}' as the one whose stamps are kept",
                     its_group.name, groups[group].name,
                 ));
             }
@@ -174,7 +199,7 @@ fn read_input(input: Input, choice: &Choice, file: &str) -> Result<Table, FileEr
     let reading = Reading::of(&input, file)?;
     let mut opened = reading.open(input)?;
     let opened = opened.as_mut();
-    let (group, why) = choose(opened, choice, file, reading.format)?;
+    let (group, why) = reading.choose(opened, choice)?;
     let mut loaded = reading.load(opened, group)?;
     if choice.join {
         reading.join(opened, group, &mut loaded)?;
@@ -192,11 +217,7 @@ fn read_input(input: Input, choice: &Choice, file: &str) -> Result<Table, FileEr
 fn contents_of_input(input: Input, file: &str) -> Result<Contents, FileError> {
     let reading = Reading::of(&input, file)?;
     let mut opened = reading.open(input)?;
-    let groups = reading.guarded(|| {
-        let periods: Vec<_> = (0..opened.groups().len()).map(|group| opened.period_s(group)).collect();
-        let groups = opened.groups().iter().cloned().zip(periods);
-        Ok(groups.map(|(group, period_s)| Group { period_s, ..group }).collect())
-    })?;
+    let groups = reading.groups(opened.as_mut())?;
     Ok(Contents { format: reading.format, version: opened.version(), groups })
 }
 

@@ -15,7 +15,7 @@ pub(crate) trait Opened {
     /// The groups, each on one time base.
     fn groups(&self) -> &[Group];
 
-    /// From row to row of a group: as stated, or as its stamps have it on average where they are
+    /// Sample period of a group, s: as the file states it, else the mean of its stamps where they are
     /// cheap to read.
     fn period_s(&mut self, group: usize) -> Option<f64> {
         self.groups()[group].period_s

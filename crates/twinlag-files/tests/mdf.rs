@@ -33,10 +33,10 @@ fn temperatures_in_groups_of_their_own_are_listed_and_joined_only_when_asked() {
     let on_the_faster = Choice { join: true, group: Some("ECU1".to_owned()), ..Choice::default() };
     let table = check("apart.mf4", &on_the_faster);
     assert!(notes(&table).contains("'T2' of group 'ECU2' interpolated linearly to the stamps of group 'ECU1'"));
-    assert!(notes(&table).contains("group 'ECU2' has one sample for 2 of group 'ECU1'"), "{}", notes(&table));
+    assert!(notes(&table).contains("group 'ECU2' has one sample for every 2 of group 'ECU1'"), "{}", notes(&table));
     let table = read(path("apart.mf4"), &Choice { join: true, ..Choice::default() }).expect("joined");
     assert_eq!(table.rows(), 18);
-    assert!(notes(&table).contains("group 'ECU2', the one with the fewest samples in a second"), "{}", notes(&table));
+    assert!(notes(&table).contains("group 'ECU2', the one with the lowest sampling rate"), "{}", notes(&table));
     assert!(!notes(&table).contains("has one sample for"), "{}", notes(&table));
     let error =
         read(path("apart.mf4"), &Choice { group: Some("ECU3".to_owned()), ..Choice::default() }).expect_err("no such");

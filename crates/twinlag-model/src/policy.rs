@@ -168,8 +168,8 @@ policy! {
     /// parts of a record.
     records_rejection_probability: f64 = 1e-3,
     /// How much more than chance the root mean square of a whitened residual may exceed 1 in a record that was left out: what the
-    /// parameters of the others are uncertain by adds to it. Chosen: a record of another sensor exceeds it, and no right model does, in
-    /// `cargo test --workspace --test campaign`; experiment `campaign` counts the records that are accused.
+    /// parameters of the others are uncertain by adds to it. Chosen: a record whose sensor is 15 % slower exceeds it
+    /// (test `campaign` of `twinlag-diagnose`); experiment `campaign` counts the records that are accused.
     left_out_rms_margin: f64 = 0.1,
     /// Probability that a record has an effect that the search has not named: chosen, one in four, of which each kind of effect
     /// that has a size has an equal share, and its places, forms and starts share that.

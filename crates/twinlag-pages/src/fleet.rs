@@ -8,6 +8,8 @@ use crate::figures::{self, CHANNELS, chart};
 use crate::making::file_name;
 use crate::words::listed;
 
+/// How the title of every summary begins.
+const TITLE: &str = "Batch";
 /// Up to so many members each has its error bar; more of them would be a grey area.
 const MAX_ERROR_BARS: usize = 300;
 /// Members in the table of those that lie apart.
@@ -43,7 +45,7 @@ pub fn fleet_report(
         _ => Tone::Caution,
     };
     let grade = format!("{} of {}", counts.answered, counts.total());
-    let document = Document::new(format!("Batch {}", file_name(title)))
+    let document = Document::new(format!("{TITLE} {}", file_name(title)))
         .byline(making.byline(&[format!("{} {unit}", counts.total())]))
         .verdict(tone, grade, sentence(fleet, unit))
         .key_numbers(keys(fleet));
@@ -55,6 +57,14 @@ pub fn fleet_report(
     let document = reasons(document, fleet);
     let [program, version] = made_by;
     Ok(making.page(&making.reproduction(document, program, version)))
+}
+
+/// Whether a file is a page that [`fleet_report`] has written.
+///
+/// - `head`: its first bytes; 64 KiB of them suffice
+pub fn is_fleet_report(head: &[u8]) -> bool {
+    let title = format!("<title>{TITLE} ");
+    head.starts_with(b"<!DOCTYPE html>") && head.windows(title.len()).any(|part| part == title.as_bytes())
 }
 
 fn sentence(fleet: &Fleet, unit: &str) -> String {
@@ -234,4 +244,19 @@ fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some(values[(share * last as f64).round() as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Fleet, Making, fleet_report, is_fleet_report};
+
+    #[test]
+    fn a_summary_is_known_by_its_first_bytes() {
+        for is_static in [true, false] {
+            let making = Making { is_static, ..Making::default() };
+            let page = fleet_report(&Fleet::default(), "table.csv", "records", ["twinlag", "0"], &making);
+            assert!(is_fleet_report(&page.expect("nothing to draw").as_bytes()[..4096]));
+        }
+        assert!(!is_fleet_report(b"<!DOCTYPE html><title>Notes</title>"));
+    }
 }

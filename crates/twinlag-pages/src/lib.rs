@@ -16,9 +16,9 @@ mod residual_figures;
 mod words;
 
 pub use diagnosis::{diagnosis_report, residual_picture};
-pub use fleet::fleet_report;
+pub use fleet::{fleet_report, is_fleet_report};
 pub use gas::{gas_report, track_report};
 pub use making::Making;
 pub use pictures::{gas_picture, readings_picture, track_picture};
 pub use twinlag_report::ReportError;
-pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words};
+pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words, unit_suffix};

@@ -153,6 +153,11 @@ pub(crate) fn unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
 }
 
+/// A unit behind a number, with the blank between them; nothing of a number without one.
+pub fn unit_suffix(of: &str) -> String {
+    if unit(of).is_empty() { String::new() } else { format!(" {of}") }
+}
+
 pub(crate) fn with_unit(number: &str, of: &str) -> String {
     if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
 }

@@ -1,14 +1,12 @@
 //! Advice in words, from the numbers of a plan and nothing else.
 
-use crate::change::Change;
+use crate::change::{Change, LONGEST_FACTOR};
 use crate::plan::{Plan, PlannedNumber, PlannedRecord, PlannedRival};
 
-/// Errors that differ by less are as good as equal.
+/// Errors that differ by less are as good as equal: chosen.
 const NOTICEABLE_SHARE: f64 = 0.1;
 /// Smallest exponent of the length with which a longer record helps: below, half an interval takes more than a hundredfold length.
 const LEAST_EXPONENT: f64 = 0.15;
-/// Lengths that are compared for it.
-const LONG: f64 = 4.0;
 
 /// What to change, and by how much.
 pub(crate) fn advice(plan: &Plan) -> Vec<String> {
@@ -37,16 +35,16 @@ fn over_now(record: &PlannedRecord) -> Option<f64> {
 
 /// How much longer a record has to be for half the intervals.
 fn length(plan: &Plan) -> String {
-    let longer = with(plan, |change| *change == Change::Length { factor: LONG });
+    let longer = with(plan, |change| *change == Change::Length { factor: LONGEST_FACTOR });
     let Some(ratio) = longer.and_then(over_now) else {
         return "length: the record as it is does not determine both time constants, so nothing can be halved; see which change \
                 determines them"
             .into();
     };
-    let exponent = -ratio.ln() / LONG.ln();
+    let exponent = -ratio.ln() / LONGEST_FACTOR.ln();
     if exponent < LEAST_EXPONENT {
         return format!(
-            "length: four times the length leaves the intervals of both time constants {:.0} % of what they are; change something \
+            "length: {LONGEST_FACTOR} times the length leaves the intervals of both time constants {:.0} % of what they are; change something \
              else",
             100.0 * ratio
         );
@@ -86,8 +84,8 @@ fn best(plan: &Plan) -> Option<String> {
         matches!(record.change, Some(Change::Excitation { .. } | Change::GasAround { .. } | Change::Pair { .. }))
     };
     // An interval is compared with the value that it is of, which another pair changes.
-    let now = plan.as_it_is.worst_time_constant();
-    let candidates = plan.changed.iter().filter(is_of_rig).map(|record| (record.worst_time_constant(), record));
+    let now = plan.as_it_is.largest_relative_error();
+    let candidates = plan.changed.iter().filter(is_of_rig).map(|record| (record.largest_relative_error(), record));
     let (least, record) = candidates.min_by(|a, b| a.0.total_cmp(&b.0))?;
     if !least.is_finite() {
         return None;

@@ -41,13 +41,15 @@ pub enum Change {
     QuietSegment,
 }
 
-/// Tones of a gas around a frequency, evenly spread over the logarithm.
+/// The longest record that is tried, in lengths of the record as it is: chosen, what an experimenter can afford.
+pub(crate) const LONGEST_FACTOR: f64 = 4.0;
+/// Tones of a gas around a frequency, evenly spread over the logarithm: chosen, so many that no effect fits between them.
 const TONES: usize = 12;
-/// A gas around a frequency reaches this factor to either side.
+/// A gas around a frequency reaches this factor to either side: chosen.
 const REACH: f64 = 3.0;
 /// Its highest frequency, in sampling frequencies: below one half, so that it is not folded back.
 const HIGHEST_CYCLES: f64 = 0.4;
-/// Its lowest, in lengths of the record: a tone that does not complete some periods is a drift.
+/// Its lowest, in lengths of the record: a tone that does not complete some periods is a drift. Chosen.
 const LEAST_PERIODS: f64 = 4.0;
 
 impl Change {

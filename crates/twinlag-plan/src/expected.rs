@@ -16,7 +16,7 @@ use twinlag::signal::{Rig, Sensor};
 use crate::error::PlanError;
 use crate::seats;
 
-/// Samples of a record that are simulated: a longer one is taken to go on as it begins.
+/// Samples of a record that are simulated: a longer one is taken to go on as it begins. Chosen: it costs time.
 pub(crate) const MAX_SAMPLES: usize = 8192;
 /// A uniform error over a step of a converter has this part of the step's square as its variance.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
@@ -27,7 +27,7 @@ pub struct Expected {
     pub(crate) prepared: Prepared,
     pub(crate) fitted: Fitted,
     /// Length of the record over that of the simulated part of it.
-    pub(crate) share: f64,
+    pub(crate) length_ratio: f64,
     /// Covariance of the parameters, where they are determined.
     pub(crate) covariance: Option<Vec<Vec<f64>>>,
     /// Inverse of the information, which is there only where all parameters are determined together.
@@ -71,7 +71,7 @@ impl Expected {
         let mut record = rig.record().clone();
         let all = record.samples;
         record.samples = all.min(MAX_SAMPLES);
-        let share = all as f64 / record.samples as f64;
+        let length_ratio = all as f64 / record.samples as f64;
         let period_s = record.sample_period_s;
         let clean = rig.clone().with_record(record)?.clean(0)?;
         let gas_std_k = std(&clean.gas_c);
@@ -95,7 +95,7 @@ impl Expected {
         let normal = fitted.model.normal_equations(&fitted.theta, &prepared.observations, &prepared.everything, None);
         let inverse = without_held(&normal.products);
         let covariance = covariance(&fitted, &prepared.observations, &prepared.everything, false);
-        Ok(Self { prepared, fitted, share, covariance, inverse, missing, gas_std_k })
+        Ok(Self { prepared, fitted, length_ratio, covariance, inverse, missing, gas_std_k })
     }
 
     /// The value of a parameter, time constants first.
@@ -107,7 +107,7 @@ impl Expected {
     pub fn standard_error(&self, parameter: usize) -> Option<f64> {
         let error = self.error_of(&[(parameter, 1.0)])?;
         // The weights of frequencies may hide that two parameters do the same: the inverse of the information does not.
-        let unweighted = (self.inverse.as_ref()?[parameter][parameter] / self.share).sqrt();
+        let unweighted = (self.inverse.as_ref()?[parameter][parameter] / self.length_ratio).sqrt();
         let is_tau = parameter < 2;
         let is_vague = is_tau && unweighted / self.value(parameter) > self.prepared.policy.vague_log_std;
         (unweighted.is_finite() && !is_vague).then_some(error)
@@ -118,18 +118,18 @@ impl Expected {
         let covariance = self.covariance.as_ref()?;
         let variance: f64 =
             sum.iter().map(|(i, a)| sum.iter().map(|(j, b)| a * b * covariance[*i][*j]).sum::<f64>()).sum();
-        let error = (variance / self.share).sqrt();
+        let error = (variance / self.length_ratio).sqrt();
         (error.is_finite() && error > 0.0).then_some(error)
     }
 
     /// The energy that a fit leaves over, all samples of the record counted.
     pub(crate) fn energy(&self, fitted: &Fitted) -> f64 {
-        self.share * fitted.chi2
+        self.length_ratio * fitted.chi2
     }
 
-    /// Residuals of a fit as it weighs frequencies, all samples of the record counted.
-    pub(crate) fn residuals(&self) -> f64 {
-        self.share * self.fitted.count.max(1.0)
+    /// Number of residuals of a fit as it weighs frequencies, all samples of the record counted.
+    pub(crate) fn residual_count(&self) -> f64 {
+        self.length_ratio * self.fitted.count.max(1.0)
     }
 }
 

@@ -6,7 +6,7 @@ use twinlag::model::Policy;
 use twinlag::signal::{Rig, Signal};
 
 use crate::advice::advice;
-use crate::change::Change;
+use crate::change::{Change, LONGEST_FACTOR};
 use crate::error::PlanError;
 use crate::expected::{Expected, MAX_SAMPLES};
 use crate::rivals::{Rival, rivals};
@@ -162,7 +162,7 @@ impl Plan {
             for change in group {
                 match now.changed(change, rig) {
                     Ok(record) => {
-                        let worst = |r: &PlannedRecord| r.worst_time_constant();
+                        let worst = |r: &PlannedRecord| r.largest_relative_error();
                         if best.as_ref().is_none_or(|known| worst(&record) < worst(known)) {
                             best = Some(record);
                         }
@@ -210,7 +210,7 @@ fn in_words(effect: Identifier, channel: Option<&str>) -> String {
 
 impl PlannedRecord {
     /// The larger of the relative standard errors of both time constants; infinite where one is not determined.
-    pub(crate) fn worst_time_constant(&self) -> f64 {
+    pub(crate) fn largest_relative_error(&self) -> f64 {
         let relative = |n: &PlannedNumber| n.standard_error.map_or(f64::INFINITY, |error| error / n.value);
         self.numbers.iter().take(2).map(relative).fold(0.0, f64::max)
     }
@@ -229,7 +229,7 @@ fn changes(rig: &Rig, expected: &Expected) -> Vec<Vec<Change>> {
         vec![Change::Rate { factor: 2.0 }],
         vec![Change::Rate { factor: 0.5 }],
         vec![Change::Length { factor: 2.0 }],
-        vec![Change::Length { factor: 4.0 }],
+        vec![Change::Length { factor: LONGEST_FACTOR }],
     ];
     if !matches!(rig.gas().signal, Signal::Series(_)) {
         out.push(vec![Change::Excitation { factor: 2.0 }]);
@@ -316,7 +316,7 @@ impl Now<'_> {
 
     fn rival(&self, rival: &Rival, expected: &Expected) -> PlannedRival {
         let effect = &expected.fitted.model.effects[rival.index];
-        let deviance = rival.fitted_noise;
+        let deviance = rival.deviance;
         let standard_deviation = 2.0 * deviance.sqrt();
         PlannedRival {
             effect: effect.identifier(),
@@ -324,7 +324,7 @@ impl Now<'_> {
             rival: rival.effect,
             rival_channel: self.channel(rival.channel),
             deviance,
-            deviance_at_most: rival.known_noise,
+            deviance_at_most: rival.deviance_known_noise,
             standard_deviation,
             is_distinguished: deviance - CLEAR_STANDARD_DEVIATIONS * standard_deviation > self.policy.tie_deviance,
         }

@@ -62,7 +62,7 @@ impl Rehearsal {
 
     /// The deviance to expect of each rival with one factor of both noise levels fitted again, and with known levels.
     pub fn deviances(&self) -> Vec<[f64; 2]> {
-        self.rivals.iter().map(|rival| [rival.fitted_noise, rival.known_noise]).collect()
+        self.rivals.iter().map(|rival| [rival.deviance, rival.deviance_known_noise]).collect()
     }
 
     /// The names of the rivals.

@@ -11,7 +11,7 @@ use twinlag::model::{Effort, Fitted, Identifier, Shared, candidates};
 
 use crate::expected::Expected;
 
-/// Rivals of an effect that are followed through the changes of a record: those that come closest.
+/// Rivals of an effect that are followed through the changes of a record: those that come closest. Chosen: it costs time.
 const MOST_RIVALS: usize = 3;
 
 /// A model with another effect in the place of one of its own.
@@ -25,9 +25,9 @@ pub(crate) struct Rival {
     /// Time constants of the model that it is a rival of, s.
     beside_tau_s: [f64; 2],
     /// Energy that it leaves over beyond that of the model, all samples counted: the deviance if noise levels are known.
-    pub(crate) known_noise: f64,
+    pub(crate) deviance_known_noise: f64,
     /// The deviance with one factor of both noise levels fitted again.
-    pub(crate) fitted_noise: f64,
+    pub(crate) deviance: f64,
 }
 
 impl Rival {
@@ -35,16 +35,16 @@ impl Rival {
         let effect = &fitted.model.effects[index];
         let (identifier, channel) = (effect.identifier(), effect.channel());
         let of_own = &expected.fitted;
-        let known_noise = (expected.energy(&fitted) - expected.energy(of_own)).max(0.0);
-        let residuals = expected.residuals();
-        let fitted_noise = residuals * (known_noise / residuals).ln_1p();
+        let deviance_known_noise = (expected.energy(&fitted) - expected.energy(of_own)).max(0.0);
+        let residuals = expected.residual_count();
+        let deviance = residuals * (deviance_known_noise / residuals).ln_1p();
         Self {
             index,
             effect: identifier,
             channel,
             beside_tau_s: [of_own.theta[0], of_own.theta[1]],
-            known_noise,
-            fitted_noise,
+            deviance_known_noise,
+            deviance,
             fitted,
         }
     }
@@ -55,7 +55,7 @@ impl Rival {
 
     /// This rival where the levels of the noise are known.
     pub(crate) fn with_known_noise(&self) -> Self {
-        Self { fitted_noise: self.known_noise, ..self.clone() }
+        Self { deviance: self.deviance_known_noise, ..self.clone() }
     }
 
     /// This rival on another record.
@@ -70,9 +70,12 @@ impl Rival {
             Self::of(expected, self.index, finished(expected, &model, &[theta.clone(), self.restarted(&model, own)]))
         };
         let other = &self.fitted.model.effects[self.index];
-        // Effects are made for a record: its means and its length are in them. Of those that differ in nothing else, such as in the
-        // temperature of which a crosstalk adds nothing, the closest is the rival.
-        let closest = like(other, expected).into_iter().map(&of).min_by(|a, b| a.known_noise.total_cmp(&b.known_noise));
+        // An effect holds means and length of its record, so it is made anew. There may be several with the same channel and parameters:
+        // crosstalk has one for each temperature at which it adds nothing. The one that fits best is the rival.
+        let closest = like(other, expected)
+            .into_iter()
+            .map(&of)
+            .min_by(|a, b| a.deviance_known_noise.total_cmp(&b.deviance_known_noise));
         closest.unwrap_or_else(|| of(other.clone()))
     }
 
@@ -88,9 +91,17 @@ impl Rival {
 /// Effects of the same kind, channel and parameters, made for the record of `expected`.
 fn like(effect: &Shared, expected: &Expected) -> Vec<Shared> {
     let names = |e: &Shared| e.parameters().iter().map(|p| p.name).collect::<Vec<_>>();
-    let mut all = candidates(&[effect.identifier()], &expected.prepared.context);
+    let mut all = forms(&[effect.identifier()], expected);
     all.retain(|other| other.channel() == effect.channel() && names(other) == names(effect));
     all
+}
+
+/// The candidates of some kinds, and the whole forms of which they are parts, such as crosstalk with an offset.
+fn forms(effects: &[Identifier], expected: &Expected) -> Vec<Shared> {
+    let parts = candidates(effects, &expected.prepared.context);
+    let whole = |part: &Shared| part.starts().first().and_then(|start| part.whole(start)).map(|(whole, _)| whole);
+    let wholes: Vec<Shared> = parts.iter().filter_map(whole).collect();
+    parts.into_iter().chain(wholes).collect()
 }
 
 /// The best fit of a model from any of some starts.
@@ -116,7 +127,7 @@ pub(crate) fn rivals(expected: &Expected) -> Vec<Rival> {
                     || (id == effect.identifier() && other.channel() != effect.channel()))
                 && accepts(&rest, other)
         };
-        let all = candidates(&Identifier::ALL, &expected.prepared.context);
+        let all = forms(&Identifier::ALL, expected);
         let mut of_effect: Vec<Rival> = Vec::new();
         for other in all.into_iter().filter(is_alike) {
             let model = own.model.replaced(index, other.clone());
@@ -129,12 +140,12 @@ pub(crate) fn rivals(expected: &Expected) -> Vec<Rival> {
             let rival = Rival::of(expected, index, finished(expected, &model, &starts));
             let seat = |rival: &Rival| (rival.effect, rival.channel);
             match of_effect.iter_mut().find(|known| seat(known) == seat(&rival)) {
-                Some(known) if known.known_noise <= rival.known_noise => {}
+                Some(known) if known.deviance_known_noise <= rival.deviance_known_noise => {}
                 Some(known) => *known = rival,
                 None => of_effect.push(rival),
             }
         }
-        of_effect.sort_by(|a, b| a.known_noise.total_cmp(&b.known_noise));
+        of_effect.sort_by(|a, b| a.deviance_known_noise.total_cmp(&b.deviance_known_noise));
         of_effect.truncate(MOST_RIVALS);
         out.extend(of_effect);
     }

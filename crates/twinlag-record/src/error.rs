@@ -132,7 +132,14 @@ pub enum RecordError {
          header only, or save each measurement to a file of its own"
     )]
     SecondMeasurement { file: String, line: usize },
-    #[error("{file}: line {line}: a quotation mark is opened and not closed; close it or remove it")]
+    #[error(
+        "{file}: expected {declared} rows, as its header declares, and found {found}: the file is cut off; copy it again, or mend the \
+         number in the header"
+    )]
+    FewerRows { file: String, declared: usize, found: usize },
+    #[error(
+        "{file}: line {line}: a quotation mark is opened and not closed in this line; close it or remove it, and put each name of a column on one line"
+    )]
     OpenQuote { file: String, line: usize },
     #[error(
         "{file}: {at}, column {column}: expected a number or a word for a missing one (empty, NaN, NA, null, ---, \

@@ -25,10 +25,29 @@ pub(crate) struct Filling<'a> {
     seen: usize,
     /// The last line that may be a row, which may be the last of all, and its number.
     held: Option<(usize, String)>,
-    /// Headers that came again, and the line of the first.
-    repeated: (usize, usize),
+    /// Headers that came again.
+    repeated: LeftOut,
+    /// Lines of a serial log that are no rows.
+    messages: LeftOut,
     /// The numbers of a row.
     row: Vec<f64>,
+}
+
+/// Lines that are left out.
+#[derive(Default)]
+struct LeftOut {
+    lines: usize,
+    /// The first of them, from 1.
+    first_line: usize,
+}
+
+impl LeftOut {
+    fn add(&mut self, line: usize) {
+        if self.lines == 0 {
+            self.first_line = line;
+        }
+        self.lines += 1;
+    }
 }
 
 impl<'a> Filling<'a> {
@@ -45,7 +64,8 @@ impl<'a> Filling<'a> {
             notes: Vec::new(),
             seen: 0,
             held: None,
-            repeated: (0, 0),
+            repeated: LeftOut::default(),
+            messages: LeftOut::default(),
             row: vec![0.0; layout.width],
         }
     }
@@ -94,9 +114,13 @@ impl<'a> Filling<'a> {
                 self.notes.push(Note::NoFinalLineBreak { line });
             }
         }
-        let (lines, first_line) = self.repeated;
+        let LeftOut { lines, first_line } = self.repeated;
         if lines > 0 {
             self.notes.push(Note::RepeatedHeader { lines, first_line });
+        }
+        let LeftOut { lines, first_line } = self.messages;
+        if lines > 0 {
+            self.notes.push(Note::Messages { lines, first_line });
         }
         Ok(())
     }
@@ -105,6 +129,7 @@ impl<'a> Filling<'a> {
         let form = &self.layout.form;
         let content = &*form.unwrap(content);
         if is_idle(content) {
+            self.messages.add(line);
             return Ok(());
         }
         if self.decimal == Decimal::Point && plain_numbers(content.as_bytes(), self.layout.delimiter, &mut self.row) {
@@ -115,10 +140,7 @@ impl<'a> Filling<'a> {
         // A header that comes again begins like no number does, so that good rows need no comparison.
         let odd = !content.trim_start().starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         if odd && self.layout.head.iter().any(|head| head.trim() == content.trim()) {
-            self.repeated.0 += 1;
-            if self.repeated.0 == 1 {
-                self.repeated.1 = line;
-            }
+            self.repeated.add(line);
             return Ok(());
         }
         let (file, width) = (|| self.source.to_owned(), self.layout.width);

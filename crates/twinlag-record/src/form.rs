@@ -38,6 +38,8 @@ pub(crate) struct Form {
     pub(crate) decimal: Option<Decimal>,
     /// The number that stands for a missing one.
     pub(crate) missing: Option<f64>,
+    /// Number of rows, where the header names it.
+    pub(crate) rows: Option<usize>,
     /// From row to row, where the header names it.
     pub(crate) period_s: Option<f64>,
     /// Whether a comment may stand behind the last cell.

@@ -79,17 +79,19 @@ impl Layout {
         let mut head: Vec<(usize, &str, Vec<Cow<'_, str>>)> = Vec::new();
         let mut comments = Vec::new();
         let mut row = Vec::new();
-        let mut first_line = None;
+        let (mut first_line, mut open_quote) = (None, None);
         for (number, line) in lines(text) {
             if let Some(comment) = uncommented(line) {
                 comments.push((number, comment));
             } else if !line.trim().is_empty() {
                 // A line with an open quote is no row; if it stands among the rows, it is refused
                 // there.
-                if split(line, delimiter, &mut row).is_ok() && columns.fits(&row) {
+                let is_open = split(line, delimiter, &mut row).is_err();
+                if !is_open && columns.fits(&row) {
                     first_line = Some(number);
                     break;
                 }
+                open_quote = open_quote.or(is_open.then_some(number));
                 head.push((number, line, row.clone()));
             }
         }
@@ -97,6 +99,10 @@ impl Layout {
             return Err(RecordError::NoData { file: file(), lines: last_line(text) });
         };
 
+        // Names may go over several lines where a spreadsheet wrote them.
+        if let Some(line) = open_quote {
+            return Err(RecordError::OpenQuote { file: file(), line });
+        }
         let counts = |cells: &[Cow<'_, str>]| columns.width_under(cells);
         let bottom = head.iter().rposition(|(_, _, cells)| counts(cells).is_some() && is_text_row(cells));
         let top = bottom.map(|bottom| {

@@ -53,7 +53,7 @@ pub(crate) const TEMPERATURE: [&str; 21] = [
     "therm",
     "温度",
 ];
-/// Never T1 or T2, whatever else is there: what is wanted or trusted, and how uncertain something is.
+/// Never T1 or T2, whatever else is there: set points, references and uncertainties.
 const APART: [&str; 20] = [
     "ref",
     "tref",

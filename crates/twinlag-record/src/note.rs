@@ -145,6 +145,13 @@ pub enum Note {
         /// The first of them.
         first_line: usize,
     },
+    /// Lines between the rows of a serial log that hold no row: what a sketch says as it starts, or of an error.
+    Messages {
+        /// How many lines were left out.
+        lines: usize,
+        /// The first of them.
+        first_line: usize,
+    },
     /// Rows with a missing temperature: NaN in the record, in no segment.
     Masked {
         /// Rows with either missing.
@@ -264,6 +271,12 @@ impl fmt::Display for Note {
             }
             Self::RepeatedHeader { lines, first_line } => {
                 write!(f, "the header comes again: {lines} lines left out, the first is line {first_line}")
+            }
+            Self::Messages { lines: 1, first_line } => {
+                write!(f, "1 line without a row of numbers left out, line {first_line}")
+            }
+            Self::Messages { lines, first_line } => {
+                write!(f, "{lines} lines without a row of numbers left out, the first is line {first_line}")
             }
             Self::Masked { rows, t1, t2 } => {
                 let rows = Counted(*rows, "row");

@@ -58,6 +58,7 @@ fn read(text: &str, file: &str) -> Result<Layout, RecordError> {
         let (key, value) = (key.trim(), value.trim());
         match key {
             "bad_flag" => form.missing = value.parse().ok(),
+            "nvalues" => form.rows = value.parse().ok(),
             "interval" => form.period_s = period_s(value),
             "file_type" if value != "ascii" => {
                 return Err(wrong(number, "'file_type = ascii': convert the cast with its ASCII output", value));

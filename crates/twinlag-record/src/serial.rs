@@ -67,22 +67,27 @@ impl Wrapping {
         (!self.labels.is_empty()).then(|| columns.unzip())
     }
 
-    /// A text with its lines unwrapped, each where it was.
+    /// A text with its lines unwrapped, each where it was. Text with as many cells as a row may be its header.
     pub(crate) fn unwrap_text(&self, text: &str) -> String {
-        lines(text).map(|(_, line)| self.unwrap(line)).collect::<Vec<_>>().join("\n")
+        lines(text).map(|(_, line)| self.unwrapped(line, true)).collect::<Vec<_>>().join("\n")
     }
 
-    /// Whether a line between rows of numbers is text of another number of cells: what a sketch says as it starts, or of an error.
-    fn is_message(&self, payload: &str) -> bool {
+    /// The cells of a line under the header, and behind them its time of arrival; empty of a message. A line that is not wrapped stays
+    /// as it is.
+    pub(crate) fn unwrap<'a>(&self, line: &'a str) -> Cow<'a, str> {
+        self.unwrapped(line, false)
+    }
+
+    /// Whether a line is text and no header: what a sketch says as it starts, or of an error.
+    fn is_message(&self, payload: &str, may_be_header: bool) -> bool {
         let mut cells = Vec::new();
         self.cells > 0
             && is_text(payload, self.delimiter)
             && split(payload, self.delimiter, &mut cells).is_ok()
-            && cells.len() != self.cells
+            && !(may_be_header && cells.len() == self.cells)
     }
 
-    /// The cells of a line, and behind them its time of arrival; empty of a message. A line that is not wrapped stays as it is.
-    pub(crate) fn unwrap<'a>(&self, line: &'a str) -> Cow<'a, str> {
+    fn unwrapped<'a>(&self, line: &'a str, may_be_header: bool) -> Cow<'a, str> {
         let wrapped = stamped(line).filter(|_| self.is_stamped);
         if self.is_stamped && wrapped.is_none() {
             return Cow::Borrowed(line);
@@ -97,7 +102,7 @@ impl Wrapping {
         let mut cells = if is_row {
             let value = |label: &String| pairs.iter().find(|pair| pair.label == label).map_or("", |pair| pair.value);
             self.labels.iter().map(value).collect::<Vec<_>>().join(&sign.to_string())
-        } else if payload.trim().is_empty() || self.is_message(payload) {
+        } else if payload.trim().is_empty() || self.is_message(payload, may_be_header) {
             return Cow::Borrowed("");
         } else {
             payload.trim_end().to_owned()

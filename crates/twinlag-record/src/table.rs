@@ -101,13 +101,13 @@ impl Table {
     /// - `source`: its name in messages
     ///
     /// # Errors
-    /// [`RecordError::CannotRead`], [`RecordError::EncodingChanges`], and those of [`Table::read`].
+    /// [`RecordError::CannotRead`], [`RecordError::EncodingChanges`], [`RecordError::FewerRows`], and those of [`Table::read`].
     pub fn from_reader(reader: impl Read, source: &str) -> Result<Self, RecordError> {
         let (reader, is_compressed) = gzip::decompressed(reader).map_err(|error| gzip::failure(source, &error))?;
         let mut parts = Parts::new(reader, source);
         let first = parts.first()?;
         let Some(first) = first else {
-            return Ok(Self::read(&parts.all()?, source)?.noting_compression(is_compressed));
+            return Self::read(&parts.all()?, source)?.noting_compression(is_compressed).whole();
         };
         let look = Look::at(&first, source)?;
         let mut filling = Filling::new(source, &look.layout, look.decimal);
@@ -117,7 +117,16 @@ impl Table {
             filling.take(&part, b'\n')?;
         }
         filling.end(parts.is_open())?;
-        Ok(Self::of(filling, parts.encoding()).noting_compression(is_compressed))
+        Self::of(filling, parts.encoding()).noting_compression(is_compressed).whole()
+    }
+
+    /// The table, if it has as many rows as the header of the file declares.
+    fn whole(self) -> Result<Self, RecordError> {
+        let declared = self.text.as_ref().and_then(|text| text.form.rows).unwrap_or(0);
+        if self.rows() < declared {
+            return Err(RecordError::FewerRows { file: self.source.clone(), declared, found: self.rows() });
+        }
+        Ok(self)
     }
 
     fn noting_compression(mut self, is_compressed: bool) -> Self {

@@ -8,7 +8,7 @@ use std::io::Write as _;
 use common::{assert_is_the_rig, assert_says, notes, record, record_with, refusal, rows};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use twinlag_record::{ColumnRef, Program, Record, RecordError, RowReader, Selection, Table, Unit};
+use twinlag_record::{ColumnRef, Note, Program, Record, RecordError, RowReader, Selection, Table, Unit};
 
 /// The body of a record of the rig: `row` is told time, T1 and T2.
 fn body(row: impl Fn(f64, f64, f64) -> String) -> String {
@@ -53,6 +53,20 @@ fn a_sea_bird_cast_is_read_by_its_header() {
     assert_eq!(got.channels, ["t090C", "t190C"]);
     let said = notes(&got);
     assert!(said.contains("Sea-Bird") && said.contains("column names on line 8"), "{said}");
+}
+
+#[test]
+fn a_cast_that_is_cut_off_is_refused() {
+    let whole = SEA_BIRD.to_owned() + &sea_bird_rows();
+    let rows = sea_bird_rows().lines().count();
+    let read = |declared: usize| {
+        let text = whole.replace("# nvalues = 10", &format!("# nvalues = {declared}"));
+        Table::from_reader(text.as_bytes(), "cast.cnv").map(|table| table.rows())
+    };
+    assert_eq!(read(rows).expect("whole"), rows);
+    let error = read(rows + 1).expect_err("a row is missing");
+    let said = format!("cast.cnv: expected {} rows, as its header declares, and found {rows}", rows + 1);
+    assert!(error.to_string().starts_with(&said), "{error}");
 }
 
 #[test]
@@ -199,10 +213,12 @@ fn messages_of_a_serial_log_are_no_rows() {
     let (first, rest) = rows.split_once('\n').expect("several rows");
     let (second, rest) = rest.split_once('\n').expect("several rows");
     let text = format!(
-        "11:59:59.801 -> DS18B20 ready\n11:59:59.901 -> Locating devices...Found 2 devices.\n{first}\n12:00:00.700 -> sensor read error\n{second}\n{rest}"
+        "11:59:59.801 -> DS18B20 ready\n11:59:59.901 -> Locating devices...Found 2 devices.\n{first}\n12:00:00.700 -> sensor read error\n{second}\n12:00:01.300 -> wifi lost, retrying\n{rest}"
     );
     let [plain, noisy] = [rows.clone(), text].map(|text| record(&text));
     assert_eq!((&noisy.time_s, &noisy.t1_c, &noisy.t2_c), (&plain.time_s, &plain.t1_c, &plain.t2_c));
+    let is_said = |record: &Record| record.notes.contains(&Note::Messages { lines: 2, first_line: 4 });
+    assert!(is_said(&noisy) && !is_said(&plain), "{:?}", noisy.notes);
 }
 
 #[test]

@@ -362,3 +362,12 @@ fn vectors_are_checked_like_files() {
     bad.time_s[2] = f64::NAN;
     assert_says(&refused(bad), &["sample 3", "missing"]);
 }
+
+/// Failed: names of a spreadsheet that go over two lines were taken for none, and a time in milliseconds for one in seconds.
+#[test]
+fn names_over_several_lines_are_refused() {
+    let text = "time [ms],\"T1\n[°C]\",\"T2\n[°C]\"\n0,20,20\n20,21,20.5\n40,23,21\n60,24,22\n80,25,23\n100,24,23\n120,23,23\n140,22,22\n";
+    let error = Table::read(text.as_bytes(), "sheet.csv").expect_err("which names?");
+    assert_eq!(error.line(), Some(("sheet.csv", 1)), "{error}");
+    assert!(error.to_string().contains("put each name of a column on one line"), "{error}");
+}

@@ -163,6 +163,29 @@ impl Shard {
         self.of
     }
 
+    /// The name of the file that holds its part.
+    ///
+    /// ```
+    /// use twinlag_study::Shard;
+    ///
+    /// let shard = Shard::new(1, 3)?;
+    /// assert_eq!(shard.file_name(), "part-1-of-3.json");
+    /// assert_eq!(Shard::of_file_name("part-1-of-3.json"), Some(shard));
+    /// assert_eq!(Shard::of_file_name("part-3-of-3.json"), None);
+    /// # Ok::<(), twinlag_study::StudyError>(())
+    /// ```
+    pub fn file_name(&self) -> String {
+        format!("part-{}-of-{}.json", self.index, self.of)
+    }
+
+    /// The shard whose part is in a file of this name; `None` where it is not the name of a part.
+    pub fn of_file_name(name: &str) -> Option<Self> {
+        let (index, of) = name.strip_prefix("part-")?.strip_suffix(".json")?.split_once("-of-")?;
+        let shard = Self::new(index.parse().ok()?, of.parse().ok()?).ok()?;
+        // Numbers with a sign or with zeros before them are not of a part.
+        (shard.file_name() == name).then_some(shard)
+    }
+
     pub(crate) fn range(self, jobs: u64) -> Range<u64> {
         let edge = |k: u64| (u128::from(jobs) * u128::from(k) / u128::from(self.of)) as u64;
         edge(self.index)..edge(self.index + 1)

@@ -25,20 +25,25 @@ fn the_difference_of_a_place_in_a_valley_is_not_given() {
 #[test]
 fn a_gas_temperature_rests_on_the_sensor_that_is_trusted() {
     let gas = "kind = \"turbulence\"\nstd_k = 40.0\ncorner_hz = 0.01\ncutoff_hz = 0.15";
-    let sensor = |tau_s: f64, rest: &str| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.25 }}\n{rest}");
-    let plain = sensor(7.4, "");
-    let record = |other: &str| record(5, 1000, 1.0, gas, [&plain, &sensor(28.0, other)]);
-    let agreeing = compensate(&record(""), &CompensateOptions::default()).expect("a gas temperature");
+    let record = |coefficients_per_k3: [f64; 2]| {
+        let sensors = [7.4, 28.0].iter().zip(coefficients_per_k3).map(|(tau_s, coefficient_per_k3)| {
+            let radiation = format!("radiation = {{ coefficient_per_k3 = {coefficient_per_k3}, wall_c = 100.0 }}");
+            format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.25 }}\n{radiation}")
+        });
+        let sensors: Vec<String> = sensors.collect();
+        record(5, 1000, 1.0, gas, [&sensors[0], &sensors[1]])
+    };
+    let agreeing = compensate(&record([0.0, 0.0]), &CompensateOptions::default()).expect("a gas temperature");
     assert_eq!(agreeing.judgement.grade, Grade::Go, "{:?}", agreeing.judgement);
-    let shifted = record("offset_k = 3.0");
+    let radiating = record([2.2e-10, 4.4e-10]);
     for (trusted, other) in [(0, "T2"), (1, "T1")] {
         let options = CompensateOptions { trusted, ..CompensateOptions::default() };
-        let found = compensate(&shifted, &options).expect("a gas temperature");
-        let model = found.model(&shifted);
-        let again = compensate(&shifted, &CompensateOptions { model, ..options }).expect("a gas temperature");
+        let found = compensate(&radiating, &options).expect("a gas temperature");
+        let model = found.model(&radiating);
+        let again = compensate(&radiating, &CompensateOptions { model, ..options }).expect("a gas temperature");
         for answer in [found, again] {
             assert_eq!(answer.judgement.grade, Grade::Conditional);
-            let condition = format!("right if only {other} has the calibration that was found");
+            let condition = format!("right if only {other} has the error named calibration");
             assert!(answer.judgement.because.contains(&condition), "{}", answer.judgement.because);
         }
     }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use twinlag::diagnosis::Grade;
 use twinlag::{Diagnosis, EffectNumber};
-use twinlag_pages::residual_picture;
+use twinlag_pages::{residual_picture, unit_suffix};
 
 /// Everything that is written of the records.
 #[derive(Default)]
@@ -122,7 +122,7 @@ pub(super) fn named(effect: &twinlag::NamedEffect, whole: bool) -> String {
         };
         match p.interval_95.filter(|_| whole) {
             Some([low, high]) => {
-                let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+                let unit = unit_suffix(&p.unit);
                 format!("{name} {} [{}, {}]{unit}", number(value), number(low), number(high))
             }
             None => format!("{name} {}", number(value)),

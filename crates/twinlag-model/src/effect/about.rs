@@ -47,8 +47,10 @@ pub struct About {
     pub is_streamable: bool,
     /// Whether both sensors are first-order lags of the gas with it as without it.
     pub leaves_lags: bool,
-    /// Whether the gas temperature moves with what both sensors have of it, which no reading shows.
-    pub moves_gas: bool,
+    /// Whether it biases the gas temperature where both sensors have it, which no reading shows: `unseen` says what stays hidden.
+    pub biases_gas_if_shared: bool,
+    /// Whether it is one channel's relative to the other, so that the gas temperature can be that of either.
+    pub is_relative: bool,
     /// Every form in which it may be added to a model of a record.
     pub candidates: fn(&Context) -> Vec<Shared>,
     /// The effect with the parameters that it was found with in another record.
@@ -79,7 +81,8 @@ impl About {
             follows_gas: false,
             is_streamable: false,
             leaves_lags: false,
-            moves_gas: false,
+            biases_gas_if_shared: false,
+            is_relative: false,
             candidates,
             restore: |known, context| Ok(described_by(known, (known.effect.about().candidates)(context))),
         }
@@ -176,10 +179,17 @@ impl About {
         self
     }
 
-    /// The gas temperature moves with what both sensors have of it, which no reading shows: its third text says what that is.
+    /// It biases the gas temperature where both sensors have it, which no reading shows.
     #[must_use]
-    pub const fn moving_gas(mut self) -> Self {
-        self.moves_gas = true;
+    pub const fn biasing_gas_if_shared(mut self) -> Self {
+        self.biases_gas_if_shared = true;
+        self
+    }
+
+    /// It is one channel's relative to the other, so that the gas temperature can be that of either.
+    #[must_use]
+    pub const fn relative(mut self) -> Self {
+        self.is_relative = true;
         self
     }
 

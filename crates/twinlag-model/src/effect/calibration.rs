@@ -26,7 +26,8 @@ pub(crate) static ABOUT: About = About::new("calibration", 4, candidates)
     .imitating(&["radiation", "drift"])
     .at_rest()
     .leaving_lags()
-    .moving_gas()
+    .biasing_gas_if_shared()
+    .relative()
     .streamable()
     .restored_by(restore);
 

@@ -23,7 +23,8 @@ pub(crate) static ABOUT: About = About::new("delay", 5, candidates)
     )
     .imitating(&["second-order", "slow-mode"])
     .turning_phases()
-    .moving_gas();
+    .biasing_gas_if_shared()
+    .relative();
 
 /// Usual delays: as a share of the faster time constant, as of a second lag, and in sample periods. Chosen.
 const USUAL_SHARE: f64 = 0.3;

@@ -19,7 +19,7 @@ pub(crate) static ABOUT: About = About::new("drift", 12, candidates)
     .imitating(&["calibration", "slow-mode", "coloured-noise", "input-mismatch"])
     .imitating_rest()
     .leaving_lags()
-    .moving_gas();
+    .biasing_gas_if_shared();
 
 struct Drift {
     seat: Seat,

@@ -18,7 +18,7 @@ pub(crate) static ABOUT: About = About::new("radiation", 11, candidates)
     )
     .imitating(&["calibration", "temperature-dependent-time-constant"])
     .imitating_rest()
-    .moving_gas()
+    .biasing_gas_if_shared()
     .restored_by(restore);
 
 struct Radiation {

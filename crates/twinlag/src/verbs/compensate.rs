@@ -1,7 +1,7 @@
 //! The gas temperature of a record with its standard deviation.
 
 use twinlag_compensate::{Form, bandwidth_hz};
-use twinlag_diagnose::{Grade, Identifier, Judgement, Masked, ModelFit, Reason, Trace, Verdict};
+use twinlag_diagnose::{Grade, Judgement, Masked, ModelFit, Reason, Trace, Verdict};
 use twinlag_record::Record;
 
 use crate::answers::{Characterisation, Compensation, Model, ModelEffect, NamedEffect, Quality, Status};
@@ -123,10 +123,9 @@ fn judged(last: &Characterisation, verdict: Option<Verdict>, effects: &[ModelEff
     }
     let channels = &last.record.channels;
     let of_lags = following_both(channels, last.sensors.each_ref().map(|sensor| &sensor.judgement));
-    let of_one_alone = effects.iter().filter(|effect| effect.effect.about().moves_gas).map(|effect| {
-        // These the gas temperature leaves in the other channel than the trusted one, whichever they were fitted in.
-        let is_relative = [Identifier::CALIBRATION, Identifier::DELAY].contains(&effect.effect);
-        let fitted_in = effect.channel.clone().filter(|_| !is_relative);
+    let of_one_alone = effects.iter().filter(|effect| effect.effect.about().biases_gas_if_shared).map(|effect| {
+        // What is relative is taken to be the other channel's than the trusted one's, whichever it was fitted in.
+        let fitted_in = effect.channel.clone().filter(|_| !effect.effect.about().is_relative);
         let channel = fitted_in.unwrap_or_else(|| channels[1 - trusted].clone());
         Reason::OfOneAlone { effect: effect.effect, channel }
     });
@@ -150,8 +149,8 @@ fn fill(out: &mut Compensation, found: Banded, record: &Record, best_effort: boo
     let is_said = |fault: &&GasFault| matches!(fault, GasFault::Widened { .. });
     out.warnings.extend(found.faults.iter().filter(|fault| !is_said(fault)).map(ToString::to_string));
     out.warnings.push(
-        "errors that both sensors share (gain, offset, radiation, drift, delay, a second lag, a slow mode) remain in the \
-         gas temperature, and no band covers them"
+        "errors that both sensors share (gain, offset, radiation, drift, delay, a second lag, a slow mode), and crosstalk that \
+         replaces part of a reading, remain in the gas temperature, and no band covers them"
             .into(),
     );
     if out.judgement.grade == Grade::NoGo && !best_effort {

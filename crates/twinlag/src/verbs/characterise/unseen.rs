@@ -45,7 +45,7 @@ pub(in crate::verbs) fn judge_unseen(
     let is_known = [sensor_1.known, sensor_2.known, false];
     for ((judgement, effects), is_known) in judgements.into_iter().zip(hidden).zip(is_known) {
         if !effects.is_empty() && !is_known {
-            *judgement = std::mem::take(judgement).and(&Reason::Hidden { effects });
+            *judgement = std::mem::take(judgement).and(&Reason::Hidden { effects, in_other_sensor: Vec::new() });
         }
     }
     Ok(())
