@@ -157,7 +157,7 @@ impl Member {
     fn of(row: &Row) -> Self {
         let text = |column| row.in_words(column).unwrap_or_default().into_owned();
         let tau = TAU.map(|tau| {
-            let [value, low, high, grade, _] = graded_columns(tau).map(|(name, _)| name);
+            let [value, low, high, grade, _] = graded_columns(tau);
             let is_go = row.get_text(&grade) == Some(&Grade::Go.to_string());
             let interval_95_s = [row.get_number(&low)?, row.get_number(&high)?];
             Some(MemberTau { value_s: row.get_number(&value)?, interval_95_s, is_go })
@@ -171,10 +171,7 @@ fn reason_without_answer(row: &Row) -> Option<&str> {
     if row.outcome() == Some(Outcome::Answered) {
         return None;
     }
-    let [one, two] = TAU.map(|tau| {
-        let [.., (because, _)] = graded_columns(tau);
-        because
-    });
+    let [[.., one], [.., two]] = TAU.map(graded_columns);
     ["reason", &one, &two, "gas_because"].into_iter().find_map(|why| row.get_text(why))
 }
 

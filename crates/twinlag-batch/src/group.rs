@@ -68,10 +68,13 @@ impl std::fmt::Display for GroupBy {
 }
 
 impl GroupBy {
-    /// The name of the rig of a file, or why nothing says which it is.
+    /// The name of the rig of a file.
     ///
     /// - `of_column`: the value of the column of this name, for which the file has to be read, or why it does not name a rig; asked only
     ///   where the rig is known by a column
+    ///
+    /// # Errors
+    /// Why nothing says which rig the file is of, in words: its name does not fit the pattern, or what `of_column` says.
     pub fn rig(&self, file: &Path, of_column: impl FnOnce(&str) -> Result<String, String>) -> Result<String, String> {
         match &self.0 {
             By::Folder => {

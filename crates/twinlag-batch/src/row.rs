@@ -109,7 +109,8 @@ const NOTES: (&str, Cells) = ("notes", Cells::Text);
 impl Verb {
     /// The columns that a table of its answers always has, in order, with what they hold.
     pub(crate) fn columns(self) -> Vec<(String, Cells)> {
-        let graded = TAU.into_iter().chain([TAU_DIFFERENCE]).flat_map(graded_columns);
+        let quantities = TAU.into_iter().chain([TAU_DIFFERENCE]);
+        let graded = quantities.flat_map(|quantity| graded_columns(quantity).into_iter().zip(GRADED));
         let own: &[_] = match self {
             Self::Characterise => &[],
             Self::Diagnose => &OF_DIAGNOSIS,
@@ -127,15 +128,18 @@ pub(crate) fn first_columns() -> [&'static str; 4] {
 }
 
 /// The columns of a number: itself, both ends of its interval, its grade, and why that is not `go`.
-pub(crate) fn graded_columns((stem, unit): Quantity<'_>) -> [(String, Cells); 5] {
+pub(crate) fn graded_columns((stem, unit): Quantity<'_>) -> [String; 5] {
     [
-        (format!("{stem}{unit}"), Cells::Number),
-        (format!("{stem}_low{unit}"), Cells::Number),
-        (format!("{stem}_high{unit}"), Cells::Number),
-        (format!("{stem}_grade"), Cells::Text),
-        (format!("{stem}_because"), Cells::Text),
+        format!("{stem}{unit}"),
+        format!("{stem}_low{unit}"),
+        format!("{stem}_high{unit}"),
+        format!("{stem}_grade"),
+        format!("{stem}_because"),
     ]
 }
+
+/// What the cells of [`graded_columns`] are.
+const GRADED: [Cells; 5] = [Cells::Number, Cells::Number, Cells::Number, Cells::Text, Cells::Text];
 
 /// What the cells of a column hold that no verb names: a parameter of an effect.
 pub(crate) fn cells_of_parameter(name: &str) -> Cells {
@@ -306,7 +310,7 @@ impl Row {
         interval: Option<[f64; 2]>,
         judgement: &Judgement,
     ) -> Self {
-        let [column, low, high, grade, because] = graded_columns(quantity).map(|(name, _)| name);
+        let [column, low, high, grade, because] = graded_columns(quantity);
         let row =
             self.number(&column, value).number(&low, interval.map(|i| i[0])).number(&high, interval.map(|i| i[1]));
         let why = if judgement.grade == Grade::Go { "" } else { &judgement.because };

@@ -60,13 +60,11 @@ pub(crate) fn choose(
                 let names: Vec<String> = choice.channels.iter().map(|name| format!("'{name}'")).collect();
                 return Ok((group, of_several(&names.join(" and "))));
             }
-            match only(&|group| temperatures(group) >= SENSORS) {
-                Some(group) => Ok((group, of_several("two temperatures or more"))),
-                None => {
-                    let groups = usable.iter().map(|&group| groups[group].clone()).collect();
-                    Err(FileError::SeveralGroups { file, groups: Listing(groups) })
-                }
+            if let Some(group) = only(&|group| temperatures(group) >= SENSORS) {
+                return Ok((group, of_several("two temperatures or more")));
             }
+            let groups = usable.iter().map(|&group| groups[group].clone()).collect();
+            Err(FileError::SeveralGroups { file, groups: Listing(groups) })
         }
     }
 }

@@ -77,8 +77,7 @@ impl Layout {
         let columns = Columns::of(sample, delimiter, cells);
 
         let mut head: Vec<(usize, &str, Vec<Cow<'_, str>>)> = Vec::new();
-        let mut comments = Vec::new();
-        let mut row = Vec::new();
+        let (mut comments, mut row) = (Vec::new(), Vec::new());
         let (mut first_line, mut open_quote) = (None, None);
         for (number, line) in lines(text) {
             if let Some(comment) = uncommented(line) {
