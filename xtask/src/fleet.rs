@@ -59,9 +59,11 @@ fn rig(number: usize, samples: usize) -> Result<Rig> {
         corner_hz = 3.0
         cutoff_hz = 60.0
         [[sensors]]
+        channel = "T1"
         time_constant_s = {}
         noise = {{ std_k = 0.3 }}
         [[sensors]]
+        channel = "T2"
         time_constant_s = {}
         noise = {{ std_k = 0.3 }}
         "#,

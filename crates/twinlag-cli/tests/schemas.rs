@@ -31,23 +31,6 @@ fn fits(schema: &Validator, answer: &Value) {
     assert!(errors.is_empty(), "{errors:#?}");
 }
 
-/// A few trials of one method.
-const STUDY: &str = r#"
-name = "mine"
-title = "A few trials"
-seed = 1
-trials = 20
-block = 10
-samples = [300]
-noise_percent = [5]
-[[gases]]
-name = "sine"
-gas = { kind = "sine", mean_c = 50.5, amplitude_k = 16.5, frequency_hz = 10.0, hold = "zero-order" }
-[[methods]]
-name = "whitened"
-estimator = "whitened"
-"#;
-
 /// With `tone.csv`, a record of a single tone.
 fn with_tone(test: &str) -> Bench {
     let bench = Bench::simulated(test, common::RIG);
@@ -100,7 +83,7 @@ fn answers_of_the_other_verbs_are_as_their_schemas_say() {
     let not_planned = bench.run(&["plan", "tone.json", "--json"]);
     assert_eq!(not_planned.code, 4, "{not_planned:#?}");
     fits(&plan, &not_planned.json());
-    bench.write("study.toml", STUDY);
+    bench.write("study.toml", common::STUDY);
     let run = |shard: &str| bench.run(&["study", "run", "study.toml", "--out", "study", "--shard", shard, "--json"]);
     fits(&schema(&bench, "study-part"), &run("0/2").json());
     assert_eq!(run("1/2").code, 0);

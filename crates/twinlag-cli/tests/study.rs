@@ -2,27 +2,11 @@
 
 mod common;
 
-use common::Bench;
-
-const PLAN: &str = r#"
-name = "mine"
-title = "A few trials"
-seed = 1
-trials = 30
-block = 10
-samples = [300]
-noise_percent = [5]
-[[gases]]
-name = "sine"
-gas = { kind = "sine", mean_c = 50.5, amplitude_k = 16.5, frequency_hz = 10.0, hold = "zero-order" }
-[[methods]]
-name = "whitened"
-estimator = "whitened"
-"#;
+use common::{Bench, STUDY};
 
 #[test]
 fn shards_in_any_order_make_the_table_of_the_whole() {
-    let bench = Bench::with("study-shards", "plan.toml", PLAN);
+    let bench = Bench::with("study-shards", "plan.toml", STUDY);
     assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "whole"]).code, 0);
     let whole = bench.read("whole/results.json");
     for shard in ["2/3", "0/3"] {
@@ -38,12 +22,12 @@ fn shards_in_any_order_make_the_table_of_the_whole() {
 
 #[test]
 fn nothing_is_overwritten_without_being_asked() {
-    let bench = Bench::with("study-twice", "plan.toml", PLAN);
+    let bench = Bench::with("study-twice", "plan.toml", STUDY);
     assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "out"]).code, 0);
     let again = bench.run(&["study", "run", "plan.toml", "--out", "out"]);
     assert_eq!(again.code, 2);
     assert!(again.stderr.contains("already holds results"), "{}", again.stderr);
-    bench.write("other.toml", PLAN.replace("trials = 30", "trials = 20"));
+    bench.write("other.toml", STUDY.replace("trials = 30", "trials = 20"));
     let other = bench.run(&["study", "run", "other.toml", "--out", "out", "--shard", "0/2"]);
     assert_eq!(other.code, 2);
     assert!(other.stderr.contains("another plan"), "{}", other.stderr);
@@ -51,7 +35,7 @@ fn nothing_is_overwritten_without_being_asked() {
 
 #[test]
 fn what_cannot_run_is_refused_with_the_reason() {
-    let bench = Bench::with("study-refused", "plan.toml", PLAN.replace("\"whitened\"\n", "\"magic\"\n"));
+    let bench = Bench::with("study-refused", "plan.toml", STUDY.replace("\"whitened\"\n", "\"magic\"\n"));
     for (arguments, code, words) in [
         (vec!["study", "run", "plan.toml", "--out", "out"], 3, "magic"),
         (vec!["study", "run", "none.toml", "--out", "out"], 3, "none.toml"),

@@ -41,9 +41,9 @@ pub enum Change {
     QuietSegment,
 }
 
-/// The longest record that is tried, in lengths of the record as it is: chosen, what an experimenter can afford.
+/// The longest record that is tried, in lengths of the record as it is: chosen.
 pub(crate) const LONGEST_FACTOR: f64 = 4.0;
-/// Tones of a gas around a frequency, evenly spread over the logarithm: chosen, so many that no effect fits between them.
+/// Tones of a gas around a frequency, evenly spread over the logarithm: chosen.
 const TONES: usize = 12;
 /// A gas around a frequency reaches this factor to either side: chosen.
 const REACH: f64 = 3.0;

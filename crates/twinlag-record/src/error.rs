@@ -138,7 +138,8 @@ pub enum RecordError {
     )]
     FewerRows { file: String, declared: usize, found: usize },
     #[error(
-        "{file}: line {line}: a quotation mark is opened and not closed in this line; close it or remove it, and put each name of a column on one line"
+        "{file}: line {line}: a quotation mark is opened and not closed in this line; close it or remove it, and put each name of a \
+         column on one line"
     )]
     OpenQuote { file: String, line: usize },
     #[error(

@@ -11,6 +11,23 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
+/// A study of a few trials of one method.
+pub(crate) const STUDY: &str = r#"
+name = "mine"
+title = "A few trials"
+seed = 1
+trials = 30
+block = 10
+samples = [300]
+noise_percent = [5]
+[[gases]]
+name = "sine"
+gas = { kind = "sine", mean_c = 50.5, amplitude_k = 16.5, frequency_hz = 10.0, hold = "zero-order" }
+[[methods]]
+name = "whitened"
+estimator = "whitened"
+"#;
+
 /// Two thermocouples in turbulence, the second read 2 K too hot, 3000 samples.
 pub(crate) const RIG: &str = r#"
 seed = 5

@@ -327,13 +327,14 @@ impl Characterisation {
 
     /// Takes out what may not be used. Where a time constant goes, the answer is not `ok`.
     pub(crate) fn withhold(&mut self) {
-        for (sensor, name) in self.sensors.iter().zip(Known::NAMES) {
-            if self.status == Status::Ok && sensor.judgement.grade == Grade::NoGo {
-                self.not_identifiable.push(name.to_owned());
-            }
-        }
-        if self.status == Status::Ok && self.sensors.iter().any(|sensor| sensor.judgement.grade == Grade::NoGo) {
+        let named = self.sensors.iter().zip(Known::NAMES);
+        let withheld: Vec<String> = named
+            .filter(|(sensor, _)| sensor.judgement.grade == Grade::NoGo)
+            .map(|(_, name)| name.to_owned())
+            .collect();
+        if self.status == Status::Ok && !withheld.is_empty() {
             self.status = Status::NotIdentifiable;
+            self.not_identifiable.extend(withheld);
         }
         for sensor in self.sensors.iter_mut().filter(|s| s.judgement.grade == Grade::NoGo) {
             (sensor.time_constant_s, sensor.standard_error_s, sensor.interval_95_s) = (None, None, None);
