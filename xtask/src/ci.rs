@@ -5,22 +5,22 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
-use pulldown_cmark::{Event, Parser, Tag};
 
-use crate::root;
+use crate::{book, report, root};
 
 /// The oldest compiler that is promised: `rust-version` of the workspace.
 const OLDEST: &str = "1.89";
 const WASM: &str = "wasm32-unknown-unknown";
 
-/// Runs all checks, the tests among them unless they are known to be `tested`.
-pub(crate) fn run(tested: bool) -> Result<()> {
+/// Runs what must hold.
+///
+/// - `tested`: whether the tests are known to pass, and are left out
+/// - `full`: features one by one, the oldest compiler, a machine without an operating system, and reports in a browser as well
+pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     if !tested {
         step("tests", "cargo", &["test", "--workspace"])?;
     }
     step("format", "cargo", &["fmt", "--all", "--check"])?;
-    features()?;
-    toolchains()?;
     step("lints", "cargo", &["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"])?;
     step("documentation", "cargo", &["doc", "--workspace", "--no-deps", "--document-private-items"])?;
     // In one build, most of which the tests have made: asked for one by one, packages take features one by one, and are compiled anew.
@@ -38,11 +38,16 @@ pub(crate) fn run(tested: bool) -> Result<()> {
     }
     let start = Instant::now();
     crate::experiment::quick(&quick)?;
-    println!("== experiments, two trials a cell: {:.0} s", start.elapsed().as_secs_f64());
-    let start = Instant::now();
-    crate::profile::quick()?;
-    println!("== profiles, a short record: {:.0} s", start.elapsed().as_secs_f64());
-    links()
+    println!("== experiments, a trial in each cell: {:.0} s", start.elapsed().as_secs_f64());
+    book::run(&root()?.join("target/book"))?;
+    if full {
+        features()?;
+        toolchains()?;
+        // In release, which has the line tables that a profile is made of.
+        step("profiles of a short record", "cargo", &["xtask", "profile", "--quick"])?;
+        report::run(&report::Report::default())?;
+    }
+    Ok(())
 }
 
 /// Each optional feature left out, one by one: there are so few that they are listed here.
@@ -100,35 +105,5 @@ fn step(name: &str, program: &str, arguments: &[&str]) -> Result<()> {
         bail!("{name}: {program} {} ended with {status}", arguments.join(" "));
     }
     println!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
-    Ok(())
-}
-
-/// Every relative link of the book and of the README leads to a file.
-fn links() -> Result<()> {
-    let root = root()?;
-    let mut pages = vec![root.join("README.md"), root.join("CONTRIBUTING.md"), root.join("CHANGELOG.md")];
-    for entry in fs::read_dir(root.join("docs/src"))? {
-        let path = entry?.path();
-        if path.extension().is_some_and(|e| e == "md") {
-            pages.push(path);
-        }
-    }
-    let mut count = 0;
-    for page in &pages {
-        let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
-        for event in Parser::new(&text) {
-            let Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) = event else { continue };
-            let target = dest_url.split('#').next().unwrap_or("");
-            if target.is_empty() || target.contains("://") {
-                continue;
-            }
-            let path = page.parent().unwrap_or(root).join(target);
-            if !path.exists() {
-                bail!("{}: the link to {target} leads nowhere", page.display());
-            }
-            count += 1;
-        }
-    }
-    println!("== links: {count} in {} pages lead to files", pages.len());
     Ok(())
 }

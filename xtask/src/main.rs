@@ -1,7 +1,8 @@
-//! Tasks of the repository: `cargo xtask ci`, `cargo xtask experiment`, `cargo xtask measured DIR`, `cargo xtask data DIR`,
-//! `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
+//! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
+//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
 
 mod bench;
+mod book;
 mod ci;
 mod dist;
 mod experiment;
@@ -10,7 +11,7 @@ mod measured;
 mod profile;
 mod report;
 
-use std::path::{Path, PathBuf};
+use std::path::{Path, PathBuf, absolute};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
@@ -30,9 +31,16 @@ enum Task {
         /// Leaves the tests out: they have just been run.
         #[arg(long)]
         tested: bool,
-        /// Opens reports in a browser as well: that takes Chromium and Node.js.
+        /// Features one by one, the oldest compiler and a machine without an operating system as well, where they are installed, and
+        /// reports in a browser: that takes Chromium and Node.js.
         #[arg(long)]
         full: bool,
+    },
+    /// Builds the book and follows its links.
+    Book {
+        /// The folder for its pages.
+        #[arg(long, value_name = "DIR", default_value = "target/book")]
+        out: PathBuf,
     },
     /// Runs every record of a folder of measured data and holds what is found against what is known of them.
     Measured {
@@ -73,9 +81,8 @@ fn main() -> ExitCode {
     // As the program does: benches measure what its users have.
     twinlag_memory::give_back_large();
     let result = match Arguments::parse().task {
-        Task::Ci { tested, full } => {
-            ci::run(tested).and_then(|()| if full { report::run(&report::Report::default()) } else { Ok(()) })
-        }
+        Task::Ci { tested, full } => ci::run(tested, full),
+        Task::Book { out } => absolute(out).map_err(Into::into).and_then(|out| book::run(&out)),
         Task::Measured { dir, campaigns, write } => measured::run(&dir, campaigns.as_deref(), write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),

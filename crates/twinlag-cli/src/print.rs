@@ -10,8 +10,8 @@ use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Value, Verdic
 use twinlag::estimate::IntervalBasis;
 use twinlag::record::{Note, Record};
 use twinlag::{
-    Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedEffect, NamedTwin, NoiseSource, SecondLag,
-    SensorEstimate, Status, Track,
+    Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedCause, NamedEffect, NamedTwin, NoiseSource,
+    SecondLag, SensorEstimate, Status, Track,
 };
 use twinlag_pages::{parameter_in_words, plausibility_in_words, unit_suffix};
 
@@ -427,23 +427,33 @@ fn effect_lines(effect: &NamedEffect) -> Vec<String> {
         lines.push(format!("    equally well explained by: {}", names.join(", ")));
     }
     lines.extend(effect.exact_twins.iter().map(twin_line));
+    lines.extend(effect.other_causes.iter().map(cause_line));
     lines.extend(effect.first_state.iter().map(|first_state| format!("    {first_state}")));
     lines.push(format!("    at the rig: {}", about.advice));
     lines
 }
 
+/// A number with its name and its interval.
+fn named_number(number: &Value) -> String {
+    let unit = unit_suffix(&number.unit);
+    let Some([low, high]) = number.interval_95 else {
+        return format!("{} {}{unit}", number.name, digits(number.value, 4));
+    };
+    let decimals = decimals_of([low, high]);
+    format!("{} {:.decimals$}{unit} [{low:.decimals$}, {high:.decimals$}]", number.name, number.value)
+}
+
+/// What the time constants are if another effect is the cause.
+fn cause_line(cause: &NamedCause) -> String {
+    let place = cause.of.channel.as_ref().map_or(String::new(), |channel| format!(" in {channel}"));
+    let [t1, t2] = cause.time_constants.each_ref().map(named_number);
+    format!("    with {}{place} instead: {t1}, {t2}, each with its 95 % interval", cause.of.effect)
+}
+
 /// What the numbers are if an exact twin is the cause.
 fn twin_line(twin: &NamedTwin) -> String {
-    let number = |number: &Value| {
-        let unit = unit_suffix(&number.unit);
-        let Some([low, high]) = number.interval_95 else {
-            return format!("{} {}{unit}", number.name, digits(number.value, 4));
-        };
-        let decimals = decimals_of([low, high]);
-        format!("{} {:.decimals$}{unit} [{low:.decimals$}, {high:.decimals$}]", number.name, number.value)
-    };
     let channel = twin.of.channel.as_deref().unwrap_or_default();
-    let [parameter, t1, t2] = [&twin.parameter, &twin.time_constants[0], &twin.time_constants[1]].map(number);
+    let [parameter, t1, t2] = [&twin.parameter, &twin.time_constants[0], &twin.time_constants[1]].map(named_number);
     format!(
         "    {} in {channel} would look the same: {parameter}, and then {t1}, {t2}, each with its 95 % interval",
         twin.of.effect

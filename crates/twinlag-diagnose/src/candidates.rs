@@ -109,8 +109,16 @@ impl Candidate {
     }
 }
 
+/// Whether a parameter of an effect lies on a bound of it in a fit.
+///
+/// - `at`: its place among all that the model has
+pub(crate) fn is_on_bound(parameter: &Parameter, at: usize, fitted: &Fitted) -> bool {
+    let has_ended_there = matches!(&fitted.end, End::OnBound(which) if which.contains(&at));
+    has_ended_there || !is_inside_bounds(parameter, fitted.theta[at])
+}
+
 /// Whether a value of a parameter lies inside its bounds, and not on one.
-pub(crate) fn is_inside_bounds(parameter: &Parameter, value: f64) -> bool {
+fn is_inside_bounds(parameter: &Parameter, value: f64) -> bool {
     let Variable { lower, upper, scale, .. } = parameter.variable;
     let [margin, low, high] = match scale {
         Scale::Logarithmic => [LOG_MARGIN, (value / lower).ln(), (upper / value).ln()],

@@ -3,7 +3,7 @@
 use twinlag_cross_relation::TestName;
 use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, summarise};
 
-use crate::candidates::Candidate;
+use crate::candidates::{Candidate, is_on_bound};
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::errors::Squares;
@@ -18,7 +18,7 @@ use crate::moves::{Move, Searched, State};
 use crate::naming::{judge_effect, name, of_defect, of_rapid};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
-use crate::ties::{Tie, widen};
+use crate::ties::{OtherCause, Tie, widen};
 use crate::transfer::Across;
 use crate::twins::{ExactTwin, cover_twins, exact_twins};
 use crate::whole_form::WholeForm;
@@ -42,19 +42,18 @@ pub(crate) fn conclude(
     let (with_effects, mut last, first_states) = last_fit(&state, policy);
     let is_base = unmasked.is_none() && state.taken.is_empty() && state.base.theta == state.current.theta;
     let mut base = if is_base { last.clone() } else { base_fit(&state, unmasked.as_ref(), policy) };
-    let mut remarks = remarks_of(&state.moves);
-    let all = state.prepared.observations.samples();
-    remarks.extend(state.rapid.as_ref().map(RapidVariation::remark));
-    if let Searched::Pieces { samples, is_screened } = state.searched {
-        remarks.push(Remark::SearchedInPieces { samples, all, is_screened });
-    }
+    let mut remarks = remarks_of(&state);
     let places = 0..state.taken.len();
     let covariance = last.covariance.as_deref();
     let twins: Vec<_> = places.map(|index| exact_twins(index, &with_effects, covariance, &settings.effects)).collect();
     let whole_forms = WholeForm::each(&with_effects, &last, &state.prepared);
-    let (remark, causes) = widen(&mut last, &whole_ties(&state, &with_effects, &twins, &whole_forms), policy);
+    let ties = whole_ties(&state, &with_effects, &twins, &whole_forms);
+    let (remark, causes) = widen(&mut last, &ties, policy);
     remarks.extend(remark);
     let mut found = found(&state, twins.into_iter().zip(first_states), (&with_effects, &last));
+    for (_, found) in found.iter_mut().filter(|(place, _)| place.is_some()) {
+        found.other_causes = other_causes(found, &ties, policy);
+    }
     whole_forms.iter().for_each(|whole| whole.widen_each(&mut found, &settings.effects));
     let left = what_is_left(&last, policy);
     if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
@@ -78,6 +77,7 @@ pub(crate) fn conclude(
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
     let is_total_delay = remarks.contains(&Remark::LagAlone);
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
+    basis.reasons.extend(effects_on_bounds(&with_effects));
     basis.reasons.extend(across.and_then(Across::reason));
     remarks.extend(across.and_then(Across::remark).filter(|_| verdict == Verdict::PartlyExplained));
     basis.reasons.extend(contradiction.as_ref().map(Contradiction::reason));
@@ -242,13 +242,17 @@ fn effects(state: &State<'_>) -> usize {
     state.taken.iter().filter(|t| !t.candidate.effect.is_noise()).count()
 }
 
-/// What the moves of the search ask to be said, once each.
-fn remarks_of(moves: &[Move]) -> Vec<Remark> {
+/// What the search asks to be said: its moves once each, a change too fast for a model, and how it was cut.
+fn remarks_of(state: &State<'_>) -> Vec<Remark> {
     let mut out: Vec<Remark> = Vec::new();
-    for remark in moves.iter().filter_map(Move::remark) {
+    for remark in state.moves.iter().filter_map(Move::remark) {
         if !out.contains(&remark) {
             out.push(remark);
         }
+    }
+    out.extend(state.rapid.as_ref().map(RapidVariation::remark));
+    if let Searched::Pieces { samples, is_screened } = state.searched {
+        out.push(Remark::SearchedInPieces { samples, all: state.prepared.observations.samples(), is_screened });
     }
     out
 }
@@ -268,6 +272,13 @@ fn found(
         (Some(index), name(index, taken, twins, first_state, (last, fit)))
     });
     defects.chain(rapid).chain(named).collect()
+}
+
+/// What the time constants are under other causes that explain the record as well as `found`, but for its exact twins.
+fn other_causes(found: &Found, ties: &[Tie], policy: &Policy) -> Vec<OtherCause> {
+    let is_twin = |tie: &&Tie| found.exact_twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == tie.other);
+    let of_this = ties.iter().filter(|tie| tie.named == (found.effect, found.fitted_in) && !is_twin(tie));
+    of_this.filter_map(|tie| tie.other_cause(policy)).collect()
 }
 
 /// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what
@@ -308,7 +319,10 @@ fn unless_wrong(verdict: Verdict, is_wrong: bool) -> Verdict {
 fn withhold_other_cases(effects: &mut [Found], is_whole: bool, is_given: bool) {
     if !is_given {
         // What they would be under another cause follows from both.
-        effects.iter_mut().for_each(|found| found.exact_twins.clear());
+        effects.iter_mut().for_each(|found| {
+            found.exact_twins.clear();
+            found.other_causes.clear();
+        });
     }
     let is_withheld = |found: &Found| !is_whole || found.judgements.iter().any(|j| j.grade == Grade::NoGo);
     for found in effects.iter_mut().filter(|found| is_withheld(found)) {
@@ -367,6 +381,16 @@ fn basis(
         _ => {}
     }
     basis
+}
+
+/// The effects, noise aside, of which the best fit lies on a bound. Standard errors of all other numbers of the model hold them there, so
+/// these are no estimates either.
+fn effects_on_bounds(last: &Fitted) -> impl Iterator<Item = Reason> {
+    let effects = last.model.effects.iter().enumerate().filter(|(_, effect)| !effect.is_noise());
+    let on_bounds = effects.filter(|(index, effect)| {
+        effect.parameters().iter().zip(last.model.range(*index)).any(|(parameter, at)| is_on_bound(parameter, at, last))
+    });
+    on_bounds.map(|(_, effect)| Reason::EffectOnBound { effect: effect.identifier(), channel: effect.channel() })
 }
 
 /// Whether the effects that were found explain the record. Of more of them than can be

@@ -110,6 +110,13 @@ pub enum Reason {
     },
     /// The best fit lies on a bound of it.
     OnBound,
+    /// The best fit of the model lies on a bound of one of its effects.
+    EffectOnBound {
+        /// The effect.
+        effect: Identifier,
+        /// Its channel, 0 or 1; `None` where it is of both.
+        channel: Option<usize>,
+    },
     /// The record contradicts what was given beforehand.
     Contradicted {
         /// What was given, as `T1 = 0.5 s`.
@@ -221,6 +228,7 @@ impl Reason {
             | Self::LeftOver
             | Self::LeftBehind { .. }
             | Self::OnBound
+            | Self::EffectOnBound { .. }
             | Self::SingleTone
             | Self::DoesNotTransfer { .. }
             | Self::RatioChanges { .. }
@@ -290,6 +298,18 @@ impl Reason {
             _ => String::new(),
         }
     }
+
+    /// What a bound says, as a clause; empty for any other reason.
+    fn of_bounds(&self) -> String {
+        match self {
+            Self::OnBound => "the best fit lies on a bound of it, so it is no estimate".into(),
+            Self::EffectOnBound { effect, channel } => format!(
+                "the best fit lies on a bound of the {effect}{}, so neither is what goes with it an estimate",
+                of_sensor(*channel)
+            ),
+            _ => String::new(),
+        }
+    }
 }
 
 /// So many records, in words.
@@ -339,7 +359,7 @@ impl fmt::Display for Reason {
                  its interval",
                 listed(effects, in_other_sensor)
             ),
-            Self::OnBound => f.write_str("the best fit lies on a bound of it, so it is no estimate"),
+            Self::OnBound | Self::EffectOnBound { .. } => f.write_str(&self.of_bounds()),
             Self::Contradicted { what, deviations, grade } => {
                 let so = if *grade == Grade::NoGo { "" } else { "right if that is so all the same: " };
                 let by = rounded(*deviations);
@@ -586,8 +606,12 @@ impl Basis {
     }
 }
 
+fn of_sensor(channel: Option<usize>) -> &'static str {
+    channel.map_or("", |channel| [" of T1", " of T2"][channel])
+}
+
 fn right_with(f: &mut fmt::Formatter<'_>, effect: Identifier, channel: Option<usize>) -> fmt::Result {
-    let place = channel.map_or("", |channel| [" of T1", " of T2"][channel]);
+    let place = of_sensor(channel);
     write!(f, "right if the cause is {effect}{place}: others explain the record as well and give another number")
 }
 

@@ -79,6 +79,7 @@ pub use judge::{Circumstances, Judgements};
 pub use limits::NEVER_TESTABLE;
 pub use moves::Move;
 pub use remark::Remark;
+pub use ties::OtherCause;
 pub use transfer::{EffectInChannel, LeftOut, Transfer};
 pub use twinlag_model::{
     About, Change, ChangePoint, Contradicted, Extended, Identifier, Instants, KnownEffect, KnownFit, KnownTimeConstant,

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use twinlag_cross_relation::{Z_975, log_normal_interval_95};
 use twinlag_model::{Defect, Derived, Fitted, Identifier, ModelFit, Parameter, Prepared, Shared, Value};
-use twinlag_optimise::{End, Scale};
+use twinlag_optimise::Scale;
 
-use crate::candidates::is_inside_bounds;
+use crate::candidates::is_on_bound;
 use crate::diagnosis::{Found, Masked};
 use crate::evidence::Evidence;
 use crate::first_state::FirstState;
@@ -80,6 +80,7 @@ pub(crate) fn name(
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives,
         exact_twins,
+        other_causes: Vec::new(),
         first_state,
         seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
         masked: Vec::new(),
@@ -147,6 +148,7 @@ pub(crate) fn of_rapid(variation: &RapidVariation) -> Found {
         evidence: Some(Evidence::of(&taken.candidate)),
         alternatives: Vec::new(),
         exact_twins: Vec::new(),
+        other_causes: Vec::new(),
         first_state: None,
         seen: Some(seen),
         masked: Vec::new(),
@@ -170,6 +172,7 @@ pub(crate) fn of_defect(defect: &Defect, prepared: &Prepared, last: &ModelFit) -
         evidence: None,
         alternatives: Vec::new(),
         exact_twins: Vec::new(),
+        other_causes: Vec::new(),
         first_state: None,
         seen: Some(seen),
         masked: Masked::runs(&defect.masked, &prepared.observations),
@@ -200,10 +203,7 @@ pub(crate) fn judge_effect(
     let (parameters, range) = (last.model.effects[effect].parameters(), last.model.range(effect));
     // What is derived from parameters has no scatter, nor has a noise, which no residual influences alone.
     let scatter = if found.effect.is_noise() { &[][..] } else { &fit.scatter[range.clone()] };
-    let has_ended_on = |at: usize| matches!(&last.end, End::OnBound(which) if which.contains(&at));
-    let is_on_bound = |index: usize| {
-        has_ended_on(range.start + index) || !is_inside_bounds(&parameters[index], last.theta[range.start + index])
-    };
+    let is_on_bound = |index: usize| is_on_bound(&parameters[index], range.start + index, last);
     let is_any_on_bound = (0..parameters.len()).any(is_on_bound);
     // Both time constants come first in a model.
     let hidden = |index: usize| {
@@ -234,6 +234,7 @@ pub(crate) fn judge_effect(
     }
     // What a twin follows from comes first.
     found.exact_twins.iter_mut().for_each(|twin| twin.widen(range.start, last, fit, circumstances));
+    found.other_causes.iter_mut().for_each(|other| other.widen(range.start, last, fit, circumstances));
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! What explains a record as well as what is named, and what the time constants are then.
 
-use twinlag_model::{Effort, Fitted, ModelFit, Policy, Prepared, Value, covariance};
+use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, Value, covariance};
 use twinlag_optimise::Scale;
 
+use crate::judge::Circumstances;
 use crate::naming::{hull, interval_95};
 use crate::remark::Remark;
 use crate::transfer::EffectInChannel;
-use crate::twins::ExactTwin;
+use crate::twins::{ExactTwin, further, widening};
 
 /// Relative change of an end of an interval that is worth a remark.
 const NOTICEABLE: f64 = 1e-3;
@@ -15,16 +16,49 @@ const DECISIVE: f64 = 0.5;
 
 /// An effect that explains the record as well as the one that is named.
 pub(crate) struct Tie {
-    named: EffectInChannel,
-    other: EffectInChannel,
+    pub(crate) named: EffectInChannel,
+    pub(crate) other: EffectInChannel,
     /// Both time constants and their difference if it is the cause.
     numbers: [Option<Estimate>; 3],
+}
+
+/// Another effect that explains a record as well as one that was found, and what the time constants are if it is the cause.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OtherCause {
+    /// The other effect.
+    pub effect: Identifier,
+    /// Its channel, 0 or 1; `None` where it is of both.
+    pub channel: Option<usize>,
+    /// Time constants of both sensors.
+    pub time_constants: [Value; 2],
+}
+
+impl OtherCause {
+    /// Makes its intervals wider by as much as those of the numbers of the model are, whichever of these is widened most.
+    ///
+    /// - `parameter`: place of the parameter of the effect that was found among all of the model `last`
+    pub(crate) fn widen(&mut self, parameter: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
+        let factors = [0, 1, parameter].map(|place| widening(place, last, fit, circumstances).unwrap_or(1.0));
+        let factor = factors.into_iter().fold(1.0, f64::max);
+        for number in &mut self.time_constants {
+            let value = number.value;
+            number.interval_95 = number.interval_95.map(|ends| ends.map(|end| further(value, end, factor, true)));
+        }
+    }
 }
 
 struct Estimate {
     value: f64,
     standard_error: f64,
     interval_95: [f64; 2],
+}
+
+impl Estimate {
+    /// Whether the record determines this time constant.
+    fn is_known(&self, policy: &Policy) -> bool {
+        self.standard_error > 0.0 && self.standard_error < policy.vague_log_std * self.value
+    }
 }
 
 impl Tie {
@@ -70,6 +104,26 @@ impl Tie {
         let [one, two] = &twin.time_constants;
         Self { named, other: (twin.effect, Some(twin.channel)), numbers: [one, two, &twin.difference].map(estimate) }
     }
+
+    /// The other cause in numbers; `None` where the record does not determine one of them, and of another form of the effect that is
+    /// named.
+    pub(crate) fn other_cause(&self, policy: &Policy) -> Option<OtherCause> {
+        let [one, two, _] = &self.numbers;
+        let number = |estimate: &Option<Estimate>| {
+            let known = estimate.as_ref().filter(|estimate| estimate.is_known(policy))?;
+            let (standard_error, interval_95) = (Some(known.standard_error), Some(known.interval_95));
+            Some(Value {
+                name: "time_constant".into(),
+                value: known.value,
+                standard_error,
+                interval_95,
+                unit: "s".into(),
+            })
+        };
+        let time_constants = [number(one)?, number(two)?];
+        let (effect, channel) = self.other;
+        (self.other != self.named).then_some(OtherCause { effect, channel, time_constants })
+    }
 }
 
 /// Widens the intervals of both time constants and of their difference, so that they hold whichever of the tied effects is
@@ -84,8 +138,10 @@ pub(crate) fn widen(
     for (i, number) in [one, two, &mut fit.difference].into_iter().enumerate() {
         let Some([low, high]) = number.interval_95_s else { continue };
         for Tie { named, other, numbers } in ties {
-            let Some(Estimate { value, standard_error, interval_95 }) = &numbers[i] else { continue };
-            if *standard_error > 0.0 && (i == 2 || *standard_error < policy.vague_log_std * value) {
+            let Some(estimate) = &numbers[i] else { continue };
+            let Estimate { value, standard_error, interval_95 } = estimate;
+            let is_known = if i == 2 { *standard_error > 0.0 } else { estimate.is_known(policy) };
+            if is_known {
                 let more = (low - interval_95[0]).max(0.0) + (interval_95[1] - high).max(0.0);
                 // Another form of the same effect is no other cause.
                 if i < 2 && more > NOTICEABLE * value && other != named {

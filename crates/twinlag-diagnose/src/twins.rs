@@ -74,10 +74,8 @@ impl ExactTwin {
             [(one, of_all), (two, of_all), (parameter, of_parameter), (difference, of_all)]
         {
             let value = number.value;
-            let further = |end: f64| {
-                if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
-            };
-            number.interval_95 = number.interval_95.map(|ends| ends.map(further));
+            number.interval_95 =
+                number.interval_95.map(|ends| ends.map(|end| further(value, end, factor, is_positive)));
         }
     }
 
@@ -124,8 +122,13 @@ pub(crate) fn cover_twins<'a>(
     }
 }
 
+/// An end of the interval of a value, `factor` times as far from it: of a positive number by its logarithm.
+pub(crate) fn further(value: f64, end: f64, factor: f64, is_positive: bool) -> f64 {
+    if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
+}
+
 /// Factor by which the interval of a number is wider with all that it has to cover; `None` of one without an interval.
-fn widening(place: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) -> Option<f64> {
+pub(crate) fn widening(place: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) -> Option<f64> {
     let value = last.theta[place];
     let half = Z_975 * fit.covariance.as_ref()?[place][place].max(0.0).sqrt();
     let between = fit.between.as_ref().and_then(|between| between.parameters[place].as_ref());

@@ -93,19 +93,25 @@ fn best(plan: &Plan) -> Option<String> {
     let what = &record.description;
     Some(if !now.is_finite() {
         format!(
-            "gas and sensors: {what} determines both time constants, the less certain one within {:.1} %",
-            100.0 * least
+            "gas and sensors: {what} determines both time constants, the less certain one within {}",
+            percent(least)
         )
     } else if least < (1.0 - NOTICEABLE_SHARE) * now {
         format!(
-            "gas and sensors: {what} helps most: the less certain time constant has a standard error of {:.2} % instead of \
-             {:.2} %",
-            100.0 * least,
-            100.0 * now
+            "gas and sensors: {what} helps most: the less certain time constant has a standard error of {} instead of {}",
+            percent(least),
+            percent(now)
         )
     } else {
         "gas and sensors: none of the changes narrows the wider interval by a tenth".into()
     })
+}
+
+/// A share in per cent, with two significant digits.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let decimals = (1.0 - percent.log10().floor()).max(0.0) as usize;
+    format!("{percent:.decimals$} %")
 }
 
 /// What breaks a tie.

@@ -36,8 +36,8 @@ pub enum PlanError {
     )]
     NotSaved { what: &'static str },
     #[error(
-        "the model has no spectrum of the gas, as it is for several records, unevenly sampled ones, those with gaps, and those of more \
-         than 65536 samples: diagnose an unbroken part of one record, or describe the rig"
+        "the model has no spectrum of the gas, as it is for unevenly sampled records, those without an unbroken part of 64 samples, and those of \
+         more than 65536 samples: diagnose a part of the record, or describe the rig"
     )]
     NoSpectrum,
     #[error("the model has {what} {got}: expected a finite number above 0")]

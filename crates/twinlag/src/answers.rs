@@ -17,7 +17,7 @@ pub use characterisation::{
     SecondLag, SensorEstimate, Status,
 };
 pub use compensation::{Compensation, Quality};
-pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedEffect, NamedLimit, NamedTwin};
+pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedCause, NamedEffect, NamedLimit, NamedTwin};
 pub use found_in::FoundIn;
 pub use gas_spectrum::{GasBand, GasSpectrum};
 pub use model::{Model, ModelEffect, ModelNumber};

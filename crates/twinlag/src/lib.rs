@@ -87,7 +87,7 @@ mod watch;
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
     ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, IntervalMethod, LeftOutUnit,
-    MadeBy, Model, ModelEffect, ModelNumber, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
+    MadeBy, Model, ModelEffect, ModelNumber, NamedCause, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
     PlausibleTimeConstant, Quality, Ratio, RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag,
     SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };

@@ -42,28 +42,32 @@ impl Page<'_> {
         if let Some(figure) = self.time_constant_figure() {
             document = document.drawing(
                 figure,
-                "Both time constants under each alternative, with their 95 % intervals: each model, and each cause that no record \
-                 distinguishes from one that was found.",
+                "Both time constants under each alternative, with their 95 % intervals: each model, and each other cause that explains \
+                 the record as well as one that was found.",
             )?;
         }
         Ok(document)
     }
 
-    /// Time constants under each model, and under each cause that would look exactly the same.
+    /// Time constants under each model, and under each other cause that explains the record as well.
     fn time_constant_figure(&self) -> Option<Figure> {
         let columns = self.columns();
-        let twins = || self.answer.effects.iter().flat_map(|effect| &effect.exact_twins);
+        let effects = &self.answer.effects;
+        let twins = effects.iter().flat_map(|effect| &effect.exact_twins).map(|twin| (&twin.of, &twin.time_constants));
+        let others =
+            effects.iter().flat_map(|effect| &effect.other_causes).map(|other| (&other.of, &other.time_constants));
+        let causes: Vec<_> = twins.chain(others).collect();
         let mut figure = None;
         for k in 0..2 {
             let of_models = columns.iter().map(|m| {
                 let sensor = &m.answer.sensors[k];
                 (m.name.to_owned(), sensor.time_constant_s, sensor.interval_95_s)
             });
-            let of_twins = twins().map(|twin| {
-                let tau = &twin.time_constants[k];
-                (format!("if it is {}", words(twin.of.effect)), Some(tau.value), tau.interval_95)
+            let of_causes = causes.iter().map(|(of, time_constants)| {
+                let tau = &time_constants[k];
+                (format!("if it is {}", words(of.effect)), Some(tau.value), tau.interval_95)
             });
-            let all = of_models.chain(of_twins).filter(|(_, value, _)| value.is_some());
+            let all = of_models.chain(of_causes).filter(|(_, value, _)| value.is_some());
             let of: Vec<(String, Option<f64>, Option<[f64; 2]>)> = all.collect();
             // One alone has nothing to be compared with.
             if of.len() < 2 {

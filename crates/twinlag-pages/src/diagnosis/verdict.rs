@@ -1,7 +1,7 @@
 //! What a diagnosis says in short: verdict, effects, the record.
 
 use twinlag::diagnosis::{Grade, Identifier, Judgement, Value, Verdict};
-use twinlag::{NamedEffect, NamedTwin, SensorEstimate};
+use twinlag::{NamedCause, NamedEffect, NamedTwin, SensorEstimate};
 use twinlag_report::{Document, KeyNumber, ReportError, Table, Tone, rounded};
 
 use super::Page;
@@ -179,11 +179,20 @@ fn masked(document: Document, found: &NamedEffect) -> Document {
 
 /// An effect that no record distinguishes, with the numbers if it is the cause.
 fn twin(twin: &NamedTwin) -> String {
-    let number =
-        |number: &Value| format!("{} {}", number.name, with_interval(number.value, number.interval_95, &number.unit));
-    let [one, two] = &twin.time_constants;
+    let [one, two] = twin.time_constants.each_ref().map(in_words);
     let what = format!("{} in {}", words(twin.of.effect), place(twin.of.channel.as_ref()));
-    format!("{what}, with {}; {}; {}", number(&twin.parameter), number(one), number(two))
+    format!("{what}, with {}; {one}; {two}", in_words(&twin.parameter))
+}
+
+/// Another cause with the time constants that it means.
+fn other_cause(other: &NamedCause) -> String {
+    let [one, two] = other.time_constants.each_ref().map(in_words);
+    format!("{} in {}, with {one}; {two}", words(other.of.effect), place(other.of.channel.as_ref()))
+}
+
+/// A number with its name and its interval.
+fn in_words(number: &Value) -> String {
+    format!("{} {}", number.name, with_interval(number.value, number.interval_95, &number.unit))
 }
 
 /// What is said of an effect.
@@ -195,6 +204,8 @@ fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
     facts.push(("What was found", sentence(&seen.collect::<Vec<_>>().join("; "))));
     facts.push(("What to do", sentence(about.advice)));
     facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
+    let others: Vec<String> = found.other_causes.iter().map(other_cause).collect();
+    facts.push(("With one of these instead", others.join("; ")));
     let twins: Vec<String> = found.exact_twins.iter().map(twin).collect();
     facts.push(("Would look exactly the same", twins.join("; ")));
     facts.push((

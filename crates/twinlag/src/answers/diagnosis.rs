@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize, Serializer};
 use twinlag_diagnose::{
     BeforeAfter, Diagnosis as Core, ErrorBudget, Evidence, ExactTwin, FirstState, Found, Grade, Identifier, IfKnown,
-    Judgement, Limit, Masked, Move, Policy, Unexplained, Value, Verdict,
+    Judgement, Limit, Masked, Move, OtherCause, Policy, Unexplained, Value, Verdict,
 };
 
 use crate::answers::{
@@ -53,6 +53,9 @@ pub struct NamedEffect {
     /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     #[serde(default)]
     pub exact_twins: Vec<NamedTwin>,
+    /// Those of the other effects with which the record determines both time constants; nothing where these are not given.
+    #[serde(default)]
+    pub other_causes: Vec<NamedCause>,
     /// Both cases of the first state of the slow body that it holds; `None` where it holds none, or more than noise is left over.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_state: Option<FirstState>,
@@ -88,6 +91,7 @@ impl NamedEffect {
             evidence: found.evidence,
             alternatives: found.alternatives.clone(),
             exact_twins: found.exact_twins.iter().map(|twin| NamedTwin::of(twin, channels)).collect(),
+            other_causes: found.other_causes.iter().map(|other| NamedCause::of(other, channels)).collect(),
             first_state: found.first_state.clone(),
             seen: found.seen.clone(),
             masked: found.masked.clone(),
@@ -114,9 +118,35 @@ impl NamedTwin {
         Self {
             of: EffectInPlace { effect: twin.effect, channel: Some(channels[twin.channel].clone()) },
             parameter: twin.parameter.clone(),
-            time_constants: [0, 1].map(|i| Value { name: channels[i].clone(), ..twin.time_constants[i].clone() }),
+            time_constants: by_name(&twin.time_constants, channels),
         }
     }
+}
+
+/// An effect that explains the record as well as one that was found, and both time constants if it is the cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[non_exhaustive]
+pub struct NamedCause {
+    /// The effect, with its channel.
+    #[serde(flatten)]
+    pub of: EffectInPlace,
+    /// Time constants of both sensors, by the names of the channels.
+    pub time_constants: [Value; 2],
+}
+
+impl NamedCause {
+    fn of(other: &OtherCause, channels: &[String; 2]) -> Self {
+        Self {
+            of: EffectInPlace { effect: other.effect, channel: other.channel.map(|i| channels[i].clone()) },
+            time_constants: by_name(&other.time_constants, channels),
+        }
+    }
+}
+
+/// Time constants by the names of their channels.
+fn by_name(time_constants: &[Value; 2], channels: &[String; 2]) -> [Value; 2] {
+    [0, 1].map(|i| Value { name: channels[i].clone(), ..time_constants[i].clone() })
 }
 
 /// What the search would have seen of an effect that it did not find, with the name of its channel.

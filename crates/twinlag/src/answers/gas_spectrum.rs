@@ -1,8 +1,12 @@
 //! The spectrum of the gas that a record shows, in bands: what a record to come may expect.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use twinlag_diagnose::Line;
 use twinlag_transform::{Complex64, Tapered, hann};
+
+use crate::bands::median;
 
 /// Fewest samples of a usable spectrum.
 const MIN_SAMPLES: usize = 64;
@@ -38,8 +42,9 @@ pub struct GasBand {
 }
 
 impl GasSpectrum {
-    /// The spectrum of a line: its tapered periodogram (Hann), bin by bin `2 |X|² / (n Σ w²)`, scaled so that all bands together
-    /// have the variance of the values. `None` where values are missing, are not evenly spaced or do not change, or are fewer than 64.
+    /// The spectrum of the longest evenly spaced part of a line, which for several records is the longest of them: its tapered
+    /// periodogram (Hann), bin by bin `2 |X|² / (n Σ w²)`, scaled so that all bands together have the variance of the values. `None`
+    /// where values are missing or do not change in it, or are fewer than 64.
     ///
     /// ```
     /// use twinlag::GasSpectrum;
@@ -57,14 +62,13 @@ impl GasSpectrum {
     /// assert!(near.map(|band| band.power_k2).sum::<f64>() > 0.999 * power_k2);
     /// ```
     pub fn of(line: &Line) -> Option<Self> {
-        let (time_s, values) = (&line.time_s, &line.value);
-        let n = values.len();
-        if n < MIN_SAMPLES || n != time_s.len() || !values.iter().all(|v| v.is_finite()) {
+        if line.time_s.len() != line.value.len() {
             return None;
         }
-        let period_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
-        let is_even = |pair: &[f64]| (pair[1] - pair[0] - period_s).abs() <= MAX_UNEVEN_SHARE * period_s;
-        if !time_s.windows(2).all(is_even) {
+        let (part, period_s) = longest_even_part(&line.time_s);
+        let values = &line.value[part];
+        let n = values.len();
+        if n < MIN_SAMPLES || !values.iter().all(|v| v.is_finite()) {
             return None;
         }
         let mean_c = values.iter().sum::<f64>() / n as f64;
@@ -88,5 +92,39 @@ impl GasSpectrum {
             from = to;
         }
         Some(Self { mean_c, bands })
+    }
+}
+
+/// The longest run of times whose steps are the median one, and that step, s.
+fn longest_even_part(time_s: &[f64]) -> (Range<usize>, f64) {
+    let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let period_s = median(steps_s.clone());
+    let is_uneven = |step_s: &f64| (step_s - period_s).abs() > MAX_UNEVEN_SHARE * period_s;
+    let (mut longest, mut from) = (0..0, 0);
+    for part in steps_s.split(is_uneven) {
+        let to = (from + part.len() + 1).min(time_s.len());
+        if to - from > longest.len() {
+            longest = from..to;
+        }
+        from = to;
+    }
+    (longest, period_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two records, one after the other: the longer one counts, at the end as at the beginning.
+    #[test]
+    fn the_longest_unbroken_part_counts() {
+        let times = |from_s: f64, count: usize| (0..count).map(move |k| from_s + 0.01 * k as f64);
+        let shorter_first: Vec<f64> = times(0.0, 80).chain(times(5.0, 120)).collect();
+        let (part, period_s) = longest_even_part(&shorter_first);
+        assert_eq!(part, 80..200);
+        assert!((period_s - 0.01).abs() < 1e-12);
+        let longer_first: Vec<f64> = times(0.0, 120).chain(times(0.5, 80)).collect();
+        assert_eq!(longest_even_part(&longer_first).0, 0..120);
+        assert_eq!(longest_even_part(&[]).0, 0..0);
     }
 }

@@ -314,9 +314,13 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
     if !(window_s >= least_s && window_s <= span_s) {
         return Err(Error::Setting {
             setting: Setting::Window,
-            expected: format!(
-                "seconds from {least_s:.4} ({SHORTEST_WINDOW} samples) to {span_s:.4}, the record's length"
-            ),
+            expected: if least_s > span_s {
+                format!(
+                    "none: the record of {span_s:.4} s is shorter than the shortest window, {SHORTEST_WINDOW} samples or {least_s:.4} s"
+                )
+            } else {
+                format!("seconds from {least_s:.4} ({SHORTEST_WINDOW} samples) to {span_s:.4}, the record's length")
+            },
             got: window_s.to_string(),
             also: Vec::new(),
         });

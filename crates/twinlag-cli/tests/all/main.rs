@@ -1,0 +1,19 @@
+//! All tests of `twinlag-cli` in one program: linked once, and run side by side.
+
+mod agreement;
+mod bad_input;
+mod batch;
+mod common;
+mod compensate;
+mod contract;
+mod diagnose;
+mod documents;
+mod explain;
+mod inspect;
+mod live;
+mod manners;
+mod plan;
+mod plausibility;
+mod saved_models;
+mod schemas;
+mod study;

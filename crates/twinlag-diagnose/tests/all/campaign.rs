@@ -1,0 +1,212 @@
+//! Several records of one rig: what they share, what is of each, and what is worth nothing on a record that was left out.
+
+use std::ops::ControlFlow;
+
+use crate::common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
+use twinlag_diagnose::{
+    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Policy, Settings, Verdict,
+    diagnose_records,
+};
+use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Tone, Turbulence};
+
+fn joint(records: &[Observations]) -> JointDiagnosis {
+    diagnose_records(records, &Settings::default(), &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
+}
+
+/// Effects with the channels that they are of.
+fn named(joint: &JointDiagnosis) -> Vec<(Identifier, Option<usize>)> {
+    joint.diagnosis.effects.iter().map(|effect| (effect.effect, effect.channel)).collect()
+}
+
+/// Normalised residuals of records that were left out are those of noise: their root mean square over some thousand samples is 1 within
+/// two per cent, and noise levels from third differences are as uncertain.
+const MAX_NOISE_RMS: f64 = 1.06;
+
+/// The film's temperature is made of the gas of each record: of the record that is left out as well, which had no part in the estimate.
+#[test]
+fn time_constants_that_follow_the_film_do_so_in_a_record_that_was_left_out() {
+    const EXPONENT: f64 = -1.8;
+    let of = |seed: u64| {
+        let gas = Signal::Turbulence(Turbulence { std_k: 60.0, corner_hz: 2.4, cutoff_hz: 200.0 });
+        let film = TemperatureDependence::of_film(EXPONENT, 300.0);
+        let follow = |sensors: &mut [Sensor; 2]| sensors.iter_mut().for_each(|s| s.temperature_dependence = Some(film));
+        let simulated = readings(seed, gas, follow);
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let joint = joint(&[of(SEED), of(SEED + 1)]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::TEMPERATURE_DEPENDENT_TIME_CONSTANT, None)], "{told}");
+    let rms = joint.transfer.normalised_rms;
+    assert!(rms.before > 1.3 && rms.after < MAX_NOISE_RMS, "{rms:?}: {told}");
+}
+
+/// Noise of one record three times that of the others: each has its own levels, residuals are those of noise in each, and none
+/// contradicts.
+#[test]
+fn records_with_noise_of_their_own_agree() {
+    let of = |seed: u64, noise_k: f64| {
+        record(seed, |sensors| {
+            sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(noise_k)));
+            sensors[1].second_time_constant_s = Some(0.018);
+        })
+    };
+    let joint = joint(&[of(SEED, NOISE_K), of(SEED + 1, 3.0 * NOISE_K), of(SEED + 2, NOISE_K)]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::SECOND_ORDER, Some(1))], "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+    for (record, want_k) in joint.records.iter().zip([NOISE_K, 3.0 * NOISE_K, NOISE_K]) {
+        assert!(record.disagreements.is_empty(), "{:?}", record.disagreements);
+        assert!(record.left_out.normalised_rms.after < MAX_NOISE_RMS, "{:?}", record.left_out);
+        // Those of 3000 samples are known to two and a half per cent: four of these.
+        assert!(record.noise_std_k.iter().all(|k| (k / want_k - 1.0).abs() < 0.1), "{:?}", record.noise_std_k);
+    }
+}
+
+/// A delay of 12 samples in records of 500: one of them by itself reaches over 10 samples, and two together over 20.
+#[test]
+fn a_long_delay_is_one_of_every_record() {
+    const DELAY_S: f64 = 0.012;
+    const SHORT: usize = 500;
+    let of = |seed: u64| {
+        let simulated = readings(seed, turbulence(), |sensors| sensors[1].delay_s = DELAY_S);
+        even(simulated.t1_c[..SHORT].to_vec(), simulated.t2_c[..SHORT].to_vec()).expect("finite and long")
+    };
+    let all: Vec<Observations> = (0..3).map(|k| of(SEED + k)).collect();
+    let joint = joint(&all);
+    let told = told(&joint.diagnosis);
+    assert_eq!(named(&joint), [(Identifier::DELAY, Some(1))], "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+    assert!(joint.records.iter().all(|record| record.agrees == Some(true)), "{told}");
+    assert!(joint.transfer.normalised_rms.after < MAX_NOISE_RMS, "{:?}", joint.transfer);
+}
+
+/// Which of six records contradict the others, where the last has a rig of its own. What records differ is known from the others alone:
+/// of four it takes a hundred standard errors to be sure, of six 15.
+fn disagreeing(change_last: impl Fn(&mut [Sensor; 2])) -> (JointDiagnosis, Vec<bool>) {
+    let mut all: Vec<Observations> = (0..5).map(|k| record(SEED + k, |_| ())).collect();
+    all.push(record(SEED + 5, |sensors| change_last(sensors)));
+    let joint = joint(&all);
+    let disagreeing: Vec<bool> = joint.records.iter().map(|record| !record.disagreements.is_empty()).collect();
+    for (record, disagrees) in joint.records.iter().zip(&disagreeing) {
+        assert_eq!(record.agrees == Some(false), *disagrees, "{:?}", record.agrees);
+    }
+    (joint, disagreeing)
+}
+
+/// Two records do not say how much records of the rig differ. They are explained without the one of another sensor, which is explained
+/// alone, and with it no two are.
+#[test]
+fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
+    let told = told(&joint.diagnosis);
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+    let rms = joint.records[2].left_out.normalised_rms.after;
+    assert!(rms > 1.0 + Policy::default().left_out_rms_margin, "{rms}");
+    // Its time constant and theirs, each within four standard errors.
+    let [of_t2] = &joint.records[2].disagreements[..] else { panic!("{:?}", joint.records[2].disagreements) };
+    let Contradicted { own, others, others_error, .. } = of_t2.values;
+    assert_eq!((of_t2.name.as_str(), own.record), ("T2", 2));
+    assert!((own.value - 1.15 * TAU_S[1]).abs() < 4.0 * own.standard_error, "{own:?}");
+    assert!((others - TAU_S[1]).abs() < 4.0 * others_error, "{others} ± {others_error} s");
+}
+
+/// A sensor of 50 ms among records of one of 45 ms leaves a residual that looks like gas which both sensors do not share. No record left
+/// out shows such gas, so it is taken out, and the record is named.
+#[test]
+fn a_record_of_another_rig_is_no_noise() {
+    let of = |seed: u64, second_s: f64| {
+        let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 5.0, cutoff_hz: 200.0 });
+        let simulated = readings(seed, gas, |sensors| sensors[1].time_constant_s = second_s);
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let joint = joint(&[of(1, 0.045), of(2, 0.045), of(4, 0.050)]);
+    let told = told(&joint.diagnosis);
+    assert!(joint.diagnosis.moves.iter().any(|m| matches!(m, Move::Withdraw { .. })), "{told}");
+    assert!(joint.diagnosis.effects.iter().all(|found| !found.effect.is_noise()), "{told}");
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+}
+
+/// Of two records that differ either may be the odd one.
+#[test]
+fn of_two_records_none_is_named() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let joint = joint(&[record(SEED, |_| ()), of_another]);
+    let told = told(&joint.diagnosis);
+    assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{told}");
+    // Together they look as if the gas were not the same: that is no cause, and nothing is explained by it.
+    assert_eq!(joint.diagnosis.verdict, Verdict::Unexplained, "{told}");
+    for (record, second_s) in joint.records.iter().zip([TAU_S[1], 1.15 * TAU_S[1]]) {
+        let [of_t2] = &record.disagreements[..] else { panic!("{:?}", record.disagreements) };
+        let OwnValue { value, standard_error, .. } = of_t2.values.own;
+        assert!((value - second_s).abs() < 4.0 * standard_error, "{value} ± {standard_error} s");
+    }
+}
+
+/// A gain of one record is no drift of all of them: the record is named, with what it shows alone.
+#[test]
+fn what_an_odd_record_shows_alone_is_said() {
+    let of_another = record(SEED + 2, |sensors| sensors[1].gain = 1.02);
+    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
+    let told = told(&joint.diagnosis);
+    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+    let alone = joint.records[2].found_alone.as_deref().expect("it was looked at");
+    assert_eq!(alone, [(Identifier::CALIBRATION, Some(1))], "{told}");
+    assert!(
+        joint.records[0].found_alone.is_none() && named(&joint).iter().all(|e| e.0 == Identifier::CALIBRATION),
+        "{told}"
+    );
+}
+
+/// Someone exchanged the second sensor before the last record: that one is named, with its time constant.
+#[test]
+fn a_record_of_another_sensor_is_named() {
+    let (joint, disagreeing) = disagreeing(|sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(disagreeing, [false, false, false, false, false, true], "{told}");
+    assert!(joint.records[5].disagreements.iter().any(|d| d.name == "T2"), "{:?}", joint.records[5].disagreements);
+    assert_ne!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
+}
+
+/// One record has a delay that the others have not: it contradicts them on what is made of it, and they do not contradict each other.
+#[test]
+fn what_one_record_alone_has_is_told_by_that_record() {
+    let (joint, disagreeing) = disagreeing(|sensors| sensors[1].delay_s = 3.0 * PERIOD_S);
+    let told = told(&joint.diagnosis);
+    assert_ne!(joint.diagnosis.verdict, Verdict::Explained, "{told}");
+    assert_eq!(disagreeing, [false, false, false, false, false, true], "{told}");
+}
+
+/// A reference junction that is warmer in each record: the calibration is none of the rig, though a fit of all records together finds
+/// something for the rest.
+#[test]
+fn an_offset_of_each_record_is_no_cause_of_all() {
+    let of = |k: u32| {
+        record(SEED + u64::from(k), |sensors| {
+            sensors[1].gain = 1.01;
+            sensors[1].offset_k = -0.5 - 0.6 * f64::from(k);
+        })
+    };
+    let joint = joint(&(0..4).map(of).collect::<Vec<_>>());
+    let told = told(&joint.diagnosis);
+    assert!(!matches!(joint.diagnosis.verdict, Verdict::Adequate | Verdict::Explained), "{told}");
+    assert!(joint.diagnosis.judgements.time_constants.iter().all(|judgement| judgement.grade == Grade::NoGo), "{told}");
+    assert!(joint.records.iter().all(|record| record.agrees != Some(true)), "{told}");
+}
+
+/// A gas of one tone in one record, and of many in the others: two equations more.
+#[test]
+fn one_record_of_a_single_tone_refuses_no_others() {
+    let tone = Signal::Sine(Tone { amplitude_k: 20.0, frequency_hz: 4.0, phase_rad: 0.3 });
+    let simulated = readings(SEED, tone, |_| {});
+    let tone = even(simulated.t1_c, simulated.t2_c).expect("finite and long");
+    let others = [SEED + 1, SEED + 2].map(|seed| record(seed, |_| {}));
+    let [one, two] = others;
+    let joint = joint(&[one, two, tone]);
+    let told = told(&joint.diagnosis);
+    assert_eq!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
+    recovers(&joint.diagnosis.last, TAU_S, &told);
+}

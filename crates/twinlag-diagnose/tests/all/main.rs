@@ -1,0 +1,11 @@
+//! All tests of `twinlag-diagnose` in one program: linked once, and run side by side.
+
+mod campaign;
+mod closed_loop;
+mod common;
+mod covered;
+mod first_state;
+mod flow;
+mod motion;
+mod records;
+mod reduced;

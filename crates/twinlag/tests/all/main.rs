@@ -1,0 +1,11 @@
+//! All tests of `twinlag` in one program: linked once, and run side by side.
+
+mod common;
+mod curvature;
+mod grades;
+mod intervals;
+mod missing;
+mod noise_levels;
+mod second_order;
+mod several_records;
+mod stream;

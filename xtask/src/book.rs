@@ -1,0 +1,59 @@
+//! The book as its readers see it, and whether what it links to is there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use mdbook_driver::MDBook;
+use pulldown_cmark::{Event, Parser, Tag};
+
+use crate::root;
+
+/// Pages beside the book that link into it.
+const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+
+/// Builds the book into `out` and follows every relative link of it and of the pages beside it.
+///
+/// # Errors
+/// The first page with a link to a file that is not there, or to a heading that the built page does not have.
+pub(crate) fn run(out: &Path) -> Result<()> {
+    let mut book = MDBook::load(root()?.join("docs"))?;
+    out.clone_into(&mut book.config.build.build_dir);
+    book.build()?;
+    let source = book.source_dir();
+    let mut pages: Vec<PathBuf> =
+        BESIDE.iter().map(|name| root().map(|root| root.join(name))).collect::<Result<_>>()?;
+    for entry in fs::read_dir(&source)? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|e| e == "md") {
+            pages.push(path);
+        }
+    }
+    let mut count = 0;
+    for page in &pages {
+        let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
+        for event in Parser::new(&text) {
+            let Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) = event else { continue };
+            if !dest_url.contains("://") {
+                follow(&dest_url, page, &source, out).with_context(|| format!("{}: {dest_url}", page.display()))?;
+                count += 1;
+            }
+        }
+    }
+    println!("== book: {}; {count} links in {} pages lead to something", out.display(), pages.len());
+    Ok(())
+}
+
+/// Whether a link of a page leads to a file and, where that is a page of the book, to a heading of it.
+fn follow(link: &str, page: &Path, source: &Path, out: &Path) -> Result<()> {
+    let (file, heading) = link.split_once('#').map_or((link, None), |(file, heading)| (file, Some(heading)));
+    let target =
+        if file.is_empty() { page.to_owned() } else { page.parent().context("a page has a folder")?.join(file) };
+    ensure!(target.exists(), "there is no such file");
+    let built =
+        target.canonicalize()?.strip_prefix(source.canonicalize()?).map(|name| out.join(name).with_extension("html"));
+    let (Some(heading), Ok(built)) = (heading, built) else { return Ok(()) };
+    let html = fs::read_to_string(&built).with_context(|| format!("{}", built.display()))?;
+    ensure!(html.contains(&format!("id=\"{heading}\"")), "the page has no such heading");
+    Ok(())
+}
