@@ -12,11 +12,12 @@ use crate::root;
 /// Pages beside the book that link into it.
 const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
 
-/// Builds the book into `out` and follows every relative link of it and of the pages beside it.
+/// Builds the book into `target/book` and follows every relative link of it and of the pages beside it.
 ///
 /// # Errors
-/// The first page with a link to a file that is not there, or to a heading that the built page does not have.
-pub(crate) fn run(out: &Path) -> Result<()> {
+/// The first page with a link to a file that is not there, to one that is no page of the book, or to a heading that its page does not have.
+pub(crate) fn run() -> Result<()> {
+    let out = &root()?.join("target/book");
     let mut book = MDBook::load(root()?.join("docs"))?;
     out.clone_into(&mut book.config.build.build_dir);
     book.build()?;
@@ -34,7 +35,7 @@ pub(crate) fn run(out: &Path) -> Result<()> {
         let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
         for event in Parser::new(&text) {
             let Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) = event else { continue };
-            if !dest_url.contains("://") {
+            if !dest_url.contains("://") && !dest_url.starts_with("mailto:") {
                 follow(&dest_url, page, &source, out).with_context(|| format!("{}: {dest_url}", page.display()))?;
                 count += 1;
             }
@@ -50,9 +51,12 @@ fn follow(link: &str, page: &Path, source: &Path, out: &Path) -> Result<()> {
     let target =
         if file.is_empty() { page.to_owned() } else { page.parent().context("a page has a folder")?.join(file) };
     ensure!(target.exists(), "there is no such file");
-    let built =
-        target.canonicalize()?.strip_prefix(source.canonicalize()?).map(|name| out.join(name).with_extension("html"));
-    let (Some(heading), Ok(built)) = (heading, built) else { return Ok(()) };
+    let Ok(name) = target.canonicalize()?.strip_prefix(source.canonicalize()?).map(|name| out.join(name)) else {
+        return Ok(());
+    };
+    let built = if name.extension().is_some_and(|e| e == "md") { name.with_extension("html") } else { name };
+    ensure!(built.exists(), "the book has no such page");
+    let Some(heading) = heading else { return Ok(()) };
     let html = fs::read_to_string(&built).with_context(|| format!("{}", built.display()))?;
     ensure!(html.contains(&format!("id=\"{heading}\"")), "the page has no such heading");
     Ok(())

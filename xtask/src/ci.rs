@@ -12,10 +12,9 @@ use crate::{book, report, root};
 const OLDEST: &str = "1.89";
 const WASM: &str = "wasm32-unknown-unknown";
 
-/// Runs what must hold.
+/// Runs the checks of every change; with `full`, those of a release.
 ///
 /// - `tested`: whether the tests are known to pass, and are left out
-/// - `full`: features one by one, the oldest compiler, a machine without an operating system, and reports in a browser as well
 pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     if !tested {
         step("tests", "cargo", &["test", "--workspace"])?;
@@ -39,7 +38,7 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     let start = Instant::now();
     crate::experiment::quick(&quick)?;
     println!("== experiments, a trial in each cell: {:.0} s", start.elapsed().as_secs_f64());
-    book::run(&root()?.join("target/book"))?;
+    book::run()?;
     if full {
         features()?;
         toolchains()?;

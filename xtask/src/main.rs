@@ -11,7 +11,7 @@ mod measured;
 mod profile;
 mod report;
 
-use std::path::{Path, PathBuf, absolute};
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
@@ -26,22 +26,18 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Task {
-    /// Everything that must hold before a change lands: tests, format, lints, documentation, quick runs.
+    /// What must hold before a change lands: tests, format, lints, documentation, quick runs.
     Ci {
         /// Leaves the tests out: they have just been run.
         #[arg(long)]
         tested: bool,
-        /// Features one by one, the oldest compiler and a machine without an operating system as well, where they are installed, and
-        /// reports in a browser: that takes Chromium and Node.js.
+        /// What must hold before a release as well: features one by one, the oldest compiler and WebAssembly where they are installed,
+        /// a profile, and reports in a browser, which takes Chromium and Node.js.
         #[arg(long)]
         full: bool,
     },
-    /// Builds the book and follows its links.
-    Book {
-        /// The folder for its pages.
-        #[arg(long, value_name = "DIR", default_value = "target/book")]
-        out: PathBuf,
-    },
+    /// Builds the book into `target/book` and follows its links.
+    Book,
     /// Runs every record of a folder of measured data and holds what is found against what is known of them.
     Measured {
         /// The folder. It is no part of the repository.
@@ -82,7 +78,7 @@ fn main() -> ExitCode {
     twinlag_memory::give_back_large();
     let result = match Arguments::parse().task {
         Task::Ci { tested, full } => ci::run(tested, full),
-        Task::Book { out } => absolute(out).map_err(Into::into).and_then(|out| book::run(&out)),
+        Task::Book => book::run(),
         Task::Measured { dir, campaigns, write } => measured::run(&dir, campaigns.as_deref(), write),
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),

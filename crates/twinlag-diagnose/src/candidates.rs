@@ -12,6 +12,7 @@ use twinlag_model::{
 };
 use twinlag_optimise::{End, Scale, Variable};
 
+use crate::grade::Reason;
 use crate::long::is_long;
 use crate::rank::{Kind, Score, threshold};
 
@@ -102,11 +103,19 @@ impl Candidate {
 
     /// Whether every parameter of an effect, noise left out, lies inside its bounds.
     pub(crate) fn is_clear_of_bounds(&self) -> bool {
-        let model = &self.fitted.model;
-        let effects = model.effects.iter().enumerate().filter(|(_, e)| !e.is_noise());
-        let mut values = effects.flat_map(|(i, e)| e.parameters().iter().zip(&self.fitted.theta[model.range(i)]));
-        values.all(|(parameter, value)| is_inside_bounds(parameter, *value))
+        effects_on_bounds(&self.fitted).next().is_none()
     }
+}
+
+/// The effects, noise aside, of which the best fit lies on a bound. Standard errors of all other numbers of the model hold them there, so
+/// these are no estimates either.
+pub(crate) fn effects_on_bounds(fitted: &Fitted) -> impl Iterator<Item = Reason> {
+    let effects = fitted.model.effects.iter().enumerate().filter(|(_, effect)| !effect.is_noise());
+    let on_bounds = effects.filter(|(index, effect)| {
+        let mut places = effect.parameters().iter().zip(fitted.model.range(*index));
+        places.any(|(parameter, at)| is_on_bound(parameter, at, fitted))
+    });
+    on_bounds.map(|(_, effect)| Reason::EffectOnBound { effect: effect.identifier(), channel: effect.channel() })
 }
 
 /// Whether a parameter of an effect lies on a bound of it in a fit.
@@ -491,5 +500,40 @@ impl<'a> Search<'a> {
         });
         let best = points.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a grid has points");
         model.fit(&best.1, observations, selection, Effort::Look)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use twinlag_model::Stretch;
+    use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
+
+    use super::*;
+    use crate::diagnose::searched;
+    use crate::grade::Grade;
+
+    /// A second lag that is found, and the same fit with it on its upper bound: nothing of that is an estimate.
+    #[test]
+    fn an_effect_on_its_bound_leaves_no_estimate() {
+        let mut sensors = [0.012, 0.060].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.1)));
+        sensors[1].second_time_constant_s = Some(0.018);
+        let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 });
+        let rig = Rig::new(20, Record::new(2000, 0.001), Gas::new(300.0, gas), sensors).expect("a rig");
+        let record = rig.simulate().expect("a record");
+        let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+        let observations = Observations::new(vec![stretch], Some(0.001)).expect("a record");
+        let settings = Settings::default();
+        let (state, _) = searched(&observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("a search");
+        let mut fitted = state.current;
+        assert_eq!(fitted.model.effects[0].identifier(), Identifier::SECOND_ORDER);
+        assert_eq!(effects_on_bounds(&fitted).count(), 0);
+        let at = fitted.model.range(0).start;
+        fitted.theta[at] = fitted.model.effects[0].parameters()[0].variable.upper;
+        let reasons: Vec<Reason> = effects_on_bounds(&fitted).collect();
+        assert_eq!(reasons, [Reason::EffectOnBound { effect: Identifier::SECOND_ORDER, channel: Some(1) }]);
+        assert_eq!(reasons[0].grade(), Grade::NoGo);
     }
 }

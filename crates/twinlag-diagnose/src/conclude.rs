@@ -3,7 +3,7 @@
 use twinlag_cross_relation::TestName;
 use twinlag_model::{Effort, Fitted, ModelError, ModelFit, Observations, Policy, Settings, TimeConstant, summarise};
 
-use crate::candidates::{Candidate, is_on_bound};
+use crate::candidates::{Candidate, effects_on_bounds};
 use crate::contradiction::Contradiction;
 use crate::diagnosis::{BeforeAfter, Diagnosis, ErrorBudget, Found, Unexplained, Verdict};
 use crate::errors::Squares;
@@ -20,7 +20,7 @@ use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 use crate::ties::{OtherCause, Tie, widen};
 use crate::transfer::Across;
-use crate::twins::{ExactTwin, cover_twins, exact_twins};
+use crate::twins::{ExactTwin, cover_causes, exact_twins};
 use crate::whole_form::WholeForm;
 
 /// The answer, its numbers fitted once more to the whole record, and that fit.
@@ -102,8 +102,8 @@ pub(crate) fn conclude(
         Circumstances::new(Basis::of(None, false, policy), &settings.known, span_s, policy).judge(&mut base)
     };
     let mut effects = judged(found, &with_effects, &last, &circumstances);
-    // Twins were widened with the parameters that they follow from: time constants cover them as they are now.
-    cover_twins(&mut last, &mut judgements, policy, effects.iter().flat_map(|found| &found.exact_twins));
+    // Those under other causes were widened with the parameters that they follow from: time constants cover them as they are now.
+    cover_causes(&mut last, &mut judgements, policy, &effects);
     let is_given = judgements.time_constants.iter().all(|judgement| judgement.grade != Grade::NoGo);
     withhold_other_cases(&mut effects, is_whole, is_given);
     // A time constant that is known does not make one rig of several, nor one that is wrong any better.
@@ -381,16 +381,6 @@ fn basis(
         _ => {}
     }
     basis
-}
-
-/// The effects, noise aside, of which the best fit lies on a bound. Standard errors of all other numbers of the model hold them there, so
-/// these are no estimates either.
-fn effects_on_bounds(last: &Fitted) -> impl Iterator<Item = Reason> {
-    let effects = last.model.effects.iter().enumerate().filter(|(_, effect)| !effect.is_noise());
-    let on_bounds = effects.filter(|(index, effect)| {
-        effect.parameters().iter().zip(last.model.range(*index)).any(|(parameter, at)| is_on_bound(parameter, at, last))
-    });
-    on_bounds.map(|(_, effect)| Reason::EffectOnBound { effect: effect.identifier(), channel: effect.channel() })
 }
 
 /// Whether the effects that were found explain the record. Of more of them than can be

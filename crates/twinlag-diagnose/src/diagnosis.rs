@@ -54,7 +54,8 @@ pub struct Found {
     pub alternatives: Vec<Identifier>,
     /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     pub exact_twins: Vec<ExactTwin>,
-    /// Those of the other effects whose time constants the record determines; nothing where time constants are not given.
+    /// Other effects that explain the record equally well and are no exact twins, each with the time constants if it is the cause;
+    /// empty where the record does not determine both, and where time constants are not given.
     pub other_causes: Vec<OtherCause>,
     /// The first state of the slow body that it holds, of which both cases were tried; `None` of an effect that holds none, and where
     /// more than noise is left over.

@@ -304,7 +304,7 @@ impl Reason {
         match self {
             Self::OnBound => "the best fit lies on a bound of it, so it is no estimate".into(),
             Self::EffectOnBound { effect, channel } => format!(
-                "the best fit lies on a bound of the {effect}{}, so neither is what goes with it an estimate",
+                "the best fit lies on a bound of the {effect}{}, so the other numbers of the model are no estimates either",
                 of_sensor(*channel)
             ),
             _ => String::new(),
@@ -705,12 +705,8 @@ impl Number {
     }
 
     fn widened(&self, [low, high]: [f64; 2], factor: f64) -> [f64; 2] {
-        let value = self.value;
-        if self.is_positive && low > 0.0 && value > 0.0 {
-            [value * (low / value).powf(factor), value * (high / value).powf(factor)]
-        } else {
-            [value - factor * (value - low), value + factor * (high - value)]
-        }
+        let is_positive = self.is_positive && low > 0.0 && self.value > 0.0;
+        [low, high].map(|end| further(self.value, end, factor, is_positive))
     }
 
     /// Whether an interval that had to be widened says anything still: of a positive number a factor, of another one its sign.
@@ -721,6 +717,11 @@ impl Number {
             low * high <= 0.0
         }
     }
+}
+
+/// An end of the interval of a value, `factor` times as far from it: of a positive number by its logarithm.
+pub(crate) fn further(value: f64, end: f64, factor: f64, is_positive: bool) -> f64 {
+    if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
 }
 
 /// Whether an interval reaches beyond another one by more than rounding.

@@ -12,6 +12,7 @@ use twinlag_model::{
     Effort, Fitted, Identifier, KnownTimeConstant, Observations, Policy, TimeConstant, Value, summarise,
 };
 
+use crate::candidates::effects_on_bounds;
 use crate::grade::{Basis, Grade, Judgement, Reason, excess};
 use crate::judge::Circumstances;
 use crate::moves::{State, Taken};
@@ -206,7 +207,8 @@ fn held(tau_s: f64, fitted: &Fitted, state: &State<'_>, policy: &Policy) -> Held
     let prepared = &state.prepared;
     let mut fit = summarise(fitted, &prepared.observations, &prepared.everything, &prepared.levels, policy);
     let known = [KnownTimeConstant { sensor: 0, value_s: tau_s, std_s: None }];
-    let basis = Basis::of(excess(&fit, fitted.model.noise().is_some()), true, policy);
+    let mut basis = Basis::of(excess(&fit, fitted.model.noise().is_some()), true, policy);
+    basis.reasons.extend(effects_on_bounds(fitted));
     let judgements = Circumstances::new(basis, &known, prepared.observations.span_s(), policy).judge(&mut fit);
     let [_, judgement] = judgements.time_constants;
     if judgements.difference.grade == Grade::NoGo {

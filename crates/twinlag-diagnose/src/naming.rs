@@ -234,7 +234,7 @@ pub(crate) fn judge_effect(
     }
     // What a twin follows from comes first.
     found.exact_twins.iter_mut().for_each(|twin| twin.widen(range.start, last, fit, circumstances));
-    found.other_causes.iter_mut().for_each(|other| other.widen(range.start, last, fit, circumstances));
+    found.other_causes.iter_mut().for_each(|other| other.widen(last, fit, circumstances));
 }
 
 #[cfg(test)]

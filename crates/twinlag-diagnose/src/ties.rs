@@ -3,11 +3,13 @@
 use twinlag_model::{Effort, Fitted, Identifier, ModelFit, Policy, Prepared, Value, covariance};
 use twinlag_optimise::Scale;
 
+use crate::candidates::effects_on_bounds;
+use crate::grade::further;
 use crate::judge::Circumstances;
 use crate::naming::{hull, interval_95};
 use crate::remark::Remark;
 use crate::transfer::EffectInChannel;
-use crate::twins::{ExactTwin, further, widening};
+use crate::twins::{ExactTwin, widening};
 
 /// Relative change of an end of an interval that is worth a remark.
 const NOTICEABLE: f64 = 1e-3;
@@ -20,9 +22,11 @@ pub(crate) struct Tie {
     pub(crate) other: EffectInChannel,
     /// Both time constants and their difference if it is the cause.
     numbers: [Option<Estimate>; 3],
+    /// Whether the fit with it has ended inside all bounds.
+    is_inside_bounds: bool,
 }
 
-/// Another effect that explains a record as well as one that was found, and what the time constants are if it is the cause.
+/// Another effect that explains a record equally well as one that was found, and the time constants if it is the cause.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct OtherCause {
@@ -35,13 +39,10 @@ pub struct OtherCause {
 }
 
 impl OtherCause {
-    /// Makes its intervals wider by as much as those of the numbers of the model are, whichever of these is widened most.
-    ///
-    /// - `parameter`: place of the parameter of the effect that was found among all of the model `last`
-    pub(crate) fn widen(&mut self, parameter: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
-        let factors = [0, 1, parameter].map(|place| widening(place, last, fit, circumstances).unwrap_or(1.0));
-        let factor = factors.into_iter().fold(1.0, f64::max);
-        for number in &mut self.time_constants {
+    /// Makes each of its intervals wider by as much as that of the same time constant of the model `last` is.
+    pub(crate) fn widen(&mut self, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
+        for (sensor, number) in self.time_constants.iter_mut().enumerate() {
+            let factor = widening(sensor, last, fit, circumstances).unwrap_or(1.0);
             let value = number.value;
             number.interval_95 = number.interval_95.map(|ends| ends.map(|end| further(value, end, factor, true)));
         }
@@ -54,11 +55,9 @@ struct Estimate {
     interval_95: [f64; 2],
 }
 
-impl Estimate {
-    /// Whether the record determines this time constant.
-    fn is_known(&self, policy: &Policy) -> bool {
-        self.standard_error > 0.0 && self.standard_error < policy.vague_log_std * self.value
-    }
+/// Whether a record determines a time constant under another cause.
+pub(crate) fn is_known(time_constant_s: f64, standard_error_s: f64, policy: &Policy) -> bool {
+    standard_error_s > 0.0 && standard_error_s < policy.vague_log_std * time_constant_s
 }
 
 impl Tie {
@@ -92,7 +91,8 @@ impl Tie {
             estimate(theta[1], variance(1, 1), Scale::Logarithmic),
             estimate(theta[1] - theta[0], of_difference, Scale::Linear { typical: 1.0 }),
         ];
-        Self { named, other, numbers }
+        let is_inside_bounds = fitted.end.is_usable() && effects_on_bounds(fitted).next().is_none();
+        Self { named, other, numbers, is_inside_bounds }
     }
 
     /// By algebra.
@@ -102,15 +102,16 @@ impl Tie {
             Some(Estimate { value: number.value, standard_error, interval_95 })
         };
         let [one, two] = &twin.time_constants;
-        Self { named, other: (twin.effect, Some(twin.channel)), numbers: [one, two, &twin.difference].map(estimate) }
+        let numbers = [one, two, &twin.difference].map(estimate);
+        Self { named, other: (twin.effect, Some(twin.channel)), numbers, is_inside_bounds: true }
     }
 
-    /// The other cause in numbers; `None` where the record does not determine one of them, and of another form of the effect that is
-    /// named.
+    /// The other cause in numbers; `None` where the record does not determine one of them, where its best fit lies on a bound, and of
+    /// another form of the effect that is named.
     pub(crate) fn other_cause(&self, policy: &Policy) -> Option<OtherCause> {
         let [one, two, _] = &self.numbers;
         let number = |estimate: &Option<Estimate>| {
-            let known = estimate.as_ref().filter(|estimate| estimate.is_known(policy))?;
+            let known = estimate.as_ref().filter(|e| is_known(e.value, e.standard_error, policy))?;
             let (standard_error, interval_95) = (Some(known.standard_error), Some(known.interval_95));
             Some(Value {
                 name: "time_constant".into(),
@@ -122,7 +123,7 @@ impl Tie {
         };
         let time_constants = [number(one)?, number(two)?];
         let (effect, channel) = self.other;
-        (self.other != self.named).then_some(OtherCause { effect, channel, time_constants })
+        (self.is_inside_bounds && self.other != self.named).then_some(OtherCause { effect, channel, time_constants })
     }
 }
 
@@ -137,11 +138,10 @@ pub(crate) fn widen(
     let [one, two] = &mut fit.time_constants;
     for (i, number) in [one, two, &mut fit.difference].into_iter().enumerate() {
         let Some([low, high]) = number.interval_95_s else { continue };
-        for Tie { named, other, numbers } in ties {
-            let Some(estimate) = &numbers[i] else { continue };
-            let Estimate { value, standard_error, interval_95 } = estimate;
-            let is_known = if i == 2 { *standard_error > 0.0 } else { estimate.is_known(policy) };
-            if is_known {
+        for Tie { named, other, numbers, .. } in ties {
+            let Some(Estimate { value, standard_error, interval_95 }) = &numbers[i] else { continue };
+            let is_determined = if i == 2 { *standard_error > 0.0 } else { is_known(*value, *standard_error, policy) };
+            if is_determined {
                 let more = (low - interval_95[0]).max(0.0) + (interval_95[1] - high).max(0.0);
                 // Another form of the same effect is no other cause.
                 if i < 2 && more > NOTICEABLE * value && other != named {

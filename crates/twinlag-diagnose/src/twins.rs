@@ -4,10 +4,12 @@ use twinlag_cross_relation::Z_975;
 use twinlag_model::{Fitted, Identifier, ModelFit, Policy, Twin, Value};
 use twinlag_optimise::Scale;
 
-use crate::grade::{Number, RecordScatter};
+use crate::diagnosis::Found;
+use crate::grade::{Number, RecordScatter, further};
 use crate::judge::{Circumstances, Judgements};
 use crate::naming::interval_95;
 use crate::propagate::variance;
+use crate::ties::is_known;
 use crate::whole_form::cover;
 
 /// An exact twin of an effect, and what the numbers are if it is the cause.
@@ -64,7 +66,7 @@ impl ExactTwin {
     /// Makes the intervals wider by as much as those of the numbers that they follow from: the parameter of a twin from that of the
     /// effect alone, and time constants from these as well, by the largest factor.
     ///
-    /// - `parameter`: place of the parameter of the effect among all of the model `last`
+    /// - `parameter`: place of the first parameter of the effect among all of the model `last`
     pub(crate) fn widen(&mut self, parameter: usize, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
         let widening = |place: usize| widening(place, last, fit, circumstances).unwrap_or(1.0);
         let of_parameter = widening(parameter);
@@ -100,31 +102,24 @@ impl ExactTwin {
     }
 }
 
-/// Makes the intervals of both time constants and of their difference cover those of exact twins as well, but for a time constant of
-/// which a twin says nothing.
-pub(crate) fn cover_twins<'a>(
-    fit: &mut ModelFit,
-    judgements: &mut Judgements,
-    policy: &Policy,
-    twins: impl Iterator<Item = &'a ExactTwin>,
-) {
-    for twin in twins {
+/// Makes the intervals of both time constants and of their difference cover those under other causes as well, but for a time constant
+/// that a record does not determine under one.
+pub(crate) fn cover_causes(fit: &mut ModelFit, judgements: &mut Judgements, policy: &Policy, effects: &[Found]) {
+    let twins = effects.iter().flat_map(|found| &found.exact_twins);
+    let others = effects.iter().flat_map(|found| &found.other_causes).map(|other| (&other.time_constants, None));
+    for (time_constants, difference) in twins.map(|twin| (&twin.time_constants, Some(&twin.difference))).chain(others) {
         let ([one, two], [of_one, of_two]) = (&mut fit.time_constants, &mut judgements.time_constants);
         let numbers = [(one, of_one), (two, of_two), (&mut fit.difference, &mut judgements.difference)];
-        let of_twin = [&twin.time_constants[0], &twin.time_constants[1], &twin.difference];
-        for (i, ((number, judgement), of_twin)) in numbers.into_iter().zip(of_twin).enumerate() {
-            let is_known = i == 2 || of_twin.standard_error.is_some_and(|e| e < policy.vague_log_std * of_twin.value);
-            let other = of_twin.interval_95.filter(|_| is_known);
+        let of_cause = time_constants.iter().map(Some).chain([difference]);
+        for (i, ((number, judgement), of_cause)) in numbers.into_iter().zip(of_cause).enumerate() {
+            let Some(of_cause) = of_cause else { continue };
+            let is_known = i == 2 || of_cause.standard_error.is_some_and(|e| is_known(of_cause.value, e, policy));
+            let other = of_cause.interval_95.filter(|_| is_known);
             if let (Some(interval), Some(other)) = (&mut number.interval_95_s, other) {
                 judgement.cover_with(interval, other);
             }
         }
     }
-}
-
-/// An end of the interval of a value, `factor` times as far from it: of a positive number by its logarithm.
-pub(crate) fn further(value: f64, end: f64, factor: f64, is_positive: bool) -> f64 {
-    if is_positive { value * (end / value).powf(factor) } else { value + factor * (end - value) }
 }
 
 /// Factor by which the interval of a number is wider with all that it has to cover; `None` of one without an interval.

@@ -14,7 +14,8 @@ use crate::observations::{Observations, Stretch};
 use crate::prepare::Prepared;
 use crate::selection::Selection;
 
-/// Time between two records, as a share of the longest one: enough to see the gap in a picture. Nothing else depends on it.
+/// Time between two records, as a share of the longest one: enough to see the gap in a picture. The spectrum of the gas takes
+/// records apart by it.
 const GAP_SHARE: f64 = 0.02;
 /// Relative difference of two sample periods that are one: clocks differ by less, and time constants move by no more than this share.
 const SAME_PERIOD: f64 = 1e-4;

@@ -73,8 +73,7 @@ fn rate(plan: &Plan) -> Option<String> {
 
 /// A frequency to four digits.
 fn hertz(frequency_hz: f64) -> String {
-    let decimals = (3.0 - frequency_hz.log10().floor()).clamp(0.0, 9.0) as usize;
-    let text = format!("{frequency_hz:.decimals$}");
+    let text = format!("{frequency_hz:.*}", decimals(frequency_hz, 4.0));
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
@@ -107,11 +106,15 @@ fn best(plan: &Plan) -> Option<String> {
     })
 }
 
-/// A share in per cent, with two significant digits.
+/// A share in per cent, to two digits.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
-    let decimals = (1.0 - percent.log10().floor()).max(0.0) as usize;
-    format!("{percent:.decimals$} %")
+    format!("{percent:.*} %", decimals(percent, 2.0))
+}
+
+/// Decimals that show so many digits of a number, none of them of one that is larger.
+fn decimals(value: f64, digits: f64) -> usize {
+    (digits - 1.0 - value.log10().floor()).clamp(0.0, 9.0) as usize
 }
 
 /// What breaks a tie.

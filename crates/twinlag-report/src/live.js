@@ -70,8 +70,10 @@
 
   function build(panel, host) {
     const series = panel.series.map((s) => ({ ...s, levels: pyramid(decoded[s.x], decoded[s.y]) }));
-    const ends = series.reduce(([low, high], { levels: [{ x }] }) =>
+    const [first, last] = series.reduce(([low, high], { levels: [{ x }] }) =>
       x.length ? [Math.min(low, x[0]), Math.max(high, x[x.length - 1])] : [low, high], [Infinity, -Infinity]);
+    /* One point alone has room beside it. */
+    const ends = first < last ? [first, last] : first === last ? [first - 0.5, last + 0.5] : [0, 1];
     let view = ends;
     const live = element("div", { class: "live", role: "group", "aria-label": panel.title + ": can be enlarged" });
     live.append(element("p", { class: "title" }, panel.title));

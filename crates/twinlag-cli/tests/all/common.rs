@@ -4,7 +4,8 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
-use std::path::PathBuf;
+use std::panic::Location;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
@@ -80,14 +81,17 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// `test` must be the name of the test: two of one name would share the directory.
+    /// `test` must be the name of the test: two of one name in one module would share the directory.
+    #[track_caller]
     pub(crate) fn new(test: &str) -> Self {
-        let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(env!("CARGO_CRATE_NAME")).join(test);
+        let module = Path::new(Location::caller().file()).file_stem().expect("a module has a file");
+        let dir = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(module).join(test);
         let _ = fs::remove_dir_all(&dir);
         fs::create_dir_all(&dir).expect("the target directory can be written");
         Self { dir }
     }
 
+    #[track_caller]
     pub(crate) fn with(test: &str, file: &str, content: impl AsRef<[u8]>) -> Self {
         let bench = Self::new(test);
         bench.write(file, content);
@@ -95,6 +99,7 @@ impl Bench {
     }
 
     /// With the record of `rig` in `run.csv`.
+    #[track_caller]
     pub(crate) fn simulated(test: &str, rig: &str) -> Self {
         let bench = Self::with(test, "rig.toml", rig);
         let answer = bench.run(&["simulate", "rig.toml", "--out", "run.csv", "--quiet"]);

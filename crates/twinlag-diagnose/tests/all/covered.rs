@@ -40,6 +40,26 @@ fn a_gain_is_right_if_there_is_an_offset_as_well() {
     assert!(gains > 0 && shares_seen > 0, "{gains} gains, {shares_seen} shares");
 }
 
+/// An offset of 2 K is as well a sensor that radiates, with time constants a little longer: their intervals lie inside those that are
+/// given, whichever of them is the cause.
+#[test]
+fn time_constants_under_another_cause_are_covered() {
+    let mut seen = 0;
+    for seed in 1..=4 {
+        let diagnosis = found(&record(seed, |sensors| sensors[1].offset_k = 2.0));
+        for other in diagnosis.effects.iter().flat_map(|effect| &effect.other_causes) {
+            for (value, given) in other.time_constants.iter().zip(&diagnosis.last.time_constants) {
+                let [low, high] = value.interval_95.expect("no number without its interval");
+                let [from, to] = given.interval_95_s.expect("no number without its interval");
+                assert!(low <= value.value && value.value <= high, "{value:?}");
+                assert!(from <= low && high <= to, "{other:#?}, given [{from}, {to}]");
+            }
+            seen += 1;
+        }
+    }
+    assert!(seen > 0, "no record has another cause");
+}
+
 /// A rig of which one sensor sees gas that differs by 3 % of what it moves.
 fn mismatched(seed: u64, channel: &str) -> Observations {
     let sensors = [0.1, 0.4].map(|tau_s| {

@@ -5,7 +5,7 @@ use twinlag_report::{Axis, Document, Figure, ReportError, Series, Table, rounded
 
 use super::{Column, Page};
 use crate::figures::{CHANNELS, WIDTH_PX, chart};
-use crate::words::{apart, grade, interval, interval_of, seconds, sentence, short, with_unit, words};
+use crate::words::{apart, grade, interval, interval_of, place, seconds, sentence, short, with_unit, words};
 
 impl Page<'_> {
     pub(super) fn numbers(&self, document: Document) -> Result<Document, ReportError> {
@@ -65,7 +65,8 @@ impl Page<'_> {
             });
             let of_causes = causes.iter().map(|(of, time_constants)| {
                 let tau = &time_constants[k];
-                (format!("if it is {}", words(of.effect)), Some(tau.value), tau.interval_95)
+                let place = place(of.channel.as_ref());
+                (format!("if it is {} in {place}", words(of.effect)), Some(tau.value), tau.interval_95)
             });
             let all = of_models.chain(of_causes).filter(|(_, value, _)| value.is_some());
             let of: Vec<(String, Option<f64>, Option<[f64; 2]>)> = all.collect();

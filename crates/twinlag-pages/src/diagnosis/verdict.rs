@@ -187,7 +187,7 @@ fn twin(twin: &NamedTwin) -> String {
 /// Another cause with the time constants that it means.
 fn other_cause(other: &NamedCause) -> String {
     let [one, two] = other.time_constants.each_ref().map(in_words);
-    format!("{} in {}, with {one}; {two}", words(other.of.effect), place(other.of.channel.as_ref()))
+    format!("{} in {}, with {one} and {two}", words(other.of.effect), place(other.of.channel.as_ref()))
 }
 
 /// A number with its name and its interval.
@@ -205,7 +205,7 @@ fn facts(found: &NamedEffect) -> Vec<(&'static str, String)> {
     facts.push(("What to do", sentence(about.advice)));
     facts.push(("Explains this record equally well", identifiers(&found.alternatives)));
     let others: Vec<String> = found.other_causes.iter().map(other_cause).collect();
-    facts.push(("With one of these instead", others.join("; ")));
+    facts.push(("Time constants with another cause", others.join("; ")));
     let twins: Vec<String> = found.exact_twins.iter().map(twin).collect();
     facts.push(("Would look exactly the same", twins.join("; ")));
     facts.push((

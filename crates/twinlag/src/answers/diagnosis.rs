@@ -53,7 +53,8 @@ pub struct NamedEffect {
     /// What no record distinguishes from it, with the time constants that it means; nothing where these are not given.
     #[serde(default)]
     pub exact_twins: Vec<NamedTwin>,
-    /// Those of the other effects with which the record determines both time constants; nothing where these are not given.
+    /// Other effects that explain the record equally well and are no exact twins, each with the time constants if it is the cause;
+    /// empty where the record does not determine both, and where time constants are not given.
     #[serde(default)]
     pub other_causes: Vec<NamedCause>,
     /// Both cases of the first state of the slow body that it holds; `None` where it holds none, or more than noise is left over.
@@ -123,7 +124,7 @@ impl NamedTwin {
     }
 }
 
-/// An effect that explains the record as well as one that was found, and both time constants if it is the cause.
+/// An effect that explains the record equally well as one that was found, and both time constants if it is the cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[non_exhaustive]

@@ -42,7 +42,7 @@ pub struct GasBand {
 }
 
 impl GasSpectrum {
-    /// The spectrum of the longest evenly spaced part of a line, which for several records is the longest of them: its tapered
+    /// The spectrum of the longest evenly spaced part of a line, which never reaches from one record into the next: its tapered
     /// periodogram (Hann), bin by bin `2 |X|² / (n Σ w²)`, scaled so that all bands together have the variance of the values. `None`
     /// where values are missing or do not change in it, or are fewer than 64.
     ///
@@ -65,12 +65,13 @@ impl GasSpectrum {
         if line.time_s.len() != line.value.len() {
             return None;
         }
-        let (part, period_s) = longest_even_part(&line.time_s);
-        let values = &line.value[part];
+        let part = longest_even_part(&line.time_s);
+        let (time_s, values) = (&line.time_s[part.clone()], &line.value[part]);
         let n = values.len();
         if n < MIN_SAMPLES || !values.iter().all(|v| v.is_finite()) {
             return None;
         }
+        let period_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
         let mean_c = values.iter().sum::<f64>() / n as f64;
         let variance_k2 = values.iter().map(|v| (v - mean_c).powi(2)).sum::<f64>() / n as f64;
         let transform = Tapered::new(hann(n)).transform(values.iter().map(|v| v - mean_c));
@@ -95,8 +96,8 @@ impl GasSpectrum {
     }
 }
 
-/// The longest run of times whose steps are the median one, and that step, s.
-fn longest_even_part(time_s: &[f64]) -> (Range<usize>, f64) {
+/// The longest run of times whose steps are the median one.
+fn longest_even_part(time_s: &[f64]) -> Range<usize> {
     let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let period_s = median(steps_s.clone());
     let is_uneven = |step_s: &f64| (step_s - period_s).abs() > MAX_UNEVEN_SHARE * period_s;
@@ -108,7 +109,7 @@ fn longest_even_part(time_s: &[f64]) -> (Range<usize>, f64) {
         }
         from = to;
     }
-    (longest, period_s)
+    longest
 }
 
 #[cfg(test)]
@@ -120,11 +121,9 @@ mod tests {
     fn the_longest_unbroken_part_counts() {
         let times = |from_s: f64, count: usize| (0..count).map(move |k| from_s + 0.01 * k as f64);
         let shorter_first: Vec<f64> = times(0.0, 80).chain(times(5.0, 120)).collect();
-        let (part, period_s) = longest_even_part(&shorter_first);
-        assert_eq!(part, 80..200);
-        assert!((period_s - 0.01).abs() < 1e-12);
+        assert_eq!(longest_even_part(&shorter_first), 80..200);
         let longer_first: Vec<f64> = times(0.0, 120).chain(times(0.5, 80)).collect();
-        assert_eq!(longest_even_part(&longer_first).0, 0..120);
-        assert_eq!(longest_even_part(&[]).0, 0..0);
+        assert_eq!(longest_even_part(&longer_first), 0..120);
+        assert_eq!(longest_even_part(&[]), 0..0);
     }
 }

@@ -316,7 +316,7 @@ fn windows(record: &Record, options: &TrackOptions, window_s: f64, watch: Watch<
             setting: Setting::Window,
             expected: if least_s > span_s {
                 format!(
-                    "none: the record of {span_s:.4} s is shorter than the shortest window, {SHORTEST_WINDOW} samples or {least_s:.4} s"
+                    "a record of at least {least_s:.4} s ({SHORTEST_WINDOW} sample periods) for any window; this one has {span_s:.4} s"
                 )
             } else {
                 format!("seconds from {least_s:.4} ({SHORTEST_WINDOW} samples) to {span_s:.4}, the record's length")
