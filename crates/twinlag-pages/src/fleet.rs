@@ -90,16 +90,24 @@ fn keys(fleet: &Fleet) -> Vec<KeyNumber> {
         let given = given(fleet, i);
         let values: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
         let value = median(values.clone())?;
-        let (share, what) =
-            if values.len() < MIN_FOR_QUANTILES { (0.0, "all of them") } else { (0.025, "95 % of them") };
-        let range = [quantile(values.clone(), share)?, quantile(values, 1.0 - share)?];
+        let (range, what) = match &given[..] {
+            [(_, alone)] => (alone.interval_95_s, "95 %:"),
+            few if few.len() < MIN_FOR_QUANTILES => {
+                ([quantile(values.clone(), 0.0)?, quantile(values, 1.0)?], "all of them")
+            }
+            _ => ([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?], "95 % of them"),
+        };
         let grade = if given.iter().all(|(_, tau)| tau.is_go) {
             (Tone::Good, "go".to_owned())
         } else {
             (Tone::Caution, "some conditional".to_owned())
         };
         Some(KeyNumber {
-            name: format!("T{}, median of {}", i + 1, given.len()),
+            name: if given.len() == 1 {
+                format!("T{}, of the only one", i + 1)
+            } else {
+                format!("T{}, median of {}", i + 1, given.len())
+            },
             value: format!("{} s", rounded(value, 4)),
             interval: format!("{what} {} s", between(range)),
             grade,

@@ -172,6 +172,26 @@
             values.textContent = at == null || u.cursor.left < 0 ? "" : rounded(u.data[0][at]) + ": "
               + series.flatMap((s, k) => (u.data[k + 1][at] == null || !s.name ? [] : [s.name + " " + rounded(u.data[k + 1][at])])).join(", ");
           }],
+          draw: [(u) => {
+            const { left, top, width, height } = u.bbox;
+            u.ctx.save();
+            u.ctx.beginPath();
+            u.ctx.rect(left, top, width, height);
+            u.ctx.clip();
+            u.ctx.lineWidth = 1.3 * devicePixelRatio;
+            for (const { edges: [high, low], colour } of panel.bars) {
+              u.ctx.strokeStyle = style(colour);
+              u.ctx.beginPath();
+              for (const [k, x] of u.data[0].entries()) {
+                if (u.data[low][k] == null || u.data[high][k] == null) continue;
+                const at = u.valToPos(x, "x", true);
+                u.ctx.moveTo(at, u.valToPos(u.data[low][k], "y", true));
+                u.ctx.lineTo(at, u.valToPos(u.data[high][k], "y", true));
+              }
+              u.ctx.stroke();
+            }
+            u.ctx.restore();
+          }],
           drawClear: [(u) => {
             if (!panel.band) return;
             const [top, bottom] = [panel.band[1], panel.band[0]].map((v) => u.valToPos(v, "y", true));

@@ -64,10 +64,11 @@ impl Live {
         // The same instants for all, so that they are there once.
         let bins = Bins::of(drawn.clone())?;
         let mut series = Vec::new();
-        let mut bands = Vec::new();
+        let (mut bands, mut bars) = (Vec::new(), Vec::new());
         for one in drawn {
-            if let Some((low, high)) = &one.band {
-                bands.push(json!({"edges": [series.len() + 2, series.len() + 1], "colour": name(styles.of(&one.name, one.colour).0)}));
+            for (ends, out) in [(&one.band, &mut bands), (&one.interval, &mut bars)] {
+                let Some((low, high)) = ends else { continue };
+                out.push(json!({"edges": [series.len() + 2, series.len() + 1], "colour": name(styles.of(&one.name, one.colour).0)}));
                 series.extend([low, high].map(|edge| self.series(one, edge, styles, &bins)));
                 series.iter_mut().rev().take(2).for_each(|edge| {
                     edge["edge"] = true.into();
@@ -82,6 +83,7 @@ impl Live {
         Some(json!({
             "title": title, "x": chart.x.label(), "y": chart.y.label(), "range": chart.y.given_range(),
             "band": band, "height": HEIGHT_PX, "bin": bins.is_needed.then_some(bins.width), "series": series, "bands": bands,
+            "bars": bars,
         }))
     }
 
