@@ -691,11 +691,14 @@ impl Number {
                 reasons.push(Reason::RecordsDisagree { ratio, is_known });
             }
         }
+        // As long as that it says nothing, and JSON has no infinity.
+        let interval = Some(interval).filter(|interval| interval.iter().all(|end| end.is_finite()));
+        reasons.extend(interval.is_none().then_some(Reason::NoInterval));
         let mut judgement = Judgement::of(&reasons);
         for covered in covers {
             judgement.cover(covered, reasons.iter().any(|reason| reason.says(covered)));
         }
-        (judgement, Some(interval))
+        (judgement, interval)
     }
 
     /// The 95 % interval that noise alone makes; `None` where nothing says what that is.
@@ -837,6 +840,15 @@ mod tests {
         let (_, interval) = number(2.0, [1.9, 2.1], false).judged(Vec::new(), &basis, &policy);
         let [low, high] = interval.expect("it had one");
         assert!((low - 1.7).abs() < 1e-12 && (high - 2.3).abs() < 1e-12, "{low} {high}");
+    }
+
+    /// Failed: an interval to infinity was null in JSON, which no model could be read from again.
+    #[test]
+    fn an_interval_without_an_end_is_none() {
+        let basis = Basis { reasons: Vec::new(), excess_energy: 0.0 };
+        let (judgement, interval) =
+            number(2.0, [0.0, f64::INFINITY], true).judged(Vec::new(), &basis, &Policy::default());
+        assert_eq!((judgement.grade, interval), (Grade::NoGo, None));
     }
 
     /// Of bands with 10, 30 and 60 degrees of freedom the two quietest hold the first quarter.
