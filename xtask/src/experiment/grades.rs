@@ -246,11 +246,12 @@ impl Stored for Plan {
         [&mut self.records, &mut self.seed]
     }
 
-    /// One record of the last set of a single effect: two effects, and the first of some plans, take a search of half a minute.
+    /// One record of usual length, of the last set of a single effect: two effects, and the first of some plans, take a search of half a
+    /// minute.
     fn shorten(&mut self) {
         self.records = 1;
         self.groups.iter_mut().for_each(|group| group.sets.retain(|set| set.len() == 1));
-        self.groups.retain(|group| !group.sets.is_empty());
+        self.groups.retain(|group| group.rows.is_none() && !group.sets.is_empty());
         self.groups.drain(..self.groups.len().saturating_sub(1));
         self.groups.iter_mut().for_each(|group| drop(group.sets.drain(..group.sets.len().saturating_sub(1))));
     }
