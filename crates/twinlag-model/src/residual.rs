@@ -289,7 +289,7 @@ fn lines(residual: &[Vec<f64>]) -> Option<ResidualTest> {
     if run.len() < 4 * NEIGHBOURS {
         return None;
     }
-    // Of a long one less than a fiftieth is left out, so that its length is quick to transform.
+    // Of a long one less than 4 % is left out, so that its length is quick to transform.
     let count = if run.len() > MAX_TRANSFORMED_AS_IT_IS { fast_length(run.len()) } else { run.len() };
     let run = &run[..count];
     let spectrum = Forward::once(count).transform(run);

@@ -3,7 +3,9 @@
 //! Here and not beside the code: the crate's own tests would compile all kernels of rustfft once
 //! more.
 
+mod doubled;
 mod fourier;
+mod length;
 mod sine;
 mod store;
 mod taper;
