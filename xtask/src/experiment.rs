@@ -122,6 +122,11 @@ pub(crate) fn run(task: Task) -> Result<()> {
     }
 }
 
+/// Leaves out all but the last so many of a list.
+fn keep_last<T>(list: &mut Vec<T>, count: usize) {
+    list.drain(..list.len().saturating_sub(count));
+}
+
 /// Every experiment with a trial in each cell, into `out`: that they run, not what they say.
 pub(crate) fn quick(out: &Path) -> Result<()> {
     let run = Run {

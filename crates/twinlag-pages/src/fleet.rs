@@ -90,12 +90,12 @@ fn keys(fleet: &Fleet) -> Vec<KeyNumber> {
         let given = given(fleet, i);
         let values: Vec<f64> = given.iter().map(|(_, tau)| tau.value_s).collect();
         let value = median(values.clone())?;
-        let (range, what) = match &given[..] {
-            [(_, alone)] => (alone.interval_95_s, "95 %:"),
-            few if few.len() < MIN_FOR_QUANTILES => {
-                ([quantile(values.clone(), 0.0)?, quantile(values, 1.0)?], "all of them")
-            }
-            _ => ([quantile(values.clone(), 0.025)?, quantile(values, 0.975)?], "95 % of them"),
+        let (range, what) = if let [(_, alone)] = &given[..] {
+            (alone.interval_95_s, "95 %:")
+        } else {
+            let (share, what) =
+                if values.len() < MIN_FOR_QUANTILES { (0.0, "all of them") } else { (0.025, "95 % of them") };
+            ([quantile(values.clone(), share)?, quantile(values, 1.0 - share)?], what)
         };
         let grade = if given.iter().all(|(_, tau)| tau.is_go) {
             (Tone::Good, "go".to_owned())

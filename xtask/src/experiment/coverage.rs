@@ -14,6 +14,7 @@ use twinlag::signal::{Record as Sampling, Rig, Simulated};
 use twinlag::{CompensateOptions, DiagnoseOptions, Known, Model, Options, compensate};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
+use super::keep_last;
 use super::pair::{self, Named};
 use super::stored::{Head, Stored};
 
@@ -180,7 +181,7 @@ impl Stored for Plan {
         self.trials = 1;
         self.samples.truncate(1);
         self.gases.truncate(1);
-        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
+        keep_last(&mut self.noise_percent, 1);
     }
 
     fn cell_name(&self, cell: usize) -> String {

@@ -17,6 +17,7 @@ use twinlag::{Characterisation, DiagnoseOptions, NamedEffect, Options, character
 use twinlag_report::{Axis, Chart, Figure, Reference, Series};
 use twinlag_study::{Failure, Merge, Outcome, Quantity, Rate, Results, Study, Tally};
 
+use super::keep_last;
 use super::loops::{own_effects, record_of, truth_s};
 use super::stored::{Head, Stored};
 
@@ -252,8 +253,8 @@ impl Stored for Plan {
         self.records = 1;
         self.groups.iter_mut().for_each(|group| group.sets.retain(|set| set.len() == 1));
         self.groups.retain(|group| group.rows.is_none() && !group.sets.is_empty());
-        self.groups.drain(..self.groups.len().saturating_sub(1));
-        self.groups.iter_mut().for_each(|group| drop(group.sets.drain(..group.sets.len().saturating_sub(1))));
+        keep_last(&mut self.groups, 1);
+        self.groups.iter_mut().for_each(|group| keep_last(&mut group.sets, 1));
     }
 
     fn cell_name(&self, cell: usize) -> String {

@@ -15,6 +15,7 @@ use twinlag::signal::undeclared::{GasKind, Kind, Undeclared, undeclared};
 use twinlag::{DiagnoseOptions, Diagnosis, NamedEffect, Options, diagnose};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
+use super::keep_last;
 use super::stored::{Head, Stored};
 pub(super) use tables::{hits_of_count, set_name};
 
@@ -252,8 +253,8 @@ impl Stored for Plan {
     /// One record of the last set, of the two largest sizes: the first of some plans has effects that take a search of half a minute.
     fn shorten(&mut self) {
         self.records = 1;
-        self.sets.drain(..self.sets.len().saturating_sub(1));
-        self.size_factors.drain(..self.size_factors.len().saturating_sub(2));
+        keep_last(&mut self.sets, 1);
+        keep_last(&mut self.size_factors, 2);
     }
 
     fn cell_name(&self, cell: usize) -> String {

@@ -17,6 +17,7 @@ use twinlag::{CompensateOptions, DiagnoseOptions, Estimator, Model, Options, cha
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study, Tally};
 use twinlag_transform::{Complex64, Forward, Inverse};
 
+use super::keep_last;
 use super::pair::{self, LEVEL_C, Named, OTHERS};
 use super::stored::{Head, Stored};
 
@@ -237,7 +238,7 @@ impl Stored for Reconstruction {
         let mut plan = self.plan.clone();
         (plan.trials, plan.samples) = (1, 300);
         plan.gases.truncate(1);
-        plan.noise_percent.drain(..plan.noise_percent.len().saturating_sub(1));
+        keep_last(&mut plan.noise_percent, 1);
         *self = Self::new(plan);
     }
 

@@ -12,6 +12,8 @@ use twinlag::sensor::Discretisation;
 use twinlag_experiment::{Cell, NoiseOf};
 use twinlag_report::{Axis, Figure, Mark, Surface};
 
+use super::keep_last;
+
 pub(super) const NAME: &str = "cost-surface";
 
 /// The plan of the surfaces.
@@ -40,7 +42,7 @@ impl Plan {
     /// A few points of the largest noise.
     pub(super) fn shorten(&mut self) {
         self.points = 5;
-        self.noise_percent.drain(..self.noise_percent.len().saturating_sub(1));
+        keep_last(&mut self.noise_percent, 1);
     }
 }
 

@@ -17,6 +17,7 @@ use twinlag::signal::{Flow, FlowSine, FlowStep, Record as Sampling, Rig, Simulat
 use twinlag::{Options, Track, TrackOptions, track};
 use twinlag_study::{Failure, Outcome, Quantity, Results, Study};
 
+use super::keep_last;
 use super::pair::{self, Named};
 use super::stored::{Head, Stored};
 use bound::{Bound, Spread};
@@ -334,7 +335,7 @@ impl Stored for Tracking {
         (plan.trials, plan.samples) = (1, 600);
         plan.gases.truncate(1);
         for levels in [&mut plan.noise_percent, &mut plan.other_noise_percent] {
-            levels.drain(..levels.len().saturating_sub(1));
+            keep_last(levels, 1);
         }
         *self = Self::new(plan);
     }

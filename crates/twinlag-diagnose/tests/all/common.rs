@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 
 use twinlag_diagnose::{
-    Diagnosis, Identifier, ModelError, ModelFit, Observations, Settings, Stretch, TimeConstant, diagnose,
+    Diagnosis, Identifier, JointDiagnosis, ModelError, ModelFit, Observations, Settings, Stretch, TimeConstant,
+    diagnose, diagnose_records,
 };
 use twinlag_signal::{Adc, Gas, Noise, Record, Rig, Sensor, Series, Signal, Simulated, Turbulence};
 
@@ -56,6 +57,11 @@ pub(crate) fn record(seed: u64, change: impl FnOnce(&mut [Sensor; 2])) -> Observ
 pub(crate) fn found(observations: &Observations) -> Diagnosis {
     diagnose(observations, &Settings::default(), &|_, _, _| ControlFlow::Continue(()))
         .expect("a record that can be diagnosed")
+}
+
+/// The joint diagnosis of records of one rig, with nothing known.
+pub(crate) fn joint(records: &[Observations]) -> JointDiagnosis {
+    diagnose_records(records, &Settings::default(), &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
 }
 
 /// The diagnosis by someone who has never heard of `effect`.

@@ -1,7 +1,7 @@
 //! That intervals cover what a record leaves open beside the effect that is named. The rigs are those of `twinlag-signal`, which share
 //! no code with the models that are fitted.
 
-use crate::common::{TAU_S, found, record};
+use crate::common::{TAU_S, found, joint, record};
 use twinlag_diagnose::{Diagnosis, Grade, Identifier, Observations, Settings, Stretch, Verdict, diagnose};
 use twinlag_signal::{Gas, Mismatch, Noise, Record, Rig, Sensor, Signal, SlowMode, Turbulence};
 
@@ -41,12 +41,15 @@ fn a_gain_is_right_if_there_is_an_offset_as_well() {
 }
 
 /// An offset of 2 K is as well a sensor that radiates, with time constants a little longer: their intervals lie inside those that are
-/// given, whichever of them is the cause.
+/// given, whichever of them is the cause. Failed: those of two records did not, where the intervals under another cause cover what
+/// records differ.
 #[test]
 fn time_constants_under_another_cause_are_covered() {
-    let mut seen = 0;
-    for seed in 1..=4 {
-        let diagnosis = found(&record(seed, |sensors| sensors[1].offset_k = 2.0));
+    let of = |seed: u64| record(seed, |sensors| sensors[1].offset_k = 2.0);
+    let alone = (1..=4).map(|seed| found(&of(seed)));
+    let of_two = [41, 11].map(|seed| joint(&[of(seed), of(seed + 1)]).diagnosis);
+    let mut seen = [0, 0];
+    for (number, diagnosis) in alone.chain(of_two).enumerate() {
         for other in diagnosis.effects.iter().flat_map(|effect| &effect.other_causes) {
             for (value, given) in other.time_constants.iter().zip(&diagnosis.last.time_constants) {
                 let [low, high] = value.interval_95.expect("no number without its interval");
@@ -54,10 +57,10 @@ fn time_constants_under_another_cause_are_covered() {
                 assert!(low <= value.value && value.value <= high, "{value:?}");
                 assert!(from <= low && high <= to, "{other:#?}, given [{from}, {to}]");
             }
-            seen += 1;
+            seen[usize::from(number >= 4)] += 1;
         }
     }
-    assert!(seen > 0, "no record has another cause");
+    assert!(seen.iter().all(|seen| *seen > 0), "no other cause alone or of two: {seen:?}");
 }
 
 /// A rig of which one sensor sees gas that differs by 3 % of what it moves.
