@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use rayon::prelude::*;
-use twinlag_cross_relation::CHI2_95;
 use twinlag_model::{
     Bands, Beside, Context, Effort, Fitted, Gas, Identifier, Linearised, Model, ModelError, Observations, Parameter,
     Policy, Prepared, Selection, Settings, Shared, Watch, candidates, dense, line_channel, lines, report,
@@ -21,8 +20,8 @@ use crate::rank::{Kind, Score, threshold};
 /// parameter is on its bound.
 const LOG_MARGIN: f64 = 1e-3;
 const LINEAR_MARGIN: f64 = 1e-9;
-/// Share of the gain of the best start, by its linearisation, from which on another start is fitted as well. Of a gas with few tones a delay
-/// and the same delay plus a period of them gain alike: from the best alone, one of 5 ms was 55 ms. Chosen: half of it.
+/// Share of the gain of the best start, by its linearisation, from which on another start is fitted as well. Of a gas with few tones starts
+/// gain alike, and from the best alone a delay of 5 ms was found as radiation (the test of a delay that is no period longer). Chosen: half.
 const START_GAIN_SHARE: f64 = 0.5;
 /// Points of the grid of each time constant, and its ends: sample periods, and a share of the
 /// record.
@@ -120,22 +119,6 @@ pub(crate) fn effects_on_bounds(fitted: &Fitted) -> impl Iterator<Item = Reason>
         places.any(|(parameter, at)| is_on_bound(parameter, at, fitted))
     });
     on_bounds.map(|(_, effect)| Reason::EffectOnBound { effect: effect.identifier(), channel: effect.channel() })
-}
-
-/// The best of all fits with an effect, by energy per degree of freedom: a longer delay leaves fewer readings to compare. Of delays that
-/// fit equally well, as they do in a periodic gas with every period more, the shortest.
-fn best(mut all: Vec<Fitted>, effect: &Shared) -> Fitted {
-    all.sort_by(|a, b| a.mean_energy().total_cmp(&b.mean_energy()));
-    let first = all.first().expect("every effect has a start");
-    let lateness = effect.parameters().iter().position(|parameter| parameter.is_lateness);
-    let place = lateness.map_or(0, |at| {
-        // The effect is the last one of the model.
-        let at = first.theta.len() - effect.parameters().len() + at;
-        let is_as_good = |fitted: &&Fitted| fitted.mean_energy() <= first.mean_energy() * (1.0 + CHI2_95 / first.count);
-        let as_good = all.iter().take_while(is_as_good).enumerate();
-        as_good.min_by(|a, b| a.1.theta[at].abs().total_cmp(&b.1.theta[at].abs())).map_or(0, |(place, _)| place)
-    });
-    all.swap_remove(place)
 }
 
 /// Whether a parameter of an effect lies on a bound of it in a fit.
@@ -494,7 +477,7 @@ impl<'a> Search<'a> {
     ) -> Candidate {
         let model = current.model.with(effect.clone());
         let all = starts.iter().flat_map(|start| fits(&model, &[&current.theta[..], start].concat()));
-        let fitted = best(all.collect(), effect);
+        let fitted = all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start");
         let before = current.model.energy(&current.theta, observations, selection);
         let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
         self.candidate(effect, fitted, gain, gain)

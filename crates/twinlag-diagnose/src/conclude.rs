@@ -16,6 +16,7 @@ use crate::left_over::what_is_left;
 use crate::limits::not_testable;
 use crate::moves::{Move, Searched, State};
 use crate::naming::{judge_effect, name, of_defect, of_rapid};
+use crate::other_delays::delay_s;
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
 use crate::ties::{OtherCause, Tie, widen};
@@ -56,10 +57,8 @@ pub(crate) fn conclude(
     }
     whole_forms.iter().for_each(|whole| whole.widen_each(&mut found, &settings.effects));
     let left = what_is_left(&last, policy);
-    if last.time_constants.iter().all(|t| t.value_s.is_none()) && with_effects.model.parameters().any(|p| p.is_lateness)
-    {
-        remarks.push(Remark::LagAlone);
-    }
+    let is_total_delay = last.time_constants.iter().all(|t| t.value_s.is_none()) && delay_s(&with_effects).is_some();
+    remarks.extend(is_total_delay.then_some(Remark::LagAlone));
     let is_refused = tones == Some(SINGLE);
     remarks.extend(is_refused.then_some(Remark::SingleTone));
     remarks.extend(drop_coherent_noise(&mut found, &last, policy));
@@ -75,7 +74,6 @@ pub(crate) fn conclude(
     let fitted = verdict(&state, found.is_empty(), unbounded, policy);
     let verdict = if is_refused { Verdict::Refused } else { unless_wrong(fitted, is_wrong) };
     let is_whole = matches!(verdict, Verdict::Adequate | Verdict::Explained);
-    let is_total_delay = remarks.contains(&Remark::LagAlone);
     let mut basis = basis(&state, verdict, excess, is_total_delay || !settings.known.is_empty(), policy);
     basis.reasons.extend(effects_on_bounds(&with_effects));
     basis.reasons.extend(across.and_then(Across::reason));
@@ -86,6 +84,8 @@ pub(crate) fn conclude(
     let mut circumstances =
         Circumstances { is_total_delay, causes, ..Circumstances::new(basis, &settings.known, span_s, policy) };
     let search = state.search().beside(&state.current);
+    circumstances.other_delays_s =
+        search.other_delays(&state.current).into_iter().map(|(delay_s, _)| delay_s).collect();
     let around = is_whole.then(|| search.around(&state.current)).transpose()?;
     if let Some(around) = &around {
         let half = half_intervals(&last, &found, &with_effects);

@@ -80,9 +80,10 @@ pub(crate) fn searched<'a>(
     Ok((state, tones))
 }
 
-/// Moves on as long as there is a move.
+/// Moves on as long as there is a move; then takes the shortest of all delays that fit equally well.
 pub(crate) fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
     while can_learn && state.taken.len() < settings.policy.most_effects && advance(state, settings)? {}
+    state.shorten_delay();
     Ok(())
 }
 

@@ -54,6 +54,11 @@ pub enum Reason {
         /// The longest that the record can show, s.
         most_s: f64,
     },
+    /// A delay, of which others fit as well: the gas repeats itself.
+    OtherDelays {
+        /// The others, the shortest first, s.
+        delays_s: Vec<f64>,
+    },
     /// It is a part of the total delay of channel 2, which alone is determined.
     PartOfTotal,
     /// Nothing says how uncertain it is.
@@ -299,6 +304,21 @@ impl Reason {
         }
     }
 
+    /// What is said of a delay, as a clause; empty for any other reason.
+    fn of_delays(&self) -> String {
+        match self {
+            Self::PartOfTotal => "only the total delay of the second channel is determined, and not its parts".into(),
+            Self::OtherDelays { delays_s } => {
+                let delays: Vec<String> = delays_s.iter().map(|delay_s| format!("{delay_s:.4}")).collect();
+                format!(
+                    "right if the delay is the shortest of those that fit equally well, and not {} s: the gas repeats itself",
+                    delays.join(" or ")
+                )
+            }
+            _ => String::new(),
+        }
+    }
+
     /// What a bound says, as a clause; empty for any other reason.
     fn of_bounds(&self) -> String {
         match self {
@@ -328,9 +348,7 @@ impl fmt::Display for Reason {
                     "the fit makes it longer than {most_s:.3} s, the longest that a record of this length can show"
                 )
             }
-            Self::PartOfTotal => {
-                f.write_str("only the total delay of the second channel is determined, and not its parts")
-            }
+            Self::PartOfTotal | Self::OtherDelays { .. } => f.write_str(&self.of_delays()),
             Self::NoInterval => f.write_str("nothing says how uncertain it is"),
             Self::LeftOver => {
                 f.write_str("the model leaves more than noise, and nothing says how far that moves this number")

@@ -28,6 +28,8 @@ pub struct Circumstances<'a> {
     pub span_s: f64,
     /// Whether the difference is the total delay of channel 2, which holds wherever the fit ended.
     pub is_total_delay: bool,
+    /// Delays that fit as well as that of the model, the shortest first, s.
+    pub other_delays_s: Vec<f64>,
     /// The effect, in its channel, that both time constants and their difference are right with alone, where others that explain
     /// the record as well give other values.
     pub causes: [Option<EffectInChannel>; 3],
@@ -53,8 +55,19 @@ impl<'a> Circumstances<'a> {
     pub fn new(basis: Basis, known: &'a [KnownTimeConstant], span_s: f64, policy: &'a Policy) -> Self {
         let (causes, hidden_from_parameters) = ([None; 3], Vec::new());
         let hidden = std::array::from_fn(|_| Vec::new());
-        let named = Vec::new();
-        Self { basis, known, span_s, is_total_delay: false, causes, hidden, hidden_from_parameters, named, policy }
+        let (named, other_delays_s) = (Vec::new(), Vec::new());
+        Self {
+            basis,
+            known,
+            span_s,
+            is_total_delay: false,
+            other_delays_s,
+            causes,
+            hidden,
+            hidden_from_parameters,
+            named,
+            policy,
+        }
     }
 
     /// Puts down the effects that may be there unseen: for both time constants, their difference, and each parameter.

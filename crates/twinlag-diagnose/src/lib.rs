@@ -55,6 +55,7 @@ mod moves;
 mod naming;
 mod noise;
 mod odd_one;
+mod other_delays;
 mod propagate;
 mod rank;
 mod rapid;

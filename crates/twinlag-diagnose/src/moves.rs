@@ -7,6 +7,7 @@ use twinlag_model::{Effort, Fitted, Identifier, ModelError, Prepared, Settings, 
 use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::evidence::Evidence;
+use crate::other_delays::delay_s;
 use crate::rank::{LookAlike, successor, worth};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
@@ -298,6 +299,15 @@ impl<'a> State<'a> {
             ties: identifiers(&ties),
         };
         Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
+    }
+
+    /// Takes the shortest of all delays that fit equally well.
+    pub(crate) fn shorten_delay(&mut self) {
+        let Some(delay_s) = delay_s(&self.current) else { return };
+        let shortest = self.search().other_delays(&self.current).into_iter().next();
+        if let Some((_, shortest)) = shortest.filter(|(other_s, _)| other_s.abs() < delay_s.abs()) {
+            self.current = shortest.in_order();
+        }
     }
 
     /// Takes effect `index` out of the model, and gives it; what was compared with it beside it is forgotten.

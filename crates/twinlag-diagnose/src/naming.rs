@@ -223,12 +223,15 @@ pub(crate) fn judge_effect(
         let between = RecordScatter::of(between.and_then(|between| between.parameters[range.start + index].as_ref()));
         let Value { standard_error, interval_95, .. } = *value;
         let number = Number { value: value.value, standard_error, interval_95, scatter, between, is_positive };
-        let is_part = circumstances.is_total_delay && parameters.get(index).is_some_and(|p| p.is_lateness);
+        let is_delay = parameters.get(index).is_some_and(|p| p.is_lateness);
+        let is_part = circumstances.is_total_delay && is_delay;
+        let has_others = is_delay && !circumstances.other_delays_s.is_empty();
         let is_bound = if index < parameters.len() { is_on_bound(index) } else { is_any_on_bound };
         let hidden = if index < parameters.len() { hidden(index) } else { (0..parameters.len()).find_map(hidden) };
         let mut own: Vec<Reason> = cause.clone().into_iter().collect();
         own.extend(hidden);
         own.extend(is_part.then_some(Reason::PartOfTotal));
+        own.extend(has_others.then(|| Reason::OtherDelays { delays_s: circumstances.other_delays_s.clone() }));
         own.extend(is_bound.then_some(Reason::OnBound));
         (found.judgements[index], value.interval_95) = number.judged(own, &basis, circumstances.policy);
     }

@@ -49,6 +49,13 @@ struct Memory<'a> {
     again: Again,
 }
 
+impl Memory<'_> {
+    /// The residuals of the last evaluation that count; what is known beforehand comes after them.
+    fn residuals(&self) -> &[f64] {
+        &self.residual[..self.ends.last().copied().unwrap_or(0)]
+    }
+}
+
 /// The derivative in one direction, window after window.
 #[derive(Default)]
 struct Column {
@@ -138,12 +145,18 @@ impl<'a> ResidualCost<'a> {
         self.memory.borrow().residual.len()
     }
 
+    /// The residuals alone, without prior knowledge.
+    pub(crate) fn residuals(&self, theta: &[f64]) -> Vec<f64> {
+        let mut memory = self.memory.borrow_mut();
+        self.evaluate(theta, &mut memory);
+        memory.residuals().to_vec()
+    }
+
     /// Energy of the residuals alone, without prior knowledge.
     pub(crate) fn energy(&self, theta: &[f64]) -> f64 {
         let mut memory = self.memory.borrow_mut();
         self.evaluate(theta, &mut memory);
-        // What is known beforehand comes after the residuals.
-        let residuals = &memory.residual[..memory.ends.last().copied().unwrap_or(0)];
+        let residuals = memory.residuals();
         let sum = dense::dot(residuals, residuals);
         if sum.is_finite() { sum } else { f64::INFINITY }
     }

@@ -170,6 +170,12 @@ impl Model {
         ResidualCost::new(self, theta, observations, selection).energy(theta)
     }
 
+    /// The correlation between the residuals that count at two points, as the fit weighs frequencies; NaN where those of one have no energy.
+    pub fn residual_correlation(&self, points: [&[f64]; 2], observations: &Observations, selection: &Selection) -> f64 {
+        let [a, b] = points.map(|theta| ResidualCost::new(self, theta, observations, selection).residuals(theta));
+        dense::dot(&a, &b) / (dense::dot(&a, &a) * dense::dot(&b, &b)).sqrt()
+    }
+
     /// The best fit with effect values as given, from the best `most` points of a grid of time constants.
     ///
     /// # Panics

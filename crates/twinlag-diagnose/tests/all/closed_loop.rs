@@ -5,7 +5,9 @@
 use crate::common::{
     GAS_K, NOISE_K, PERIOD_S, SEED, TAU_S, even, found, found_without, limited, ramps, readings, record, recovers, told,
 };
-use twinlag_diagnose::{Diagnosis, Found, Identifier, KnownEffect, Observations, Settings, Stretch, Verdict, fit_with};
+use twinlag_diagnose::{
+    Diagnosis, Found, Grade, Identifier, KnownEffect, Observations, Settings, Stretch, Verdict, fit_with,
+};
 use twinlag_signal::{
     ColouredNoise, Engine, Gas, Noise, Record, Rig, Sensor, Signal, Spikes, TemperatureDependence, Turbulence,
 };
@@ -296,12 +298,12 @@ fn coloured_noise_of_the_fast_channel_is_not_put_into_the_other() {
     assert_ne!(effect.channel, Some(1), "{}", told(&d));
 }
 
-/// Failed: in the exhaust of an engine at 20 Hz a delay of 5 ms was given as 55 ms, a period more. With seed 4 it still is, and is no part
-/// of this: a delay a period longer leaves other readings to compare, and fits better there by chance.
+/// Failed: in the exhaust of an engine at 20 Hz a delay of 5 ms was given as 55 ms, a period more, and graded `go`; with seed 7 it was found
+/// as radiation. A period more fits as well, which is said.
 #[test]
 fn a_delay_is_no_period_longer() {
     const DELAY_S: f64 = 0.005;
-    for seed in 1..=2 {
+    for seed in 1..=8 {
         let mut sensors = [0.0238, 0.1168].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
         sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.5)));
         sensors[1].delay_s = DELAY_S;
@@ -314,5 +316,8 @@ fn a_delay_is_no_period_longer() {
         let delay = &effect.parameters[0];
         let error = delay.standard_error.expect("a fitted number has one");
         assert!((delay.value - DELAY_S).abs() < 4.0 * error, "seed {seed}: {delay:?}");
+        let judgement = &effect.judgements[0];
+        assert_eq!(judgement.grade, Grade::Conditional, "seed {seed}: {judgement:?}");
+        assert!(judgement.because.contains("the gas repeats itself"), "seed {seed}: {judgement:?}");
     }
 }
