@@ -1,5 +1,6 @@
 //! The book as its readers see it, and whether what it links to is there.
 
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +10,10 @@ use pulldown_cmark::{Event, Parser, Tag};
 
 use crate::root;
 
+/// The folder of the book's sources, as pages of the repository link to it.
+const SOURCES: &str = "docs/src/";
+/// The folder of the book in a release archive.
+pub(crate) const IN_ARCHIVE: &str = "book/";
 /// Pages beside the book that link into it.
 const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
 
@@ -18,10 +23,7 @@ const BESIDE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"];
 /// The first page with a link to a file that is not there, to one that is no page of the book, or to a heading that its page does not have.
 pub(crate) fn run() -> Result<()> {
     let out = &root()?.join("target/book");
-    let mut book = MDBook::load(root()?.join("docs"))?;
-    out.clone_into(&mut book.config.build.build_dir);
-    book.build()?;
-    let source = book.source_dir();
+    let source = build(out)?;
     let mut pages: Vec<PathBuf> =
         BESIDE.iter().map(|name| root().map(|root| root.join(name))).collect::<Result<_>>()?;
     for entry in fs::read_dir(&source)? {
@@ -33,16 +35,47 @@ pub(crate) fn run() -> Result<()> {
     let mut count = 0;
     for page in &pages {
         let text = fs::read_to_string(page).with_context(|| format!("{}", page.display()))?;
-        for event in Parser::new(&text) {
-            let Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) = event else { continue };
-            if !dest_url.contains("://") && !dest_url.starts_with("mailto:") {
-                follow(&dest_url, page, &source, out).with_context(|| format!("{}: {dest_url}", page.display()))?;
-                count += 1;
-            }
+        for link in links(&text) {
+            follow(&link, page, &source, out).with_context(|| format!("{}: {link}", page.display()))?;
+            count += 1;
         }
     }
     println!("== book: {}; {count} links in {} pages lead to something", out.display(), pages.len());
     Ok(())
+}
+
+/// Builds the book into a folder, and gives that of its sources.
+pub(crate) fn build(out: &Path) -> Result<PathBuf> {
+    if out.exists() {
+        fs::remove_dir_all(out)?;
+    }
+    let mut book = MDBook::load(root()?.join("docs"))?;
+    out.clone_into(&mut book.config.build.build_dir);
+    book.build()?;
+    Ok(book.source_dir())
+}
+
+/// A page of the repository as it stands in an archive, where its links lead to the built book.
+pub(crate) fn in_archive(page: &str) -> String {
+    let link_start = format!("]({SOURCES}");
+    let mut parts = page.split(&link_start);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (link, rest) = part.split_once(')').unwrap_or((part, ""));
+        let _ = write!(out, "]({IN_ARCHIVE}{})", link.replace(".md", ".html"));
+        out.push_str(rest);
+    }
+    out
+}
+
+/// Where a page links to, as long as that is no other site: a path, with a heading or without.
+pub(crate) fn links(page: &str) -> Vec<String> {
+    let link = |event| match event {
+        Event::Start(Tag::Link { dest_url, .. } | Tag::Image { dest_url, .. }) => Some(dest_url.into_string()),
+        _ => None,
+    };
+    let is_here = |link: &String| !link.contains("://") && !link.starts_with("mailto:");
+    Parser::new(page).filter_map(link).filter(is_here).collect()
 }
 
 /// Whether a link of a page leads to a file and, where that is a page of the book, to a heading of it.

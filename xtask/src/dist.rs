@@ -1,4 +1,4 @@
-//! Release archives: the program with its manual, completions, licences and examples, as one file for each platform.
+//! Release archives: the program with its manual, the book, completions and licences, as one file for each platform.
 //!
 //! An archive is the same to the byte wherever the repository lies, as long as compiler, dependencies and platform are the same: paths
 //! of the machine are taken out of the program, and entries are in order, with one date and one owner. An archive for another platform takes its
@@ -16,7 +16,7 @@ use flate2::{Compression, GzBuilder};
 use sha2::{Digest, Sha256};
 use zip::write::SimpleFileOptions;
 
-use crate::root;
+use crate::{book, root};
 
 /// Files of the repository that go with the program.
 const BESIDE: [&str; 5] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT", "CITATION.cff"];
@@ -74,9 +74,7 @@ fn make(target: &str, host: &str, build: &Path, out: &Path) -> Result<PathBuf> {
     let folder = format!("twinlag-{version}-{target}");
     let mut entries =
         vec![(program.file_name().context("a program has a name")?.to_owned().into(), fs::read(&program)?, true)];
-    for name in BESIDE {
-        entries.push((PathBuf::from(name), fs::read(root()?.join(name))?, false));
-    }
+    entries.extend(documents(&build.join("book"))?);
     for shell in SHELLS {
         let script = Command::new(&here).args(["completions", shell]).output()?;
         ensure!(script.status.success(), "no completions for {shell}");
@@ -102,6 +100,38 @@ fn make(target: &str, host: &str, build: &Path, out: &Path) -> Result<PathBuf> {
         tarred(&archive, &folder, &entries)?;
         Ok(archive)
     }
+}
+
+/// The book, and the pages beside it, of which every link leads to something in the archive.
+fn documents(built: &Path) -> Result<Vec<Entry>> {
+    book::build(built)?;
+    let mut entries = Vec::new();
+    let mut folders = vec![built.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let content = fs::read(&path)?;
+                entries.push((Path::new(book::IN_ARCHIVE).join(path.strip_prefix(built)?), content, false));
+            }
+        }
+    }
+    let mut pages = Vec::new();
+    for name in BESIDE {
+        let page = book::in_archive(&fs::read_to_string(root()?.join(name))?);
+        entries.push((PathBuf::from(name), page.clone().into_bytes(), false));
+        pages.push((name, page));
+    }
+    for (name, page) in pages {
+        for link in book::links(&page) {
+            let file = link.split('#').next().unwrap_or_default();
+            let is_there = file.is_empty() || entries.iter().any(|(path, _, _)| path.starts_with(file));
+            ensure!(is_there, "{name} links to {link}, which is not in the archive");
+        }
+    }
+    Ok(entries)
 }
 
 /// The program for a platform, without paths of this machine in it.

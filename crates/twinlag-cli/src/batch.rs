@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Value, json};
 use twinlag::compensation::Form;
-use twinlag::diagnosis::Identifier;
+use twinlag::diagnosis::{Grade, Identifier};
 use twinlag::record::{ColumnRef, Record};
 use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
 use twinlag_batch::{
@@ -584,7 +584,7 @@ const SHOWN: usize = 20;
 /// Reasons that are shown on the console, the most frequent; chosen, so that they fit on one screen with the members.
 const REASONS: usize = 5;
 
-/// Both time constants of each member, where there are few.
+/// Both time constants of each member with their grades, where there are few.
 fn members(fleet: &Fleet) -> Vec<String> {
     if fleet.members.is_empty() || fleet.members.len() > SHOWN {
         return Vec::new();
@@ -597,7 +597,10 @@ fn members(fleet: &Fleet) -> Vec<String> {
     let header = cells("", ["T1", "T2"].map(str::to_owned), "verdict".to_owned());
     let row = |member: &Member| {
         let taus = member.tau.map(|tau| match tau {
-            Some(MemberTau { value_s, interval_95_s: [low, high], .. }) => print::interval(value_s, low, high, " s"),
+            Some(MemberTau { value_s, interval_95_s: [low, high], is_go, .. }) => {
+                let grade = if is_go { Grade::Go } else { Grade::Conditional };
+                format!("{}  {grade}", print::interval(value_s, low, high, " s"))
+            }
             None => "not given".to_owned(),
         });
         let effects = if member.effects.is_empty() { String::new() } else { format!(": {}", member.effects) };

@@ -43,7 +43,7 @@ mod track;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory, FromArgMatches};
 
 use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;
@@ -60,8 +60,19 @@ fn main() -> ExitCode {
     }
 }
 
+/// Lets options take negative numbers, so that what says which numbers an option may have says it of these too.
+fn taking_negative_numbers(command: clap::Command) -> clap::Command {
+    let taking = |argument: clap::Arg| {
+        let is_option = !argument.is_positional() && argument.get_action().takes_values();
+        if is_option { argument.allow_negative_numbers(true) } else { argument }
+    };
+    command.mut_args(taking).mut_subcommands(taking_negative_numbers)
+}
+
 fn run() -> Result<u8, Failure> {
-    let arguments = Arguments::parse_from(config::with_config(std::env::args_os().collect())?);
+    let command = taking_negative_numbers(Arguments::command());
+    let matches = command.get_matches_from(config::with_config(std::env::args_os().collect())?);
+    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let console = arguments.console();
     match arguments.command {
         Command::Characterise(command) => characterise::run(&command, console),

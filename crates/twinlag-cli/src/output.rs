@@ -223,7 +223,8 @@ pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> 
     replace(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
 }
 
-/// The command line of this run, quoted for a shell.
+/// The command line of this run, quoted for a shell. Of absolute paths the last name alone is kept: where files and the program lie is
+/// nobody's business but the user's.
 pub(crate) fn command_line() -> String {
     let quoted = |argument: String| {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:+".contains(c);
@@ -233,12 +234,22 @@ pub(crate) fn command_line() -> String {
             format!("'{}'", argument.replace('\'', "'\\''"))
         }
     };
-    // Where the program lies is nobody's business but the user's.
-    let program =
-        |path: String| Path::new(&path).file_name().map_or(path.clone(), |name| name.to_string_lossy().into_owned());
     let mut arguments = std::env::args();
-    let first = arguments.next().map(program);
-    first.into_iter().chain(arguments).map(quoted).collect::<Vec<_>>().join(" ")
+    let program = arguments.next().map(|path| file_name(&path));
+    let rest = arguments.map(|argument| match argument.split_once('=') {
+        Some((option, value)) if option.starts_with("--") => format!("{option}={}", without_folders(value)),
+        _ => without_folders(&argument),
+    });
+    program.into_iter().chain(rest).map(quoted).collect::<Vec<_>>().join(" ")
+}
+
+/// The last name of an absolute path; anything else as it is.
+fn without_folders(argument: &str) -> String {
+    if Path::new(argument).is_absolute() { format!(".../{}", file_name(argument)) } else { argument.to_owned() }
+}
+
+fn file_name(path: &str) -> String {
+    Path::new(path).file_name().map_or(path.to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 fn cannot_be_written(path: &Path, error: &std::io::Error) -> Failure {

@@ -39,6 +39,34 @@ fn a_file_of_options_that_are_none_is_refused() {
     bench.refuses(3, &["characterise", "run.csv", "--config", "none.toml"], &["none.toml", "cannot be read"]);
 }
 
+/// Failed: a negative number was taken for an option, with the advice to write `-- -1`.
+#[test]
+fn what_says_which_numbers_an_option_may_have_says_it_of_negative_ones() {
+    let bench = Bench::with("negative", "run.csv", Trace::GOOD.csv());
+    for (code, arguments, words) in [
+        (2, &["track", "run.csv", "--window", "-1", "--out", "out.csv"][..], &["window: expected seconds", "-1"][..]),
+        (2, &["characterise", "run.csv", "--period", "-1"], &["the sample period must be positive", "-1"]),
+        (2, &["track", "run.csv", "--live", "-5", "--out", "-"], &["--live", "-5", "200.."]),
+        (2, &["batch", "run.csv", "--threads", "-1", "--out", "out.csv"], &["--threads", "-1"]),
+    ] {
+        bench.refuses(code, arguments, words);
+    }
+}
+
+/// Failed: the page of a batch showed the folders of the machine that it was made on.
+#[test]
+fn a_page_names_no_folder_of_the_machine() {
+    let bench = Bench::with("folders", "run.csv", Trace::GOOD.csv());
+    let here = bench.path("").to_string_lossy().into_owned();
+    let file = bench.path("run.csv").to_string_lossy().into_owned();
+    let table = bench.path("table.csv").to_string_lossy().into_owned();
+    let report = format!("--report={}", bench.path("page.html").display());
+    assert_eq!(bench.run(&["batch", &file, "--out", &table, &report]).code, 0);
+    let page = String::from_utf8(bench.read("page.html")).expect("a page is text");
+    assert!(page.contains("batch .../run.csv --out .../table.csv --report=.../page.html"), "{page}");
+    assert!(!page.contains(here.trim_end_matches('/')), "{page}");
+}
+
 #[test]
 fn the_line_that_a_message_is_about_is_shown() {
     let mut lines = Trace::GOOD.lines();
