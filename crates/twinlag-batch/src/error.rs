@@ -32,6 +32,24 @@ pub enum BatchError {
         path.display()
     )]
     Damaged { path: PathBuf, line: usize, reason: String },
+    #[error(
+        "{}, line {line}: expected the manifest of a batch: {reason}; remove it, and it is made anew; all shards are to be run again",
+        path.display()
+    )]
+    DamagedManifest { path: PathBuf, line: usize, reason: String },
+    #[error("{file}: the name is no Unicode, so that no manifest can hold it; give the file another name")]
+    NoUnicode { file: String },
+    #[error(
+        "{}: is no part of this batch (it differs in {what}); remove it, and run its shard again",
+        path.display()
+    )]
+    Foreign { path: PathBuf, what: String },
+    #[error("{}, line {line}: {reason}; remove this part, and run its shard again", path.display())]
+    DamagedPart { path: PathBuf, line: usize, reason: String },
+    #[error("{unit} is in {} and in {}: remove one of them, and run what is missing then", first.display(), second.display())]
+    Twice { unit: String, first: PathBuf, second: PathBuf },
+    #[error("{units} of {all} units are missing, first {first}: run {shards} again")]
+    Incomplete { units: usize, all: usize, first: String, shards: String },
     #[error("{}: expected the journal of a batch, got a file that does not begin as one; choose another table", path.display())]
     NoJournal { path: PathBuf },
     #[error("{} is being written by another run; wait until it ends, or choose another table", path.display())]

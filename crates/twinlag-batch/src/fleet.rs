@@ -7,7 +7,7 @@ use twinlag::diagnosis::Grade;
 
 use crate::error::BatchError;
 use crate::group::Unit;
-use crate::journal::Journal;
+use crate::journal::Answers;
 use crate::outcome::Outcome;
 use crate::row::{Row, TAU, graded_columns};
 
@@ -104,13 +104,13 @@ impl Fleet {
     ///
     /// # Errors
     /// [`BatchError::Read`].
-    pub fn of(units: &[Unit], journal: &mut Journal) -> Result<Self, BatchError> {
+    pub fn of(units: &[Unit], answers: &mut impl Answers) -> Result<Self, BatchError> {
         let mut fleet = Self::default();
         let mut reasons: BTreeMap<String, ReasonCount> = BTreeMap::new();
         let (mut verdicts, mut effects) = (BTreeMap::new(), BTreeMap::new());
         let is_grouped = !units.iter().any(|unit| matches!(unit, Unit::Record(_)));
         for unit in units {
-            let rows = journal.rows(unit)?;
+            let rows = answers.rows(unit)?;
             for row in &rows {
                 if let Some(reason) = reason_without_answer(row) {
                     let name = row.name();

@@ -1,7 +1,8 @@
 //! The journal of a batch: what is done, line by line, so that a run that was killed goes on where it stopped.
 //!
 //! The first line says what was asked; each further one has the rows of a unit, with the size and the time of change of its files: a
-//! unit whose files have changed since is asked again. A line that was cut off in the middle is dropped.
+//! unit whose files have changed since is asked again. Each of these begins with its SHA-256. A line that was cut off in the middle is
+//! dropped; one that does not fit its hash is an error. The journal of a shard is its part of the batch.
 
 use std::collections::HashMap;
 use std::fs::{File, Metadata, TryLockError};
@@ -12,13 +13,18 @@ use std::time::UNIX_EPOCH;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use twinlag_study::Shard;
 
+use crate::digest::sha256;
 use crate::error::BatchError;
 use crate::group::{Unit, name_of};
 use crate::row::Row;
 
 /// Name and number of the format.
-const SCHEMA: &str = "twinlag.batch-journal/2";
+const SCHEMA: &str = "twinlag.batch-journal/3";
+
+/// Digits of a SHA-256.
+const HASH_DIGITS: usize = 64;
 
 /// How every journal begins.
 const START: &str = "{\"schema\":\"twinlag.batch-journal/";
@@ -62,13 +68,24 @@ struct Stamp {
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
-struct Header {
+pub(crate) struct Header {
     schema: String,
     version: String,
     asked: Value,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    part_of: Option<PartOf>,
 }
 
-/// Any further line.
+/// What a journal is a part of.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PartOf {
+    /// [`Manifest::sha256`](crate::Manifest::sha256) of the batch.
+    pub manifest: String,
+    /// The shard.
+    pub shard: Shard,
+}
+
+/// Any further line, behind its hash.
 #[derive(Serialize, Deserialize)]
 struct Entry<Rows> {
     unit: String,
@@ -85,6 +102,20 @@ impl Journal {
     /// [`BatchError::Exists`], [`BatchError::NoJournal`], [`BatchError::OtherQuestion`], [`BatchError::Damaged`], [`BatchError::Busy`],
     /// [`BatchError::Read`], [`BatchError::Write`].
     pub fn open(path: &Path, asked: &Value, begin: Begin) -> Result<Self, BatchError> {
+        Self::open_as(path, asked, None, begin)
+    }
+
+    /// Opens the journal of a shard, as [`Self::open`] does that of a batch.
+    ///
+    /// - `part_of`: the batch that it is a part of; a run that goes on has to be of the same shard
+    ///
+    /// # Errors
+    /// As of [`Self::open`].
+    pub fn open_part(path: &Path, asked: &Value, part_of: PartOf, begin: Begin) -> Result<Self, BatchError> {
+        Self::open_as(path, asked, Some(part_of), begin)
+    }
+
+    fn open_as(path: &Path, asked: &Value, part_of: Option<PartOf>, begin: Begin) -> Result<Self, BatchError> {
         let unwritable = |error: std::io::Error| BatchError::Write { path: path.to_owned(), reason: error.to_string() };
         if begin == Begin::Create && path.exists() {
             return Err(BatchError::Exists { path: path.to_owned() });
@@ -96,18 +127,47 @@ impl Journal {
             Ok(()) | Err(TryLockError::Error(_)) => {}
             Err(TryLockError::WouldBlock) => return Err(BatchError::Busy { path: path.to_owned() }),
         }
-        let header =
-            Header { schema: SCHEMA.to_owned(), version: env!("CARGO_PKG_VERSION").to_owned(), asked: asked.clone() };
+        let (schema, version) = (SCHEMA.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+        let header = Header { schema, version, asked: asked.clone(), part_of };
         let mut journal = Self { file, path: path.to_owned(), end: 0, done: HashMap::new() };
         journal.expect_journal()?;
-        if begin == Begin::Resume {
-            journal.take_up(&header)?;
+        let was = if begin == Begin::Resume { journal.take_up()? } else { None };
+        if let Some(was) = was {
+            was.expect_same(&header, &journal.path)?;
         }
         journal.file.set_len(journal.end).map_err(unwritable)?;
         if journal.end == 0 {
-            journal.write_line(&header)?;
+            journal.write_line(&text_of(&header, path)?)?;
         }
         Ok(journal)
+    }
+
+    /// Opens a part that nobody writes any more, to read it.
+    ///
+    /// # Errors
+    /// As of [`Journal::open`].
+    pub(crate) fn read_part(path: &Path) -> Result<(Self, Header), BatchError> {
+        let unreadable = |error: std::io::Error| BatchError::Read { path: path.to_owned(), reason: error.to_string() };
+        let file = File::open(path).map_err(unreadable)?;
+        if matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
+            return Err(BatchError::Busy { path: path.to_owned() });
+        }
+        let mut journal = Self { file, path: path.to_owned(), end: 0, done: HashMap::new() };
+        journal.expect_journal()?;
+        match journal.take_up()? {
+            Some(header) => Ok((journal, header)),
+            None => Err(BatchError::Foreign { path: path.to_owned(), what: "everything: it is empty".to_owned() }),
+        }
+    }
+
+    /// Its file.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The keys of the units that are done.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = &String> {
+        self.done.keys()
     }
 
     /// Has a unit asked again, since what it led to beside its rows is gone.
@@ -131,23 +191,10 @@ impl Journal {
     /// [`BatchError::Write`].
     pub(crate) fn append(&mut self, unit: &Unit, seen: Seen, rows: &[Row]) -> Result<(), BatchError> {
         let (key, at) = (unit.key(), self.end);
-        self.write_line(&Entry { unit: key.clone(), stamps: seen.0.clone(), rows })?;
+        let text = text_of(&Entry { unit: key.clone(), stamps: seen.0.clone(), rows }, &self.path)?;
+        self.write_line(&format!("{} {text}", sha256(text.as_bytes())))?;
         self.done.insert(key, Done { at, bytes: (self.end - at) as usize, stamps: seen.0 });
         Ok(())
-    }
-
-    /// The rows of a unit; none of one that is not done.
-    ///
-    /// # Errors
-    /// [`BatchError::Read`].
-    pub fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError> {
-        let Some(done) = self.done.get(&unit.key()) else { return Ok(Vec::new()) };
-        let mut line = vec![0; done.bytes];
-        let mut read = || self.file.seek(SeekFrom::Start(done.at)).and_then(|_| self.file.read_exact(&mut line));
-        let wrong = |reason: String| BatchError::Read { path: self.path.clone(), reason };
-        read().map_err(|error| wrong(error.to_string()))?;
-        let entry: Entry<Vec<Row>> = serde_json::from_slice(&line).map_err(|error| wrong(error.to_string()))?;
-        Ok(entry.rows)
     }
 
     /// Refuses to replace a file that is no journal.
@@ -160,51 +207,111 @@ impl Journal {
         if is_journal { Ok(()) } else { Err(BatchError::NoJournal { path: self.path.clone() }) }
     }
 
-    /// Reads what an earlier run has done.
-    fn take_up(&mut self, header: &Header) -> Result<(), BatchError> {
+    /// Reads what an earlier run has done, and what was asked; `None` of an empty file.
+    fn take_up(&mut self) -> Result<Option<Header>, BatchError> {
         let unreadable =
             |path: &Path, error: &std::io::Error| BatchError::Read { path: path.to_owned(), reason: error.to_string() };
         let mut reader = BufReader::new(&self.file);
-        let mut text = Vec::new();
+        let (mut header, mut text) = (None, Vec::new());
         for line in 1.. {
             text.clear();
             reader.read_until(b'\n', &mut text).map_err(|error| unreadable(&self.path, &error))?;
             if text.last() != Some(&b'\n') {
                 break;
             }
-            let damaged = |error: serde_json::Error| BatchError::Damaged {
-                path: self.path.clone(),
-                line,
-                reason: error.to_string(),
-            };
+            let damaged = |reason: String| BatchError::Damaged { path: self.path.clone(), line, reason };
             if line == 1 {
-                let was: Header = serde_json::from_slice(&text).map_err(damaged)?;
-                was.expect_same(header, &self.path)?;
+                let was: Header = serde_json::from_slice(&text).map_err(|error| damaged(error.to_string()))?;
+                header = Some(was);
             } else {
-                let entry: Entry<IgnoredAny> = serde_json::from_slice(&text).map_err(damaged)?;
+                let json = checked(&text).ok_or_else(|| damaged("it does not fit its hash".to_owned()))?;
+                let entry: Entry<IgnoredAny> =
+                    serde_json::from_slice(json).map_err(|error| damaged(error.to_string()))?;
                 let done = Done { at: self.end, bytes: text.len(), stamps: entry.stamps };
                 self.done.insert(entry.unit, done);
             }
             self.end += text.len() as u64;
         }
-        Ok(())
+        Ok(header)
     }
 
     /// Appends a line in one piece.
-    fn write_line(&mut self, line: &impl Serialize) -> Result<(), BatchError> {
-        let wrong = |reason: String| BatchError::Write { path: self.path.clone(), reason };
-        let mut text = serde_json::to_vec(line).map_err(|error| wrong(error.to_string()))?;
-        text.push(b'\n');
-        let mut write = || self.file.seek(SeekFrom::Start(self.end)).and_then(|_| self.file.write_all(&text));
-        write().map_err(|error| wrong(error.to_string()))?;
-        self.end += text.len() as u64;
+    fn write_line(&mut self, text: &str) -> Result<(), BatchError> {
+        let line = format!("{text}\n");
+        let mut write = || self.file.seek(SeekFrom::Start(self.end)).and_then(|_| self.file.write_all(line.as_bytes()));
+        write().map_err(|error| BatchError::Write { path: self.path.clone(), reason: error.to_string() })?;
+        self.end += line.len() as u64;
         Ok(())
     }
 }
 
+/// Where the rows of units are.
+pub trait Answers {
+    /// The rows of a unit; none of one that is not done.
+    ///
+    /// # Errors
+    /// [`BatchError::Read`].
+    fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError>;
+}
+
+impl Answers for Journal {
+    fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError> {
+        let Some(done) = self.done.get(&unit.key()) else { return Ok(Vec::new()) };
+        let mut line = vec![0; done.bytes];
+        let mut read = || self.file.seek(SeekFrom::Start(done.at)).and_then(|_| self.file.read_exact(&mut line));
+        let wrong = |reason: String| BatchError::Read { path: self.path.clone(), reason };
+        read().map_err(|error| wrong(error.to_string()))?;
+        let json = checked(&line).ok_or_else(|| wrong("a line no longer fits its hash".to_owned()))?;
+        let entry: Entry<Vec<Row>> = serde_json::from_slice(json).map_err(|error| wrong(error.to_string()))?;
+        Ok(entry.rows)
+    }
+}
+
+/// A line as text, for a journal at `path`.
+fn text_of(line: &impl Serialize, path: &Path) -> Result<String, BatchError> {
+    serde_json::to_string(line).map_err(|error| BatchError::Write { path: path.to_owned(), reason: error.to_string() })
+}
+
+/// What stands behind the hash of a line; `None` where that is not its hash.
+fn checked(line: &[u8]) -> Option<&[u8]> {
+    let line = line.strip_suffix(b"\n").unwrap_or(line);
+    let (hash, text) = line.split_at_checked(HASH_DIGITS)?;
+    let text = text.strip_prefix(b" ")?;
+    (hash == sha256(text).as_bytes()).then_some(text)
+}
+
 impl Header {
-    /// Refuses to go on with another question.
+    /// Refuses a part of another batch, or one that was asked something else than `first`.
+    pub(crate) fn expect_part_of(&self, manifest: &str, first: &Self, path: &Path) -> Result<(), BatchError> {
+        let foreign = |what: String| Err(BatchError::Foreign { path: path.to_owned(), what });
+        match &self.part_of {
+            None => return foreign("its batch: it is one by itself".to_owned()),
+            Some(part_of) if part_of.manifest != manifest => return foreign("the manifest".to_owned()),
+            Some(_) => {}
+        }
+        match self.expect_same_question(first, path) {
+            Err(BatchError::OtherQuestion { what, .. }) => foreign(what),
+            other => other,
+        }
+    }
+
+    /// What was asked.
+    pub(crate) fn asked(&self) -> &Value {
+        &self.asked
+    }
+
+    /// Refuses to go on with another question, or with another part.
     fn expect_same(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
+        self.expect_same_question(now, path)?;
+        let what = match (&self.part_of, &now.part_of) {
+            (was, is) if was == is => return Ok(()),
+            (Some(was), Some(is)) if was.manifest == is.manifest => "the shard",
+            _ => "the manifest",
+        };
+        Err(BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() })
+    }
+
+    fn expect_same_question(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
         let differs = |what: &str| BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() };
         if (&self.schema, &self.version) != (&now.schema, &now.version) {
             return Err(differs("the version of the program"));

@@ -38,24 +38,30 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod digest;
 mod error;
 mod find;
 mod fleet;
 mod group;
 mod journal;
+mod manifest;
 mod outcome;
 mod parquet;
+mod parts;
 mod row;
 mod run;
 mod table;
 
+pub use digest::{sha256, sha256_of_file};
 pub use error::BatchError;
 pub use find::{Found, find};
 pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};
 pub use group::{GroupBy, Unit, each, grouped, name_of};
-pub use journal::{Begin, Journal};
+pub use journal::{Answers, Begin, Journal, PartOf};
+pub use manifest::Manifest;
 pub use outcome::Outcome;
 pub use parquet::write_parquet;
+pub use parts::{Parts, part_path, parts_beside};
 pub use row::{Answer, Row, Verb};
 pub use run::{Progress, map, run};
 pub use table::{is_table, write_csv};

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use crate::error::BatchError;
 use crate::group::Unit;
-use crate::journal::Journal;
+use crate::journal::Answers;
 use crate::row::{Cells, Row, Verb};
 use crate::table::columns;
 
@@ -37,16 +37,16 @@ impl From<ParquetError> for BatchError {
 /// [`BatchError::Table`], [`BatchError::Read`].
 pub fn write_parquet(
     units: &[Unit],
-    journal: &mut Journal,
+    answers: &mut impl Answers,
     verb: Verb,
     out: impl Write + Send,
 ) -> Result<(), BatchError> {
-    let columns = columns(units, journal, verb)?;
+    let columns = columns(units, answers, verb)?;
     let properties = WriterProperties::builder().set_compression(Compression::ZSTD(<_>::default())).build();
     let mut writer = SerializedFileWriter::new(out, schema(&columns)?, Arc::new(properties))?;
     let mut held = Vec::with_capacity(GROUP_ROWS);
     for unit in units {
-        held.extend(journal.rows(unit)?);
+        held.extend(answers.rows(unit)?);
         if held.len() >= GROUP_ROWS {
             write_group(&mut writer, &columns, &held)?;
             held.clear();

@@ -7,16 +7,20 @@ use std::path::Path;
 
 use crate::error::BatchError;
 use crate::group::Unit;
-use crate::journal::Journal;
+use crate::journal::Answers;
 use crate::parquet::is_parquet_table;
 use crate::row::{Cells, Verb, cells_of_parameter, first_columns};
 
 /// The columns of a table: those of its verb, then those of the parameters that were found, by name.
-pub(crate) fn columns(units: &[Unit], journal: &mut Journal, verb: Verb) -> Result<Vec<(String, Cells)>, BatchError> {
+pub(crate) fn columns(
+    units: &[Unit],
+    answers: &mut impl Answers,
+    verb: Verb,
+) -> Result<Vec<(String, Cells)>, BatchError> {
     let mut columns = verb.columns();
     let mut others: BTreeSet<String> = BTreeSet::new();
     for unit in units {
-        for row in journal.rows(unit)? {
+        for row in answers.rows(unit)? {
             let of_verb = |name: &str| columns.iter().any(|(column, _)| column == name);
             others.extend(row.columns().filter(|name| !of_verb(name)).map(str::to_owned));
         }
@@ -33,13 +37,13 @@ pub(crate) fn columns(units: &[Unit], journal: &mut Journal, verb: Verb) -> Resu
 ///
 /// # Errors
 /// [`BatchError::Table`], [`BatchError::Read`].
-pub fn write_csv(units: &[Unit], journal: &mut Journal, verb: Verb, out: impl Write) -> Result<(), BatchError> {
+pub fn write_csv(units: &[Unit], answers: &mut impl Answers, verb: Verb, out: impl Write) -> Result<(), BatchError> {
     let wrong = |error: csv::Error| BatchError::Table { reason: error.to_string() };
-    let columns = columns(units, journal, verb)?;
+    let columns = columns(units, answers, verb)?;
     let mut table = csv::Writer::from_writer(out);
     table.write_record(columns.iter().map(|(name, _)| name)).map_err(wrong)?;
     for unit in units {
-        for row in journal.rows(unit)? {
+        for row in answers.rows(unit)? {
             table
                 .write_record(columns.iter().map(|(name, _)| row.in_words(name).unwrap_or_default().into_owned()))
                 .map_err(wrong)?;

@@ -17,10 +17,12 @@ use twinlag::diagnosis::{Grade, Identifier};
 use twinlag::record::{ColumnRef, Record};
 use twinlag::{Characterisation, CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Model, Options};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, Found, GroupBy, Journal, Member, MemberTau, Outcome, Row, Unit, Verb as RowVerb,
-    each, find, grouped, is_table, map, name_of, run as run_units, write_csv, write_parquet,
+    Answer, Answers, BatchError, Begin, Fleet, Found, GroupBy, Journal, Manifest, Member, MemberTau, Outcome, PartOf,
+    Row, Unit, Verb as RowVerb, each, find, grouped, is_table, map, name_of, part_path, run as run_units, write_csv,
+    write_parquet,
 };
 use twinlag_pages::{fleet_report, is_fleet_report};
+use twinlag_study::Shard;
 
 use crate::arguments::{Columns, Method, Physics, Trust, form};
 use crate::columns::columns;
@@ -31,7 +33,7 @@ use crate::output::Output;
 use crate::profile::Profile;
 use crate::progress;
 use crate::read::{read_watched, table_watched};
-use crate::{characterise, compensate, diagnose, output, print, report, several};
+use crate::{characterise, compensate, diagnose, output, print, report, several, shards};
 
 /// What is asked of each record, or of each rig.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -63,14 +65,18 @@ column for each of their parameters. A file that cannot be used is a row with it
 (column:serial), or those whose names agree in one part ('{rig}_run*.csv'). The table then has a row for each rig (level rig)
 and one for each of its records (level record), with what is left over when it is left out, and whether it agrees.
 
+--shard K/N asks only one of N parts of the batch, on this machine or another that sees the same files, and leaves it beside the
+table as TABLE.part-K-of-N. The first shard lists the files with sizes and hashes in TABLE.manifest, which the others take. --merge
+makes the table of all parts: the same, to the byte, as without shards.
+
 What is done is kept in TABLE.journal. A run that was stopped goes on with --resume, and gives the same table; so does a run
 after files have been added or changed, which asks only of those.
 
 Exit codes: 0 the table is written, and at least one unit has an answer; 4 none has, though files were read; 3 no file can be
-used; 2 wrong usage; 1 any other error. Column exit_code has what the verb alone would have ended with.")]
+used; 2 wrong usage; 75 a shard is missing; 1 any other error. Column exit_code has what the verb alone would have ended with.")]
 pub(crate) struct Batch {
     /// Folders, quoted patterns, or files.
-    #[arg(required = true, value_name = "WHAT")]
+    #[arg(required_unless_present = "merge", value_name = "WHAT")]
     what: Vec<PathBuf>,
     /// What is asked of each.
     #[arg(long, value_name = "VERB", default_value = "characterise")]
@@ -105,6 +111,25 @@ pub(crate) struct Batch {
     /// With --verb compensate: the channel to trust where gain, offset or delay differ.
     #[arg(long, value_name = "CHANNEL", default_value = "T1", ignore_case = true)]
     trust: Trust,
+    #[command(flatten)]
+    course: Course,
+    #[command(flatten)]
+    columns: Columns,
+    #[command(flatten)]
+    method: Method,
+    #[command(flatten)]
+    physics: Physics,
+}
+
+/// How a batch goes about it; no cell of the table depends on it.
+#[derive(Debug, Args)]
+struct Course {
+    /// Ask only part K of N, with K counted from 0; see --merge.
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["merge", "report"])]
+    shard: Option<Shard>,
+    /// Make the table of the parts that shards have left beside it.
+    #[arg(long, conflicts_with_all = ["what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "threads"])]
+    merge: bool,
     /// Go on where an earlier run stopped; only files that were added or changed since are asked again.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -114,12 +139,6 @@ pub(crate) struct Batch {
     /// Begin anew, and overwrite output files that exist.
     #[arg(long)]
     force: bool,
-    #[command(flatten)]
-    columns: Columns,
-    #[command(flatten)]
-    method: Method,
-    #[command(flatten)]
-    physics: Physics,
 }
 
 /// How the files of gas temperatures end.
@@ -129,25 +148,33 @@ const GAS_ENDING: &str = ".gas.csv";
 const SILENT: Console = Console { json: true, quiet: true };
 
 pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
+    if command.course.merge {
+        return merge(command, console);
+    }
     let question = Question::of(command)?;
-    let journal_path = with_ending(&command.out[0], ".journal");
-    let files = command.files(&journal_path)?;
-    let begin = match (command.resume, command.force) {
+    let table = &command.out[0];
+    let journal_path =
+        command.course.shard.map_or_else(|| with_ending(table, ".journal"), |shard| part_path(table, shard));
+    command.check_outputs(&journal_path)?;
+    let Asked { manifest, files, units, part_of } = Asked::of(command, &question, &journal_path, console)?;
+    let begin = match (command.course.resume, command.course.force) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Replace,
         _ => Begin::Create,
     };
     let gas_files = question.gas_files(&files)?;
-    let is_resumed = command.resume && journal_path.exists();
-    if let Some(gas) = gas_files.values().find(|gas| gas.exists()).filter(|_| !is_resumed && !command.force) {
+    let is_resumed = command.course.resume && journal_path.exists();
+    if let Some(gas) = gas_files.values().find(|gas| gas.exists()).filter(|_| !is_resumed && !command.course.force) {
         return Err(Failure::Usage(format!(
             "{} exists: choose another folder for --gas, or add --force",
             gas.display()
         )));
     }
-    let files = files.into_iter().map(|file| file.path).collect();
-    let units = question.units(files, command.threads, console);
-    let mut journal = Journal::open(&journal_path, &question.asked()?, begin)?;
+    let asked = question.asked()?;
+    let mut journal = match part_of {
+        Some(part_of) => Journal::open_part(&journal_path, &asked, part_of, begin)?,
+        None => Journal::open(&journal_path, &asked, begin)?,
+    };
     match journal.other_units(&units) {
         0 => {}
         count => console.note(|| {
@@ -170,21 +197,85 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     // What a panic says is in the row of its file.
     panic::set_hook(Box::new(|_| {}));
     let bar = progress::bar(console).with_message(question.unit_name());
-    let work = |unit: &Unit| question.rows(unit, &gas_files);
-    let done = run_units(&units, &mut journal, command.threads, work, |progress| {
+    let work = |unit: &Unit| match manifest.as_ref().and_then(|manifest| manifest.change_in(unit)) {
+        Some(change) => vec![failed(unit, &change)],
+        None => question.rows(unit, &gas_files),
+    };
+    let done = run_units(&units, &mut journal, command.course.threads, work, |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     });
     bar.finish_and_clear();
     let _ = panic::take_hook();
     done?;
+    match command.course.shard {
+        Some(shard) => shards::say_done(table, &journal_path, shard, console).map(|()| 0),
+        None => finish(command, &units, &mut journal, question.verb.into(), question.unit_name(), console),
+    }
+}
 
+/// What a run asks of what.
+struct Asked {
+    /// The batch that it is a shard of.
+    manifest: Option<Manifest>,
+    /// All files of the batch.
+    files: Vec<Found>,
+    /// The units that are asked, in the order of the table.
+    units: Vec<Unit>,
+    part_of: Option<PartOf>,
+}
+
+impl Asked {
+    fn of(command: &Batch, question: &Question<'_>, journal: &Path, console: Console) -> Result<Self, Failure> {
+        let threads = command.course.threads;
+        let found = || {
+            let files = command.files(journal)?;
+            let paths = files.iter().map(|file| file.path.clone()).collect();
+            let units = question.units(paths, threads, console);
+            Ok::<_, Failure>((files, units))
+        };
+        let Some(shard) = command.course.shard else {
+            let (files, units) = found()?;
+            return Ok(Self { manifest: None, files, units, part_of: None });
+        };
+        let (what, group_by) = (&command.what, question.group_by);
+        let manifest = shards::manifest(&command.out[0], what, group_by, || {
+            let (files, units) = found()?;
+            shards::listed(what, group_by, &units, &files, threads, console)
+        })?;
+        let (files, units) = (manifest.files(), manifest.units_of(shard));
+        let part_of = PartOf { manifest: manifest.sha256(), shard };
+        Ok(Self { manifest: Some(manifest), files, units, part_of: Some(part_of) })
+    }
+}
+
+/// Makes the table of all parts of a batch.
+fn merge(command: &Batch, console: Console) -> Result<u8, Failure> {
+    let table = &command.out[0];
+    command.check_outputs(&shards::manifest_path(table))?;
+    let (manifest, mut parts) = shards::all(table)?;
+    let asked = parts.asked();
+    let unit_name = unit_name(!asked["group_by"].is_null());
+    let verb = serde_json::from_value(asked["verb"].clone())
+        .map_err(|error| Failure::File(format!("{}: the parts ask nothing that is known: {error}", table.display())))?;
+    finish(command, &manifest.units(), &mut parts, verb, unit_name, console)
+}
+
+/// Writes the table and the summary, and says what came of it.
+fn finish(
+    command: &Batch,
+    units: &[Unit],
+    answers: &mut impl Answers,
+    verb: RowVerb,
+    unit_name: &'static str,
+    console: Console,
+) -> Result<u8, Failure> {
     for out in &command.out {
         output::replace(out, |file| {
             let written = if is_parquet(out) {
-                write_parquet(&units, &mut journal, question.verb.into(), file)
+                write_parquet(units, answers, verb, file)
             } else {
-                write_csv(&units, &mut journal, question.verb.into(), std::io::BufWriter::new(file))
+                write_csv(units, answers, verb, std::io::BufWriter::new(file))
             };
             written.map_err(|error| match error {
                 BatchError::Table { .. } => Failure::Other(format!("{}: {error}", out.display())),
@@ -192,14 +283,14 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
             })
         })?;
     }
-    let fleet = Fleet::of(&units, &mut journal)?;
+    let fleet = Fleet::of(units, answers)?;
     if let Some(path) = &command.report {
         let making = report::making(&[] as &[&Path], command.is_static);
         let title = command.out[0].display().to_string();
         let made_by = ["twinlag", env!("CARGO_PKG_VERSION")];
-        output::write(path, fleet_report(&fleet, &title, question.unit_name(), made_by, &making)?)?;
+        output::write(path, fleet_report(&fleet, &title, unit_name, made_by, &making)?)?;
     }
-    say(command, &question, &fleet, console)?;
+    say(command, unit_name, &fleet, console)?;
     let outcome = match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
         (0, 0, 0) => Outcome::Unusable,
         (0, 0, _) => Outcome::Failed,
@@ -210,30 +301,44 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
 }
 
 impl Batch {
-    /// The files that are asked, without what the batch itself writes.
-    fn files(&self, journal: &Path) -> Result<Vec<Found>, Failure> {
+    /// Refuses outputs that could not be written or would overwrite something.
+    fn check_outputs(&self, journal: &Path) -> Result<(), Failure> {
         if let Some(out) = self.out.iter().find(|out| !is_parquet(out) && !has_ending(out, "csv")) {
             let text = format!("--out {}: expected a name that ends in .csv or .parquet", out.display());
             return Err(Failure::Usage(text));
         }
-        let tables = self.out.iter().map(|path| ("--out", path.as_path()));
-        let outputs: Vec<Output<'_>> =
-            tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect();
-        let is_resumed = self.resume && journal.exists();
+        let outputs = self.outputs();
+        let is_resumed = self.course.resume && journal.exists();
         output::check(journal, &outputs, true)?;
         let others: Vec<_> = outputs.iter().copied().filter(|(_, path)| !(is_resumed && is_of_batch(path))).collect();
-        output::check(journal, &others, self.force)?;
+        // A shard writes none of them.
+        output::check(journal, &others, self.course.force || self.course.shard.is_some())
+    }
+
+    /// The tables and the page.
+    fn outputs(&self) -> Vec<Output<'_>> {
+        let tables = self.out.iter().map(|path| ("--out", path.as_path()));
+        tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect()
+    }
+
+    /// The files that are asked, without what the batch itself writes.
+    fn files(&self, journal: &Path) -> Result<Vec<Found>, Failure> {
+        let outputs = self.outputs();
         let gas = self.gas.as_ref().and_then(|folder| folder.canonicalize().ok());
         let is_gas = |file: &Path| {
             file.to_string_lossy().ends_with(GAS_ENDING)
                 && gas.as_ref().is_some_and(|gas| file.canonicalize().is_ok_and(|file| file.starts_with(gas)))
         };
         let is_output = |file: &Path| {
-            output::is_same(file, journal) || outputs.iter().any(|(_, output)| output::is_same(file, output))
+            output::is_same(file, journal)
+                || outputs.iter().any(|(_, output)| output::is_same(file, output))
+                || shards::is_beside(&self.out[0], file)
         };
         let found = find(&self.what)?;
         let (own, files): (Vec<_>, Vec<_>) = found.into_iter().partition(|file| is_output(&file.path));
-        match own.iter().find(|file| !output::is_same(&file.path, journal) && !is_of_batch(&file.path)) {
+        let is_own =
+            |file: &Path| output::is_same(file, journal) || is_of_batch(file) || shards::is_beside(&self.out[0], file);
+        match own.iter().find(|file| !is_own(&file.path)) {
             Some(file) => Err(Failure::Usage(format!(
                 "{} is one of the records: choose another name for --out or --report",
                 file.path.display()
@@ -328,7 +433,7 @@ impl<'a> Question<'a> {
     }
 
     fn unit_name(&self) -> &'static str {
-        if self.group_by.is_some() { "rigs" } else { "records" }
+        unit_name(self.group_by.is_some())
     }
 
     fn units(&self, files: Vec<PathBuf>, threads: Option<NonZeroUsize>, console: Console) -> Vec<Unit> {
@@ -472,6 +577,19 @@ impl<'a> Question<'a> {
     }
 }
 
+/// What the units of a batch are.
+fn unit_name(is_grouped: bool) -> &'static str {
+    if is_grouped { "rigs" } else { "records" }
+}
+
+/// The row of a unit that was not asked, though it should have been.
+fn failed(unit: &Unit, reason: &str) -> Row {
+    match unit {
+        Unit::Rig { name, .. } => Row::rig_without_answer(name, 0, Outcome::Failed, reason),
+        unit => Row::without_answer(unit, &unit.files()[0], Outcome::Failed, reason),
+    }
+}
+
 /// Refuses what is no file: whoever opens a pipe or a device may wait for ever.
 fn expect_file(file: &Path) -> Result<(), Failure> {
     let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
@@ -537,13 +655,13 @@ pub(crate) struct BatchAnswer {
 }
 
 /// Says what came of it.
-fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console) -> Result<(), Failure> {
+fn say(command: &Batch, unit_name: &'static str, fleet: &Fleet, console: Console) -> Result<(), Failure> {
     let counts = &fleet.units;
     if console.json {
         return print::json(&BatchAnswer {
             schema: "twinlag.batch/1",
             out: command.out.clone(),
-            units: question.unit_name(),
+            units: unit_name,
             answered: counts.answered,
             undetermined: counts.undetermined,
             unusable: counts.unusable,
@@ -553,7 +671,7 @@ fn say(command: &Batch, question: &Question<'_>, fleet: &Fleet, console: Console
         });
     }
     let names: Vec<String> = command.out.iter().map(|out| out.display().to_string()).collect();
-    let unit = if counts.total() == 1 { question.unit_name().trim_end_matches('s') } else { question.unit_name() };
+    let unit = if counts.total() == 1 { unit_name.trim_end_matches('s') } else { unit_name };
     let mut lines = vec![format!(
         "{}: {} {}: {} answered, {} undetermined, {} unusable, {} failed",
         names.join(", "),
@@ -619,9 +737,15 @@ impl From<BatchError> for Failure {
             BatchError::OtherQuestion { .. } => Self::Usage(format!("{text} (option --force)")),
             BatchError::Pattern { .. } | BatchError::GroupBy { .. } => Self::Usage(text),
             BatchError::Damaged { .. } => Self::File(format!("{text} (option --force)")),
-            BatchError::NothingFound { .. } | BatchError::Empty { .. } | BatchError::NoJournal { .. } => {
-                Self::File(text)
-            }
+            BatchError::Incomplete { .. } => Self::NotYet(format!("{text} (options --shard, --resume)")),
+            BatchError::NothingFound { .. }
+            | BatchError::Empty { .. }
+            | BatchError::NoJournal { .. }
+            | BatchError::DamagedManifest { .. }
+            | BatchError::DamagedPart { .. }
+            | BatchError::NoUnicode { .. }
+            | BatchError::Foreign { .. }
+            | BatchError::Twice { .. } => Self::File(text),
             _ => Self::Other(text),
         }
     }

@@ -36,6 +36,7 @@ mod report;
 mod schema;
 mod settings;
 mod several;
+mod shards;
 mod simulate;
 mod sparkline;
 mod study;

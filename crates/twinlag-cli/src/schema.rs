@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::inspect::Inspection;
 use crate::plan::PlanAnswer;
 use crate::print;
+use crate::shards::BatchPart;
 use crate::simulate::Simulation;
 use crate::study::{StudyAnswer, StudyPart};
 
@@ -29,6 +30,8 @@ pub(crate) enum Name {
     Inspection,
     /// The answer of `batch`; its table is described in the book.
     Batch,
+    /// The answer of `batch` with --shard.
+    BatchPart,
     /// The answer of `plan`.
     Plan,
     /// The answer of `simulate`.
@@ -50,6 +53,7 @@ pub(crate) fn run(name: Name) -> Result<u8, Failure> {
         Name::Model => generator.into_root_schema_for::<Model>(),
         Name::Inspection => generator.into_root_schema_for::<Inspection>(),
         Name::Batch => generator.into_root_schema_for::<BatchAnswer>(),
+        Name::BatchPart => generator.into_root_schema_for::<BatchPart>(),
         Name::Plan => generator.into_root_schema_for::<PlanAnswer>(),
         Name::Simulation => generator.into_root_schema_for::<Simulation>(),
         Name::Study => generator.into_root_schema_for::<StudyAnswer>(),

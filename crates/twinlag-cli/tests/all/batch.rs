@@ -263,3 +263,34 @@ fn what_cannot_be_asked_is_refused() {
         &["notes.html exists"],
     );
 }
+
+/// Whatever the shards, the table is the same; and one that is not there yet asks to be tried again.
+#[test]
+fn shards_give_the_table_of_a_whole_run() {
+    let bench = Bench::new("shards");
+    for (file, seed) in [("runs_a.csv", 1), ("runs_b.csv", 2)] {
+        bench.write(file, Trace { seed, ..Trace::GOOD }.csv());
+    }
+    bench.write("runs_c.csv", "");
+    let batch = ["batch", "runs_*.csv", "--group-by", "{rig}_*.csv"];
+    assert_eq!(bench.run(&[&batch[..], &["--out", "whole.csv"]].concat()).code, 0);
+    let run = |shard: &str| bench.run(&[&batch[..], &["--out", "t.csv", "--shard", shard, "--resume"]].concat());
+    let merge = || bench.run(&["batch", "--merge", "--out", "t.csv"]);
+    assert_eq!(run("1/2").code, 0);
+    let incomplete = merge();
+    assert_eq!(incomplete.code, 75, "{incomplete:#?}");
+    incomplete.says(&["missing", "0/2"]);
+    assert_eq!(run("0/2").code, 0);
+    assert_eq!(merge().code, 0);
+    assert_eq!(bench.read("t.csv"), bench.read("whole.csv"));
+    bench.refuses(2, &["batch", "--merge", "--out", "t.csv"], &["t.csv exists", "--force"]);
+    // What a shard finds changed is a row that says so.
+    bench.write("runs_a.csv", Trace { seed: 3, ..Trace::GOOD }.csv());
+    let again = ["batch", "runs_*.csv", "--group-by", "{rig}_*.csv", "--out", "t.csv", "--force"];
+    for shard in ["0/2", "1/2"] {
+        assert_eq!(bench.run(&[&again[..], &["--shard", shard]].concat()).code, 0);
+    }
+    assert_eq!(bench.run(&["batch", "--merge", "--out", "t.csv", "--force"]).code, 1);
+    let table = String::from_utf8(bench.read("t.csv")).expect("text");
+    assert!(table.contains("runs_a.csv: has changed since the batch was divided"), "{table}");
+}

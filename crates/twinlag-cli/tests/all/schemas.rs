@@ -73,6 +73,8 @@ fn answers_of_the_other_verbs_are_as_their_schemas_say() {
     assert_eq!(unusable.code, 3, "{unusable:#?}");
     fits(&inspection, &unusable.json());
     fits(&schema(&bench, "batch"), &bench.run(&["batch", "run.csv", "one.csv", "--out", "t.csv", "--json"]).json());
+    let part = bench.run(&["batch", "run.csv", "one.csv", "--out", "t.csv", "--shard", "1/2", "--json"]);
+    fits(&schema(&bench, "batch-part"), &part.json());
     let simulated = bench.run(&["simulate", "rig.toml", "--out", "again.csv", "--json"]);
     fits(&schema(&bench, "simulation"), &simulated.json());
     let plan = schema(&bench, "plan");

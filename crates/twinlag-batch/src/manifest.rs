@@ -1,0 +1,245 @@
+//! The files of a batch as they were when it was divided into shards, so that any machine that sees them asks the same.
+//!
+//! One line of JSON says what the batch is of, each further one has a unit, and the last one how many there are: a manifest that was cut
+//! off is none.
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+use std::io::{BufRead, Write};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use twinlag_study::Shard;
+
+use crate::digest::{sha256, sha256_of_file};
+use crate::error::BatchError;
+use crate::find::Found;
+use crate::group::{GroupBy, Unit, name_of};
+use crate::run::{Progress, map};
+
+/// Name and number of the format.
+const SCHEMA: &str = "twinlag.manifest/1";
+/// What a file counts beside its bytes when shards are balanced; chosen: what opening one costs beside reading it.
+const FILE_BYTES: u64 = 1 << 12;
+
+/// The units of a batch, with size and hash of their files.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Manifest {
+    header: Header,
+    units: Vec<Listed>,
+    /// The place of the unit that each file is of.
+    places: HashMap<PathBuf, usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Header {
+    schema: String,
+    /// Folders, patterns and files that were named.
+    what: Vec<String>,
+    /// What a rig is known by.
+    group_by: Option<String>,
+}
+
+/// A unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Listed {
+    /// The name of the rig; `None` of a record by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    rig: Option<String>,
+    /// Why nothing says which rig it is of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    without_rig: Option<String>,
+    files: Vec<ListedFile>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct ListedFile {
+    path: PathBuf,
+    /// As in [`Found`].
+    below: PathBuf,
+    /// `None` where it could not be read.
+    #[serde(flatten)]
+    content: Option<Content>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Content {
+    bytes: u64,
+    sha256: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct End {
+    units: usize,
+}
+
+impl Content {
+    fn of(path: &Path) -> Option<Self> {
+        let bytes = path.metadata().ok()?.len();
+        Some(Self { bytes, sha256: sha256_of_file(path).ok()? })
+    }
+}
+
+impl Manifest {
+    /// Lists units, and reads all their files.
+    ///
+    /// - `what`: folders, patterns and files that were named
+    /// - `found`: the files of all units
+    ///
+    /// # Errors
+    /// [`BatchError::NoUnicode`].
+    pub fn of(
+        what: &[PathBuf],
+        group_by: Option<&GroupBy>,
+        units: &[Unit],
+        found: &[Found],
+        threads: Option<NonZeroUsize>,
+        progress: impl FnMut(Progress),
+    ) -> Result<Self, BatchError> {
+        let contents = map(found, threads, |file| Content::of(&file.path), progress);
+        let listed: HashMap<&Path, ListedFile> = found
+            .iter()
+            .zip(contents)
+            .map(|(file, content)| {
+                let Found { path, below } = file.clone();
+                (file.path.as_path(), ListedFile { path, below, content })
+            })
+            .collect();
+        if let Some(file) = found.iter().find(|file| file.path.to_str().is_none()) {
+            return Err(BatchError::NoUnicode { file: name_of(&file.path) });
+        }
+        let unit = |unit: &Unit| {
+            let files = unit.files().iter().filter_map(|file| listed.get(file.as_path()).cloned()).collect();
+            let (rig, without_rig) = match unit {
+                Unit::Record(_) => (None, None),
+                Unit::Rig { name, .. } => (Some(name.clone()), None),
+                Unit::WithoutRig { reason, .. } => (None, Some(reason.clone())),
+            };
+            Listed { rig, without_rig, files }
+        };
+        let what = what.iter().map(|what| name_of(what)).collect();
+        let header = Header { schema: SCHEMA.to_owned(), what, group_by: group_by.map(ToString::to_string) };
+        Ok(Self::new(header, units.iter().map(unit).collect()))
+    }
+
+    fn new(header: Header, units: Vec<Listed>) -> Self {
+        let of_unit = |(place, unit): (usize, &Listed)| {
+            unit.files.iter().map(|file| (file.path.clone(), place)).collect::<Vec<_>>()
+        };
+        let places = units.iter().enumerate().flat_map(of_unit).collect();
+        Self { header, units, places }
+    }
+
+    /// Reads a manifest.
+    ///
+    /// - `path`: for messages
+    ///
+    /// # Errors
+    /// [`BatchError::Damaged`], [`BatchError::Read`].
+    pub fn read(path: &Path, text: impl BufRead) -> Result<Self, BatchError> {
+        let (mut header, mut units, mut end) = (None, Vec::new(), None);
+        for (line, text) in (1..).zip(text.lines()) {
+            let text = text.map_err(|error| BatchError::Read { path: path.to_owned(), reason: error.to_string() })?;
+            let damaged = |error: serde_json::Error| BatchError::DamagedManifest {
+                path: path.to_owned(),
+                line,
+                reason: error.to_string(),
+            };
+            if header.is_none() {
+                header = Some(serde_json::from_str::<Header>(&text).map_err(damaged)?);
+            } else if let Ok(End { units }) = serde_json::from_str(&text) {
+                end = Some(units);
+            } else {
+                units.push(serde_json::from_str(&text).map_err(damaged)?);
+            }
+        }
+        let header = header.filter(|header| header.schema == SCHEMA && end == Some(units.len()));
+        header.map(|header| Self::new(header, units)).ok_or_else(|| BatchError::DamagedManifest {
+            path: path.to_owned(),
+            line: 1,
+            reason: format!("it does not begin as a {SCHEMA}, or is cut off"),
+        })
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// Those of writing.
+    pub fn write(&self, mut out: impl Write) -> std::io::Result<()> {
+        out.write_all(self.text().as_bytes())
+    }
+
+    fn text(&self) -> String {
+        let line = |value: Result<String, serde_json::Error>| value.expect("names are text") + "\n";
+        let mut text = line(serde_json::to_string(&self.header));
+        self.units.iter().for_each(|unit| text.push_str(&line(serde_json::to_string(unit))));
+        text + &line(serde_json::to_string(&End { units: self.units.len() }))
+    }
+
+    /// Its own hash: parts of batches that differ in it are not mixed.
+    pub fn sha256(&self) -> String {
+        sha256(self.text().as_bytes())
+    }
+
+    /// Whether it is of what is named now, and of rigs that are known by the same.
+    pub fn is_of(&self, what: &[PathBuf], group_by: Option<&GroupBy>) -> bool {
+        let what: Vec<String> = what.iter().map(|what| name_of(what)).collect();
+        self.header.what == what && self.header.group_by == group_by.map(ToString::to_string)
+    }
+
+    /// Its units, in the order of the table.
+    pub fn units(&self) -> Vec<Unit> {
+        let unit = |listed: &Listed| {
+            let mut files = listed.files.iter().map(|file| file.path.clone());
+            match (&listed.rig, &listed.without_rig) {
+                (Some(name), _) => Some(Unit::Rig { name: name.clone(), files: files.collect() }),
+                (None, Some(reason)) => Some(Unit::WithoutRig { file: files.next()?, reason: reason.clone() }),
+                (None, None) => files.next().map(Unit::Record),
+            }
+        };
+        self.units.iter().filter_map(unit).collect()
+    }
+
+    /// Its files.
+    pub fn files(&self) -> Vec<Found> {
+        let all = self.units.iter().flat_map(|unit| &unit.files);
+        all.map(|file| Found { path: file.path.clone(), below: file.below.clone() }).collect()
+    }
+
+    /// The units of a shard, in the order of the table. Shards have as much to read as can be: the largest unit goes first, each to the
+    /// shard that has least.
+    pub fn units_of(&self, shard: Shard) -> Vec<Unit> {
+        let shards = self.shards(shard.of());
+        let units = self.units().into_iter().zip(shards);
+        units.filter(|(_, of)| *of == shard.index()).map(|(unit, _)| unit).collect()
+    }
+
+    /// The shard, of so many, that each unit belongs to.
+    pub(crate) fn shards(&self, of: u64) -> Vec<u64> {
+        let bytes = |listed: &Listed| {
+            let each = |file: &ListedFile| FILE_BYTES + file.content.as_ref().map_or(0, |content| content.bytes);
+            listed.files.iter().map(each).sum::<u64>()
+        };
+        let mut largest_first: Vec<usize> = (0..self.units.len()).collect();
+        largest_first.sort_by_key(|place| (Reverse(bytes(&self.units[*place])), *place));
+        let mut loads: BinaryHeap<Reverse<(u64, u64)>> = (0..of).map(|shard| Reverse((0, shard))).collect();
+        let mut shards = vec![0; self.units.len()];
+        for place in largest_first {
+            let Reverse((load, shard)) = loads.pop().expect("there is a shard");
+            shards[place] = shard;
+            loads.push(Reverse((load + bytes(&self.units[place]), shard)));
+        }
+        shards
+    }
+
+    /// Why a file of a unit is not what it was, in words; `None` where all are.
+    pub fn change_in(&self, unit: &Unit) -> Option<String> {
+        let listed = &self.units[*self.places.get(unit.files().first()?)?];
+        listed.files.iter().find_map(|file| {
+            let is_same = Content::of(&file.path) == file.content;
+            (!is_same).then(|| format!("{}: has changed since the batch was divided into shards", name_of(&file.path)))
+        })
+    }
+}
