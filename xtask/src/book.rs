@@ -62,7 +62,8 @@ pub(crate) fn in_archive(page: &str) -> String {
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
         let (link, rest) = part.split_once(')').unwrap_or((part, ""));
-        let _ = write!(out, "]({IN_ARCHIVE}{})", link.replace(".md", ".html"));
+        // Of the file alone: a heading keeps its name.
+        let _ = write!(out, "]({IN_ARCHIVE}{})", link.replacen(".md", ".html", 1));
         out.push_str(rest);
     }
     out
@@ -93,4 +94,17 @@ fn follow(link: &str, page: &Path, source: &Path, out: &Path) -> Result<()> {
     let html = fs::read_to_string(&built).with_context(|| format!("{}", built.display()))?;
     ensure!(html.contains(&format!("id=\"{heading}\"")), "the page has no such heading");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{in_archive, links};
+
+    #[test]
+    fn links_of_a_page_lead_into_the_archive() {
+        let page = "See [files](docs/src/files.md#a.md), [more](docs/src/a/b.md), [this](CHANGELOG.md) and ![it](docs/src/images/x.svg).";
+        let want = "See [files](book/files.html#a.md), [more](book/a/b.html), [this](CHANGELOG.md) and ![it](book/images/x.svg).";
+        assert_eq!(in_archive(page), want);
+        assert_eq!(links(want), ["book/files.html#a.md", "book/a/b.html", "CHANGELOG.md", "book/images/x.svg"]);
+    }
 }

@@ -11,7 +11,7 @@ use sha2::{Digest as _, Sha256};
 const READ_BYTES: usize = 1 << 16;
 
 /// The SHA-256 of bytes, in hexadecimal digits.
-pub fn sha256(bytes: &[u8]) -> String {
+pub(crate) fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
@@ -25,9 +25,11 @@ pub fn sha256_of_file(path: &Path) -> io::Result<String> {
     }
     let (mut file, mut hasher, mut bytes) = (File::open(path)?, Sha256::new(), vec![0; READ_BYTES]);
     loop {
-        match file.read(&mut bytes)? {
-            0 => return Ok(hexadecimal(&hasher.finalize())),
-            read => hasher.update(&bytes[..read]),
+        match file.read(&mut bytes) {
+            Ok(0) => return Ok(hexadecimal(&hasher.finalize())),
+            Ok(read) => hasher.update(&bytes[..read]),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
         }
     }
 }

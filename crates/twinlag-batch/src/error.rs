@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use thiserror::Error;
+use twinlag_study::Shard;
 
 /// Why a batch could not run. A file that cannot be used is no error: it is a row.
 #[derive(Debug, Error)]
@@ -46,10 +47,16 @@ pub enum BatchError {
     Foreign { path: PathBuf, what: String },
     #[error("{}, line {line}: {reason}; remove this part, and run its shard again", path.display())]
     DamagedPart { path: PathBuf, line: usize, reason: String },
-    #[error("{unit} is in {} and in {}: remove one of them, and run what is missing then", first.display(), second.display())]
-    Twice { unit: String, first: PathBuf, second: PathBuf },
-    #[error("{units} of {all} units are missing, first {first}: run {shards} again")]
-    Incomplete { units: usize, all: usize, first: String, shards: String },
+    #[error(
+        "{} and {} are of different divisions, in which units are in other shards: keep the parts of one, and remove the others",
+        first.display(),
+        second.display()
+    )]
+    Divisions { first: PathBuf, second: PathBuf },
+    #[error("{} is of shard {shard}, which has a part of its own: remove this one, and run the shard of its name", path.display())]
+    Twice { path: PathBuf, shard: Shard },
+    #[error("{units} of {all} units are missing, first {first}: run shard {shards} of {of}")]
+    Incomplete { units: usize, all: usize, first: String, shards: String, of: u64 },
     #[error("{}: expected the journal of a batch, got a file that does not begin as one; choose another table", path.display())]
     NoJournal { path: PathBuf },
     #[error("{} is being written by another run; wait until it ends, or choose another table", path.display())]

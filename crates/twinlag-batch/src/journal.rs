@@ -156,13 +156,12 @@ impl Journal {
         journal.expect_journal()?;
         match journal.take_up()? {
             Some(header) => Ok((journal, header)),
-            None => Err(BatchError::Foreign { path: path.to_owned(), what: "everything: it is empty".to_owned() }),
+            None => Err(BatchError::Damaged {
+                path: path.to_owned(),
+                line: 1,
+                reason: "its first line is cut off".to_owned(),
+            }),
         }
-    }
-
-    /// Its file.
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// The keys of the units that are done.
@@ -222,6 +221,7 @@ impl Journal {
             let damaged = |reason: String| BatchError::Damaged { path: self.path.clone(), line, reason };
             if line == 1 {
                 let was: Header = serde_json::from_slice(&text).map_err(|error| damaged(error.to_string()))?;
+                was.expect_this_version(&self.path)?;
                 header = Some(was);
             } else {
                 let json = checked(&text).ok_or_else(|| damaged("it does not fit its hash".to_owned()))?;
@@ -245,7 +245,7 @@ impl Journal {
     }
 }
 
-/// Where the rows of units are.
+/// Gives the rows of each unit.
 pub trait Answers {
     /// The rows of a unit; none of one that is not done.
     ///
@@ -281,12 +281,15 @@ fn checked(line: &[u8]) -> Option<&[u8]> {
 }
 
 impl Header {
-    /// Refuses a part of another batch, or one that was asked something else than `first`.
-    pub(crate) fn expect_part_of(&self, manifest: &str, first: &Self, path: &Path) -> Result<(), BatchError> {
+    /// Refuses another part than this, and one that was asked something else than `first`.
+    pub(crate) fn expect_part(&self, part: &PartOf, first: &Self, path: &Path) -> Result<(), BatchError> {
         let foreign = |what: String| Err(BatchError::Foreign { path: path.to_owned(), what });
         match &self.part_of {
             None => return foreign("its batch: it is one by itself".to_owned()),
-            Some(part_of) if part_of.manifest != manifest => return foreign("the manifest".to_owned()),
+            Some(is) if is.manifest != part.manifest => return foreign("the manifest".to_owned()),
+            Some(is) if is.shard != part.shard => {
+                return Err(BatchError::Twice { path: path.to_owned(), shard: is.shard });
+            }
             Some(_) => {}
         }
         match self.expect_same_question(first, path) {
@@ -311,11 +314,15 @@ impl Header {
         Err(BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() })
     }
 
+    /// Refuses what another version has written.
+    fn expect_this_version(&self, path: &Path) -> Result<(), BatchError> {
+        let what = "the version of the program".to_owned();
+        let is_same = (&self.schema[..], &self.version[..]) == (SCHEMA, env!("CARGO_PKG_VERSION"));
+        if is_same { Ok(()) } else { Err(BatchError::OtherQuestion { path: path.to_owned(), what }) }
+    }
+
     fn expect_same_question(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
         let differs = |what: &str| BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() };
-        if (&self.schema, &self.version) != (&now.schema, &now.version) {
-            return Err(differs("the version of the program"));
-        }
         match difference(&self.asked, &now.asked) {
             Some(what) if what.is_empty() => Err(differs("the whole question")),
             Some(what) => Err(differs(&what)),

@@ -52,7 +52,7 @@ mod row;
 mod run;
 mod table;
 
-pub use digest::{sha256, sha256_of_file};
+pub use digest::sha256_of_file;
 pub use error::BatchError;
 pub use find::{Found, find};
 pub use fleet::{Counts, Fleet, Member, MemberTau, ReasonCount};

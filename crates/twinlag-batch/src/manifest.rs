@@ -70,9 +70,17 @@ struct Content {
     sha256: String,
 }
 
-#[derive(Serialize, Deserialize)]
+/// The last line.
+#[derive(PartialEq, Serialize, Deserialize)]
 struct End {
     units: usize,
+    /// Of all lines before.
+    sha256: String,
+}
+
+/// One line of a manifest.
+fn line(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("names are text") + "\n"
 }
 
 impl Content {
@@ -98,6 +106,9 @@ impl Manifest {
         threads: Option<NonZeroUsize>,
         progress: impl FnMut(Progress),
     ) -> Result<Self, BatchError> {
+        if let Some(file) = found.iter().find(|file| file.path.to_str().is_none()) {
+            return Err(BatchError::NoUnicode { file: name_of(&file.path) });
+        }
         let contents = map(found, threads, |file| Content::of(&file.path), progress);
         let listed: HashMap<&Path, ListedFile> = found
             .iter()
@@ -107,9 +118,6 @@ impl Manifest {
                 (file.path.as_path(), ListedFile { path, below, content })
             })
             .collect();
-        if let Some(file) = found.iter().find(|file| file.path.to_str().is_none()) {
-            return Err(BatchError::NoUnicode { file: name_of(&file.path) });
-        }
         let unit = |unit: &Unit| {
             let files = unit.files().iter().filter_map(|file| listed.get(file.as_path()).cloned()).collect();
             let (rig, without_rig) = match unit {
@@ -137,30 +145,33 @@ impl Manifest {
     /// - `path`: for messages
     ///
     /// # Errors
-    /// [`BatchError::Damaged`], [`BatchError::Read`].
+    /// [`BatchError::DamagedManifest`], [`BatchError::Read`].
     pub fn read(path: &Path, text: impl BufRead) -> Result<Self, BatchError> {
         let (mut header, mut units, mut end) = (None, Vec::new(), None);
+        let damaged = |line, reason: String| BatchError::DamagedManifest { path: path.to_owned(), line, reason };
+        let mut last = 0;
         for (line, text) in (1..).zip(text.lines()) {
-            let text = text.map_err(|error| BatchError::Read { path: path.to_owned(), reason: error.to_string() })?;
-            let damaged = |error: serde_json::Error| BatchError::DamagedManifest {
-                path: path.to_owned(),
-                line,
-                reason: error.to_string(),
-            };
+            last = line;
+            let text = text.map_err(|error| damaged(line, error.to_string()))?;
+            let wrong = |error: serde_json::Error| damaged(line, error.to_string());
             if header.is_none() {
-                header = Some(serde_json::from_str::<Header>(&text).map_err(damaged)?);
-            } else if let Ok(End { units }) = serde_json::from_str(&text) {
-                end = Some(units);
+                let is: Header = serde_json::from_str(&text).map_err(wrong)?;
+                if is.schema != SCHEMA {
+                    return Err(damaged(line, format!("expected {SCHEMA}, got {}", is.schema)));
+                }
+                header = Some(is);
+            } else if let Ok(is) = serde_json::from_str::<End>(&text) {
+                end = Some(is);
             } else {
-                units.push(serde_json::from_str(&text).map_err(damaged)?);
+                units.push(serde_json::from_str(&text).map_err(wrong)?);
             }
         }
-        let header = header.filter(|header| header.schema == SCHEMA && end == Some(units.len()));
-        header.map(|header| Self::new(header, units)).ok_or_else(|| BatchError::DamagedManifest {
-            path: path.to_owned(),
-            line: 1,
-            reason: format!("it does not begin as a {SCHEMA}, or is cut off"),
-        })
+        let (Some(header), Some(end)) = (header, end) else {
+            return Err(damaged(last, "it is cut off".to_owned()));
+        };
+        let manifest = Self::new(header, units);
+        let is_whole = end == manifest.end() && manifest.units.iter().all(|unit| !unit.files.is_empty());
+        if is_whole { Ok(manifest) } else { Err(damaged(last, "the lines do not fit their hash".to_owned())) }
     }
 
     /// Writes it.
@@ -168,25 +179,32 @@ impl Manifest {
     /// # Errors
     /// Those of writing.
     pub fn write(&self, mut out: impl Write) -> std::io::Result<()> {
-        out.write_all(self.text().as_bytes())
+        out.write_all(self.body().as_bytes())?;
+        out.write_all(line(&self.end()).as_bytes())
     }
 
-    fn text(&self) -> String {
-        let line = |value: Result<String, serde_json::Error>| value.expect("names are text") + "\n";
-        let mut text = line(serde_json::to_string(&self.header));
-        self.units.iter().for_each(|unit| text.push_str(&line(serde_json::to_string(unit))));
-        text + &line(serde_json::to_string(&End { units: self.units.len() }))
+    /// All lines but the last.
+    fn body(&self) -> String {
+        let mut text = line(&self.header);
+        self.units.iter().for_each(|unit| text.push_str(&line(unit)));
+        text
+    }
+
+    fn end(&self) -> End {
+        End { units: self.units.len(), sha256: self.sha256() }
     }
 
     /// Its own hash: parts of batches that differ in it are not mixed.
     pub fn sha256(&self) -> String {
-        sha256(self.text().as_bytes())
+        sha256(self.body().as_bytes())
     }
 
-    /// Whether it is of what is named now, and of rigs that are known by the same.
-    pub fn is_of(&self, what: &[PathBuf], group_by: Option<&GroupBy>) -> bool {
-        let what: Vec<String> = what.iter().map(|what| name_of(what)).collect();
-        self.header.what == what && self.header.group_by == group_by.map(ToString::to_string)
+    /// What it is of, where that is not what is named now, or rigs are known by something else.
+    pub fn is_of_other(&self, what: &[PathBuf], group_by: Option<&GroupBy>) -> Option<String> {
+        let now: Vec<String> = what.iter().map(|what| name_of(what)).collect();
+        let is_same = self.header.what == now && self.header.group_by == group_by.map(ToString::to_string);
+        let by = self.header.group_by.as_ref().map_or(String::new(), |by| format!(", grouped by {by}"));
+        (!is_same).then(|| format!("{}{by}", self.header.what.join(", ")))
     }
 
     /// Its units, in the order of the table.
@@ -202,10 +220,16 @@ impl Manifest {
         self.units.iter().filter_map(unit).collect()
     }
 
-    /// Its files.
-    pub fn files(&self) -> Vec<Found> {
-        let all = self.units.iter().flat_map(|unit| &unit.files);
-        all.map(|file| Found { path: file.path.clone(), below: file.below.clone() }).collect()
+    /// How many of these files it does not list.
+    pub fn unlisted(&self, found: &[Found]) -> usize {
+        found.iter().filter(|file| !self.places.contains_key(&file.path)).count()
+    }
+
+    /// The files of a shard.
+    pub fn files_of(&self, shard: Shard) -> Vec<Found> {
+        let units = self.units.iter().zip(self.shards(shard.of())).filter(|(_, of)| *of == shard.index());
+        let files = units.flat_map(|(unit, _)| &unit.files);
+        files.map(|file| Found { path: file.path.clone(), below: file.below.clone() }).collect()
     }
 
     /// The units of a shard, in the order of the table. Shards have as much to read as can be: the largest unit goes first, each to the
@@ -224,7 +248,9 @@ impl Manifest {
         };
         let mut largest_first: Vec<usize> = (0..self.units.len()).collect();
         largest_first.sort_by_key(|place| (Reverse(bytes(&self.units[*place])), *place));
-        let mut loads: BinaryHeap<Reverse<(u64, u64)>> = (0..of).map(|shard| Reverse((0, shard))).collect();
+        // Of shards that are more than the units the last ones have none.
+        let used = of.min(self.units.len() as u64);
+        let mut loads: BinaryHeap<Reverse<(u64, u64)>> = (0..used).map(|shard| Reverse((0, shard))).collect();
         let mut shards = vec![0; self.units.len()];
         for place in largest_first {
             let Reverse((load, shard)) = loads.pop().expect("there is a shard");
@@ -239,7 +265,13 @@ impl Manifest {
         let listed = &self.units[*self.places.get(unit.files().first()?)?];
         listed.files.iter().find_map(|file| {
             let is_same = Content::of(&file.path) == file.content;
-            (!is_same).then(|| format!("{}: has changed since the batch was divided into shards", name_of(&file.path)))
+            (!is_same).then(|| {
+                format!(
+                    "{}: has changed since the batch was divided into shards, or is gone: put it back, or remove manifest and parts to divide \
+                     the batch anew",
+                    name_of(&file.path)
+                )
+            })
         })
     }
 }

@@ -9,12 +9,9 @@ use twinlag_study::Shard;
 
 use crate::error::BatchError;
 use crate::group::Unit;
-use crate::journal::{Answers, Header, Journal};
+use crate::journal::{Answers, Header, Journal, PartOf};
 use crate::manifest::Manifest;
 use crate::row::Row;
-
-/// Shards that are named when they are missing; chosen, so that the message stays a line.
-const NAMED_SHARDS: usize = 8;
 
 /// The path of a shard's part, beside the table: `table.csv.part-1-of-3`.
 pub fn part_path(table: &Path, shard: Shard) -> PathBuf {
@@ -46,7 +43,7 @@ pub fn parts_beside(table: &Path) -> Result<Vec<(Shard, PathBuf)>, BatchError> {
     Ok(parts)
 }
 
-/// The parts of a batch. How it was divided does not count, but that every unit is there once.
+/// The parts of all shards of a batch.
 #[derive(Debug)]
 pub struct Parts {
     parts: Vec<Journal>,
@@ -59,30 +56,30 @@ impl Parts {
     /// Reads all parts of the batch of a manifest.
     ///
     /// # Errors
-    /// [`BatchError::Foreign`], [`BatchError::Twice`], [`BatchError::DamagedPart`] and [`BatchError::Busy`], each with the part;
-    /// [`BatchError::Incomplete`] with the shards to run again.
+    /// [`BatchError::Divisions`], [`BatchError::Twice`], [`BatchError::Foreign`], [`BatchError::DamagedPart`] and [`BatchError::Busy`], each
+    /// with the part; [`BatchError::Incomplete`] with the shards to run again.
     pub fn open(parts: &[(Shard, PathBuf)], manifest: &Manifest) -> Result<Self, BatchError> {
+        if let Some(pair) = parts.windows(2).find(|pair| pair[0].0.of() != pair[1].0.of()) {
+            return Err(BatchError::Divisions { first: pair[0].1.clone(), second: pair[1].1.clone() });
+        }
         let hash = manifest.sha256();
         let mut first: Option<Header> = None;
         let mut out = Self { parts: Vec::new(), places: HashMap::new(), asked: Value::Null };
-        for (_, path) in parts {
+        for (shard, path) in parts {
             let (journal, header) = Journal::read_part(path).map_err(|error| match error {
                 BatchError::Damaged { path, line, reason } => BatchError::DamagedPart { path, line, reason },
                 BatchError::NoJournal { path } => BatchError::Foreign { path, what: "everything".to_owned() },
+                BatchError::OtherQuestion { path, what } => BatchError::Foreign { path, what },
                 error => error,
             })?;
-            header.expect_part_of(&hash, first.as_ref().unwrap_or(&header), path)?;
-            for unit in journal.keys() {
-                if let Some(other) = out.places.insert(unit.clone(), out.parts.len()) {
-                    let (first, second) = (out.parts[other].path().to_owned(), path.clone());
-                    return Err(BatchError::Twice { unit: unit.clone(), first, second });
-                }
-            }
+            let part_of = PartOf { manifest: hash.clone(), shard: *shard };
+            header.expect_part(&part_of, first.as_ref().unwrap_or(&header), path)?;
+            out.places.extend(journal.keys().map(|unit| (unit.clone(), out.parts.len())));
             out.parts.push(journal);
             first = first.or(Some(header));
         }
         out.asked = first.map_or(Value::Null, |header| header.asked().clone());
-        out.expect_all(parts, manifest)?;
+        out.expect_all(parts.first().map_or(Shard::WHOLE, |(shard, _)| *shard), manifest)?;
         Ok(out)
     }
 
@@ -91,23 +88,33 @@ impl Parts {
         &self.asked
     }
 
-    fn expect_all(&self, parts: &[(Shard, PathBuf)], manifest: &Manifest) -> Result<(), BatchError> {
+    /// - `division`: any shard of it
+    fn expect_all(&self, division: Shard, manifest: &Manifest) -> Result<(), BatchError> {
         let units = manifest.units();
         let is_missing = |unit: &Unit| !self.places.contains_key(&unit.key());
         let Some(first) = units.iter().find(|unit| is_missing(unit)) else { return Ok(()) };
-        let of = parts.iter().map(|(shard, _)| shard.of()).max().unwrap_or(1);
+        let of = division.of();
         let shards = manifest.shards(of);
-        let mut missing: Vec<u64> =
+        let missing: Vec<u64> =
             units.iter().zip(&shards).filter(|(unit, _)| is_missing(unit)).map(|(_, shard)| *shard).collect();
-        let count = missing.len();
-        missing.sort_unstable();
-        missing.dedup();
-        let mut named: Vec<String> = missing.iter().take(NAMED_SHARDS).map(|shard| format!("{shard}/{of}")).collect();
-        if missing.len() > NAMED_SHARDS {
-            named.push(format!("and {} others", missing.len() - NAMED_SHARDS));
-        }
-        Err(BatchError::Incomplete { units: count, all: units.len(), first: first.key(), shards: named.join(", ") })
+        Err(BatchError::Incomplete {
+            units: missing.len(),
+            all: units.len(),
+            first: first.key(),
+            shards: ranges(missing),
+            of,
+        })
     }
+}
+
+/// Numbers as ranges: `0-7, 9`.
+fn ranges(mut numbers: Vec<u64>) -> String {
+    numbers.sort_unstable();
+    numbers.dedup();
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    let in_words =
+        runs.map(|run| if run.len() == 1 { run[0].to_string() } else { format!("{}-{}", run[0], run[run.len() - 1]) });
+    in_words.collect::<Vec<_>>().join(", ")
 }
 
 impl Answers for Parts {

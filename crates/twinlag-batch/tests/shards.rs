@@ -82,6 +82,8 @@ fn a_manifest_reads_back_and_sees_a_change() {
     assert_eq!(read(&text).expect("whole"), manifest);
     let cut = read(&text[..text.len() - 5]).expect_err("cut off");
     assert!(matches!(cut, BatchError::DamagedManifest { .. }), "{cut}");
+    let edited = String::from_utf8(text.clone()).expect("text").replacen("\"bytes\":10", "\"bytes\":11", 1);
+    assert!(read(edited.as_bytes()).expect_err("edited").to_string().contains("hash"));
     let units = manifest.units();
     assert!(units.iter().all(|unit| manifest.change_in(unit).is_none()));
     // As long as before.
@@ -121,15 +123,20 @@ fn parts_that_are_missing_double_corrupt_or_foreign_are_named() {
     let part = fs::read_to_string(&second).expect("a part");
 
     fs::remove_file(&second).expect("there");
-    refused(&["missing", "1/3"]);
+    refused(&["missing", "shard 1 of 3"]);
     // A run that was killed: its last line is cut off.
     fs::write(&second, &part[..part.len() - 10]).expect("a part");
-    refused(&["1 of 5 units", "1/3"]);
-    // A shard of a finer division has some of the same units.
+    refused(&["1 of 5 units", "shard 1 of 3"]);
+    // A shard of another division has some of the same units.
     fs::write(&second, &part).expect("a part");
     let finer = run_shard(&manifest, &table, "0/4", &asked);
-    refused(&["part-0-of-3", "part-0-of-4"]);
+    refused(&["part-2-of-3", "part-0-of-4", "different divisions"]);
     fs::remove_file(finer).expect("there");
+    // The part of another shard by this one's name.
+    fs::copy(part_path(&table, shard("0/3")), &second).expect("a part");
+    refused(&[name, "0/3"]);
+    fs::write(&second, part.replacen("batch-journal/3", "batch-journal/9", 1)).expect("a part");
+    refused(&[name, "version"]);
     fs::write(&second, part.replacen(" bytes", " Bytes", 1)).expect("a part");
     refused(&[name, "line 2", "hash"]);
     run_shard(&manifest, &table, "1/3", &json!({"verb": "characterise", "strict": true}));

@@ -19,7 +19,7 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     let usage = |text: String| Err(Failure::Usage(text));
     let mut seen: Vec<(&str, PathBuf)> = Vec::new();
     for (option, path) in outputs {
-        let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(path);
         if !folder.exists() {
             let (path, folder) = (path.display(), folder.display());
             return Err(Failure::Other(format!(
@@ -147,7 +147,7 @@ fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)
     if is_stream || (is_link && old.is_none()) {
         return Ok(None);
     }
-    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&target);
     // Opened by hand, it can be read by whoever may read other new files of the user.
     let new = |path: &Path| File::options().write(true).create_new(true).open(path);
     let part = match (Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new), old) {
@@ -221,6 +221,18 @@ impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     replace(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
+}
+
+/// A path with something appended to its name.
+pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// The folder of a file: of a bare name this one.
+pub(crate) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// The command line of this run, quoted for a shell. Of absolute paths the last name alone is kept: where files and the program lie is

@@ -1,17 +1,19 @@
 //! The shards of a batch: their manifest, and their parts beside the table.
 
 use std::fs::File;
-use std::io::{BufReader, Seek as _, Write as _};
+use std::io::{BufReader, ErrorKind};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use tempfile::Builder;
 use twinlag_batch::{Found, GroupBy, Manifest, Parts, Unit, parts_beside};
 use twinlag_study::Shard;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::output::{folder_of, with_ending};
 use crate::{print, progress};
 
 /// What `twinlag batch --shard` prints with --json.
@@ -25,21 +27,25 @@ pub(crate) struct BatchPart {
     shard: String,
 }
 
+/// How the journal of a batch on one machine ends.
+pub(crate) const JOURNAL_ENDING: &str = ".journal";
+/// How the manifest of a table ends.
+const MANIFEST_ENDING: &str = ".manifest";
+
 /// The manifest of a table.
 pub(crate) fn manifest_path(table: &Path) -> PathBuf {
-    let mut path = table.as_os_str().to_owned();
-    path.push(".manifest");
-    path.into()
+    with_ending(table, MANIFEST_ENDING)
 }
 
-/// Whether a file is the manifest of a table, or one of its parts.
+/// Whether a file is the manifest of a table, its journal, or one of its parts.
 pub(crate) fn is_beside(table: &Path, file: &Path) -> bool {
     let is_named = |name: &str| {
         let rest = table.file_name().and_then(|table| name.strip_prefix(table.to_str()?));
-        rest.is_some_and(|rest| rest == ".manifest" || rest.starts_with(".part-"))
+        rest.is_some_and(|rest| [MANIFEST_ENDING, JOURNAL_ENDING].contains(&rest) || rest.starts_with(".part-"))
     };
-    let folder = |path: &Path| path.parent().map(|folder| folder.canonicalize().ok());
-    file.file_name().and_then(|name| name.to_str()).is_some_and(is_named) && folder(table) == folder(file)
+    let is_in = |folder: PathBuf| folder_of(file).canonicalize().is_ok_and(|is| is == folder);
+    file.file_name().and_then(|name| name.to_str()).is_some_and(is_named)
+        && folder_of(table).canonicalize().is_ok_and(is_in)
 }
 
 /// Lists the units of a batch, with sizes and hashes of their files.
@@ -60,7 +66,7 @@ pub(crate) fn listed(
     Ok(manifest?)
 }
 
-/// The manifest of a table. The first shard makes it, and those that begin at the same time wait for it.
+/// The manifest of a table: that of the first shard that has made one, whole and never replaced.
 pub(crate) fn manifest(
     table: &Path,
     what: &[PathBuf],
@@ -68,33 +74,37 @@ pub(crate) fn manifest(
     make: impl FnOnce() -> Result<Manifest, Failure>,
 ) -> Result<Manifest, Failure> {
     let path = manifest_path(table);
-    let failed = |error: std::io::Error| Failure::Other(format!("{}: cannot be written: {error}", path.display()));
-    let mut file = File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-    // A file system without locks has shards that make the same manifest twice.
-    let _ = file.lock();
-    if file.metadata().map_err(failed)?.len() == 0 {
-        let manifest = make()?;
-        manifest.write(&mut file).and_then(|()| file.flush()).map_err(failed)?;
-        return Ok(manifest);
+    if !path.exists() {
+        let made = make()?;
+        let failed = |error: std::io::Error| Failure::Other(format!("{}: cannot be written: {error}", path.display()));
+        let mut part =
+            Builder::new().prefix(".twinlag-").suffix(".part").tempfile_in(folder_of(&path)).map_err(failed)?;
+        made.write(part.as_file_mut()).and_then(|()| part.as_file().sync_all()).map_err(failed)?;
+        match part.persist_noclobber(&path) {
+            Err(error) if error.error.kind() != ErrorKind::AlreadyExists => return Err(failed(error.error)),
+            _ => {}
+        }
     }
-    file.rewind().map_err(failed)?;
-    let manifest = Manifest::read(&path, BufReader::new(&file))?;
-    if !manifest.is_of(what, group_by) {
-        return Err(Failure::Usage(format!(
-            "{}: is of other files, or of rigs known by something else: name the same, or remove it and all parts beside it",
+    let manifest = read(&path)?;
+    match manifest.is_of_other(what, group_by) {
+        None => Ok(manifest),
+        Some(other) => Err(Failure::Usage(format!(
+            "{}: is of {other}: name the same, or remove it and all parts beside it",
             path.display()
-        )));
+        ))),
     }
-    Ok(manifest)
+}
+
+fn read(path: &Path) -> Result<Manifest, Failure> {
+    let file = File::open(path).map_err(|error| {
+        Failure::File(format!("{}: cannot be read: {error}; run the shards first (option --shard)", path.display()))
+    })?;
+    Ok(Manifest::read(path, BufReader::new(file))?)
 }
 
 /// The manifest of a table, and all its parts.
 pub(crate) fn all(table: &Path) -> Result<(Manifest, Parts), Failure> {
-    let path = manifest_path(table);
-    let file = File::open(&path).map_err(|error| {
-        Failure::File(format!("{}: cannot be read: {error}; --shard makes it (option --merge)", path.display()))
-    })?;
-    let manifest = Manifest::read(&path, BufReader::new(&file))?;
+    let manifest = read(&manifest_path(table))?;
     let parts = Parts::open(&parts_beside(table)?, &manifest)?;
     Ok((manifest, parts))
 }

@@ -84,8 +84,8 @@ pub(crate) fn conclude(
     let mut circumstances =
         Circumstances { is_total_delay, causes, ..Circumstances::new(basis, &settings.known, span_s, policy) };
     let search = state.search().beside(&state.current);
-    circumstances.other_delays_s =
-        search.other_delays(&state.current).into_iter().map(|(delay_s, _)| delay_s).collect();
+    let all_delays_s = search.delays(&state.current).into_iter().map(|(delay_s, _)| delay_s);
+    circumstances.other_delays_s = all_delays_s.filter(|other_s| delay_s(&state.current) != Some(*other_s)).collect();
     let around = is_whole.then(|| search.around(&state.current)).transpose()?;
     if let Some(around) = &around {
         let half = half_intervals(&last, &found, &with_effects);

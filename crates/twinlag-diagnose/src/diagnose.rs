@@ -80,10 +80,12 @@ pub(crate) fn searched<'a>(
     Ok((state, tones))
 }
 
-/// Moves on as long as there is a move; then takes the shortest of all delays that fit equally well.
+/// Moves on as long as there is a move; then takes the shortest of all delays that fit as well as the best.
 pub(crate) fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
     while can_learn && state.taken.len() < settings.policy.most_effects && advance(state, settings)? {}
-    state.shorten_delay();
+    if let Some(proposal) = state.choose_delay() {
+        state.apply(proposal);
+    }
     Ok(())
 }
 
@@ -189,7 +191,11 @@ mod tests {
                     let place = at(&taken, effect, channel);
                     taken.remove(place);
                 }
-                Move::Extend { .. } | Move::Reduce { .. } | Move::LowerNoise { .. } | Move::Reweigh { .. } => {}
+                Move::Extend { .. }
+                | Move::Reduce { .. }
+                | Move::LowerNoise { .. }
+                | Move::ChooseDelay { .. }
+                | Move::Reweigh { .. } => {}
             }
         }
         taken

@@ -54,7 +54,7 @@ pub enum Reason {
         /// The longest that the record can show, s.
         most_s: f64,
     },
-    /// A delay, of which others fit as well: the gas repeats itself.
+    /// Other delays fit as well: the gas repeats itself.
     OtherDelays {
         /// The others, the shortest first, s.
         delays_s: Vec<f64>,

@@ -88,6 +88,13 @@ pub enum Move {
         /// Deviance that it saves there, not above 0.
         gain: f64,
     },
+    /// Of delays that fit as well as the best, the shortest was taken.
+    ChooseDelay {
+        /// The delay that the search had found, s.
+        before_s: f64,
+        /// The shortest, s.
+        after_s: f64,
+    },
     /// Noise levels were lowered to what is left over.
     LowerNoise {
         /// Energy of the residual per residual beforehand.
@@ -109,9 +116,12 @@ impl Move {
             Self::Remove { effect, .. } => Some(Remark::Needless { effect: *effect }),
             Self::Withdraw { effect, .. } => Some(Remark::DoesNotTransfer { effect: *effect }),
             Self::LowerNoise { .. } => Some(Remark::NoiseLowered),
-            Self::Add { .. } | Self::Extend { .. } | Self::Reduce { .. } | Self::Keep { .. } | Self::Reweigh { .. } => {
-                None
-            }
+            Self::Add { .. }
+            | Self::Extend { .. }
+            | Self::Reduce { .. }
+            | Self::Keep { .. }
+            | Self::ChooseDelay { .. }
+            | Self::Reweigh { .. } => None,
         }
     }
 }
@@ -142,6 +152,8 @@ enum Change {
     Ties(usize, Vec<Candidate>),
     /// Without an effect, fitted again.
     Drop(usize, Box<Fitted>),
+    /// The same model elsewhere.
+    Refit(Box<Fitted>),
     Levels,
     Weights,
 }
@@ -253,6 +265,7 @@ impl<'a> State<'a> {
                 self.current = *fitted;
                 self.taken.remove(index);
             }
+            Change::Refit(fitted) => self.current = fitted.in_order(),
             Change::Levels => {
                 self.prepared.lower_levels(&self.current, self.settings);
                 self.refit();
@@ -301,13 +314,12 @@ impl<'a> State<'a> {
         Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
     }
 
-    /// Takes the shortest of all delays that fit equally well.
-    pub(crate) fn shorten_delay(&mut self) {
-        let Some(delay_s) = delay_s(&self.current) else { return };
-        let shortest = self.search().other_delays(&self.current).into_iter().next();
-        if let Some((_, shortest)) = shortest.filter(|(other_s, _)| other_s.abs() < delay_s.abs()) {
-            self.current = shortest.in_order();
-        }
+    /// Takes the shortest of all delays that fit as well as the best.
+    pub(crate) fn choose_delay(&self) -> Option<Proposal> {
+        let before_s = delay_s(&self.current)?;
+        let (after_s, fitted) = self.search().delays(&self.current).into_iter().next()?;
+        let entry = Move::ChooseDelay { before_s, after_s };
+        (after_s != before_s).then(|| Proposal { entry, change: Change::Refit(Box::new(fitted)) })
     }
 
     /// Takes effect `index` out of the model, and gives it; what was compared with it beside it is forgotten.

@@ -16,41 +16,48 @@ fn place_of_delay(fitted: &Fitted) -> Option<usize> {
 }
 
 impl Search<'_> {
-    /// The fits at other minima over the delay that are as good as `fitted`, each with its delay in s, the shortest first: two whose energies differ by no
-    /// more than 1.96 standard deviations of what they differ by chance.
-    pub(crate) fn other_delays(&self, fitted: &Fitted) -> Vec<(f64, Fitted)> {
+    /// The fits that are as good as the best one over all delays, each with its delay in s, the shortest first; `fitted`, the best or not, is
+    /// among those that are compared. None where the model has no delay.
+    ///
+    /// As good: the energies differ by at most 1.96 standard deviations of their difference by chance.
+    pub(crate) fn delays(&self, fitted: &Fitted) -> Vec<(f64, Fitted)> {
         let Some(at) = place_of_delay(fitted) else { return Vec::new() };
         let step_s = self.observations.step_s();
-        let mut out: Vec<(f64, Fitted)> = Vec::new();
-        for theta in Minima::new(fitted, at, self.excerpt()).as_good() {
+        let mut all = vec![(fitted.theta[at], fitted.clone())];
+        for theta in Scan::new(fitted, at, self.excerpt()).promising() {
             let other = fitted.model.fit(&theta, self.observations, self.selection, Effort::Compare);
             let delay_s = other.theta[at];
-            let is_new = out
-                .iter()
-                .map(|(known_s, _)| *known_s)
-                .chain([fitted.theta[at]])
-                .all(|known_s| (known_s - delay_s).abs() > step_s);
-            let most = Z_975 * std_of_difference(fitted, &other.theta, self.observations, self.selection);
-            if is_new && other.end.is_usable() && other.chi2 - fitted.chi2 <= most {
-                out.push((delay_s, other));
+            if other.end.is_usable() && all.iter().all(|(known_s, _)| (known_s - delay_s).abs() > step_s) {
+                all.push((delay_s, other));
             }
         }
-        out.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-        out
+        let best = all.iter().min_by(|a, b| a.1.chi2.total_cmp(&b.1.chi2)).map(|(_, best)| best.clone());
+        let Some(best) = best.filter(|_| all.len() > 1) else { return all };
+        let is_as_good = |(_, other): &(f64, Fitted)| {
+            let by_chance = std_of_difference(&best, &other.theta, self.observations, self.selection);
+            other.chi2 - best.chi2 <= Z_975 * by_chance
+        };
+        all.retain(is_as_good);
+        all.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        all
     }
 }
 
-/// The standard deviation by which the energies at the best fit and at `theta` differ by chance, where both leave nothing but noise:
+/// The standard deviation by which the energies at a fit and at `theta` differ by chance, where both leave nothing but white noise:
 /// `2 v √(n (1 − ρ²))`, for residuals of `n` degrees of freedom, of variance `v` and with correlation `ρ`.
 fn std_of_difference(fitted: &Fitted, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
-    let model = &fitted.model;
-    let rho = model.residual_correlation([&fitted.theta, theta], observations, selection);
-    let energy = model.energy(&fitted.theta, observations, selection);
-    2.0 * (fitted.mean_energy() * energy * (1.0 - rho * rho)).sqrt()
+    let rho = fitted.model.residual_correlation([&fitted.theta, theta], observations, selection);
+    // Of an excerpt there are as many fewer as there is less energy.
+    let energy = fitted.model.energy(&fitted.theta, observations, selection);
+    2.0 * (fitted.mean_energy() * energy * (1.0 - rho * rho).max(0.0)).sqrt()
 }
 
+/// How much more energy than the best fit a minimum may have whose other parameters are not fitted yet, in the differences up to which
+/// fits are as good. Chosen.
+const UNFITTED_DIFFERENCES: f64 = 2.0;
+
 /// The energy of an excerpt over the delay, sample period by sample period, all other parameters as they are.
-struct Minima<'a> {
+struct Scan<'a> {
     fitted: &'a Fitted,
     at: usize,
     observations: &'a Observations,
@@ -58,7 +65,7 @@ struct Minima<'a> {
     energy: Vec<f64>,
 }
 
-impl<'a> Minima<'a> {
+impl<'a> Scan<'a> {
     fn new(fitted: &'a Fitted, at: usize, (observations, selection): &'a (Observations, Selection)) -> Self {
         let mut out = Self { fitted, at, observations, selection, energy: Vec::new() };
         out.energy = (0..=2 * out.most_periods()).map(|i| out.energy(&out.moved(i as f64))).collect();
@@ -82,17 +89,16 @@ impl<'a> Minima<'a> {
         self.fitted.model.energy(theta, self.observations, self.selection)
     }
 
-    /// The minima, between the samples by the parabola through three of them, that may be as good as the fit: their other parameters are
-    /// not fitted yet, so that twice the difference is allowed.
-    fn as_good(&self) -> Vec<Vec<f64>> {
+    /// The minima, between the samples by the parabola through three of them, that may be as good as the fit.
+    fn promising(&self) -> Vec<Vec<f64>> {
         let here = self.energy(&self.fitted.theta);
-        let is_as_good = |theta: &Vec<f64>| {
-            let most = 2.0 * Z_975 * std_of_difference(self.fitted, theta, self.observations, self.selection);
-            self.energy(theta) - here <= most
+        let is_promising = |theta: &Vec<f64>| {
+            let by_chance = std_of_difference(self.fitted, theta, self.observations, self.selection);
+            self.energy(theta) - here <= UNFITTED_DIFFERENCES * Z_975 * by_chance
         };
-        let neighbours = self.energy.windows(3).enumerate();
+        let neighbours = self.energy.windows(3).enumerate().filter(|(_, e)| e.iter().all(|e| e.is_finite()));
         let minima = neighbours.filter(|(_, e)| e[1] < e[0] && e[1] <= e[2]);
         let vertex = |(i, e): (usize, &[f64])| i as f64 + 1.0 + 0.5 * (e[0] - e[2]) / (e[0] - 2.0 * e[1] + e[2]);
-        minima.map(|minimum| self.moved(vertex(minimum))).filter(is_as_good).collect()
+        minima.map(|minimum| self.moved(vertex(minimum))).filter(is_promising).collect()
     }
 }

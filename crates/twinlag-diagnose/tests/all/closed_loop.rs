@@ -165,6 +165,8 @@ fn a_delay_is_found() {
     let effect = is_inferred(&d, Identifier::DELAY);
     let sign = if effect.channel == Some(0) { 1.0 } else { -1.0 };
     is_sized(effect, "delay", sign * DELAY_S);
+    // The gas does not repeat itself, so that no other delay fits as well.
+    assert!(!effect.judgements[0].because.contains("repeats itself"), "{:?}", effect.judgements);
 }
 
 #[test]
@@ -319,5 +321,7 @@ fn a_delay_is_no_period_longer() {
         let judgement = &effect.judgements[0];
         assert_eq!(judgement.grade, Grade::Conditional, "seed {seed}: {judgement:?}");
         assert!(judgement.because.contains("the gas repeats itself"), "seed {seed}: {judgement:?}");
+        // A period more, to the first two decimals.
+        assert!(judgement.because.contains("0.05"), "seed {seed}: {judgement:?}");
     }
 }
