@@ -152,7 +152,7 @@ enum Change {
     Ties(usize, Vec<Candidate>),
     /// Without an effect, fitted again.
     Drop(usize, Box<Fitted>),
-    /// The same model elsewhere.
+    /// Other parameters of the model that there is.
     Refit(Box<Fitted>),
     Levels,
     Weights,
