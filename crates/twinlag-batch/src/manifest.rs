@@ -1,7 +1,7 @@
 //! The files of a batch as they were when it was divided into shards, so that any machine that sees them asks the same.
 //!
-//! One line of JSON says what the batch is of, each further one has a unit, and the last one how many there are: one that was cut
-//! off is refused.
+//! One line of JSON says what the batch is of, each further one has a unit, and the last one how many there are, with the hash of
+//! all before. A manifest that was cut off or edited is refused.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
