@@ -145,7 +145,7 @@ impl Manifest {
     /// - `path`: for messages
     ///
     /// # Errors
-    /// [`BatchError::DamagedManifest`], [`BatchError::Read`].
+    /// [`BatchError::DamagedManifest`].
     pub fn read(path: &Path, text: impl BufRead) -> Result<Self, BatchError> {
         let (mut header, mut units, mut end) = (None, Vec::new(), None);
         let damaged = |line, reason: String| BatchError::DamagedManifest { path: path.to_owned(), line, reason };

@@ -214,7 +214,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
 struct Scope {
     /// The batch that it is a shard of.
     manifest: Option<Manifest>,
-    /// Their files.
+    /// The files of the units.
     files: Vec<Found>,
     /// The units that are asked, in the order of the table.
     units: Vec<Unit>,

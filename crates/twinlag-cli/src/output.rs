@@ -148,9 +148,7 @@ fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)
         return Ok(None);
     }
     let folder = folder_of(&target);
-    // Opened by hand, it can be read by whoever may read other new files of the user.
-    let new = |path: &Path| File::options().write(true).create_new(true).open(path);
-    let part = match (Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new), old) {
+    let part = match (new_part(folder), old) {
         (Ok(part), None) => part,
         (Ok(part), Some(old)) => {
             part.as_file().set_permissions(old.permissions())?;
@@ -221,6 +219,13 @@ impl<W: Write, I: Iterator<Item = String>> Write for WithCells<W, I> {
 
 pub(crate) fn write(path: &Path, text: impl AsRef<[u8]>) -> Result<(), Failure> {
     replace(path, |file| file.write_all(text.as_ref()).map_err(|e| cannot_be_written(path, &e)))
+}
+
+/// A new file, `.twinlag-*.part`, that takes its name when it is whole. It can be read by whoever may read other new files of the user,
+/// other than those in folders of temporary files.
+pub(crate) fn new_part(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
+    let new = |path: &Path| File::options().write(true).create_new(true).open(path);
+    Builder::new().prefix(".twinlag-").suffix(".part").make_in(folder, new)
 }
 
 /// A path with something appended to its name.

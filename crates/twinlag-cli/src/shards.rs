@@ -7,13 +7,12 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use tempfile::Builder;
 use twinlag_batch::{Found, GroupBy, Manifest, Parts, Unit, parts_beside};
 use twinlag_study::Shard;
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{folder_of, with_ending};
+use crate::output::{folder_of, new_part, with_ending};
 use crate::{print, progress};
 
 /// What `twinlag batch --shard` prints with --json.
@@ -77,8 +76,7 @@ pub(crate) fn manifest(
     if !path.exists() {
         let made = make()?;
         let failed = |error: std::io::Error| Failure::Other(format!("{}: cannot be written: {error}", path.display()));
-        let mut part =
-            Builder::new().prefix(".twinlag-").suffix(".part").tempfile_in(folder_of(&path)).map_err(failed)?;
+        let mut part = new_part(folder_of(&path)).map_err(failed)?;
         made.write(part.as_file_mut()).and_then(|()| part.as_file().sync_all()).map_err(failed)?;
         match part.persist_noclobber(&path) {
             Err(error) if error.error.kind() != ErrorKind::AlreadyExists => return Err(failed(error.error)),

@@ -47,7 +47,7 @@ impl Search<'_> {
 /// `2 v √(n (1 − ρ²))`, for residuals of `n` degrees of freedom, of variance `v` and with correlation `ρ`.
 fn std_of_difference(fitted: &Fitted, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
     let rho = fitted.model.residual_correlation([&fitted.theta, theta], observations, selection);
-    // Of an excerpt there are as many fewer as there is less energy.
+    // This is `v n`, of an excerpt as of the whole.
     let energy = fitted.model.energy(&fitted.theta, observations, selection);
     2.0 * (fitted.mean_energy() * energy * (1.0 - rho * rho).max(0.0)).sqrt()
 }

@@ -283,6 +283,9 @@ fn shards_give_the_table_of_a_whole_run() {
     assert_eq!(run("0/2").code, 0);
     assert_eq!(merge().code, 0);
     assert_eq!(bench.read("t.csv"), bench.read("whole.csv"));
+    // Failed: the other machine could not read the manifest where another user ran it.
+    let permissions = |file| bench.path(file).metadata().expect("there").permissions();
+    assert_eq!(permissions("t.csv.manifest"), permissions("t.csv"));
     bench.refuses(2, &["batch", "--merge", "--out", "t.csv"], &["t.csv exists", "--force"]);
     bench.refuses(2, &["batch", "--merge", "--out", "t.csv", "--force", "--strict"], &["--merge", "--strict"]);
     bench.refuses(2, &["batch", "--merge", "--out", "t.csv", "--report", "t.csv.part-0-of-2", "--force"], &["part"]);
