@@ -29,6 +29,11 @@ pub enum BatchError {
     )]
     OtherQuestion { path: PathBuf, what: String },
     #[error(
+        "{} is of another batch ({difference}): ask the same of the same files, or remove it and all parts beside it",
+        path.display()
+    )]
+    OtherBatch { path: PathBuf, difference: String },
+    #[error(
         "{}, line {line}: expected the journal of a batch: {reason}; begin anew, or choose another table",
         path.display()
     )]

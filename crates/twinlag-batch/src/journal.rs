@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use twinlag_study::Shard;
 
+use crate::asked::difference;
 use crate::digest::sha256;
 use crate::error::BatchError;
 use crate::group::{Unit, name_of};
@@ -27,7 +28,7 @@ const SCHEMA: &str = "twinlag.batch-journal/3";
 const HASH_DIGITS: usize = 64;
 
 /// How every journal begins.
-const START: &str = "{\"schema\":\"twinlag.batch-journal/";
+pub(crate) const START: &str = "{\"schema\":\"twinlag.batch-journal/";
 
 /// How a run begins where there may be a journal of an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -281,8 +282,8 @@ fn checked(line: &[u8]) -> Option<&[u8]> {
 }
 
 impl Header {
-    /// Refuses another part than this, and one that was asked something else than `first`.
-    pub(crate) fn expect_part(&self, part: &PartOf, first: &Self, path: &Path) -> Result<(), BatchError> {
+    /// Refuses another part than this, and one that was asked something else.
+    pub(crate) fn expect_part(&self, part: &PartOf, asked: &Value, path: &Path) -> Result<(), BatchError> {
         let foreign = |what: String| Err(BatchError::Foreign { path: path.to_owned(), what });
         match &self.part_of {
             None => return foreign("its batch: it is one by itself".to_owned()),
@@ -292,20 +293,15 @@ impl Header {
             }
             Some(_) => {}
         }
-        match self.expect_same_question(first, path) {
+        match self.expect_same_question(asked, path) {
             Err(BatchError::OtherQuestion { what, .. }) => foreign(what),
             other => other,
         }
     }
 
-    /// What was asked.
-    pub(crate) fn asked(&self) -> &Value {
-        &self.asked
-    }
-
     /// Refuses to go on with another question, or with another part.
     fn expect_same(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
-        self.expect_same_question(now, path)?;
+        self.expect_same_question(&now.asked, path)?;
         let what = match (&self.part_of, &now.part_of) {
             (was, is) if was == is => return Ok(()),
             (Some(was), Some(is)) if was.manifest == is.manifest => "the shard",
@@ -321,29 +317,10 @@ impl Header {
         if is_same { Ok(()) } else { Err(BatchError::OtherQuestion { path: path.to_owned(), what }) }
     }
 
-    fn expect_same_question(&self, now: &Self, path: &Path) -> Result<(), BatchError> {
+    fn expect_same_question(&self, asked: &Value, path: &Path) -> Result<(), BatchError> {
         let differs = |what: &str| BatchError::OtherQuestion { path: path.to_owned(), what: what.to_owned() };
-        match difference(&self.asked, &now.asked) {
-            Some(what) if what.is_empty() => Err(differs("the whole question")),
-            Some(what) => Err(differs(&what)),
-            None => Ok(()),
-        }
+        difference(&self.asked, asked).map_or(Ok(()), |setting| Err(differs(&setting)))
     }
-}
-
-/// The name of the first setting in which two questions differ, those within a setting behind it; empty where they have no settings,
-/// `None` of equal ones.
-fn difference(was: &Value, is: &Value) -> Option<String> {
-    if was == is {
-        return None;
-    }
-    let (Value::Object(was), Value::Object(is)) = (was, is) else { return Some(String::new()) };
-    let mut names = was.keys().chain(is.keys());
-    names.find_map(|name| {
-        let of = |asked: &serde_json::Map<String, Value>| asked.get(name).cloned().unwrap_or(Value::Null);
-        let within = difference(&of(was), &of(is))?;
-        Some(if within.is_empty() { name.clone() } else { format!("{name}.{within}") })
-    })
 }
 
 /// The files of a unit as they were before they were read.

@@ -38,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod asked;
 mod digest;
 mod error;
 mod find;
@@ -46,6 +47,7 @@ mod group;
 mod journal;
 mod manifest;
 mod outcome;
+mod own;
 mod parquet;
 mod parts;
 mod row;
@@ -60,8 +62,9 @@ pub use group::{GroupBy, Unit, each, grouped, name_of};
 pub use journal::{Answers, Begin, Journal, PartOf};
 pub use manifest::Manifest;
 pub use outcome::Outcome;
+pub use own::is_of_batch;
 pub use parquet::write_parquet;
 pub use parts::{Parts, part_path, parts_beside};
 pub use row::{Answer, Row, Verb};
 pub use run::{Progress, map, run};
-pub use table::{is_table, write_csv};
+pub use table::write_csv;

@@ -1,7 +1,7 @@
 //! The files of a batch as they were when it was divided into shards, so that any machine that sees them asks the same.
 //!
-//! One line of JSON says what the batch is of, each further one has a unit, and the last one how many there are, with the hash of
-//! all before. A manifest that was cut off or edited is refused.
+//! One line of JSON says what the batch is of and what is asked, each further one has a unit, and the last one how many there are, with
+//! the hash of all before. A manifest that was cut off or edited is refused.
 
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
@@ -10,20 +10,24 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use twinlag_study::Shard;
 
+use crate::asked::difference;
 use crate::digest::{sha256, sha256_of_file};
 use crate::error::BatchError;
 use crate::find::Found;
-use crate::group::{GroupBy, Unit, name_of};
+use crate::group::{Unit, name_of};
 use crate::run::{Progress, map};
 
 /// Name and number of the format.
-const SCHEMA: &str = "twinlag.manifest/1";
+const SCHEMA: &str = "twinlag.manifest/2";
+/// How every manifest begins.
+pub(crate) const START: &str = "{\"schema\":\"twinlag.manifest/";
 /// What a file counts beside its bytes when shards are balanced; chosen: what opening one costs beside reading it.
 const FILE_BYTES: u64 = 1 << 12;
 
-/// The units of a batch, with size and hash of their files.
+/// What a batch asks, and its units, with size and hash of their files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifest {
     header: Header,
@@ -37,8 +41,8 @@ struct Header {
     schema: String,
     /// Folders, patterns and files that were named.
     what: Vec<String>,
-    /// What a rig is known by.
-    group_by: Option<String>,
+    /// What is asked of each unit.
+    asked: Value,
 }
 
 /// A unit.
@@ -78,6 +82,10 @@ struct End {
     sha256: String,
 }
 
+fn names(paths: &[PathBuf]) -> Vec<String> {
+    paths.iter().map(|path| name_of(path)).collect()
+}
+
 /// One line of a manifest.
 fn line(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("names are text") + "\n"
@@ -94,13 +102,14 @@ impl Manifest {
     /// Lists units, and reads all their files.
     ///
     /// - `what`: folders, patterns and files that were named
+    /// - `asked`: the question; all shards have to ask the same
     /// - `found`: the files of all units
     ///
     /// # Errors
     /// [`BatchError::NoUnicode`].
     pub fn of(
         what: &[PathBuf],
-        group_by: Option<&GroupBy>,
+        asked: Value,
         units: &[Unit],
         found: &[Found],
         threads: Option<NonZeroUsize>,
@@ -127,8 +136,7 @@ impl Manifest {
             };
             Listed { rig, without_rig, files }
         };
-        let what = what.iter().map(|what| name_of(what)).collect();
-        let header = Header { schema: SCHEMA.to_owned(), what, group_by: group_by.map(ToString::to_string) };
+        let header = Header { schema: SCHEMA.to_owned(), what: names(what), asked };
         Ok(Self::new(header, units.iter().map(unit).collect()))
     }
 
@@ -199,12 +207,26 @@ impl Manifest {
         sha256(self.body().as_bytes())
     }
 
-    /// What it is of, where that is not what is named now, or rigs are known by something else.
-    pub fn is_of_other(&self, what: &[PathBuf], group_by: Option<&GroupBy>) -> Option<String> {
-        let now: Vec<String> = what.iter().map(|what| name_of(what)).collect();
-        let is_same = self.header.what == now && self.header.group_by == group_by.map(ToString::to_string);
-        let by = self.header.group_by.as_ref().map_or(String::new(), |by| format!(", grouped by {by}"));
-        (!is_same).then(|| format!("{}{by}", self.header.what.join(", ")))
+    /// What is asked of each unit.
+    pub fn asked(&self) -> &Value {
+        &self.header.asked
+    }
+
+    /// Refuses to be of other files than are named now, and of another question.
+    ///
+    /// - `path`: its own, for messages
+    ///
+    /// # Errors
+    /// [`BatchError::OtherBatch`].
+    pub fn expect_same(&self, path: &Path, what: &[PathBuf], asked: &Value) -> Result<(), BatchError> {
+        let other = |difference: String| Err(BatchError::OtherBatch { path: path.to_owned(), difference });
+        if self.header.what != names(what) {
+            return other(format!("it is of {}", self.header.what.join(", ")));
+        }
+        match difference(self.asked(), asked) {
+            None => Ok(()),
+            Some(setting) => other(format!("it differs in {setting}")),
+        }
     }
 
     /// Its units, in the order of the table.
@@ -220,9 +242,10 @@ impl Manifest {
         self.units.iter().filter_map(unit).collect()
     }
 
-    /// How many of these files it does not list.
-    pub fn unlisted(&self, found: &[Found]) -> usize {
-        found.iter().filter(|file| !self.places.contains_key(&file.path)).count()
+    /// Those of these files that it does not list.
+    pub fn unlisted(&self, mut found: Vec<Found>) -> Vec<Found> {
+        found.retain(|file| !self.places.contains_key(&file.path));
+        found
     }
 
     /// The files of a shard.

@@ -4,12 +4,11 @@ use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
 use twinlag_study::Shard;
 
 use crate::error::BatchError;
 use crate::group::Unit;
-use crate::journal::{Answers, Header, Journal, PartOf};
+use crate::journal::{Answers, Journal, PartOf};
 use crate::manifest::Manifest;
 use crate::row::Row;
 
@@ -49,7 +48,6 @@ pub struct Parts {
     parts: Vec<Journal>,
     /// The part that has a unit.
     places: HashMap<String, usize>,
-    asked: Value,
 }
 
 impl Parts {
@@ -63,8 +61,7 @@ impl Parts {
             return Err(BatchError::Divisions { first: pair[0].1.clone(), second: pair[1].1.clone() });
         }
         let hash = manifest.sha256();
-        let mut first: Option<Header> = None;
-        let mut out = Self { parts: Vec::new(), places: HashMap::new(), asked: Value::Null };
+        let mut out = Self { parts: Vec::new(), places: HashMap::new() };
         for (shard, path) in parts {
             let (journal, header) = Journal::read_part(path).map_err(|error| match error {
                 BatchError::Damaged { path, line, reason } => BatchError::DamagedPart { path, line, reason },
@@ -73,19 +70,12 @@ impl Parts {
                 error => error,
             })?;
             let part_of = PartOf { manifest: hash.clone(), shard: *shard };
-            header.expect_part(&part_of, first.as_ref().unwrap_or(&header), path)?;
+            header.expect_part(&part_of, manifest.asked(), path)?;
             out.places.extend(journal.keys().map(|unit| (unit.clone(), out.parts.len())));
             out.parts.push(journal);
-            first = first.or(Some(header));
         }
-        out.asked = first.map_or(Value::Null, |header| header.asked().clone());
         out.expect_all(parts.first().map_or(Shard::WHOLE, |(shard, _)| *shard), manifest)?;
         Ok(out)
-    }
-
-    /// What was asked of the units.
-    pub fn asked(&self) -> &Value {
-        &self.asked
     }
 
     /// - `division`: any shard of it

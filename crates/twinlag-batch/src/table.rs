@@ -1,15 +1,12 @@
 //! The table of a batch: which columns it has, and its rows as delimited text.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{Read as _, Write};
-use std::path::Path;
+use std::io::Write;
 
 use crate::error::BatchError;
 use crate::group::Unit;
 use crate::journal::Answers;
-use crate::parquet::is_parquet_table;
-use crate::row::{Cells, Verb, cells_of_parameter, first_columns};
+use crate::row::{Cells, Verb, cells_of_parameter};
 
 /// The columns of a table: those of its verb, then those of the parameters that were found, by name.
 pub(crate) fn columns(
@@ -50,11 +47,4 @@ pub fn write_csv(units: &[Unit], answers: &mut impl Answers, verb: Verb, out: im
         }
     }
     table.flush().map_err(|error| BatchError::Table { reason: error.to_string() })
-}
-
-/// Whether a file is a table that [`write_csv`] or [`write_parquet`](crate::write_parquet) has written. One that cannot be read is not.
-pub fn is_table(path: &Path) -> bool {
-    let (want, mut start) = (first_columns().join(","), Vec::new());
-    let read = File::open(path).and_then(|file| file.take(want.len() as u64).read_to_end(&mut start));
-    read.is_ok() && (start == want.as_bytes() || is_parquet_table(path))
 }

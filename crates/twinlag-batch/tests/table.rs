@@ -9,7 +9,8 @@ use serde_json::json;
 use twinlag::Options as Question;
 use twinlag::record::{Channels, Record, SamplingChoice};
 use twinlag_batch::{
-    Answer, BatchError, Begin, Fleet, Journal, Outcome, Row, Unit, Verb, each, is_table, run, write_csv, write_parquet,
+    Answer, BatchError, Begin, Fleet, Journal, Outcome, Row, Unit, Verb, each, is_of_batch, run, write_csv,
+    write_parquet,
 };
 
 /// Two first-order lags of a pseudo-random gas that is constant from sample to sample, with noise of a tenth of a kelvin.
@@ -114,11 +115,11 @@ fn a_table_is_known_whatever_its_length() {
         let create = |path: &Path| File::create(path).expect("a file");
         write_csv(&units, &mut journal, Verb::Diagnose, create(&csv)).expect("can be written");
         write_parquet(&units, &mut journal, Verb::Diagnose, create(&parquet)).expect("can be written");
-        assert!(is_table(&csv) && is_table(&parquet), "{name}");
+        assert!(is_of_batch(&csv) && is_of_batch(&parquet), "{name}");
     }
     for text in ["level,rig", "PAR1 twinlag_batch"] {
         std::fs::write(&other, text).expect("can be written");
-        assert!(!is_table(&other), "{text}");
+        assert!(!is_of_batch(&other), "{text}");
     }
 }
 

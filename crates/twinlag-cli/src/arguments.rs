@@ -8,7 +8,7 @@ use twinlag::compensation::Form;
 use twinlag::convection::Flow;
 use twinlag::diagnosis::Identifier;
 use twinlag::estimate::Bootstrap;
-use twinlag::record::{ColumnRef, Record, SamplingChoice, Selection, Unit};
+use twinlag::record::{ColumnRef, Record, SAMPLE_PERIODS_S, SamplingChoice, Selection, Unit};
 use twinlag::{
     Estimator, Hold, Intervals, Known, NoiseColour, Options, Plausibility, TypicalSensor, optimise::Optimiser,
 };
@@ -396,7 +396,7 @@ pub(crate) struct Columns {
     position: Option<ColumnRef>,
     /// Time from row to row, for files without a time column; a guessed time column is then
     /// ignored.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = period)]
     period: Option<f64>,
     /// How to read the time stamps: auto, uniform (evenly spaced, whatever they say) or as-stamped [default: auto].
     #[arg(long, value_name = "HOW", value_parser = sampling)]
@@ -417,6 +417,18 @@ fn time_unit(text: &str) -> Result<Unit, String> {
         unit @ Unit::Time { .. } => Ok(unit),
         _ => Err("expected s, ms, us, ns, min, h or d".into()),
     }
+}
+
+fn period(text: &str) -> Result<f64, String> {
+    let period_s: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
+    let is_period = SAMPLE_PERIODS_S.contains(&period_s);
+    let wrong = || format!("the sample period must be positive, from a nanosecond to a year, got {text} s");
+    if is_period { Ok(period_s) } else { Err(wrong()) }
+}
+
+/// Of all random numbers.
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
 fn sampling(text: &str) -> Result<SamplingChoice, String> {
@@ -505,7 +517,7 @@ pub(crate) struct Method {
     #[arg(long, value_name = "N", help_heading = "Research")]
     replicates: Option<usize>,
     /// Seed of the bootstrap [default: 1].
-    #[arg(long, value_name = "N", help_heading = "Research")]
+    #[arg(long, value_name = "N", value_parser = seed, help_heading = "Research")]
     seed: Option<u64>,
     /// Also print numbers that are graded no-go, each marked as such: they may be far off.
     #[arg(long, help_heading = "Grades")]
@@ -626,7 +638,7 @@ pub(crate) struct Simulate {
     #[arg(long, value_name = "CSV")]
     pub(crate) out: PathBuf,
     /// Seed for all random numbers, in place of the one in the rig.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed)]
     pub(crate) seed: Option<u64>,
     /// Overwrite the output if it exists.
     #[arg(long)]
@@ -693,6 +705,6 @@ pub(crate) struct Explain {
 )]
 pub(crate) struct Demo {
     /// Seed for all random numbers, in place of the one in the rig.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed)]
     pub(crate) seed: Option<u64>,
 }

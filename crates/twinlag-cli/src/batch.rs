@@ -10,12 +10,13 @@ use std::panic;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use serde_json::Value;
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
 use twinlag::record::ColumnRef;
 use twinlag_batch::{
     Answers, BatchError, Begin, Fleet, Found, GroupBy, Journal, Manifest, Outcome, PartOf, Row, Unit, Verb as RowVerb,
-    find, is_table, name_of, part_path, run as run_units, write_csv, write_parquet,
+    find, is_of_batch, name_of, part_path, run as run_units, write_csv, write_parquet,
 };
 use twinlag_pages::{fleet_report, is_fleet_report};
 use twinlag_study::Shard;
@@ -69,7 +70,8 @@ What is done is kept in TABLE.journal. A run that was stopped goes on with --res
 after files have been added or changed, which asks only of those.
 
 Exit codes: 0 the table is written, and at least one unit has an answer; 4 none has, though files were read; 3 no file can be
-used, or a part cannot be; 2 wrong usage; 75 a shard is missing; 1 any other error. Column exit_code has what the verb alone would have ended with.")]
+used, or a part cannot be; 2 wrong usage; 75 a shard is missing, or another run has not ended;
+1 any other error. Column exit_code has what the verb alone would have ended with.")]
 pub(crate) struct Batch {
     /// Folders, quoted patterns, or files.
     #[arg(required_unless_present = "merge", value_name = "WHAT")]
@@ -152,7 +154,8 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     let journal_path =
         command.course.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
     command.check_outputs(&journal_path)?;
-    let Scope { manifest, files, units, part_of } = Scope::of(command, &question, &journal_path, console)?;
+    let asked = question.asked()?;
+    let Scope { manifest, files, units, part_of } = Scope::of(command, &question, &asked, &journal_path, console)?;
     let begin = match (command.course.resume, command.course.force) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Replace,
@@ -166,7 +169,6 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
             gas.display()
         )));
     }
-    let asked = question.asked()?;
     let mut journal = match part_of {
         Some(part_of) => Journal::open_part(&journal_path, &asked, part_of, begin)?,
         None => Journal::open(&journal_path, &asked, begin)?,
@@ -222,10 +224,20 @@ struct Scope {
 }
 
 impl Scope {
-    fn of(command: &Batch, question: &Question<'_>, journal: &Path, console: Console) -> Result<Self, Failure> {
+    fn of(
+        command: &Batch,
+        question: &Question<'_>,
+        asked: &Value,
+        journal: &Path,
+        console: Console,
+    ) -> Result<Self, Failure> {
         let threads = command.course.threads;
         let found = || {
-            let files = command.files(journal)?;
+            let (files, others) = command.records(find(&command.what)?, journal)?;
+            if let Some(first) = others.first() {
+                let (count, first) = (others.len(), first.path.display());
+                console.note(|| format!("not asked for: {count} files that batches have written, first {first}"));
+            }
             let paths = files.iter().map(|file| file.path.clone()).collect();
             let units = question.units(paths, threads, console);
             Ok::<_, Failure>((files, units))
@@ -234,17 +246,18 @@ impl Scope {
             let (files, units) = found()?;
             return Ok(Self { manifest: None, files, units, part_of: None });
         };
-        let (what, group_by) = (&command.what, question.group_by);
-        let manifest = shards::manifest(&command.out[0], what, group_by, || {
+        let what = &command.what;
+        let manifest = shards::manifest(&command.out[0], what, asked, || {
             let (files, units) = found()?;
-            shards::listed(what, group_by, &units, &files, threads, console)
+            shards::listed(what, asked, &units, &files, threads, console)
         })?;
         let units = manifest.units_of(shard);
-        let (path, unlisted) = (shards::manifest_path(&command.out[0]), manifest.unlisted(&command.files(journal)?));
-        if unlisted > 0 {
+        let (unlisted, _) = command.records(manifest.unlisted(find(what)?), journal)?;
+        if !unlisted.is_empty() {
+            let (count, path) = (unlisted.len(), shards::manifest_path(&command.out[0]));
             console.note(|| {
                 format!(
-                    "not asked for: {unlisted} files that {} does not list; remove it and all parts beside it to divide the batch anew",
+                    "not asked for: {count} files that {} does not list; remove it and all parts beside it to divide the batch anew",
                     path.display()
                 )
             });
@@ -260,7 +273,7 @@ fn merge(command: &Batch, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     command.check_outputs(&shards::manifest_path(table))?;
     let (manifest, mut parts) = shards::all(table)?;
-    let asked = parts.asked();
+    let asked = manifest.asked();
     let unit_name = unit_name(!asked["group_by"].is_null());
     let verb = serde_json::from_value(asked["verb"].clone())
         .map_err(|error| Failure::File(format!("{}: the parts ask nothing that is known: {error}", table.display())))?;
@@ -333,7 +346,7 @@ impl Batch {
         let outputs = self.outputs();
         let is_resumed = self.course.resume && journal.exists();
         output::check(journal, &outputs, true)?;
-        let others: Vec<_> = outputs.iter().copied().filter(|(_, path)| !(is_resumed && is_of_batch(path))).collect();
+        let others: Vec<_> = outputs.iter().copied().filter(|(_, path)| !(is_resumed && is_written(path))).collect();
         // A shard writes none of them.
         output::check(journal, &others, self.course.force || self.course.shard.is_some())
     }
@@ -344,29 +357,29 @@ impl Batch {
         tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect()
     }
 
-    /// The files that are asked, without what the batch itself writes.
-    fn files(&self, journal: &Path) -> Result<Vec<Found>, Failure> {
+    /// The records among files, and what other batches have written among them.
+    fn records(&self, found: Vec<Found>, journal: &Path) -> Result<(Vec<Found>, Vec<Found>), Failure> {
         let outputs = self.outputs();
         let gas = self.gas.as_ref().and_then(|folder| folder.canonicalize().ok());
         let is_gas = |file: &Path| {
             file.to_string_lossy().ends_with(GAS_ENDING)
                 && gas.as_ref().is_some_and(|gas| file.canonicalize().is_ok_and(|file| file.starts_with(gas)))
         };
-        let is_output = |file: &Path| {
-            output::is_same(file, journal)
-                || outputs.iter().any(|(_, output)| output::is_same(file, output))
-                || shards::is_beside(&self.out[0], file)
-        };
-        let found = find(&self.what)?;
-        let (own, files): (Vec<_>, Vec<_>) = found.into_iter().partition(|file| is_output(&file.path));
-        let is_own =
-            |file: &Path| output::is_same(file, journal) || is_of_batch(file) || shards::is_beside(&self.out[0], file);
-        match own.iter().find(|file| !is_own(&file.path)) {
+        let is_output = |file: &Path| outputs.iter().any(|(_, output)| output::is_same(file, output));
+        // One that is empty yet is known by its name alone.
+        let is_beside = |file: &Path| output::is_same(file, journal) || shards::is_beside(&self.out[0], file);
+        let (written, mut files): (Vec<_>, Vec<_>) =
+            found.into_iter().partition(|file| is_beside(&file.path) || is_written(&file.path));
+        match files.iter().find(|file| is_output(&file.path)) {
             Some(file) => Err(Failure::Usage(format!(
                 "{} is one of the records: choose another name for --out or --report",
                 file.path.display()
             ))),
-            None => Ok(files.into_iter().filter(|file| !is_gas(&file.path)).collect()),
+            None => {
+                files.retain(|file| !is_gas(&file.path));
+                let others = written.into_iter().filter(|file| !is_beside(&file.path) && !is_output(&file.path));
+                Ok((files, others.collect()))
+            }
         }
     }
 }
@@ -374,11 +387,14 @@ impl Batch {
 /// First bytes of a file by which a summary of a batch is known.
 const HEAD_BYTES: u64 = 1 << 16;
 
-/// Whether a file is a table or a summary that a batch has written.
-fn is_of_batch(file: &Path) -> bool {
-    let mut head = Vec::new();
-    let read = fs::File::open(file).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
-    read.is_ok() && (is_fleet_report(&head) || is_table(file))
+/// Whether a file is a table, a summary, a journal, a part or a manifest that a batch has written.
+fn is_written(file: &Path) -> bool {
+    let is_summary = || {
+        let mut head = Vec::new();
+        let read = fs::File::open(file).and_then(|file| file.take(HEAD_BYTES).read_to_end(&mut head));
+        read.is_ok() && is_fleet_report(&head)
+    };
+    is_of_batch(file) || is_summary()
 }
 
 /// What the units of a batch are.
@@ -401,9 +417,12 @@ impl From<BatchError> for Failure {
         match error {
             BatchError::Exists { .. } => Self::Usage(format!("{text} (options --resume, --force)")),
             BatchError::OtherQuestion { .. } => Self::Usage(format!("{text} (option --force)")),
-            BatchError::Pattern { .. } | BatchError::GroupBy { .. } => Self::Usage(text),
+            BatchError::OtherBatch { .. } | BatchError::Pattern { .. } | BatchError::GroupBy { .. } => {
+                Self::Usage(text)
+            }
             BatchError::Damaged { .. } => Self::File(format!("{text} (option --force)")),
             BatchError::Incomplete { .. } => Self::NotYet(format!("{text} (options --shard, --resume)")),
+            BatchError::Busy { .. } => Self::NotYet(text),
             BatchError::NothingFound { .. }
             | BatchError::Empty { .. }
             | BatchError::NoJournal { .. }

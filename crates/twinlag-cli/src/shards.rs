@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use twinlag_batch::{Found, GroupBy, Manifest, Parts, Unit, parts_beside};
+use serde_json::Value;
+use twinlag_batch::{Found, Manifest, Parts, Unit, parts_beside};
 use twinlag_study::Shard;
 
 use crate::console::Console;
@@ -50,14 +51,14 @@ pub(crate) fn is_beside(table: &Path, file: &Path) -> bool {
 /// Lists the units of a batch, with sizes and hashes of their files.
 pub(crate) fn listed(
     what: &[PathBuf],
-    group_by: Option<&GroupBy>,
+    asked: &Value,
     units: &[Unit],
     files: &[Found],
     threads: Option<NonZeroUsize>,
     console: Console,
 ) -> Result<Manifest, Failure> {
     let bar = progress::bar(console).with_message("listing files");
-    let manifest = Manifest::of(what, group_by, units, files, threads, |progress| {
+    let manifest = Manifest::of(what, asked.clone(), units, files, threads, |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
     });
@@ -69,7 +70,7 @@ pub(crate) fn listed(
 pub(crate) fn manifest(
     table: &Path,
     what: &[PathBuf],
-    group_by: Option<&GroupBy>,
+    asked: &Value,
     make: impl FnOnce() -> Result<Manifest, Failure>,
 ) -> Result<Manifest, Failure> {
     let path = manifest_path(table);
@@ -84,13 +85,8 @@ pub(crate) fn manifest(
         }
     }
     let manifest = read(&path)?;
-    match manifest.is_of_other(what, group_by) {
-        None => Ok(manifest),
-        Some(other) => Err(Failure::Usage(format!(
-            "{}: is of {other}: name the same, or remove it and all parts beside it",
-            path.display()
-        ))),
-    }
+    manifest.expect_same(&path, what, asked)?;
+    Ok(manifest)
 }
 
 fn read(path: &Path) -> Result<Manifest, Failure> {

@@ -1,6 +1,8 @@
 //! Which columns are time, T1 and T2: those that the caller names, else a guess from names and
 //! units. A guess is noted. If a header can be read in two ways, nothing is guessed.
 
+use std::ops::RangeInclusive;
+
 use crate::RecordError;
 use crate::clock;
 use crate::column::{Column, Kind};
@@ -38,10 +40,9 @@ impl Chosen {
     }
 }
 
-/// Periods from row to row that may be given: no logger is faster than a nanosecond or slower than
-/// a year. What is beyond is a slip of the exponent.
-const SHORTEST_PERIOD_S: f64 = 1e-9;
-const LONGEST_PERIOD_S: f64 = 366.0 * 86_400.0;
+/// Periods from row to row that may be given, in seconds: no logger is faster than a nanosecond or slower than a year. What is beyond is
+/// a slip of the exponent.
+pub const SAMPLE_PERIODS_S: RangeInclusive<f64> = 1e-9..=366.0 * 86_400.0;
 
 /// Longest unit of time after which a column may be called and be the time: those of longer ones, as `h`, `d` and `min`, stand
 /// for other quantities as well.
@@ -66,7 +67,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         if let Some(time) = named_time {
             return Err(RecordError::TimeAndPeriod { file, column: table.title(time), period_s });
         }
-        if !(SHORTEST_PERIOD_S..=LONGEST_PERIOD_S).contains(&period_s) {
+        if !SAMPLE_PERIODS_S.contains(&period_s) {
             return Err(RecordError::BadPeriod { file, period_s });
         }
     }

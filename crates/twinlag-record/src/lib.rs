@@ -70,6 +70,7 @@ mod unit;
 mod wording;
 mod write;
 
+pub use choose::SAMPLE_PERIODS_S;
 pub use column::{Column, Kind};
 pub use error::{Candidates, Place, RecordError};
 pub use form::Program;

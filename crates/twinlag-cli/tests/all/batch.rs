@@ -277,6 +277,12 @@ fn shards_give_the_table_of_a_whole_run() {
     let run = |shard: &str| bench.run(&[&batch[..], &["--out", "t.csv", "--shard", shard, "--resume"]].concat());
     let merge = || bench.run(&["batch", "--merge", "--out", "t.csv"]);
     assert_eq!(run("1/2").code, 0);
+    // Failed: only the merge saw that a shard had asked something else.
+    bench.refuses(
+        2,
+        &[&batch[..], &["--out", "t.csv", "--shard", "0/2", "--strict"]].concat(),
+        &["strict", "t.csv.manifest"],
+    );
     let incomplete = merge();
     assert_eq!(incomplete.code, 75, "{incomplete:#?}");
     incomplete.says(&["missing", "shard 0 of 2"]);
@@ -319,6 +325,11 @@ fn shards_with_gas_in_the_folder_of_the_records_give_the_table_of_a_whole_run() 
     }
     assert_eq!(bench.run(&[&batch[..], &["--force"]].concat()).code, 0);
     assert_eq!(merged, bench.read("t.csv"));
+    // Failed: what other batches in the folder had written was taken for records.
+    let other = ["batch", ".", "--verb", "compensate", "--without", "slow-mode", "--out", "other.csv", "--gas", "gas"];
+    let answer = bench.run(&[&other[..], &["--force"]].concat());
+    answer.says(&["not asked for: 2 files", "t.csv"]);
+    assert_eq!(merged, bench.read("other.csv"));
     // A file that is added later is in no shard.
     bench.run(&[&batch[..], &["--shard", "0/1", "--force"]].concat());
     bench.write("d.csv", Trace::GOOD.csv());

@@ -46,6 +46,8 @@ fn what_says_which_numbers_an_option_may_have_says_it_of_negative_ones() {
     for (code, arguments, words) in [
         (2, &["track", "run.csv", "--window", "-1", "--out", "out.csv"][..], &["window: expected seconds", "-1"][..]),
         (2, &["characterise", "run.csv", "--period", "-1"], &["the sample period must be positive", "-1"]),
+        (2, &["batch", "run.csv", "--period", "-1", "--out", "out.csv"], &["--period", "positive", "-1"]),
+        (2, &["demo", "--seed", "-1"], &["--seed", "expected a whole number from 0 to 1844"]),
         (2, &["track", "run.csv", "--live", "-5", "--out", "-"], &["--live", "-5", "200.."]),
         (2, &["batch", "run.csv", "--threads", "-1", "--out", "out.csv"], &["--threads", "-1"]),
     ] {
