@@ -4,7 +4,6 @@
 //! of the machine are taken out of the program, and entries are in order, with one date and one owner. An archive for another platform takes its
 //! target of Rust and a linker for it; runners of a CI service have each its own.
 
-use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{Read, Write as _};
 use std::path::{Path, PathBuf};
@@ -199,9 +198,5 @@ fn zipped(path: &Path, folder: &str, entries: &[Entry]) -> Result<()> {
 fn hash(path: &Path) -> Result<String> {
     let mut content = Vec::new();
     File::open(path)?.read_to_end(&mut content)?;
-    let hexadecimal = |mut text: String, byte: &u8| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    };
-    Ok(Sha256::digest(&content).iter().fold(String::new(), hexadecimal))
+    Ok(base16ct::lower::encode_string(&Sha256::digest(&content)))
 }

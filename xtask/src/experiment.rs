@@ -268,6 +268,7 @@ fn options(run: &Run, out: &Path) -> Result<Options> {
         shard: run.shard.unwrap_or(Shard::WHOLE),
         checkpoint,
         resume: run.resume,
+        program: commit(),
         ..Options::default()
     })
 }
@@ -324,21 +325,33 @@ fn times(plan: &Plan) -> Result<String> {
     Ok(lines.join("\n") + "\n")
 }
 
+/// The commit that is checked out, and whether sources differ from it.
+fn commit() -> String {
+    let differ = if is_clean() == Some(false) { ", with changes" } else { "" };
+    format!("{}{differ}", first_line("git", &["rev-parse", "HEAD"]).unwrap_or_default())
+}
+
+/// Whether the sources of the library are as committed; `None` without git.
+fn is_clean() -> Option<bool> {
+    first_line("git", &["status", "--porcelain", "--", "crates", "Cargo.lock"]).map(|changes| changes.is_empty())
+}
+
+/// What a program says; `None` where it fails.
+fn first_line(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(arguments).current_dir(root().ok()?).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
 /// What made the results: everything that may change from run to run, kept apart from the table that may not.
 fn provenance(name: &str, seed: u64, trials: u64, out: &Path, seconds: f64, threads: usize) -> Result<()> {
-    let first_line = |program: &str, arguments: &[&str]| {
-        let output = Command::new(program).args(arguments).current_dir(root().ok()?).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
     let commit = first_line("git", &["rev-parse", "HEAD"]);
-    let is_clean = first_line("git", &["status", "--porcelain", "--", "crates", "Cargo.lock"]).map(|s| s.is_empty());
     let cpu = fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
         let line = text.lines().find(|l| l.starts_with("model name"))?;
         Some(line.split(':').nth(1)?.trim().to_owned())
     });
     let value = json!({
         "experiment": name, "seed": seed, "trials": trials, "version": env!("CARGO_PKG_VERSION"),
-        "commit": commit, "sources_as_committed": is_clean, "rustc": first_line("rustc", &["--version"]),
+        "commit": commit, "sources_as_committed": is_clean(), "rustc": first_line("rustc", &["--version"]),
         "processor": cpu, "threads": threads, "seconds": (10.0 * seconds).round() / 10.0,
     });
     Ok(fs::write(out.join("provenance.json"), format!("{}\n", serde_json::to_string_pretty(&value)?))?)

@@ -1,10 +1,10 @@
 //! SHA-256, as hexadecimal digits.
 
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+use base16ct::lower::encode_string;
 use sha2::{Digest as _, Sha256};
 
 /// Bytes that are read at once; chosen, so that a file of any length takes little memory.
@@ -12,7 +12,7 @@ const READ_BYTES: usize = 1 << 16;
 
 /// The SHA-256 of bytes, in hexadecimal digits.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
+    encode_string(&Sha256::digest(bytes))
 }
 
 /// The SHA-256 of a file, in hexadecimal digits.
@@ -26,19 +26,12 @@ pub fn sha256_of_file(path: &Path) -> io::Result<String> {
     let (mut file, mut hasher, mut bytes) = (File::open(path)?, Sha256::new(), vec![0; READ_BYTES]);
     loop {
         match file.read(&mut bytes) {
-            Ok(0) => return Ok(hexadecimal(&hasher.finalize())),
+            Ok(0) => return Ok(encode_string(&hasher.finalize())),
             Ok(read) => hasher.update(&bytes[..read]),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }
     }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

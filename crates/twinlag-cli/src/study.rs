@@ -114,6 +114,7 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
         shard,
         checkpoint: Some(part.clone()),
         resume: run.resume,
+        program: env!("TWINLAG_VERSION").to_owned(),
         ..Options::default()
     };
     let bar = progress::bar(console).with_message("trials");

@@ -50,8 +50,8 @@ pub enum StudyError {
     Read { path: PathBuf, cause: std::io::Error },
     #[error("{} could not be written: {cause}", path.display())]
     Write { path: PathBuf, cause: std::io::Error },
-    #[error("{} is not part of a study, or is damaged: {cause}", path.display())]
-    Damaged { path: PathBuf, cause: serde_json::Error },
+    #[error("{} is not part of a study, or is damaged: {reason}", path.display())]
+    Damaged { path: PathBuf, reason: String },
     #[error("{} has another {what}: expected {expected}, got {got}", path.display())]
     OtherStudy { path: PathBuf, what: &'static str, expected: String, got: String },
     #[error("{} repeats {gap}, which is also in another part", path.display())]

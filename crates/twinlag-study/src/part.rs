@@ -2,20 +2,24 @@
 
 use std::fmt;
 use std::fs;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use crate::error::{Gap, StudyError};
 use crate::forest::{Forest, ForestError};
 use crate::study::{Quantity, Study};
 use crate::tally::Tally;
 
-/// Version of the layout of parts and results on disk.
+/// Version of the layout of a study, in parts and results.
 const FORMAT: u32 = 1;
+
+/// Name and number of the layout of the file of a part: a line with its SHA-256, and a line with the part.
+const FILE_SCHEMA: &str = "twinlag.study-part-file/2";
 
 /// What a study is: parts belong together if this is equal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,39 +96,18 @@ impl Header {
     }
 
     fn expect_same(&self, got: &Self, path: &Path) -> Result<(), StudyError> {
-        let differ = |what, expected: &dyn fmt::Display, got: &dyn fmt::Display| {
-            Err(StudyError::OtherStudy {
-                path: path.into(),
-                what,
-                expected: expected.to_string(),
-                got: got.to_string(),
-            })
-        };
-        if got.format != self.format {
-            return differ("format", &self.format, &got.format);
-        }
-        if got.version != self.version {
-            return differ("version of twinlag-study", &self.version, &got.version);
-        }
-        if got.plan != self.plan {
-            return differ("plan", &self.plan, &got.plan);
-        }
-        if got.trials != self.trials {
-            return differ("number of trials", &self.trials, &got.trials);
-        }
-        if got.block != self.block {
-            return differ("block size", &self.block, &got.block);
-        }
-        if got.cells.len() != self.cells.len() {
-            return differ("number of cells", &self.cells.len(), &got.cells.len());
-        }
+        let Self { format, version, plan, trials, block, cells } = self;
+        expect_equal("format", format, &got.format, path)?;
+        expect_equal("version of twinlag-study", version, &got.version, path)?;
+        expect_equal("plan", plan, &got.plan, path)?;
+        expect_equal("number of trials", trials, &got.trials, path)?;
+        expect_equal("block size", block, &got.block, path)?;
+        expect_equal("number of cells", &cells.len(), &got.cells.len(), path)?;
         let names = |quantities: &[Quantity]| {
             quantities.iter().map(|q| format!("{} ({:?})", q.name, q.kind)).collect::<Vec<_>>().join(", ")
         };
-        match self.cells.iter().zip(&got.cells).find(|(a, b)| a != b) {
-            Some((a, b)) => differ("list of quantities", &names(a), &names(b)),
-            None => Ok(()),
-        }
+        let mut pairs = cells.iter().zip(&got.cells);
+        pairs.try_for_each(|(a, b)| expect_equal("list of quantities", &names(a), &names(b), path))
     }
 }
 
@@ -228,39 +211,53 @@ impl From<Shard> for String {
 pub struct Part {
     header: Header,
     shard: Shard,
+    program: String,
     cells: Vec<Forest<Tally>>,
 }
 
+/// The first line of the file of a part.
+#[derive(Serialize, Deserialize)]
+struct FirstLine {
+    schema: String,
+    /// Of all that comes behind this line.
+    sha256: String,
+}
+
 impl Part {
-    pub(crate) fn empty(header: Header, shard: Shard) -> Self {
+    pub(crate) fn empty(header: Header, shard: Shard, program: &str) -> Self {
         let cells = vec![Forest::new(header.blocks()); header.cells.len()];
-        Self { header, shard, cells }
+        Self { header, shard, program: program.to_owned(), cells }
     }
 
     /// Reads a part.
     ///
     /// # Errors
-    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is not a part of a study;
+    /// [`StudyError::Read`]; [`StudyError::Damaged`] if it is not a part of a study, or does not fit its hash;
     /// [`StudyError::OtherStudy`] if it is in another format.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        #[derive(Deserialize)]
-        struct Probe {
-            header: ProbeHeader,
-        }
-        #[derive(Deserialize)]
-        struct ProbeHeader {
-            format: u32,
-        }
         let bytes = fs::read(path).map_err(|cause| StudyError::Read { path: path.into(), cause })?;
-        serde_json::from_slice(&bytes).map_err(|cause| match serde_json::from_slice::<Probe>(&bytes) {
-            Ok(Probe { header }) if header.format != FORMAT => StudyError::OtherStudy {
-                path: path.into(),
-                what: "format",
-                expected: FORMAT.to_string(),
-                got: header.format.to_string(),
-            },
-            _ => StudyError::Damaged { path: path.into(), cause },
-        })
+        let damaged = |reason: String| StudyError::Damaged { path: path.into(), reason };
+        let other = |got: String| StudyError::OtherStudy {
+            path: path.into(),
+            what: "format",
+            expected: FILE_SCHEMA.to_owned(),
+            got,
+        };
+        let end = bytes.iter().position(|byte| *byte == b'\n').map_or(bytes.len(), |end| end + 1);
+        let (first, part) = bytes.split_at(end);
+        let FirstLine { schema, sha256: hash } = serde_json::from_slice(first).map_err(|error| {
+            // Before there was a first line.
+            let is_of_first_format =
+                serde_json::from_slice::<serde_json::Value>(first).is_ok_and(|part| part["header"]["format"].is_u64());
+            if is_of_first_format { other("1".to_owned()) } else { damaged(error.to_string()) }
+        })?;
+        if schema != FILE_SCHEMA {
+            return Err(other(schema));
+        }
+        if sha256(part) != hash {
+            return Err(damaged("what it holds does not fit its hash".to_owned()));
+        }
+        serde_json::from_slice(part).map_err(|error| damaged(error.to_string()))
     }
 
     /// Writes the part, in place of an older one if there is one. At every moment there is the old
@@ -276,11 +273,12 @@ impl Part {
         temporary.push(format!(".tmp-{}", std::process::id()));
         let temporary = PathBuf::from(temporary);
         let write = || {
-            let mut file = BufWriter::new(fs::File::create(&temporary)?);
-            serde_json::to_writer(&mut file, self)?;
-            file.write_all(b"\n")?;
+            let part = serde_json::to_string(self)? + "\n";
+            let first = FirstLine { schema: FILE_SCHEMA.to_owned(), sha256: sha256(part.as_bytes()) };
+            let mut file = fs::File::create(&temporary)?;
+            file.write_all(format!("{}\n{part}", serde_json::to_string(&first)?).as_bytes())?;
             // Else a power failure could leave the new name with no content.
-            file.into_inner()?.sync_all()?;
+            file.sync_all()?;
             fs::rename(&temporary, path)
         };
         write().map_err(|cause| StudyError::Write { path: path.into(), cause })
@@ -294,6 +292,17 @@ impl Part {
     /// The shard to which this part belongs.
     pub fn shard(&self) -> Shard {
         self.shard
+    }
+
+    /// The program that made it, see [`Options::program`](crate::Options).
+    pub fn program(&self) -> &str {
+        &self.program
+    }
+
+    /// Trials that are there.
+    pub fn done(&self) -> u64 {
+        let trials = |forest: &Forest<Tally>| forest.nodes().map(|(_, tally)| tally.trials()).sum::<u64>();
+        self.cells.iter().map(trials).sum()
     }
 
     /// What each cell has so far.
@@ -320,13 +329,16 @@ impl Part {
         finish(self, Some(shards))
     }
 
-    pub(crate) fn expect_same(&self, header: &Header, shard: Shard, path: &Path) -> Result<(), StudyError> {
-        header.expect_same(&self.header, path)?;
-        if self.shard == shard {
-            return Ok(());
-        }
-        let (expected, got) = (shard.to_string(), self.shard.to_string());
-        Err(StudyError::OtherStudy { path: path.into(), what: "shard", expected, got })
+    /// Refuses to go on from a part, at `path`, of another study, shard or program.
+    pub(crate) fn expect_same(&self, found: &Self, path: &Path) -> Result<(), StudyError> {
+        self.expect_same_study(found, path)?;
+        expect_equal("shard", &self.shard, &found.shard, path)
+    }
+
+    /// Refuses a part, at `path`, of another study or program.
+    fn expect_same_study(&self, found: &Self, path: &Path) -> Result<(), StudyError> {
+        self.header.expect_same(&found.header, path)?;
+        expect_equal("program", &self.program, &found.program, path)
     }
 
     pub(crate) fn insert(&mut self, job: u64, tally: Tally) {
@@ -355,17 +367,34 @@ impl Part {
     }
 }
 
+fn expect_equal<T: PartialEq + fmt::Display>(
+    what: &'static str,
+    expected: &T,
+    got: &T,
+    path: &Path,
+) -> Result<(), StudyError> {
+    if expected == got {
+        return Ok(());
+    }
+    Err(StudyError::OtherStudy { path: path.into(), what, expected: expected.to_string(), got: got.to_string() })
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    base16ct::lower::encode_string(&Sha256::digest(bytes))
+}
+
 #[derive(Deserialize)]
 struct UncheckedPart {
     header: Header,
     shard: Shard,
+    program: String,
     cells: Vec<Forest<Tally>>,
 }
 
 impl TryFrom<UncheckedPart> for Part {
     type Error = String;
 
-    fn try_from(UncheckedPart { header, shard, cells }: UncheckedPart) -> Result<Self, String> {
+    fn try_from(UncheckedPart { header, shard, program, cells }: UncheckedPart) -> Result<Self, String> {
         header.check()?;
         if cells.len() != header.cells.len() {
             return Err(format!("the header has {} cells, the body {}", header.cells.len(), cells.len()));
@@ -378,7 +407,7 @@ impl TryFrom<UncheckedPart> for Part {
                 header.check_tally(cell, &blocks, tally)?;
             }
         }
-        Ok(Self { header, shard, cells })
+        Ok(Self { header, shard, program, cells })
     }
 }
 
@@ -483,7 +512,7 @@ pub fn merge<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Resul
             whole = Some(part);
             continue;
         };
-        whole.header.expect_same(&part.header, path)?;
+        whole.expect_same_study(&part, path)?;
         divided_by = divided_by.filter(|&of| of == part.shard.of);
         for (cell, (mine, other)) in whole.cells.iter_mut().zip(part.cells).enumerate() {
             mine.join(other).map_err(|e| match e {

@@ -34,6 +34,9 @@ pub struct Options {
     pub resume: bool,
     /// How long to wait between checkpoints; by default five seconds.
     pub every: Duration,
+    /// The program that runs it, by its version and commit; by default empty. It is kept in each part, and parts of different programs
+    /// are not joined; the result does not hold it.
+    pub program: String,
 }
 
 impl Default for Options {
@@ -44,6 +47,7 @@ impl Default for Options {
             checkpoint: None,
             resume: false,
             every: Duration::from_secs(5),
+            program: String::new(),
         }
     }
 }
@@ -155,14 +159,14 @@ pub fn replay<S: Study>(study: &S, cell: usize, trial: u64) -> Result<Outcome, S
 
 /// The part to go on from.
 fn open(header: &Header, options: &Options) -> Result<Part, StudyError> {
-    let part = Part::empty(header.clone(), options.shard);
+    let part = Part::empty(header.clone(), options.shard, &options.program);
     let Some(path) = &options.checkpoint else { return Ok(part) };
     match (path.try_exists(), options.resume) {
         (Err(cause), _) => Err(StudyError::Read { path: path.clone(), cause }),
         (Ok(true), false) => Err(StudyError::Exists { path: path.clone() }),
         (Ok(true), true) => {
             let found = Part::read(path)?;
-            found.expect_same(header, options.shard, path)?;
+            part.expect_same(&found, path)?;
             Ok(found)
         }
         // Written at once, so that a directory that cannot be written to shows before the work is

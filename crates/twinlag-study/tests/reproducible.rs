@@ -14,6 +14,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sha2::{Digest as _, Sha256};
 use twinlag_study::{
     Failure, Forest, Kind, Options, Outcome, Part, Quantity, Results, Shard, Study, StudyError, Tally, merge, replay,
     run,
@@ -93,7 +94,7 @@ impl Study for Noise {
 }
 
 fn options(threads: usize) -> Options {
-    Options { threads: NonZeroUsize::new(threads).unwrap(), ..Options::default() }
+    Options { threads: NonZeroUsize::new(threads).unwrap(), program: "1".into(), ..Options::default() }
 }
 
 fn go_on<T>(_: T) -> ControlFlow<()> {
@@ -102,6 +103,13 @@ fn go_on<T>(_: T) -> ControlFlow<()> {
 
 fn reference() -> String {
     run(&NOISE, &options(1), go_on).unwrap().into_results().unwrap().to_json()
+}
+
+/// The file of a part, with the hash that it should have.
+fn with_hash(part: &str) -> String {
+    let part = format!("{part}\n");
+    let hash = base16ct::lower::encode_string(&Sha256::digest(&part));
+    format!("{{\"schema\":\"twinlag.study-part-file/2\",\"sha256\":\"{hash}\"}}\n{part}")
 }
 
 /// An empty directory for one test.
@@ -311,15 +319,23 @@ fn a_part_of_another_study_is_refused() {
     paths[1] = shards(&dir.join("8"), &other, 2)[1].clone();
     assert!(matches!(merge(&paths), Err(StudyError::OtherStudy { what: "plan", .. })));
 
+    // Another program may compute something else by the same plan.
+    let options = Options { shard: Shard::new(0, 2).unwrap(), program: "2".into(), ..options };
+    let error = run(&NOISE, &options, go_on).unwrap_err().to_string();
+    assert!(error.ends_with("0-2.json has another program: expected 2, got 1"), "{error}");
+
     let text = fs::read_to_string(&paths[0]).unwrap();
-    for (from, to, what) in [
-        (format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION")), "\"version\":\"0.0.0\"", "version of twinlag-study"),
-        ("\"format\":1".into(), "\"format\":2", "format"),
+    let part = text.lines().nth(1).unwrap();
+    let version = part.replacen(&format!("\"version\":\"{}\"", env!("CARGO_PKG_VERSION")), "\"version\":\"0.0.0\"", 1);
+    for (file, what) in [
+        (with_hash(&version), "version of twinlag-study"),
         // A format of which nothing but its number is known.
-        ("\"format\":1,\"version\"".into(), "\"format\":2,\"what\"", "format"),
+        (text.replacen("study-part-file/2", "study-part-file/3", 1), "format"),
+        // The first one had no hash.
+        (format!("{part}\n"), "format"),
     ] {
-        assert!(text.contains(&from));
-        fs::write(&paths[0], text.replacen(&from, to, 1)).unwrap();
+        assert_ne!(file, text);
+        fs::write(&paths[0], file).unwrap();
         let options = Options { shard: Shard::new(0, 2).unwrap(), ..options.clone() };
         let error = run(&NOISE, &options, go_on).unwrap_err();
         assert!(matches!(&error, StudyError::OtherStudy { what: got, .. } if *got == what), "{what}: {error}");
@@ -349,8 +365,7 @@ fn a_damaged_part_is_refused_wherever_it_is_cut_and_whatever_was_edited() {
         assert!(matches!(error, StudyError::Damaged { .. }), "{what}: {error}");
         assert!(error.to_string().contains("0-2.json is not part of a study, or is damaged"), "{error}");
     };
-    // The file ends in a line feed that it can do without.
-    for cut in (0..text.len() - 2).step_by(text.len() / 97).chain([text.len() - 2]) {
+    for cut in (0..text.len() - 1).step_by(text.len() / 97).chain([text.len() - 1]) {
         refused(&text.as_bytes()[..cut], "cut");
     }
     refused(&[0xff, 0xfe, 0, 1], "garbage");
@@ -365,7 +380,10 @@ fn a_damaged_part_is_refused_wherever_it_is_cut_and_whatever_was_edited() {
         ("\"block\":10", "\"block\":0"),
     ] {
         assert!(text.contains(from), "{from} is not in the file");
-        refused(text.replacen(from, to, 1).as_bytes(), to);
+        let edited = text.replacen(from, to, 1);
+        refused(edited.as_bytes(), to);
+        // What does not fit together is refused also where the hash fits.
+        refused(with_hash(edited.lines().nth(1).unwrap()).as_bytes(), to);
     }
 }
 

@@ -1,6 +1,5 @@
 //! The data that a model was found in.
 
-use std::fmt::Write as _;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -107,11 +106,7 @@ fn sha256(record: &Record) -> String {
         let bits = if value.is_nan() { 0x7ff8_0000_0000_0000 } else { value.to_bits() };
         hash.update(bits.to_le_bytes());
     }
-    hash.finalize().iter().fold(String::new(), |mut text, byte| {
-        // A string takes everything.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+    base16ct::lower::encode_string(&hash.finalize())
 }
 
 /// `value` to four digits.
