@@ -165,6 +165,22 @@ impl Journal {
         }
     }
 
+    /// How many units are done in a part, whether it is being written or not.
+    ///
+    /// # Errors
+    /// [`BatchError::Read`], [`BatchError::NoJournal`], [`BatchError::OtherQuestion`], [`BatchError::Damaged`], [`BatchError::Foreign`],
+    /// [`BatchError::Twice`].
+    pub(crate) fn done_in_part(path: &Path, part: &PartOf, asked: &Value) -> Result<usize, BatchError> {
+        let file =
+            File::open(path).map_err(|error| BatchError::Read { path: path.to_owned(), reason: error.to_string() })?;
+        let mut journal = Self { file, path: path.to_owned(), end: 0, done: HashMap::new() };
+        journal.expect_journal()?;
+        if let Some(header) = journal.take_up()? {
+            header.expect_part(part, asked, path)?;
+        }
+        Ok(journal.done.len())
+    }
+
     /// The keys of the units that are done.
     pub(crate) fn keys(&self) -> impl Iterator<Item = &String> {
         self.done.keys()

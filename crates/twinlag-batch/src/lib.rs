@@ -64,7 +64,7 @@ pub use manifest::Manifest;
 pub use outcome::Outcome;
 pub use own::is_of_batch;
 pub use parquet::write_parquet;
-pub use parts::{Parts, part_path, parts_beside};
+pub use parts::{Parts, done_in_part, part_path, parts_beside};
 pub use row::{Answer, Row, Verb};
 pub use run::{Progress, map, run};
 pub use table::write_csv;

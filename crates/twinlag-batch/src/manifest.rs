@@ -34,6 +34,8 @@ pub struct Manifest {
     units: Vec<Listed>,
     /// The place of the unit that each file is of.
     places: HashMap<PathBuf, usize>,
+    /// Of all lines but the last.
+    sha256: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -145,7 +147,9 @@ impl Manifest {
             unit.files.iter().map(|file| (file.path.clone(), place)).collect::<Vec<_>>()
         };
         let places = units.iter().enumerate().flat_map(of_unit).collect();
-        Self { header, units, places }
+        let mut manifest = Self { header, units, places, sha256: String::new() };
+        manifest.sha256 = sha256(manifest.body().as_bytes());
+        manifest
     }
 
     /// Reads a manifest.
@@ -199,12 +203,12 @@ impl Manifest {
     }
 
     fn end(&self) -> End {
-        End { units: self.units.len(), sha256: self.sha256() }
+        End { units: self.units.len(), sha256: self.sha256.clone() }
     }
 
     /// Its own hash: parts of batches that differ in it are not mixed.
-    pub fn sha256(&self) -> String {
-        sha256(self.body().as_bytes())
+    pub fn sha256(&self) -> &str {
+        &self.sha256
     }
 
     /// What is asked of each unit.
@@ -261,6 +265,13 @@ impl Manifest {
         let shards = self.shards(shard.of());
         let units = self.units().into_iter().zip(shards);
         units.filter(|(_, of)| *of == shard.index()).map(|(unit, _)| unit).collect()
+    }
+
+    /// How many units each of so many shards has.
+    pub fn units_of_shards(&self, of: u64) -> Vec<u64> {
+        let mut counts = vec![0; of as usize];
+        self.shards(of).into_iter().for_each(|shard| counts[shard as usize] += 1);
+        counts
     }
 
     /// The shard, of so many, that each unit belongs to.

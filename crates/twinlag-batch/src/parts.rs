@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use twinlag_study::Shard;
+use twinlag_study::{Shard, ranges};
 
 use crate::error::BatchError;
 use crate::group::Unit;
@@ -42,6 +42,29 @@ pub fn parts_beside(table: &Path) -> Result<Vec<(Shard, PathBuf)>, BatchError> {
     Ok(parts)
 }
 
+/// How many units of a shard are done, whether its part is being written or not.
+///
+/// # Errors
+/// [`BatchError::Read`], [`BatchError::Foreign`], [`BatchError::Twice`], [`BatchError::DamagedPart`].
+pub fn done_in_part(table: &Path, shard: Shard, manifest: &Manifest) -> Result<usize, BatchError> {
+    let path = part_path(table, shard);
+    if !path.exists() {
+        return Ok(0);
+    }
+    let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard };
+    Journal::done_in_part(&path, &part_of, manifest.asked()).map_err(of_part)
+}
+
+/// What is wrong with a journal, said of a part.
+fn of_part(error: BatchError) -> BatchError {
+    match error {
+        BatchError::Damaged { path, line, reason } => BatchError::DamagedPart { path, line, reason },
+        BatchError::NoJournal { path } => BatchError::Foreign { path, what: "everything".to_owned() },
+        BatchError::OtherQuestion { path, what } => BatchError::Foreign { path, what },
+        error => error,
+    }
+}
+
 /// The parts of all shards of a batch.
 #[derive(Debug)]
 pub struct Parts {
@@ -60,16 +83,10 @@ impl Parts {
         if let Some(pair) = parts.windows(2).find(|pair| pair[0].0.of() != pair[1].0.of()) {
             return Err(BatchError::Divisions { first: pair[0].1.clone(), second: pair[1].1.clone() });
         }
-        let hash = manifest.sha256();
         let mut out = Self { parts: Vec::new(), places: HashMap::new() };
         for (shard, path) in parts {
-            let (journal, header) = Journal::read_part(path).map_err(|error| match error {
-                BatchError::Damaged { path, line, reason } => BatchError::DamagedPart { path, line, reason },
-                BatchError::NoJournal { path } => BatchError::Foreign { path, what: "everything".to_owned() },
-                BatchError::OtherQuestion { path, what } => BatchError::Foreign { path, what },
-                error => error,
-            })?;
-            let part_of = PartOf { manifest: hash.clone(), shard: *shard };
+            let (journal, header) = Journal::read_part(path).map_err(of_part)?;
+            let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard: *shard };
             header.expect_part(&part_of, manifest.asked(), path)?;
             out.places.extend(journal.keys().map(|unit| (unit.clone(), out.parts.len())));
             out.parts.push(journal);
@@ -91,20 +108,10 @@ impl Parts {
             units: missing.len(),
             all: units.len(),
             first: first.key(),
-            shards: ranges(missing),
+            shards: ranges(&missing),
             of,
         })
     }
-}
-
-/// Numbers as ranges: `0-7, 9`.
-fn ranges(mut numbers: Vec<u64>) -> String {
-    numbers.sort_unstable();
-    numbers.dedup();
-    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
-    let in_words =
-        runs.map(|run| if run.len() == 1 { run[0].to_string() } else { format!("{}-{}", run[0], run[run.len() - 1]) });
-    in_words.collect::<Vec<_>>().join(", ")
 }
 
 impl Answers for Parts {

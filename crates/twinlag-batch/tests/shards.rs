@@ -54,7 +54,7 @@ fn run_shard(manifest: &Manifest, table: &Path, of: &str) -> PathBuf {
 
 fn run_shard_asked(manifest: &Manifest, table: &Path, of: &str, asked: &Value) -> PathBuf {
     let path = part_path(table, shard(of));
-    let part_of = PartOf { manifest: manifest.sha256(), shard: shard(of) };
+    let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard: shard(of) };
     let mut journal = Journal::open_part(&path, asked, part_of, Begin::Replace).expect("a new one");
     run(&manifest.units_of(shard(of)), &mut journal, None, row, |_| {}).expect("can be written");
     path

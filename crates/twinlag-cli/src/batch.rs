@@ -5,7 +5,7 @@ mod said;
 
 use std::fs;
 use std::io::Read as _;
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::panic;
 use std::path::{Path, PathBuf};
 
@@ -28,6 +28,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{Output, with_ending};
 use crate::shards::JOURNAL_ENDING;
+use crate::submission::{self, Cluster};
 use crate::{output, progress, report, shards};
 
 pub(crate) use crate::batch::said::BatchAnswer;
@@ -64,7 +65,8 @@ and one for each of its records (level record), with what is left over when it i
 
 --shard K/N asks only one of N parts of the batch, on this machine or another that sees the same files, and leaves it beside the
 table as TABLE.part-K-of-N. The first shard lists the files with sizes and hashes in TABLE.manifest, which the others take. --merge
-makes the table of all parts: the same, to the byte, as without shards.
+makes the table of all parts: the same, to the byte, as without shards. --engine submits all shards and the merge to a cluster;
+--status says how far they are, and --resubmit submits again what is missing.
 
 What is done is kept in TABLE.journal. A run that was stopped goes on with --resume, and gives the same table; so does a run
 after files have been added or changed, which asks only of those.
@@ -74,7 +76,7 @@ used, or a part cannot be; 2 wrong usage; 75 a shard is missing, or another run 
 1 any other error. Column exit_code has what the verb alone would have ended with.")]
 pub(crate) struct Batch {
     /// Folders, quoted patterns, or files.
-    #[arg(required_unless_present = "merge", value_name = "WHAT")]
+    #[arg(required_unless_present_any = ["merge", "status", "resubmit"], value_name = "WHAT")]
     what: Vec<PathBuf>,
     /// What is asked of each.
     #[arg(long, value_name = "VERB", default_value = "characterise")]
@@ -112,6 +114,10 @@ pub(crate) struct Batch {
     #[command(flatten)]
     course: Course,
     #[command(flatten)]
+    division: Division,
+    #[command(flatten)]
+    cluster: Cluster,
+    #[command(flatten)]
     columns: Columns,
     #[command(flatten)]
     method: Method,
@@ -119,15 +125,32 @@ pub(crate) struct Batch {
     physics: Physics,
 }
 
+/// What a run on its own is of, and nothing else goes with.
+const OF_RUN: [&str; 15] = [
+    "what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "shard", "Cluster",
+    "Columns", "Method", "Physics",
+];
+
+/// The shards of a batch; no cell of the table depends on them.
+#[derive(Debug, Args)]
+struct Division {
+    /// Ask only part K of N, with K counted from 0; see --merge.
+    #[arg(long, value_name = "K/N", allow_hyphen_values = true, conflicts_with_all = ["report", "Cluster"])]
+    shard: Option<Shard>,
+    /// Make the table of the parts that shards have left beside it.
+    #[arg(long, conflicts_with_all = OF_RUN)]
+    merge: bool,
+    /// Say how far the shards are that were submitted with --engine.
+    #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "resubmit", "report", "force", "threads"])]
+    status: bool,
+    /// Submit again the shards that are missing: not done, and not in the engine's hands any more.
+    #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "report", "force", "threads"])]
+    resubmit: bool,
+}
+
 /// How a batch goes about it; no cell of the table depends on it.
 #[derive(Debug, Args)]
 struct Course {
-    /// Ask only part K of N, with K counted from 0; see --merge.
-    #[arg(long, value_name = "K/N", allow_hyphen_values = true, conflicts_with_all = ["merge", "report"])]
-    shard: Option<Shard>,
-    /// Make the table of the parts that shards have left beside it.
-    #[arg(long, conflicts_with_all = ["what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "Columns", "Method", "Physics"])]
-    merge: bool,
     /// Go on where an earlier run stopped; only files that were added or changed since are asked again.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
@@ -146,15 +169,21 @@ const GAS_ENDING: &str = ".gas.csv";
 const SILENT: Console = Console { json: true, quiet: true };
 
 pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
-    if command.course.merge {
-        return merge(command, console);
+    let (table, Division { merge, status, resubmit, .. }) = (&command.out[0], &command.division);
+    if *merge {
+        return merge_parts(command, console);
+    }
+    if *status || *resubmit {
+        return follow(table, *resubmit, console);
     }
     let question = Question::of(command)?;
-    let table = &command.out[0];
     let journal_path =
-        command.course.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
+        command.division.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
     command.check_outputs(&journal_path)?;
     let asked = question.asked()?;
+    if command.cluster.engine.is_some() {
+        return submit(command, &question, &asked, &journal_path, console);
+    }
     let Scope { manifest, files, units, part_of } = Scope::of(command, &question, &asked, &journal_path, console)?;
     let begin = match (command.course.resume, command.course.force) {
         (true, _) => Begin::Resume,
@@ -206,7 +235,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     bar.finish_and_clear();
     let _ = panic::take_hook();
     done?;
-    match command.course.shard {
+    match command.division.shard {
         Some(shard) => shards::say_done(table, &journal_path, shard, console).map(|()| 0),
         None => finish(command, &units, &mut journal, question.verb.into(), question.unit_name(), console),
     }
@@ -231,28 +260,13 @@ impl Scope {
         journal: &Path,
         console: Console,
     ) -> Result<Self, Failure> {
-        let threads = command.course.threads;
-        let found = || {
-            let (files, others) = command.records(find(&command.what)?, journal)?;
-            if let Some(first) = others.first() {
-                let (count, first) = (others.len(), first.path.display());
-                console.note(|| format!("not asked for: {count} files that batches have written, first {first}"));
-            }
-            let paths = files.iter().map(|file| file.path.clone()).collect();
-            let units = question.units(paths, threads, console);
-            Ok::<_, Failure>((files, units))
-        };
-        let Some(shard) = command.course.shard else {
-            let (files, units) = found()?;
+        let Some(shard) = command.division.shard else {
+            let (files, units) = command.units(question, journal, console)?;
             return Ok(Self { manifest: None, files, units, part_of: None });
         };
-        let what = &command.what;
-        let manifest = shards::manifest(&command.out[0], what, asked, || {
-            let (files, units) = found()?;
-            shards::listed(what, asked, &units, &files, threads, console)
-        })?;
+        let manifest = command.manifest(question, asked, journal, console)?;
         let units = manifest.units_of(shard);
-        let (unlisted, _) = command.records(manifest.unlisted(find(what)?), journal)?;
+        let (unlisted, _) = command.records(manifest.unlisted(find(&command.what)?), journal)?;
         if !unlisted.is_empty() {
             let (count, path) = (unlisted.len(), shards::manifest_path(&command.out[0]));
             console.note(|| {
@@ -263,13 +277,65 @@ impl Scope {
             });
         }
         let files = manifest.files_of(shard);
-        let part_of = PartOf { manifest: manifest.sha256(), shard };
+        let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard };
         Ok(Self { manifest: Some(manifest), files, units, part_of: Some(part_of) })
     }
 }
 
+/// Submits all shards of a batch to a cluster.
+fn submit(
+    command: &Batch,
+    question: &Question<'_>,
+    asked: &Value,
+    journal: &Path,
+    console: Console,
+) -> Result<u8, Failure> {
+    let table = &command.out[0];
+    let manifest_path = shards::manifest_path(table);
+    if manifest_path.exists() && !command.course.resume {
+        return Err(Failure::Usage(format!(
+            "{} is there from an earlier run: go on with it (option --resume), or remove it and all parts beside it",
+            manifest_path.display()
+        )));
+    }
+    question.gas_files(&[])?;
+    command.manifest(question, asked, journal, console)?;
+    let of_merge = ["report", "static", "force"];
+    let dropped: Vec<String> =
+        [&of_merge[..], &["resume", "threads", "json", "quiet"]].concat().into_iter().map(str::to_owned).collect();
+    let mut shard = submission::arguments_without("batch", &[dropped, Cluster::options()].concat())?;
+    let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
+    // Behind the name of the command, whatever stands behind `--`.
+    let place = shard.iter().position(|argument| argument == "batch").map_or(0, |place| place + 1);
+    shard.splice(place..place, ["--resume".to_owned(), "--quiet".to_owned(), format!("--threads={threads}")]);
+    let mut merge = vec!["batch".to_owned(), "--merge".to_owned()];
+    let text = |path: &Path| {
+        let text = path.to_str().map(str::to_owned);
+        text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", path.display())))
+    };
+    for (option, path) in command.outputs() {
+        merge.extend([option.to_owned(), text(path)?]);
+    }
+    merge.extend(command.is_static.then(|| "--static".to_owned()));
+    merge.extend(command.course.force.then(|| "--force".to_owned()));
+    let name = table.file_stem().unwrap_or_default().to_string_lossy();
+    let work = command.cluster.work(&name, shard, merge)?;
+    command.cluster.submit(&shards::submission_path(table), work, console)
+}
+
+/// Says how far the shards of a table are, or submits again what is missing of them.
+fn follow(table: &Path, resubmit: bool, console: Console) -> Result<u8, Failure> {
+    let scripts = shards::submission_path(table);
+    let progress = |of| shards::progress_of(table, of);
+    if resubmit {
+        return submission::resubmit(&scripts, progress, None, console);
+    }
+    let is_grouped = shards::manifest_path(table).exists() && !shards::asked(table)?["group_by"].is_null();
+    submission::status(&scripts, progress, unit_name(is_grouped), is_written(table), console)
+}
+
 /// Makes the table of all parts of a batch.
-fn merge(command: &Batch, console: Console) -> Result<u8, Failure> {
+fn merge_parts(command: &Batch, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     command.check_outputs(&shards::manifest_path(table))?;
     let (manifest, mut parts) = shards::all(table)?;
@@ -326,7 +392,7 @@ impl Batch {
             let text = format!("--out {}: expected a name that ends in .csv or .parquet", out.display());
             return Err(Failure::Usage(text));
         }
-        if self.course.shard.is_some() || self.course.merge {
+        if self.division.shard.is_some() || self.division.merge || self.cluster.engine.is_some() {
             let table = &self.out[0];
             if table.to_str().is_none() {
                 return Err(Failure::Usage(format!(
@@ -348,13 +414,44 @@ impl Batch {
         output::check(journal, &outputs, true)?;
         let others: Vec<_> = outputs.iter().copied().filter(|(_, path)| !(is_resumed && is_written(path))).collect();
         // A shard writes none of them.
-        output::check(journal, &others, self.course.force || self.course.shard.is_some())
+        output::check(journal, &others, self.course.force || self.division.shard.is_some())
     }
 
     /// The tables and the page.
     fn outputs(&self) -> Vec<Output<'_>> {
         let tables = self.out.iter().map(|path| ("--out", path.as_path()));
         tables.chain(self.report.iter().map(|path| ("--report", path.as_path()))).collect()
+    }
+
+    /// The records, and what is asked together.
+    fn units(
+        &self,
+        question: &Question<'_>,
+        journal: &Path,
+        console: Console,
+    ) -> Result<(Vec<Found>, Vec<Unit>), Failure> {
+        let (files, others) = self.records(find(&self.what)?, journal)?;
+        if let Some(first) = others.first() {
+            let (count, first) = (others.len(), first.path.display());
+            console.note(|| format!("not asked for: {count} files that batches have written, first {first}"));
+        }
+        let paths = files.iter().map(|file| file.path.clone()).collect();
+        let units = question.units(paths, self.course.threads, console);
+        Ok((files, units))
+    }
+
+    /// The manifest of its shards, made where there is none.
+    fn manifest(
+        &self,
+        question: &Question<'_>,
+        asked: &Value,
+        journal: &Path,
+        console: Console,
+    ) -> Result<Manifest, Failure> {
+        shards::manifest(&self.out[0], &self.what, asked, || {
+            let (files, units) = self.units(question, journal, console)?;
+            shards::listed(&self.what, asked, &units, &files, self.course.threads, console)
+        })
     }
 
     /// The records among files, and what other batches have written among them.

@@ -40,6 +40,7 @@ mod shards;
 mod simulate;
 mod sparkline;
 mod study;
+mod submission;
 mod track;
 
 use std::process::ExitCode;

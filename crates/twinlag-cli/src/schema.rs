@@ -12,6 +12,7 @@ use crate::print;
 use crate::shards::BatchPart;
 use crate::simulate::Simulation;
 use crate::study::{StudyAnswer, StudyPart};
+use crate::submission::{SubmissionAnswer, SubmissionStatus};
 
 /// What can be described.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -40,6 +41,10 @@ pub(crate) enum Name {
     Study,
     /// The answer of `study run` with --shard.
     StudyPart,
+    /// The answer of `study submit` and `study resubmit`, and of `batch` with --engine and --resubmit.
+    Submission,
+    /// The answer of `study status` and of `batch` with --status.
+    SubmissionStatus,
 }
 
 /// Prints the schema, of draft 2020-12.
@@ -58,6 +63,8 @@ pub(crate) fn run(name: Name) -> Result<u8, Failure> {
         Name::Simulation => generator.into_root_schema_for::<Simulation>(),
         Name::Study => generator.into_root_schema_for::<StudyAnswer>(),
         Name::StudyPart => generator.into_root_schema_for::<StudyPart>(),
+        Name::Submission => generator.into_root_schema_for::<SubmissionAnswer>(),
+        Name::SubmissionStatus => generator.into_root_schema_for::<SubmissionStatus>(),
     };
     print::json(&schema)?;
     Ok(0)

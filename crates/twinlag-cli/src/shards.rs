@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
-use twinlag_batch::{Found, Manifest, Parts, Unit, parts_beside};
+use twinlag_batch::{Found, Manifest, Parts, Unit, done_in_part, parts_beside};
 use twinlag_study::Shard;
 
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{folder_of, new_part, with_ending};
+use crate::submission::{self, ShardProgress};
 use crate::{print, progress};
 
 /// What `twinlag batch --shard` prints with --json.
@@ -32,13 +33,25 @@ pub(crate) const JOURNAL_ENDING: &str = ".journal";
 /// How the manifest of a table ends.
 const MANIFEST_ENDING: &str = ".manifest";
 
+/// How the folder of what was submitted to a cluster ends.
+const SUBMISSION_ENDING: &str = ".submission";
+
+/// The folder of what was submitted of a table to a cluster.
+pub(crate) fn submission_path(table: &Path) -> PathBuf {
+    with_ending(table, SUBMISSION_ENDING)
+}
+
 /// The manifest of a table.
 pub(crate) fn manifest_path(table: &Path) -> PathBuf {
     with_ending(table, MANIFEST_ENDING)
 }
 
-/// Whether a file is the manifest of a table, its journal, or one of its parts.
+/// Whether a file is the manifest of a table, its journal, one of its parts, or of its submission to a cluster.
 pub(crate) fn is_beside(table: &Path, file: &Path) -> bool {
+    let submission = submission_path(table).canonicalize();
+    if submission.is_ok_and(|submission| file.canonicalize().is_ok_and(|file| file.starts_with(submission))) {
+        return true;
+    }
     let is_named = |name: &str| {
         let rest = table.file_name().and_then(|table| name.strip_prefix(table.to_str()?));
         rest.is_some_and(|rest| [MANIFEST_ENDING, JOURNAL_ENDING].contains(&rest) || rest.starts_with(".part-"))
@@ -87,6 +100,21 @@ pub(crate) fn manifest(
     let manifest = read(&path)?;
     manifest.expect_same(&path, what, asked)?;
     Ok(manifest)
+}
+
+/// What each of so many shards has left.
+pub(crate) fn progress_of(table: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
+    let manifest = read(&manifest_path(table))?;
+    let mut totals = manifest.units_of_shards(of).into_iter();
+    submission::each_shard(of, |shard| {
+        let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
+        Ok(ShardProgress { total: totals.next().unwrap_or(0), done: done.map_err(|error| error.to_string()) })
+    })
+}
+
+/// What was asked of the units of a table in shards.
+pub(crate) fn asked(table: &Path) -> Result<Value, Failure> {
+    Ok(read(&manifest_path(table))?.asked().clone())
 }
 
 fn read(path: &Path) -> Result<Manifest, Failure> {

@@ -1,10 +1,11 @@
-//! `twinlag study run PLAN.toml --out DIR` and `twinlag study merge DIR`.
+//! `twinlag study run PLAN.toml --out DIR`, `twinlag study merge DIR`, and shards on a cluster.
 //!
 //! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. A run
-//! without shards merges its only part itself.
+//! without shards merges its only part itself. What was submitted is in the folder `submission` within.
 
 use std::ffi::OsStr;
 use std::fs;
+use std::num::NonZeroU32;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -12,12 +13,12 @@ use clap::{Args, Subcommand};
 use schemars::JsonSchema;
 use serde::Serialize;
 use twinlag_experiment::{Experiment, ExperimentError, Plan, Row, Table, write};
-use twinlag_study::{Options, Shard, Study as _, StudyError};
+use twinlag_study::{Options, Part, Shard, Study as _, StudyError};
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::print;
-use crate::progress;
+use crate::submission::{self, Cluster, ShardProgress};
+use crate::{output, print, progress};
 
 /// What to do with a Monte-Carlo study.
 #[derive(Debug, Subcommand)]
@@ -30,6 +31,33 @@ pub(crate) enum Study {
         /// The folder that holds the parts.
         dir: PathBuf,
     },
+    /// Run all shards of a study on a cluster, and the merge behind them.
+    #[command(mut_arg("engine", |engine| engine.required(true)))]
+    Submit(Submit),
+    /// Say how far the shards are that were submitted. Exit code 75: there is no result yet.
+    Status {
+        /// The folder that holds the parts.
+        dir: PathBuf,
+    },
+    /// Submit again the shards that are missing: not done, and not in the engine's hands any more.
+    Resubmit {
+        /// The folder that holds the parts.
+        dir: PathBuf,
+        /// Another limit than before, in minutes.
+        #[arg(long, value_name = "MINUTES")]
+        time_limit: Option<NonZeroU32>,
+    },
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Submit {
+    /// The plan, a TOML file; the book's chapter Experiments describes it.
+    plan: PathBuf,
+    /// The folder for the results, created if necessary; all machines have to see it.
+    #[arg(long)]
+    out: PathBuf,
+    #[command(flatten)]
+    cluster: Cluster,
 }
 
 #[derive(Debug, Args)]
@@ -78,6 +106,75 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
     match command {
         Study::Run(run) => start(run, console),
         Study::Merge { dir } => merge(dir, console),
+        Study::Submit(command) => submit(command, console),
+        Study::Status { dir } => {
+            let merged = dir.join(RESULTS).exists();
+            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", merged, console)
+        }
+        Study::Resubmit { dir, time_limit } => {
+            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, console)
+        }
+    }
+}
+
+/// The plan in the folder of the results.
+const PLAN: &str = "plan.toml";
+/// The results.
+const RESULTS: &str = "results.json";
+/// The folder of what was submitted.
+const SUBMISSION: &str = "submission";
+
+/// Submits all shards.
+fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
+    let plan = prepare(&command.plan, &command.out)?;
+    expect_no_results(&command.out)?;
+    let text = |path: &Path| {
+        let text = path.to_str().map(str::to_owned);
+        text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", path.display())))
+    };
+    let (out, copy) = (text(&command.out)?, text(&command.out.join(PLAN))?);
+    let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
+    let shard = format!("--threads={threads}");
+    let shard = ["study", "run", &copy, "--out", &out, "--resume", "--quiet", &shard].map(str::to_owned).to_vec();
+    let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
+    let work = command.cluster.work(&plan.name, shard, merge)?;
+    command.cluster.submit(&command.out.join(SUBMISSION), work, console)
+}
+
+/// What each of so many shards has left.
+fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
+    let (plan, _) = read(&dir.join(PLAN))?;
+    let experiment = Experiment::new(&plan)?;
+    submission::each_shard(of, |shard| {
+        let path = dir.join(shard.file_name());
+        let done = if path.exists() { Part::read(&path).map(|part| part.done()) } else { Ok(0) };
+        Ok(ShardProgress { total: shard.trials(&experiment)?, done: done.map_err(|error| error.to_string()) })
+    })
+}
+
+fn expect_no_results(out: &Path) -> Result<(), Failure> {
+    if out.join(RESULTS).exists() {
+        let out = out.display();
+        return Err(Failure::Usage(format!("{out}: already holds results; name another folder, or remove them")));
+    }
+    Ok(())
+}
+
+/// Reads the plan of a study, and puts it into the folder of the results.
+fn prepare(plan_file: &Path, out: &Path) -> Result<Plan, Failure> {
+    let (plan, text) = read(plan_file)?;
+    Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", plan_file.display())))?;
+    fs::create_dir_all(out).map_err(|e| Failure::Other(format!("{}: cannot be created: {e}", out.display())))?;
+    let copy = out.join(PLAN);
+    match fs::read_to_string(&copy) {
+        Ok(other) if other != text => {
+            Err(Failure::Usage(format!("{}: holds another plan; name another folder", copy.display())))
+        }
+        Ok(_) => Ok(plan),
+        Err(_) => {
+            output::write(&copy, &text)?;
+            Ok(plan)
+        }
     }
 }
 
@@ -89,24 +186,12 @@ fn read(path: &Path) -> Result<(Plan, String), Failure> {
 }
 
 fn start(run: &Run, console: Console) -> Result<u8, Failure> {
-    let (plan, text) = read(&run.plan)?;
-    let experiment = Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", run.plan.display())))?;
+    if !run.resume && run.shard.is_none() {
+        expect_no_results(&run.out)?;
+    }
+    let plan = prepare(&run.plan, &run.out)?;
+    let experiment = Experiment::new(&plan)?;
     let out = run.out.display();
-    fs::create_dir_all(&run.out).map_err(|e| Failure::Other(format!("{out}: cannot be created: {e}")))?;
-    if !run.resume && run.shard.is_none() && run.out.join("results.json").exists() {
-        return Err(Failure::Usage(format!("{out}: already holds results; name another folder, or remove them")));
-    }
-    let copy = run.out.join("plan.toml");
-    match fs::read_to_string(&copy) {
-        Ok(other) if other != text => {
-            return Err(Failure::Usage(format!("{}: holds another plan; name another folder", copy.display())));
-        }
-        Ok(_) => {}
-        Err(_) => {
-            fs::write(&copy, &text)
-                .map_err(|e| Failure::Other(format!("{}: cannot be written: {e}", copy.display())))?;
-        }
-    }
     let shard = run.shard.unwrap_or(Shard::WHOLE);
     let part = run.out.join(shard.file_name());
     let options = Options {
@@ -134,11 +219,13 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
 }
 
 fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
-    let (plan, _) = read(&dir.join("plan.toml"))?;
+    let (plan, _) = read(&dir.join(PLAN))?;
     let name = dir.display();
     let entries = fs::read_dir(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
-    let mut parts: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| is_part(p)).collect();
-    parts.sort();
+    let mut parts: Vec<PathBuf> =
+        entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| shard_of(p).is_some()).collect();
+    // Neighbours merge at once.
+    parts.sort_by_key(|path| shard_of(path).map(|shard| (shard.of(), shard.index())));
     if parts.is_empty() {
         return Err(Failure::File(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
@@ -157,8 +244,9 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn is_part(path: &Path) -> bool {
-    path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name).is_some()
+/// The shard whose part is in a file.
+fn shard_of(path: &Path) -> Option<Shard> {
+    path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name)
 }
 
 fn say(console: Console, answer: &impl Serialize, text: String) -> Result<(), Failure> {

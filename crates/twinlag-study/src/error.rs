@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::part::Shard;
+use crate::shard::{Shard, ranges};
 use crate::study::Failure;
 
 /// Blocks of one cell.
@@ -67,7 +67,10 @@ fn shard_list(shards: &[Shard]) -> String {
     match shards {
         [] => String::new(),
         [one] => format!("shard {one}: "),
-        many => format!("shards {}: ", many.iter().map(Shard::to_string).collect::<Vec<_>>().join(", ")),
+        [first, ..] => {
+            let indices: Vec<u64> = shards.iter().map(Shard::index).collect();
+            format!("shards {} of {}: ", ranges(&indices), first.of())
+        }
     }
 }
 

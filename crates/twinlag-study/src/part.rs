@@ -5,13 +5,13 @@ use std::fs;
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
 use crate::error::{Gap, StudyError};
 use crate::forest::{Forest, ForestError};
+use crate::shard::Shard;
 use crate::study::{Quantity, Study};
 use crate::tally::Tally;
 
@@ -95,6 +95,13 @@ impl Header {
         blocks.start * self.block..(blocks.end * self.block).min(self.trials)
     }
 
+    /// Trials of a job.
+    pub(crate) fn job_trials(&self, job: u64) -> u64 {
+        let block = job % self.blocks();
+        let trials = self.trials_in(&(block..block + 1));
+        trials.end - trials.start
+    }
+
     fn expect_same(&self, got: &Self, path: &Path) -> Result<(), StudyError> {
         let Self { format, version, plan, trials, block, cells } = self;
         expect_equal("format", format, &got.format, path)?;
@@ -108,100 +115,6 @@ impl Header {
         };
         let mut pairs = cells.iter().zip(&got.cells);
         pairs.try_for_each(|(a, b)| expect_equal("list of quantities", &names(a), &names(b), path))
-    }
-}
-
-/// The `k`-th of `n` contiguous ranges of the blocks of all cells, cell after cell. Written `k/n`,
-/// counted from 0.
-///
-/// Contiguous, because blocks that are neighbours merge: a shard of `b` blocks of a cell is at most
-/// `2 log2 b + 1` nodes, where every `n`-th block would be `b` nodes. If cells differ much in cost,
-/// divide into more shards than there are machines.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "String", into = "String")]
-pub struct Shard {
-    index: u64,
-    of: u64,
-}
-
-impl Shard {
-    /// The only shard there is: all of the study.
-    pub const WHOLE: Self = Self { index: 0, of: 1 };
-
-    /// Shard `index` of `of`.
-    ///
-    /// # Errors
-    /// [`StudyError::NoSuchShard`] unless `index < of`.
-    pub fn new(index: u64, of: u64) -> Result<Self, StudyError> {
-        if index < of { Ok(Self { index, of }) } else { Err(StudyError::NoSuchShard { got: format!("{index}/{of}") }) }
-    }
-
-    /// Index of the shard, from 0.
-    pub fn index(&self) -> u64 {
-        self.index
-    }
-
-    /// Number of shards.
-    pub fn of(&self) -> u64 {
-        self.of
-    }
-
-    /// The name of the file that holds its part.
-    ///
-    /// ```
-    /// use twinlag_study::Shard;
-    ///
-    /// let shard = Shard::new(1, 3)?;
-    /// assert_eq!(shard.file_name(), "part-1-of-3.json");
-    /// assert_eq!(Shard::of_file_name("part-1-of-3.json"), Some(shard));
-    /// assert_eq!(Shard::of_file_name("part-3-of-3.json"), None);
-    /// # Ok::<(), twinlag_study::StudyError>(())
-    /// ```
-    pub fn file_name(&self) -> String {
-        format!("part-{}-of-{}.json", self.index, self.of)
-    }
-
-    /// The shard whose part is in a file of this name; `None` where it is not the name of a part.
-    pub fn of_file_name(name: &str) -> Option<Self> {
-        let (index, of) = name.strip_prefix("part-")?.strip_suffix(".json")?.split_once("-of-")?;
-        let shard = Self::new(index.parse().ok()?, of.parse().ok()?).ok()?;
-        // Numbers with a sign or with zeros before them are not of a part.
-        (shard.file_name() == name).then_some(shard)
-    }
-
-    pub(crate) fn range(self, jobs: u64) -> Range<u64> {
-        let edge = |k: u64| (u128::from(jobs) * u128::from(k) / u128::from(self.of)) as u64;
-        edge(self.index)..edge(self.index + 1)
-    }
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.index, self.of)
-    }
-}
-
-impl FromStr for Shard {
-    type Err = StudyError;
-
-    fn from_str(text: &str) -> Result<Self, StudyError> {
-        let parsed = text.split_once('/').and_then(|(k, n)| Some((k.trim().parse().ok()?, n.trim().parse().ok()?)));
-        let (index, of) = parsed.ok_or_else(|| StudyError::NoSuchShard { got: format!("\"{text}\"") })?;
-        Self::new(index, of)
-    }
-}
-
-impl TryFrom<String> for Shard {
-    type Error = StudyError;
-
-    fn try_from(text: String) -> Result<Self, StudyError> {
-        text.parse()
-    }
-}
-
-impl From<Shard> for String {
-    fn from(shard: Shard) -> Self {
-        shard.to_string()
     }
 }
 
@@ -325,7 +238,7 @@ impl Part {
     /// # Errors
     /// [`StudyError::Incomplete`].
     pub fn into_results(self) -> Result<Results, StudyError> {
-        let shards = self.shard.of;
+        let shards = self.shard.of();
         finish(self, Some(shards))
     }
 
@@ -508,12 +421,12 @@ pub fn merge<P: AsRef<Path>>(paths: impl IntoIterator<Item = P>) -> Result<Resul
         let path = path.as_ref();
         let part = Part::read(path)?;
         let Some(whole) = &mut whole else {
-            divided_by = Some(part.shard.of);
+            divided_by = Some(part.shard.of());
             whole = Some(part);
             continue;
         };
         whole.expect_same_study(&part, path)?;
-        divided_by = divided_by.filter(|&of| of == part.shard.of);
+        divided_by = divided_by.filter(|&of| of == part.shard.of());
         for (cell, (mine, other)) in whole.cells.iter_mut().zip(part.cells).enumerate() {
             mine.join(other).map_err(|e| match e {
                 ForestError::Twice { range: blocks, .. } => {
@@ -532,7 +445,7 @@ fn finish(part: Part, divided_by: Option<u64>) -> Result<Results, StudyError> {
     let jobs = part.header.jobs();
     let gaps = part.gaps_in(&(0..jobs));
     if !gaps.is_empty() {
-        let shards = divided_by.into_iter().flat_map(|of| (0..of).map(move |index| Shard { index, of }));
+        let shards = divided_by.into_iter().flat_map(Shard::all);
         let shards = shards.filter(|shard| !part.gaps_in(&shard.range(jobs)).is_empty()).collect();
         return Err(StudyError::Incomplete { shards, gaps });
     }

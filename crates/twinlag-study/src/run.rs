@@ -14,7 +14,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::error::StudyError;
-use crate::part::{Header, Part, Shard};
+use crate::part::{Header, Part};
+use crate::shard::Shard;
 use crate::study::{Failure, Outcome, Study};
 use crate::tally::Tally;
 
@@ -209,14 +210,6 @@ impl Queue {
             place -= length;
         }
         None
-    }
-}
-
-impl Header {
-    fn job_trials(&self, job: u64) -> u64 {
-        let block = job % self.blocks();
-        let trials = self.trials_in(&(block..block + 1));
-        trials.end - trials.start
     }
 }
 

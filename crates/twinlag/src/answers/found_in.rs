@@ -1,6 +1,5 @@
 //! The data that a model was found in.
 
-
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use twinlag_record::Record;

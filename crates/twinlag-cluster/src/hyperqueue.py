@@ -1,0 +1,49 @@
+"""Submits shards to a HyperQueue server that is running, and the merge behind them; prints the number of the job.
+
+Needs the package `hyperqueue`, of the version of the server. --server-dir, or the variable HQ_SERVER_DIR, says which server.
+"""
+
+import argparse
+import os
+import pathlib
+
+from hyperqueue import Client, Job
+from hyperqueue.ffi.protocol import ResourceRequest
+
+
+def numbers(text):
+    """The numbers in ranges such as 0-2,9."""
+    for part in text.split(","):
+        first, _, last = part.partition("-")
+        yield from range(int(first), int(last or first) + 1)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--name", required=True)
+    parser.add_argument("--shards", required=True)
+    parser.add_argument("--cpus", type=int, required=True)
+    parser.add_argument("--time", type=int, required=True, help="minutes that a worker has to have left")
+    parser.add_argument("--crash-limit", type=int, default=5, help="workers that a shard may lose")
+    parser.add_argument("--server-dir", default=os.environ.get("HQ_SERVER_DIR"))
+    options = parser.parse_args()
+
+    here = pathlib.Path(__file__).resolve().parent
+    # A shard that fails, for whatever reason, keeps no other from being run.
+    job = Job(name=options.name, max_fails=None, default_workdir=here)
+    shards = [
+        job.program(
+            ["sh", str(here / "shard.sh"), str(shard)],
+            stdout=None,
+            stderr=None,
+            resources=ResourceRequest(cpus=options.cpus, min_time=60.0 * options.time),
+            crash_limit=options.crash_limit,
+        )
+        for shard in numbers(options.shards)
+    ]
+    job.program(["sh", str(here / "merge.sh")], stdout=None, stderr=None, deps=shards)
+    print(Client(server_dir=options.server_dir).submit(job).id)
+
+
+if __name__ == "__main__":
+    main()

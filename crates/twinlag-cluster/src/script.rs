@@ -1,0 +1,63 @@
+//! The scripts of a shard and of the merge, for a shell of POSIX.
+
+use std::path::Path;
+
+use crate::error::ClusterError;
+use crate::work::Work;
+
+/// The name of the script of a shard.
+pub(crate) const SHARD: &str = "shard.sh";
+/// The name of the script that joins the parts.
+pub(crate) const MERGE: &str = "merge.sh";
+/// The folder of what the commands say.
+pub(crate) const LOGS: &str = "logs";
+/// The exit code of what is to be tried again.
+const AGAIN: u8 = 75;
+
+/// A word as a shell takes it.
+pub(crate) fn quoted(word: &str) -> Result<String, ClusterError> {
+    let quoted = shlex::try_quote(word).map_err(|_| ClusterError::NoText { text: word.to_owned() })?;
+    Ok(quoted.into_owned())
+}
+
+/// A path as a shell takes it.
+pub(crate) fn quoted_path(path: &Path) -> Result<String, ClusterError> {
+    let text = path.to_str().ok_or_else(|| ClusterError::NoText { text: path.to_string_lossy().into_owned() })?;
+    quoted(text)
+}
+
+fn command(arguments: &[String]) -> Result<String, ClusterError> {
+    let words = arguments.iter().map(|word| quoted(word)).collect::<Result<Vec<_>, _>>()?;
+    Ok(format!("\"${{TWINLAG:-$program}}\" {}", words.join(" ")))
+}
+
+/// The beginning of each script.
+///
+/// - `directives`: lines for the engine
+/// - `log`: the file of what the commands say, in the folder of logs
+fn head(work: &Work, about: &str, directives: &[String], logs: &Path, log: &str) -> Result<String, ClusterError> {
+    let directives: String = directives.iter().map(|line| format!("{line}\n")).collect();
+    let (program, folder, logs) = (quoted_path(&work.program)?, quoted_path(&work.folder)?, quoted_path(logs)?);
+    Ok(format!(
+        "#!/bin/sh\n{directives}# {about}\nset -eu\nprogram={program}\nlogs={logs}\nexec >> \"$logs/{log}\" 2>&1\ncd {folder}\n"
+    ))
+}
+
+/// The script of a shard: of that which is its first argument, or the task of an array.
+pub(crate) fn shard(work: &Work, directives: &[String], logs: &Path) -> Result<String, ClusterError> {
+    let shards = work.shards;
+    let about = format!(
+        "One shard of {shards}, counted from 0: the first argument, or the task of an array.\n\
+         shard=\"${{1:-${{SLURM_ARRAY_TASK_ID:-${{JOB_COMPLETION_INDEX:?expected the number of a shard}}}}}}\""
+    );
+    let head = head(work, &about, directives, logs, "shard-$shard.log")?;
+    Ok(format!("{head}exec {} --shard \"$shard/{shards}\"\n", command(&work.shard)?))
+}
+
+/// The script that joins the parts. A shard that is missing does not come by waiting: an engine that tries again what ends with
+/// [`AGAIN`] is told otherwise.
+pub(crate) fn merge(work: &Work, directives: &[String], logs: &Path) -> Result<String, ClusterError> {
+    let head = head(work, "Joins the parts of all shards.", directives, logs, "merge.log")?;
+    let command = command(&work.merge)?;
+    Ok(format!("{head}{command} || {{ code=$?; [ $code -ne {AGAIN} ] || code=1; exit $code; }}\n"))
+}

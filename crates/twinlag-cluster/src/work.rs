@@ -1,0 +1,47 @@
+//! Work, and what a shard of it needs.
+
+use std::num::{NonZeroU32, NonZeroU64};
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+/// Work that is divided into shards.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Work {
+    /// What engines show it as.
+    pub name: String,
+    /// The folder in which all commands run; every machine has to see it.
+    pub folder: PathBuf,
+    /// The program; on a machine that has it elsewhere, the variable `TWINLAG` says where.
+    pub program: PathBuf,
+    /// Its arguments for a shard, to which `--shard K/N` is added.
+    pub shard: Vec<String>,
+    /// Its arguments that join the parts of all shards.
+    pub merge: Vec<String>,
+    /// Number of shards.
+    pub shards: NonZeroU64,
+}
+
+/// What a shard needs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Resources {
+    /// The longest that it may take, min. Without such a limit a shard whose machine was lost may be taken to run for ever.
+    pub time_min: NonZeroU32,
+    /// Processors, each with a thread.
+    pub cpus: NonZeroU32,
+    /// Memory, as the engine writes it; `None` for what it gives by itself.
+    pub memory: Option<String>,
+    /// Further options of the engine, as they are.
+    pub options: Vec<String>,
+}
+
+impl Resources {
+    /// One processor for so many minutes.
+    ///
+    /// # Panics
+    /// If they are zero.
+    pub fn of_minutes(time_min: u32) -> Self {
+        let time_min = NonZeroU32::new(time_min).expect("a shard takes some time");
+        Self { time_min, cpus: NonZeroU32::MIN, memory: None, options: Vec::new() }
+    }
+}
