@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{book, report, root};
+use crate::{book, cluster, report, root};
 
 /// The oldest compiler that is promised: `rust-version` of the workspace.
 const OLDEST: &str = "1.89";
@@ -44,6 +44,7 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
         toolchains()?;
         // In release, which has the line tables that a profile is made of.
         step("profiles of a short record", "cargo", &["xtask", "profile", "--quick"])?;
+        cluster::run(&cluster::Cluster::default())?;
         report::run(&report::Report::default())?;
     }
     Ok(())

@@ -29,11 +29,16 @@ pub(crate) struct Fleet {
 }
 
 pub(crate) fn run(fleet: &Fleet) -> Result<()> {
-    ensure!(!fleet.dir.exists(), "{} exists: name another folder", fleet.dir.display());
-    (0..fleet.files).into_par_iter().try_for_each(|number| {
-        let folder = fleet.dir.join(format!("rig-{:04}", number / FILES_PER_RIG));
+    make(&fleet.dir, fleet.files, fleet.samples)
+}
+
+/// Simulates a fleet into a folder that is made.
+pub(crate) fn make(dir: &Path, files: usize, samples: usize) -> Result<()> {
+    ensure!(!dir.exists(), "{} exists: name another folder", dir.display());
+    (0..files).into_par_iter().try_for_each(|number| {
+        let folder = dir.join(format!("rig-{:04}", number / FILES_PER_RIG));
         fs::create_dir_all(&folder)?;
-        let record = rig(number, fleet.samples)?.simulate()?;
+        let record = rig(number, samples)?.simulate()?;
         let text = text(&record)?;
         let is_damaged = number % DAMAGED_EVERY == DAMAGED_EVERY - 1;
         let text = if is_damaged { damaged(&text, number / DAMAGED_EVERY) } else { text };

@@ -1,9 +1,10 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
-//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
+//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask cluster`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
 
 mod bench;
 mod book;
 mod ci;
+mod cluster;
 mod dist;
 mod experiment;
 mod fleet;
@@ -65,6 +66,8 @@ enum Task {
     Bench(bench::Bench),
     /// Simulates a fleet of records of many rigs, one file in ten damaged, to measure `twinlag batch` on.
     Fleet(fleet::Fleet),
+    /// Runs a study and a batch on Slurm, HyperQueue and GNU parallel on this machine, and kills nodes: the bytes have to be the same.
+    Cluster(cluster::Cluster),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),
     /// Makes a release archive for a platform, the same to the byte whenever it is made.
@@ -83,6 +86,7 @@ fn main() -> ExitCode {
         Task::Data { dir, force } => data(&dir, force),
         Task::Bench(arguments) => bench::run(&arguments),
         Task::Fleet(arguments) => fleet::run(&arguments),
+        Task::Cluster(arguments) => cluster::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
         Task::Dist(arguments) => dist::run(&arguments),

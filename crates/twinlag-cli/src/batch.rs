@@ -135,7 +135,7 @@ const OF_RUN: [&str; 15] = [
 #[derive(Debug, Args)]
 struct Division {
     /// Ask only part K of N, with K counted from 0; see --merge.
-    #[arg(long, value_name = "K/N", allow_hyphen_values = true, conflicts_with_all = ["report", "Cluster"])]
+    #[arg(long, value_name = "K/N", allow_hyphen_values = true, conflicts_with_all = ["report", "engine"])]
     shard: Option<Shard>,
     /// Make the table of the parts that shards have left beside it.
     #[arg(long, conflicts_with_all = OF_RUN)]
@@ -170,11 +170,14 @@ const SILENT: Console = Console { json: true, quiet: true };
 
 pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     let (table, Division { merge, status, resubmit, .. }) = (&command.out[0], &command.division);
+    if command.cluster.time_limit.is_some() && command.cluster.engine.is_none() && !resubmit {
+        return Err(Failure::Usage("--time-limit needs --engine or --resubmit".to_owned()));
+    }
     if *merge {
         return merge_parts(command, console);
     }
     if *status || *resubmit {
-        return follow(table, *resubmit, console);
+        return follow(command, console);
     }
     let question = Question::of(command)?;
     let journal_path =
@@ -307,7 +310,10 @@ fn submit(
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
     // Behind the name of the command, whatever stands behind `--`.
     let place = shard.iter().position(|argument| argument == "batch").map_or(0, |place| place + 1);
-    shard.splice(place..place, ["--resume".to_owned(), "--quiet".to_owned(), format!("--threads={threads}")]);
+    shard.splice(
+        place..place,
+        ["--resume".to_owned(), "--quiet".to_owned(), "--threads".to_owned(), threads.to_string()],
+    );
     let mut merge = vec!["batch".to_owned(), "--merge".to_owned()];
     let text = |path: &Path| {
         let text = path.to_str().map(str::to_owned);
@@ -324,11 +330,13 @@ fn submit(
 }
 
 /// Says how far the shards of a table are, or submits again what is missing of them.
-fn follow(table: &Path, resubmit: bool, console: Console) -> Result<u8, Failure> {
+fn follow(command: &Batch, console: Console) -> Result<u8, Failure> {
+    let table = &command.out[0];
     let scripts = shards::submission_path(table);
     let progress = |of| shards::progress_of(table, of);
-    if resubmit {
-        return submission::resubmit(&scripts, progress, None, console);
+    if command.division.resubmit {
+        let merge = format!("twinlag batch --merge --out {}", table.display());
+        return submission::resubmit(&scripts, progress, command.cluster.time_limit, &merge, console);
     }
     let is_grouped = shards::manifest_path(table).exists() && !shards::asked(table)?["group_by"].is_null();
     submission::status(&scripts, progress, unit_name(is_grouped), is_written(table), console)

@@ -112,7 +112,8 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
             submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", merged, console)
         }
         Study::Resubmit { dir, time_limit } => {
-            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, console)
+            let merge = format!("twinlag study merge {}", dir.display());
+            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, &merge, console)
         }
     }
 }
@@ -133,9 +134,10 @@ fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
         text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", path.display())))
     };
     let (out, copy) = (text(&command.out)?, text(&command.out.join(PLAN))?);
-    let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
-    let shard = format!("--threads={threads}");
-    let shard = ["study", "run", &copy, "--out", &out, "--resume", "--quiet", &shard].map(str::to_owned).to_vec();
+    let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
+    let shard = ["study", "run", &copy, "--out", &out, "--resume", "--quiet", "--threads", &threads]
+        .map(str::to_owned)
+        .to_vec();
     let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
     let work = command.cluster.work(&plan.name, shard, merge)?;
     command.cluster.submit(&command.out.join(SUBMISSION), work, console)

@@ -27,8 +27,8 @@ pub(crate) struct Cluster {
     #[arg(long, value_name = "N", requires = "engine")]
     shards: Option<NonZeroU64>,
     /// The longest that a shard may take, in minutes.
-    #[arg(long, value_name = "MINUTES", requires = "engine")]
-    time_limit: Option<NonZeroU32>,
+    #[arg(long, value_name = "MINUTES")]
+    pub(crate) time_limit: Option<NonZeroU32>,
     /// Processors of each shard, one if left out.
     #[arg(long, value_name = "N", requires = "engine")]
     pub(crate) cpus: Option<NonZeroU32>,
@@ -152,10 +152,12 @@ impl Cluster {
 /// Submits again what is missing: shards that are not done, and that the engine does not have any more.
 ///
 /// - `progress`: what each shard of so many has left
+/// - `merge`: the command that joins the parts
 pub(crate) fn resubmit(
     scripts: &Path,
     progress: impl FnOnce(u64) -> Result<Vec<ShardProgress>, Failure>,
     time_limit: Option<NonZeroU32>,
+    merge: &str,
     console: Console,
 ) -> Result<u8, Failure> {
     let mut submission = Submission::open(scripts)?;
@@ -172,8 +174,13 @@ pub(crate) fn resubmit(
         .map(|(shard, _)| shard)
         .collect();
     if missing.is_empty() {
-        let why = if states.is_empty() { "all shards are done" } else { "all shards are done, wait or run" };
-        console.note(|| format!("nothing is missing: {why}"));
+        console.note(|| {
+            if states.is_empty() {
+                format!("nothing is missing: all shards are done; if there is no result, run `{merge}`")
+            } else {
+                "nothing is missing: all shards are done, wait or run".to_owned()
+            }
+        });
         return Ok(0);
     }
     if let Some(time_min) = time_limit {

@@ -9,10 +9,10 @@ use crate::submission::answer;
 use crate::work::{Resources, Work};
 
 /// The name of the script.
-pub(crate) const FILE: &str = "hyperqueue.py";
+pub(crate) const FILE: &str = "submit.py";
 
 /// The script that submits.
-pub(crate) const SCRIPT: &str = include_str!("hyperqueue.py");
+pub(crate) const SCRIPT: &str = include_str!("submit.py");
 
 /// The command that submits shards.
 pub(crate) fn command(script: &str, work: &Work, resources: &Resources, shards: &[u64]) -> Vec<String> {

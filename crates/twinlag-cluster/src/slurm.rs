@@ -56,7 +56,7 @@ fn name(work: &Work) -> String {
 
 /// The command that submits an array of shards.
 pub(crate) fn array(shards: &[u64], script: &str) -> Vec<String> {
-    let words = [format!("--array={}", ranges(shards)), script.to_owned()];
+    let words = ["--array".to_owned(), ranges(shards), script.to_owned()];
     SUBMIT.map(str::to_owned).into_iter().chain(words).collect()
 }
 

@@ -3,6 +3,7 @@
 mod agreement;
 mod bad_input;
 mod batch;
+mod cluster;
 mod common;
 mod compensate;
 mod contract;

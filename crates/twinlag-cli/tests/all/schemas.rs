@@ -88,6 +88,10 @@ fn answers_of_the_other_verbs_are_as_their_schemas_say() {
     fits(&schema(&bench, "study-part"), &run("0/2").json());
     assert_eq!(run("1/2").code, 0);
     fits(&schema(&bench, "study"), &bench.run(&["study", "merge", "study", "--json"]).json());
+    let submit = ["study", "submit", "study.toml", "--out", "other", "--engine", "parallel", "--shards", "2"];
+    let submitted = bench.run(&[&submit[..], &["--time-limit", "5", "--json"]].concat());
+    fits(&schema(&bench, "submission"), &submitted.json());
+    fits(&schema(&bench, "submission-status"), &bench.run(&["study", "status", "other", "--json"]).json());
 }
 
 /// A schema that takes anything would take every answer.

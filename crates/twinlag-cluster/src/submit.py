@@ -4,6 +4,7 @@ Needs the package `hyperqueue`, of the version of the server. --server-dir, or t
 """
 
 import argparse
+import datetime
 import os
 import pathlib
 
@@ -36,7 +37,7 @@ def main():
             ["sh", str(here / "shard.sh"), str(shard)],
             stdout=None,
             stderr=None,
-            resources=ResourceRequest(cpus=options.cpus, min_time=60.0 * options.time),
+            resources=ResourceRequest(cpus=options.cpus, min_time=datetime.timedelta(minutes=options.time)),
             crash_limit=options.crash_limit,
         )
         for shard in numbers(options.shards)

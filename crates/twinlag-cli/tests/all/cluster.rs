@@ -1,0 +1,203 @@
+//! `twinlag study submit` and `twinlag batch --engine`, with commands in place of an engine's that run at once what is submitted. Those of
+//! real engines are called by `cargo xtask cluster`.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt as _;
+
+use crate::common::{Answer, Bench, STUDY, Trace};
+
+/// In place of `sbatch`: runs the tasks of an array, without those in the file `lost`, or a job, and says its number. What it was
+/// called with is in `submitted`.
+const SBATCH: &str = r#"#!/bin/sh
+echo "$@" >> "$HERE/submitted"
+[ -f "$HERE/refused" ] && { cat "$HERE/refused" >&2; exit 1; }
+job=$(wc -l < "$HERE/submitted")
+case $2 in
+--array)
+    for range in $(echo "$3" | tr , ' '); do
+        for task in $(seq "${range%-*}" "${range#*-}"); do
+            grep -qx "$task" "$HERE/lost" 2> /dev/null || SLURM_ARRAY_TASK_ID=$task sh "$4"
+        done
+    done
+    ;;
+*) sh "$3" ;;
+esac
+echo "$job;loop"
+"#;
+
+/// In place of `squeue`: lists what is in the file `queue`.
+const SQUEUE: &str = "#!/bin/sh\ncat \"$HERE/queue\" 2> /dev/null || true\n";
+
+struct Cluster {
+    bench: Bench,
+    path: String,
+}
+
+impl Cluster {
+    fn new(bench: Bench) -> Self {
+        fs::create_dir(bench.path("bin")).expect("a new folder");
+        for (name, text) in [("sbatch", SBATCH), ("squeue", SQUEUE)] {
+            bench.write(&format!("bin/{name}"), text);
+            fs::set_permissions(bench.path(&format!("bin/{name}")), fs::Permissions::from_mode(0o755)).expect("ours");
+        }
+        let path = format!("{}:{}", bench.path("bin").display(), std::env::var("PATH").unwrap_or_default());
+        Self { bench, path }
+    }
+
+    fn run(&self, arguments: &[&str]) -> Answer {
+        let here = self.bench.path("").display().to_string();
+        self.bench.run_in_environment(arguments, &[("PATH", &self.path), ("HERE", &here)])
+    }
+
+    fn submitted(&self) -> String {
+        String::from_utf8(self.bench.read("submitted")).expect("text")
+    }
+}
+
+const SUBMIT: [&str; 8] = ["study", "submit", "plan.toml", "--out", "out", "--engine", "slurm", "--time-limit=5"];
+
+#[test]
+fn shards_of_a_study_that_are_lost_are_missing_until_they_are_submitted_again() {
+    let cluster = Cluster::new(Bench::with("study", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "whole"]).code, 0);
+    bench.write("lost", "1\n");
+    let answer = cluster.run(&[&SUBMIT[..], &["--shards", "3", "--cpus", "2", "--json"]].concat());
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let json = answer.json();
+    assert_eq!((&json["job"], &json["merge_job"], &json["shards"]), (&"1".into(), &"2".into(), &"0-2".into()));
+    let submitted = cluster.submitted();
+    assert!(submitted.contains("--array 0-2 ") && submitted.contains("--dependency=afterany:1 "), "{submitted}");
+    let script = String::from_utf8(bench.read("out/submission/shard.sh")).expect("text");
+    for line in ["#SBATCH --requeue", "#SBATCH --time=5", "#SBATCH --cpus-per-task=2", "--threads 2"] {
+        assert!(script.contains(line), "{line} in {script}");
+    }
+    let log = String::from_utf8(bench.read("out/submission/logs/merge.log")).expect("text");
+    assert!(log.contains("missing shard 1/3"), "{log}");
+
+    let status = || cluster.run(&["study", "status", "out"]);
+    let before = status();
+    assert_eq!(before.code, 75, "{before:#?}");
+    for words in ["20 of 30 trials in 3 shards", "done     2  0,2", "missing  1  1", "no result yet"] {
+        assert!(before.stdout.contains(words), "{words} in {before:#?}");
+    }
+    // One that the engine still has is not sent again.
+    bench.write("queue", "1 1 RUNNING\n7 1 PENDING\n");
+    assert!(status().stdout.contains("running  1  1"));
+    cluster.run(&["study", "resubmit", "out"]).says(&["nothing is missing"]);
+    for file in ["queue", "lost"] {
+        fs::remove_file(bench.path(file)).expect("there");
+    }
+    let again = cluster.run(&["study", "resubmit", "out", "--time-limit", "7"]);
+    assert!(again.code == 0 && again.stdout.starts_with("shards 1 are submitted"), "{again:#?}");
+    assert!(cluster.submitted().contains("--array 1 "));
+    assert!(String::from_utf8(bench.read("out/submission/shard.sh")).expect("text").contains("--time=7"));
+    let after = status();
+    assert!(after.code == 0 && after.stdout.contains("the result is there"), "{after:#?}");
+    assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
+}
+
+#[test]
+fn a_damaged_part_is_named_and_not_overwritten() {
+    let cluster = Cluster::new(Bench::with("damaged", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    bench.write("lost", "2\n");
+    assert_eq!(cluster.run(&[&SUBMIT[..], &["--shards", "3"]].concat()).code, 0);
+    let part = String::from_utf8(bench.read("out/part-0-of-3.json")).expect("text");
+    bench.write("out/part-0-of-3.json", part.replace("\"trials\":10", "\"trials\":11"));
+    let status = cluster.run(&["study", "status", "out"]);
+    assert!(status.stdout.contains("unusable  1  0") && status.stdout.contains("hash"), "{status:#?}");
+    let refused = cluster.run(&["study", "resubmit", "out"]);
+    assert_eq!(refused.code, 3, "{refused:#?}");
+    refused.says(&["part-0-of-3.json", "hash"]);
+    fs::remove_file(bench.path("out/part-0-of-3.json")).expect("there");
+    fs::remove_file(bench.path("lost")).expect("there");
+    assert_eq!(cluster.run(&["study", "resubmit", "out"]).code, 0);
+    assert!(cluster.submitted().contains("--array 0,2 "));
+    assert_eq!(cluster.run(&["study", "status", "out"]).code, 0);
+}
+
+#[test]
+fn what_cannot_be_submitted_is_refused_with_the_reason() {
+    let cluster = Cluster::new(Bench::with("refused", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    bench.refuses(2, &["study", "submit", "plan.toml", "--out", "out"], &["--engine"]);
+    bench.refuses(2, &SUBMIT, &["--shards"]);
+    bench.refuses(2, &[&SUBMIT[..5], &["--engine", "cron", "--shards", "3", "--time-limit", "5"]].concat(), &["slurm"]);
+    bench.refuses(3, &["study", "status", "out"], &["nothing was submitted"]);
+    bench.refuses(2, &["batch", "plan.toml", "--out", "t.csv", "--time-limit", "5"], &["--time-limit", "--engine"]);
+    bench.refuses(2, &["batch", "plan.toml", "--out", "t.csv", "--cpus", "5"], &["--engine"]);
+    bench.refuses(2, &["batch", "plan.toml", "--out", "t.csv", "--status"], &["--status"]);
+    let submit = [&SUBMIT[..], &["--shards", "3"]].concat();
+    bench.write("refused", "sbatch: error: invalid partition");
+    let refused = cluster.run(&submit);
+    assert_eq!(refused.code, 1, "{refused:#?}");
+    refused.says(&["sbatch refused", "invalid partition"]);
+    let nowhere = bench.path("nowhere").display().to_string();
+    let without = bench.run_in_environment(&submit, &[("PATH", &nowhere)]);
+    assert_eq!(without.code, 1, "{without:#?}");
+    without.says(&["sbatch cannot be run"]);
+    // Nothing was submitted so far.
+    fs::remove_file(bench.path("refused")).expect("there");
+    assert_eq!(cluster.run(&submit).code, 0);
+    let twice = cluster.run(&submit);
+    assert_eq!(twice.code, 2, "{twice:#?}");
+}
+
+/// Names that a shell would take apart, a page, and a table among the records.
+#[test]
+fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
+    let cluster = Cluster::new(Bench::new("batch"));
+    let bench = &cluster.bench;
+    fs::create_dir(bench.path("the $runs")).expect("a new folder");
+    for (file, seed) in [("it's a.csv", 1), ("b \"c\".csv", 2)] {
+        bench.write(&format!("the $runs/{file}"), Trace { seed, ..Trace::GOOD }.csv());
+    }
+    bench.write("the $runs/bad.csv", "");
+    let batch = ["batch", "the $runs", "--verb", "diagnose", "--without", "slow-mode"];
+    assert_eq!(bench.run(&[&batch[..], &["--out", "whole.csv"]].concat()).code, 0);
+    let outs = ["--out", "the $runs/t.csv", "--report", "t.html", "--threads", "2"];
+    let engine = ["--engine", "slurm", "--shards", "2", "--time-limit", "5", "--engine-option=--partition=short"];
+    let submitted = cluster.run(&[&batch[..], &outs, &engine].concat());
+    assert_eq!(submitted.code, 0, "{submitted:#?}");
+    assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
+    assert!(bench.has("t.html"));
+    let script = String::from_utf8(bench.read("the $runs/t.csv.submission/shard.sh")).expect("text");
+    assert!(script.contains("#SBATCH --partition=short") && !script.contains("t.html"), "{script}");
+    let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv", "--json"]);
+    assert_eq!(status.code, 0, "{status:#?}");
+    let json = status.json();
+    assert_eq!((&json["done"], &json["total"], &json["units"]), (&3.into(), &3.into(), &"records".into()));
+    cluster.run(&["batch", "--resubmit", "--out", "the $runs/t.csv"]).says(&["nothing is missing"]);
+    // What was submitted is among the records now.
+    assert_eq!(bench.run(&[&batch[..], &["--out", "the $runs/t.csv", "--force"]].concat()).code, 0);
+    assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
+    let again = cluster.run(&[&batch[..], &["--out", "the $runs/t.csv", "--force"], &engine].concat());
+    assert_eq!(again.code, 2, "{again:#?}");
+    again.says(&["t.csv.manifest", "--resume"]);
+}
+
+/// The commands that are printed do what submitting does.
+#[test]
+fn commands_of_a_dry_run_can_be_typed() {
+    let cluster = Cluster::new(Bench::with("dry", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "whole"]).code, 0);
+    let dry = cluster.run(&[&SUBMIT[..], &["--shards", "2", "--dry-run"]].concat());
+    assert_eq!(dry.code, 0, "{dry:#?}");
+    assert!(!bench.has("submitted") && dry.stdout.starts_with("sbatch --parsable --array 0-1 "), "{dry:#?}");
+    for engine in ["parallel", "kubernetes", "hyperqueue"] {
+        let answer =
+            cluster.run(&[&SUBMIT[..6], &[engine, "--shards", "2", "--time-limit", "5", "--dry-run"]].concat());
+        assert_eq!(answer.code, 0, "{answer:#?}");
+    }
+    assert!(String::from_utf8(bench.read("out/submission/job.yaml")).expect("text").contains("completions: 2"));
+    for shard in ["0", "1"] {
+        let script = bench.path("out/submission/shard.sh");
+        assert!(std::process::Command::new("sh").arg(script).arg(shard).status().expect("a shell").success());
+    }
+    let merge = std::process::Command::new("sh").arg(bench.path("out/submission/merge.sh")).status();
+    assert!(merge.expect("a shell").success());
+    assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
+}
