@@ -78,16 +78,16 @@ C
     ;;
 kill)
     end "$dir/run/slurmd_$3.pid" KILL
-    # Without its daemon a step would go on: its processes are known by their environment, the one that holds them as their parent.
-    for environment in $(grep -lzx "SLURMD_NODENAME=$3" /proc/[0-9]*/environ 2> /dev/null); do
-        process=${environment#/proc/}
-        process=${process%/environ}
-        parent=$(ps -o ppid= -p "$process" || true)
-        case $(ps -o args= -p "${parent:-0}" || true) in
-        *slurmstepd*) kill -KILL "$parent" ;;
+    # Without its daemon a step would go on. Its processes are known by their environment; the one that holds them, their parent, goes
+    # first, or it would report that the task has failed.
+    processes=$(grep -lzx "SLURMD_NODENAME=$3" /proc/[0-9]*/environ 2> /dev/null | cut -d / -f 3)
+    for process in $processes; do
+        parent=$(ps -o ppid= -p "$process" | tr -d ' ')
+        case $(ps -o args= -p "${parent:-1}") in
+        slurmstepd*) kill -KILL "$parent" ;;
         esac
-        kill -KILL "$process" 2> /dev/null || true
     done
+    for process in $processes; do kill -KILL "$process" 2> /dev/null || true; done
     ;;
 revive)
     slurmd -N "$3" -f "$SLURM_CONF"
