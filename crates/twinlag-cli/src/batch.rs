@@ -475,17 +475,15 @@ impl Batch {
         let is_beside = |file: &Path| output::is_same(file, journal) || shards::is_beside(&self.out[0], file);
         let (written, mut files): (Vec<_>, Vec<_>) =
             found.into_iter().partition(|file| is_beside(&file.path) || is_written(&file.path));
-        match files.iter().find(|file| is_output(&file.path)) {
-            Some(file) => Err(Failure::Usage(format!(
+        if let Some(file) = files.iter().find(|file| is_output(&file.path)) {
+            return Err(Failure::Usage(format!(
                 "{} is one of the records: choose another name for --out or --report",
                 file.path.display()
-            ))),
-            None => {
-                files.retain(|file| !is_gas(&file.path));
-                let others = written.into_iter().filter(|file| !is_beside(&file.path) && !is_output(&file.path));
-                Ok((files, others.collect()))
-            }
+            )));
         }
+        files.retain(|file| !is_gas(&file.path));
+        let others = written.into_iter().filter(|file| !is_beside(&file.path) && !is_output(&file.path));
+        Ok((files, others.collect()))
     }
 }
 

@@ -210,17 +210,12 @@ fn say(submission: &Submission, shards: &[u64], submitted: Submitted, console: C
     }
     let SubmissionAnswer { scripts, shards, job, merge_job, commands, .. } = answer;
     let scripts = scripts.display();
-    match job {
-        Some(job) => {
-            let merge = merge_job.map_or(String::new(), |merge| format!(", and the merge as job {merge}"));
-            print::on_stdout(&format!(
-                "shards {shards} are submitted as job {job}{merge}; scripts and logs: {scripts}\n"
-            ))?;
-        }
-        None => {
-            console.note(|| format!("scripts: {scripts}; these commands start shards {shards}, and the merge:"));
-            print::on_stdout(&(commands.join("\n") + "\n"))?;
-        }
+    if let Some(job) = job {
+        let merge = merge_job.map_or(String::new(), |merge| format!(", and the merge as job {merge}"));
+        print::on_stdout(&format!("shards {shards} are submitted as job {job}{merge}; scripts and logs: {scripts}\n"))?;
+    } else {
+        console.note(|| format!("scripts: {scripts}; these commands start shards {shards}, and the merge:"));
+        print::on_stdout(&(commands.join("\n") + "\n"))?;
     }
     Ok(0)
 }
@@ -273,21 +268,21 @@ impl SubmissionStatus {
     fn in_words(&self) -> String {
         let Self { engine, units, done, total, merged, shards, .. } = self;
         let count = shards.len();
-        let mut text = format!("{engine}: {done} of {total} {units} in {count} shards\n");
         let of_state = |state: &&str| {
             let of: Vec<u64> = shards.iter().filter(|shard| shard.state == *state).map(|shard| shard.shard).collect();
             (!of.is_empty()).then(|| vec![(*state).to_owned(), of.len().to_string(), ranges(&of)])
         };
         let rows: Vec<_> =
             ["done", "running", "waiting", "missing", "unknown", "unusable"].iter().filter_map(of_state).collect();
-        for line in columns(&rows, |column| column != 1) {
-            text.push_str(&format!("  {line}\n"));
-        }
-        for because in shards.iter().filter_map(|shard| shard.because.as_ref()) {
-            text.push_str(&format!("  {because}\n"));
-        }
-        text.push_str(if *merged { "the result is there\n" } else { "no result yet\n" });
-        text
+        let because = shards.iter().filter_map(|shard| shard.because.clone());
+        let end = if *merged { "the result is there\n" } else { "no result yet\n" };
+        let lines = columns(&rows, |column| column != 1).into_iter().chain(because).map(|line| format!("  {line}"));
+        [format!("{engine}: {done} of {total} {units} in {count} shards")]
+            .into_iter()
+            .chain(lines)
+            .chain([end.to_owned()])
+            .collect::<Vec<_>>()
+            .join("\n")
     }
 }
 
@@ -331,7 +326,7 @@ pub(crate) fn each_shard(
     Shard::all(of).map(&mut progress).collect()
 }
 
-/// What was submitted depends on how the program was called; what an engine says is none of its business.
+/// What was submitted depends on how the program was called; what an engine refuses does not.
 impl From<ClusterError> for Failure {
     fn from(error: ClusterError) -> Self {
         let text = error.to_string();

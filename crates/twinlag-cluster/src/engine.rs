@@ -14,7 +14,7 @@ pub enum Engine {
     Slurm,
     /// A job of many tasks on a server that is running (`python3` with the package `hyperqueue`).
     Hyperqueue,
-    /// GNU parallel, on this machine or on those that it is told of; started by hand.
+    /// GNU parallel, on this machine or on those that it is given; started by hand.
     Parallel,
     /// An indexed job; its image and volume are to be filled in, and it is started by hand.
     Kubernetes,

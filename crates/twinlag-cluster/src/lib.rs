@@ -1,4 +1,4 @@
-//! Work that is divided into shards, on the engines that clusters have: Slurm, HyperQueue, GNU parallel and Kubernetes.
+//! Work that is divided into shards, on the engines that clusters have: Slurm, `HyperQueue`, GNU parallel and Kubernetes.
 //!
 //! For a program that can do part K of N of its work (`--shard K/N`), leave the part in a folder that all machines see, and join the
 //! parts. [`Submission::prepare`] writes a script for a shard and one that joins the parts, [`Submission::submit`] hands them to the

@@ -36,7 +36,7 @@ fn command(arguments: &[String]) -> Result<String, ClusterError> {
 /// - `directives`: lines for the engine
 /// - `log`: the file of what the commands say, in the folder of logs
 fn head(work: &Work, about: &str, directives: &[String], logs: &Path, log: &str) -> Result<String, ClusterError> {
-    let directives: String = directives.iter().map(|line| format!("{line}\n")).collect();
+    let directives: String = directives.iter().flat_map(|line| [line, "\n"]).collect();
     let (program, folder, logs) = (quoted_path(&work.program)?, quoted_path(&work.folder)?, quoted_path(logs)?);
     Ok(format!(
         "#!/bin/sh\n{directives}# {about}\nset -eu\nprogram={program}\nlogs={logs}\nexec >> \"$logs/{log}\" 2>&1\ncd {folder}\n"
@@ -54,8 +54,8 @@ pub(crate) fn shard(work: &Work, directives: &[String], logs: &Path) -> Result<S
     Ok(format!("{head}exec {} --shard \"$shard/{shards}\"\n", command(&work.shard)?))
 }
 
-/// The script that joins the parts. A shard that is missing does not come by waiting: an engine that tries again what ends with
-/// [`AGAIN`] is told otherwise.
+/// The script that joins the parts. A shard that is missing does not come by waiting: to an engine that tries again what ends with
+/// [`AGAIN`] it is an error.
 pub(crate) fn merge(work: &Work, directives: &[String], logs: &Path) -> Result<String, ClusterError> {
     let head = head(work, "Joins the parts of all shards.", directives, logs, "merge.log")?;
     let command = command(&work.merge)?;
