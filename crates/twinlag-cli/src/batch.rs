@@ -127,7 +127,7 @@ pub(crate) struct Batch {
 
 /// What a run on its own is of, and nothing else goes with.
 const OF_RUN: [&str; 15] = [
-    "what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "shard", "Cluster",
+    "what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "shard", "engine",
     "Columns", "Method", "Physics",
 ];
 
@@ -323,7 +323,8 @@ fn submit(
         merge.extend([option.to_owned(), text(path)?]);
     }
     merge.extend(command.is_static.then(|| "--static".to_owned()));
-    merge.extend(command.course.force.then(|| "--force".to_owned()));
+    // Nothing was there, or it was to be replaced: what is there then is of an earlier merge.
+    merge.push("--force".to_owned());
     let name = table.file_stem().unwrap_or_default().to_string_lossy();
     let work = command.cluster.work(&name, shard, merge)?;
     command.cluster.submit(&shards::submission_path(table), work, console)
@@ -335,8 +336,7 @@ fn follow(command: &Batch, console: Console) -> Result<u8, Failure> {
     let scripts = shards::submission_path(table);
     let progress = |of| shards::progress_of(table, of);
     if command.division.resubmit {
-        let merge = format!("twinlag batch --merge --out {}", table.display());
-        return submission::resubmit(&scripts, progress, command.cluster.time_limit, &merge, console);
+        return submission::resubmit(&scripts, progress, command.cluster.time_limit, console);
     }
     let is_grouped = shards::manifest_path(table).exists() && !shards::asked(table)?["group_by"].is_null();
     submission::status(&scripts, progress, unit_name(is_grouped), is_written(table), console)

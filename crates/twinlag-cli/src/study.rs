@@ -112,8 +112,7 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
             submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", merged, console)
         }
         Study::Resubmit { dir, time_limit } => {
-            let merge = format!("twinlag study merge {}", dir.display());
-            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, &merge, console)
+            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, console)
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use twinlag_study::ranges;
 
-/// The commands that run these shards, and the merge behind them.
+/// The commands that run these shards, and the merge behind them. What `parallel` is given it hands to a shell once more, unless it is
+/// to quote it.
 ///
 /// - `shard`, `merge`: the scripts, as a shell takes them
 pub(crate) fn commands(shard: &str, merge: &str, shards: &[u64]) -> Vec<String> {
@@ -12,5 +13,5 @@ pub(crate) fn commands(shard: &str, merge: &str, shards: &[u64]) -> Vec<String> 
         None => format!("echo {range}"),
     });
     let numbers = numbers.collect::<Vec<_>>().join("; ");
-    vec![format!("{{ {numbers}; }} | parallel --jobs 1 sh {shard}; sh {merge}")]
+    vec![format!("{{ {numbers}; }} | parallel --jobs 1 --quote sh {shard}; sh {merge}")]
 }

@@ -60,19 +60,26 @@ pub(crate) fn array(shards: &[u64], script: &str) -> Vec<String> {
     SUBMIT.map(str::to_owned).into_iter().chain(words).collect()
 }
 
-/// Submits the shards, and the merge behind them; the numbers of both jobs.
-pub(crate) fn submit(shards: &[u64], shard: &str, merge: &str) -> Result<(String, Option<String>), ClusterError> {
-    let id = submit_one(&array(shards, shard)[1..])?;
-    let [program, parsable] = SUBMIT;
-    debug_assert_eq!(program, "sbatch");
-    let merge_id = submit_one(&[parsable.to_owned(), format!("--dependency=afterany:{id}"), merge.to_owned()])?;
-    Ok((id, Some(merge_id)))
+/// Submits shards; the number of their job.
+pub(crate) fn submit_shards(shards: &[u64], script: &str) -> Result<String, ClusterError> {
+    submit(&array(shards, script)[1..])
 }
 
-/// The number of a job, behind which a federation has the name of the cluster.
-fn submit_one(arguments: &[String]) -> Result<String, ClusterError> {
+/// Submits the merge; the number of its job.
+///
+/// - `behind`: the job at whose end it begins
+pub(crate) fn submit_merge(script: &str, behind: Option<&str>) -> Result<String, ClusterError> {
+    let [_, parsable] = SUBMIT.map(str::to_owned);
+    let dependency = behind.map(|id| format!("--dependency=afterany:{id}"));
+    submit(&[parsable].into_iter().chain(dependency).chain([script.to_owned()]).collect::<Vec<_>>())
+}
+
+/// The number of a job, which is on the last line; in a federation the name of the cluster stands behind it.
+fn submit(arguments: &[String]) -> Result<String, ClusterError> {
     let said = answer("sbatch", arguments)?;
-    Ok(said.split(';').next().unwrap_or_default().to_owned())
+    let number = said.lines().last().unwrap_or_default().split(';').next().unwrap_or_default().trim();
+    let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
+    if is_number { Ok(number.to_owned()) } else { Err(ClusterError::Refused { program: "sbatch", said }) }
 }
 
 /// The shards of these jobs that are in the queue.

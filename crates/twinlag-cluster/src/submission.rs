@@ -178,20 +178,27 @@ impl Submission {
     /// # Errors
     /// [`ClusterError::NoProgram`], [`ClusterError::Refused`], [`ClusterError::Write`].
     pub fn submit(&mut self, shards: &[u64]) -> Result<Submitted, ClusterError> {
-        let (id, merge_id) = match self.engine {
-            Engine::Slurm => slurm::submit(shards, &self.path(SHARD)?, &self.path(MERGE)?)?,
+        // What cannot be kept is not submitted.
+        self.keep()?;
+        let mut job = match self.engine {
+            Engine::Slurm if shards.is_empty() => Job { id: slurm::submit_merge(&self.path(MERGE)?, None)?, merge_id: None, shards: String::new() },
+            Engine::Slurm => Job { id: slurm::submit_shards(shards, &self.path(SHARD)?)?, merge_id: None, shards: ranges(shards) },
             Engine::Hyperqueue => {
                 let script = self.path(hyperqueue::FILE)?;
-                (hyperqueue::submit(&script, &self.work, &self.resources, shards)?, None)
+                let id = hyperqueue::submit(&script, &self.work, &self.resources, shards)?;
+                Job { id, merge_id: None, shards: ranges(shards) }
             }
-            Engine::Parallel | Engine::Kubernetes => {
-                self.keep()?;
-                return Ok(Submitted::ByHand(self.commands(shards)?));
-            }
+            Engine::Parallel | Engine::Kubernetes => return Ok(Submitted::ByHand(self.commands(shards)?)),
         };
-        let job = Job { id, merge_id, shards: ranges(shards) };
         self.jobs.push(job.clone());
         self.keep()?;
+        if self.engine == Engine::Slurm && !shards.is_empty() {
+            let merge_id = slurm::submit_merge(&self.path(MERGE)?, Some(&job.id))?;
+            job.merge_id = Some(merge_id);
+            self.jobs.pop();
+            self.jobs.push(job.clone());
+            self.keep()?;
+        }
         Ok(Submitted::Job(job))
     }
 
