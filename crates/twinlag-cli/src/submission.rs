@@ -16,6 +16,14 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 
+/// Most shards of one submission; chosen: engines take some thousand, and each has a file.
+const MAX_SHARDS: u64 = 1_000_000;
+
+fn shards(text: &str) -> Result<NonZeroU64, String> {
+    let shards = text.parse().ok().filter(|shards: &NonZeroU64| shards.get() <= MAX_SHARDS);
+    shards.ok_or_else(|| format!("expected a number of shards from 1 to {MAX_SHARDS}"))
+}
+
 /// Which engine runs the shards, and what each of them needs.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Cluster")]
@@ -24,7 +32,7 @@ pub(crate) struct Cluster {
     #[arg(long, value_name = "ENGINE", requires_all = ["shards", "time_limit"])]
     pub(crate) engine: Option<Engine>,
     /// Number of shards; best such that each takes some minutes or more.
-    #[arg(long, value_name = "N", requires = "engine")]
+    #[arg(long, value_name = "N", requires = "engine", value_parser = shards)]
     shards: Option<NonZeroU64>,
     /// The longest that a shard may take, in minutes.
     #[arg(long, value_name = "MINUTES")]
@@ -152,17 +160,16 @@ impl Cluster {
 /// Submits again what is missing: shards that are not done, and that the engine does not have any more.
 ///
 /// - `progress`: what each shard of so many has left
-/// - `merge`: the command that joins the parts
 pub(crate) fn resubmit(
     scripts: &Path,
     progress: impl FnOnce(u64) -> Result<Vec<ShardProgress>, Failure>,
     time_limit: Option<NonZeroU32>,
-    merge: &str,
     console: Console,
 ) -> Result<u8, Failure> {
     let mut submission = Submission::open(scripts)?;
-    let progress = progress(submission.work().shards.get())?;
+    // A shard that ends in between is done, not missing.
     let states = submission.states()?.unwrap_or_default();
+    let progress = progress(submission.work().shards.get())?;
     let places = (0..).zip(&progress);
     if let Some((_, Err(reason))) =
         places.clone().map(|(shard, shown)| (shard, &shown.done)).find(|(_, done)| done.is_err())
@@ -176,7 +183,8 @@ pub(crate) fn resubmit(
     if missing.is_empty() {
         console.note(|| {
             if states.is_empty() {
-                format!("nothing is missing: all shards are done; if there is no result, run `{merge}`")
+                let merge = submission.merge_script();
+                format!("nothing is missing: all shards are done; if there is no result, run `sh {}`", merge.display())
             } else {
                 "nothing is missing: all shards are done, wait or run".to_owned()
             }
@@ -252,6 +260,8 @@ pub(crate) fn status(
         ShardStatus { shard, state, done, total: shown.total, because: shown.done.err() }
     };
     let shards: Vec<ShardStatus> = (0..).zip(progress).map(of_shard).collect();
+    // A result that was there before some of the parts is not theirs.
+    let merged = merged && shards.iter().all(|shard| shard.state == "done");
     let (done, total) = shards.iter().fold((0, 0), |(done, total), shard| (done + shard.done, total + shard.total));
     let schema = "twinlag.submission-status/1";
     let engine = submission.engine().name();

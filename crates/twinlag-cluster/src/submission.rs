@@ -108,6 +108,11 @@ impl Submission {
         &self.folder
     }
 
+    /// The script that joins the parts.
+    pub fn merge_script(&self) -> PathBuf {
+        self.folder.join(MERGE)
+    }
+
     /// Gives the shards that are submitted from now on another limit of time.
     ///
     /// # Errors
@@ -181,8 +186,12 @@ impl Submission {
         // What cannot be kept is not submitted.
         self.keep()?;
         let mut job = match self.engine {
-            Engine::Slurm if shards.is_empty() => Job { id: slurm::submit_merge(&self.path(MERGE)?, None)?, merge_id: None, shards: String::new() },
-            Engine::Slurm => Job { id: slurm::submit_shards(shards, &self.path(SHARD)?)?, merge_id: None, shards: ranges(shards) },
+            Engine::Slurm if shards.is_empty() => {
+                Job { id: slurm::submit_merge(&self.path(MERGE)?, None)?, merge_id: None, shards: String::new() }
+            }
+            Engine::Slurm => {
+                Job { id: slurm::submit_shards(shards, &self.path(SHARD)?)?, merge_id: None, shards: ranges(shards) }
+            }
             Engine::Hyperqueue => {
                 let script = self.path(hyperqueue::FILE)?;
                 let id = hyperqueue::submit(&script, &self.work, &self.resources, shards)?;

@@ -124,6 +124,7 @@ fn what_cannot_be_submitted_is_refused_with_the_reason() {
     let bench = &cluster.bench;
     bench.refuses(2, &["study", "submit", "plan.toml", "--out", "out"], &["--engine"]);
     bench.refuses(2, &SUBMIT, &["--shards"]);
+    bench.refuses(2, &[&SUBMIT[..], &["--shards", "99999999999"]].concat(), &["from 1 to 1000000"]);
     bench.refuses(2, &[&SUBMIT[..5], &["--engine", "cron", "--shards", "3", "--time-limit", "5"]].concat(), &["slurm"]);
     bench.refuses(3, &["study", "status", "out"], &["nothing was submitted"]);
     bench.refuses(2, &["batch", "plan.toml", "--out", "t.csv", "--time-limit", "5"], &["--time-limit", "--engine"]);
@@ -169,7 +170,15 @@ fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
     assert_eq!(status.code, 0, "{status:#?}");
     let json = status.json();
     assert_eq!((&json["done"], &json["total"], &json["units"]), (&3.into(), &3.into(), &"records".into()));
-    cluster.run(&["batch", "--resubmit", "--out", "the $runs/t.csv"]).says(&["nothing is missing"]);
+    let resubmit = ["batch", "--resubmit", "--out", "the $runs/t.csv", "--time-limit", "7"];
+    cluster.run(&resubmit).says(&["nothing is missing", "merge.sh"]);
+    // Failed: the merge of what was submitted again refused to replace the table of the one before, which was taken for the result.
+    fs::remove_file(bench.path("the $runs/t.csv.part-1-of-2")).expect("there");
+    let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv"]);
+    assert_eq!(status.code, 75, "{status:#?}");
+    bench.write("the $runs/t.csv", bench.read("the $runs/t.csv.manifest"));
+    assert_eq!(cluster.run(&resubmit).code, 0);
+    assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
     // What was submitted is among the records now.
     assert_eq!(bench.run(&[&batch[..], &["--out", "the $runs/t.csv", "--force"]].concat()).code, 0);
     assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
