@@ -57,11 +57,13 @@ impl Submission {
     /// Writes the scripts into a folder, which is created where necessary. Nothing is submitted.
     ///
     /// # Errors
-    /// [`ClusterError::Exists`] if something was submitted from there; [`ClusterError::NoText`], [`ClusterError::Write`].
+    /// [`ClusterError::Exists`] if an engine has taken something from there; [`ClusterError::NoText`], [`ClusterError::Write`].
     pub fn prepare(folder: &Path, engine: Engine, work: Work, resources: Resources) -> Result<Self, ClusterError> {
-        let path = folder.join(FILE);
-        if path.exists() {
-            return Err(ClusterError::Exists { path });
+        match Self::open(folder) {
+            Err(ClusterError::NotSubmitted { .. }) => {}
+            // The engine has taken nothing.
+            Ok(earlier) if earlier.jobs.is_empty() => {}
+            _ => return Err(ClusterError::Exists { path: folder.join(FILE) }),
         }
         let (schema, version) = (SCHEMA.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
         let submission = Self { schema, version, engine, work, resources, jobs: Vec::new(), folder: folder.to_owned() };
