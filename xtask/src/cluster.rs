@@ -36,35 +36,43 @@ const PATIENCE_S: u64 = 1800;
 /// Between two looks at a state, ms.
 const LOOK_MS: u64 = 500;
 
+/// What the quick run has of each; chosen, for a few minutes in all.
+const TRIALS: u64 = 10_000;
+const SAMPLES: u64 = 300;
+const SHARDS: u64 = 8;
+const FILES: usize = 60;
+/// The estimator of the quick run.
+const ESTIMATOR: &str = "whitened";
+
 #[derive(Args)]
 pub(crate) struct Cluster {
     /// Trials of the study.
-    #[arg(long, default_value_t = 10_000)]
+    #[arg(long, default_value_t = TRIALS)]
     trials: u64,
     /// Samples of each trial.
-    #[arg(long, default_value_t = 300)]
+    #[arg(long, default_value_t = SAMPLES)]
     samples: u64,
     /// Estimator of the study.
-    #[arg(long, default_value = "whitened")]
+    #[arg(long, default_value = ESTIMATOR)]
     estimator: String,
     /// Shards of the study.
-    #[arg(long, default_value_t = 8)]
+    #[arg(long, default_value_t = SHARDS)]
     shards: u64,
     /// Files of the fleet, of which one in ten is damaged, ten to a rig.
-    #[arg(long, default_value_t = 60)]
+    #[arg(long, default_value_t = FILES)]
     files: usize,
     /// The program to run; by default that of the last build in debug.
     #[arg(long)]
     program: Option<PathBuf>,
-    /// Only this engine: slurm, hyperqueue or parallel.
-    #[arg(long)]
+    /// Only this engine.
+    #[arg(long, value_parser = ["slurm", "hyperqueue", "parallel"])]
     only: Option<String>,
 }
 
 impl Default for Cluster {
     fn default() -> Self {
-        let estimator = "whitened".to_owned();
-        Self { trials: 10_000, samples: 300, estimator, shards: 8, files: 60, program: None, only: None }
+        let estimator = ESTIMATOR.to_owned();
+        Self { trials: TRIALS, samples: SAMPLES, estimator, shards: SHARDS, files: FILES, program: None, only: None }
     }
 }
 
@@ -191,7 +199,7 @@ impl Site {
         self.wait(question, |state| state["merged"] == true)
     }
 
-    /// Waits until some shards are done, and others run.
+    /// Waits until a good part of the units is done, and another is not.
     fn wait_until_midway(&self, question: &[&str]) -> Result<()> {
         self.wait(question, |state| {
             let (done, total) = (state["done"].as_f64().unwrap_or(0.0), state["total"].as_f64().unwrap_or(1.0));
@@ -211,9 +219,9 @@ impl Site {
         let dir = |nodes: &str| place.path().join(nodes).display().to_string();
         for nodes in ["1", "3"] {
             let dir = dir(nodes);
-            self.tool(&["start", &dir, nodes])?;
             self.variables = vec![("SLURM_CONF", Path::new(&dir).join("slurm.conf"))];
-            let done = self.on_slurm(nodes, &dir, alone_s, files);
+            let started = self.tool(&["start", &dir, nodes]);
+            let done = started.and_then(|()| self.on_slurm(nodes, &dir, alone_s, files));
             self.tool(&["stop", &dir])?;
             done?;
         }

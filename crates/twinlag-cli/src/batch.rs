@@ -303,9 +303,7 @@ fn submit(
     }
     question.gas_files(&[])?;
     command.manifest(question, asked, journal, console)?;
-    let of_merge = ["report", "static", "force"];
-    let dropped: Vec<String> =
-        [&of_merge[..], &["resume", "threads", "json", "quiet"]].concat().into_iter().map(str::to_owned).collect();
+    let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();
     let mut shard = submission::arguments_without("batch", &[dropped, Cluster::options()].concat())?;
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
     // Behind the name of the command, whatever stands behind `--`.
@@ -315,12 +313,8 @@ fn submit(
         ["--resume".to_owned(), "--quiet".to_owned(), "--threads".to_owned(), threads.to_string()],
     );
     let mut merge = vec!["batch".to_owned(), "--merge".to_owned()];
-    let text = |path: &Path| {
-        let text = path.to_str().map(str::to_owned);
-        text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", path.display())))
-    };
     for (option, path) in command.outputs() {
-        merge.extend([option.to_owned(), text(path)?]);
+        merge.extend([option.to_owned(), submission::text(path)?]);
     }
     merge.extend(command.is_static.then(|| "--static".to_owned()));
     // Nothing was there, or it was to be replaced: what is there then is of an earlier merge.

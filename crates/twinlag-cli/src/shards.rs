@@ -14,7 +14,7 @@ use twinlag_study::Shard;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{folder_of, new_part, with_ending};
-use crate::submission::{self, ShardProgress};
+use crate::submission::ShardProgress;
 use crate::{print, progress};
 
 /// What `twinlag batch --shard` prints with --json.
@@ -105,11 +105,11 @@ pub(crate) fn manifest(
 /// What each of so many shards has left.
 pub(crate) fn progress_of(table: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let manifest = read(&manifest_path(table))?;
-    let mut totals = manifest.units_of_shards(of).into_iter();
-    submission::each_shard(of, |shard| {
+    let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
-        Ok(ShardProgress { total: totals.next().unwrap_or(0), done: done.map_err(|error| error.to_string()) })
-    })
+        ShardProgress { total, done: done.map_err(|error| error.to_string()) }
+    };
+    Ok(Shard::all(of).zip(manifest.units_of_shards(of)).map(progress).collect())
 }
 
 /// What was asked of the units of a table in shards.

@@ -126,13 +126,9 @@ const SUBMISSION: &str = "submission";
 
 /// Submits all shards.
 fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
-    let plan = prepare(&command.plan, &command.out)?;
     expect_no_results(&command.out)?;
-    let text = |path: &Path| {
-        let text = path.to_str().map(str::to_owned);
-        text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", path.display())))
-    };
-    let (out, copy) = (text(&command.out)?, text(&command.out.join(PLAN))?);
+    let plan = prepare(&command.plan, &command.out)?;
+    let (out, copy) = (submission::text(&command.out)?, submission::text(command.out.join(PLAN))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
     let shard = ["study", "run", &copy, "--out", &out, "--resume", "--quiet", "--threads", &threads]
         .map(str::to_owned)
@@ -146,11 +142,12 @@ fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
 fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let (plan, _) = read(&dir.join(PLAN))?;
     let experiment = Experiment::new(&plan)?;
-    submission::each_shard(of, |shard| {
+    let progress = |shard: Shard| {
         let path = dir.join(shard.file_name());
         let done = if path.exists() { Part::read(&path).map(|part| part.done()) } else { Ok(0) };
         Ok(ShardProgress { total: shard.trials(&experiment)?, done: done.map_err(|error| error.to_string()) })
-    })
+    };
+    Shard::all(of).map(progress).collect()
 }
 
 fn expect_no_results(out: &Path) -> Result<(), Failure> {

@@ -1,5 +1,6 @@
 //! Shards in the hands of a cluster's engine: what `study submit` and `batch --engine` have in common.
 
+use std::ffi::OsStr;
 use std::num::{NonZeroU32, NonZeroU64};
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,7 @@ use clap::{Arg, Args, Command, CommandFactory};
 use schemars::JsonSchema;
 use serde::Serialize;
 use twinlag_cluster::{ClusterError, Engine, Resources, State, Submission, Submitted, Work};
-use twinlag_study::{Shard, ranges};
+use twinlag_study::ranges;
 
 use crate::arguments::Arguments;
 use crate::columns::columns;
@@ -170,13 +171,11 @@ pub(crate) fn resubmit(
     // A shard that ends in between is done, not missing.
     let states = submission.states()?.unwrap_or_default();
     let progress = progress(submission.work().shards.get())?;
-    let places = (0..).zip(&progress);
-    if let Some((_, Err(reason))) =
-        places.clone().map(|(shard, shown)| (shard, &shown.done)).find(|(_, done)| done.is_err())
-    {
+    if let Some(reason) = progress.iter().find_map(|shown| shown.done.as_ref().err()) {
         return Err(Failure::File(reason.clone()));
     }
-    let missing: Vec<u64> = places
+    let missing: Vec<u64> = (0..)
+        .zip(&progress)
         .filter(|(shard, shown)| !shown.is_done() && !states.contains_key(shard))
         .map(|(shard, _)| shard)
         .collect();
@@ -309,9 +308,7 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
     };
     let (mut kept, mut is_value, mut is_over) = (Vec::new(), false, false);
     for argument in config::with_config(std::env::args_os().collect())?.into_iter().skip(1) {
-        let argument = argument.into_string().map_err(|argument| {
-            Failure::Usage(format!("{}: is no Unicode, as a script needs it", argument.to_string_lossy()))
-        })?;
+        let argument = text(&argument)?;
         if std::mem::take(&mut is_value) {
             continue;
         }
@@ -326,14 +323,11 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
     Ok(kept)
 }
 
-/// What each shard of a division has left.
-///
-/// - `of`: number of shards
-pub(crate) fn each_shard(
-    of: u64,
-    mut progress: impl FnMut(Shard) -> Result<ShardProgress, Failure>,
-) -> Result<Vec<ShardProgress>, Failure> {
-    Shard::all(of).map(&mut progress).collect()
+/// A name as a script has it.
+pub(crate) fn text(name: impl AsRef<OsStr>) -> Result<String, Failure> {
+    let name = name.as_ref();
+    let text = name.to_str().map(str::to_owned);
+    text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", name.display())))
 }
 
 /// What was submitted depends on how the program was called; what an engine refuses does not.

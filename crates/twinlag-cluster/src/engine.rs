@@ -54,8 +54,8 @@ impl FromStr for Engine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum State {
-    /// It has it, and has not started it, or starts it again.
+    /// Queued, or queued again.
     Waiting,
-    /// It runs it.
+    /// Started, and not ended.
     Running,
 }

@@ -2,8 +2,8 @@
 //!
 //! For a program that can do part K of N of its work (`--shard K/N`), leave the part in a folder that all machines see, and join the
 //! parts. [`Submission::prepare`] writes a script for a shard and one that joins the parts, [`Submission::submit`] hands them to the
-//! engine, [`Submission::states`] asks it which shards wait or run. Which shards are done is in their parts, and known to the program
-//! alone. How the work is divided, and that its result does not depend on it, is the business of `twinlag-study` and `twinlag-batch`.
+//! engine, [`Submission::states`] asks Slurm which shards wait or run. Which of them are done only the program knows, from their
+//! parts. How the work is divided, and that its result does not depend on it, is the business of `twinlag-study` and `twinlag-batch`.
 //!
 //! A shard may be killed at any moment, and may run twice at once: an engine that has lost a machine does not know whether the process
 //! on it has ended. So a program keeps what is done, replaces files rather than edits them, and ends with exit code 75 where another

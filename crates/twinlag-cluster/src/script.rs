@@ -33,31 +33,36 @@ fn command(arguments: &[String]) -> Result<String, ClusterError> {
 
 /// The beginning of each script.
 ///
+/// - `about`: what the script does
 /// - `directives`: lines for the engine
-/// - `log`: the file of what the commands say, in the folder of logs
-fn head(work: &Work, about: &str, directives: &[String], logs: &Path, log: &str) -> Result<String, ClusterError> {
+/// - `first`: commands before all others
+/// - `logs`, `log`: a folder, and the file in it of what the commands say
+fn head(
+    work: &Work,
+    about: &str,
+    directives: &[String],
+    first: &str,
+    [logs, log]: [&str; 2],
+) -> Result<String, ClusterError> {
     let directives: String = directives.iter().flat_map(|line| [line, "\n"]).collect();
-    let (program, folder, logs) = (quoted_path(&work.program)?, quoted_path(&work.folder)?, quoted_path(logs)?);
+    let (program, folder, logs) = (quoted_path(&work.program)?, quoted_path(&work.folder)?, quoted(logs)?);
     Ok(format!(
-        "#!/bin/sh\n{directives}# {about}\nset -eu\nprogram={program}\nlogs={logs}\nexec >> \"$logs/{log}\" 2>&1\ncd {folder}\n"
+        "#!/bin/sh\n{directives}# {about}\n{first}set -eu\nprogram={program}\nlogs={logs}\nexec >> \"$logs/{log}\" 2>&1\ncd {folder}\n"
     ))
 }
 
 /// The script of a shard: of that which is its first argument, or the task of an array.
-pub(crate) fn shard(work: &Work, directives: &[String], logs: &Path) -> Result<String, ClusterError> {
+pub(crate) fn shard(work: &Work, directives: &[String], logs: &str) -> Result<String, ClusterError> {
     let shards = work.shards;
-    let about = format!(
-        "One shard of {shards}, counted from 0: the first argument, or the task of an array.\n\
-         shard=\"${{1:-${{SLURM_ARRAY_TASK_ID:-${{JOB_COMPLETION_INDEX:?expected the number of a shard}}}}}}\""
-    );
-    let head = head(work, &about, directives, logs, "shard-$shard.log")?;
+    let about = format!("One shard of {shards}, counted from 0: the first argument, or the task of an array.");
+    let first = "shard=\"${1:-${SLURM_ARRAY_TASK_ID:-${JOB_COMPLETION_INDEX:?expected the number of a shard}}}\"\n";
+    let head = head(work, &about, directives, first, [logs, "shard-$shard.log"])?;
     Ok(format!("{head}exec {} --shard \"$shard/{shards}\"\n", command(&work.shard)?))
 }
 
-/// The script that joins the parts. A shard that is missing does not come by waiting: to an engine that tries again what ends with
-/// [`AGAIN`] it is an error.
-pub(crate) fn merge(work: &Work, directives: &[String], logs: &Path) -> Result<String, ClusterError> {
-    let head = head(work, "Joins the parts of all shards.", directives, logs, "merge.log")?;
+/// The script that joins the parts. Where one is missing it ends with 1, not with [`AGAIN`]: waiting does not bring the part.
+pub(crate) fn merge(work: &Work, directives: &[String], logs: &str) -> Result<String, ClusterError> {
+    let head = head(work, "Joins the parts of all shards.", directives, "", [logs, "merge.log"])?;
     let command = command(&work.merge)?;
     Ok(format!("{head}{command} || {{ code=$?; [ $code -ne {AGAIN} ] || code=1; exit $code; }}\n"))
 }

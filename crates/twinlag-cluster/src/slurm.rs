@@ -12,10 +12,9 @@ use crate::error::ClusterError;
 use crate::submission::{Job, answer};
 use crate::work::{Resources, Work};
 
-/// The command that submits, and prints the number of the job alone.
-pub(crate) const SUBMIT: [&str; 2] = ["sbatch", "--parsable"];
+const SBATCH: &str = "sbatch";
 
-/// What the merge may take, min; chosen: tables of 10⁵ records are written within one.
+/// What the merge may take, min; chosen, far above what writing a table takes.
 const MERGE_TIME_MIN: u32 = 60;
 
 fn lines(options: impl IntoIterator<Item = String>) -> Vec<String> {
@@ -49,37 +48,42 @@ pub(crate) fn merge_directives(work: &Work, resources: &Resources) -> Vec<String
     lines(own.into_iter().chain(memory).chain(resources.options.iter().cloned()))
 }
 
-/// The name of the work, without what ends a word.
+/// The name of the work, in characters that need no quotes.
 fn name(work: &Work) -> String {
     work.name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
 /// The command that submits an array of shards.
 pub(crate) fn array(shards: &[u64], script: &str) -> Vec<String> {
-    let words = ["--array".to_owned(), ranges(shards), script.to_owned()];
-    SUBMIT.map(str::to_owned).into_iter().chain(words).collect()
+    submitting(["--array".to_owned(), ranges(shards), script.to_owned()])
+}
+
+/// The command that submits the merge behind the job of the shards.
+pub(crate) fn behind(job: &str, script: &str) -> Vec<String> {
+    submitting([format!("--dependency=afterany:{job}"), script.to_owned()])
+}
+
+/// The command that submits, and prints the number of the job alone.
+fn submitting(arguments: impl IntoIterator<Item = String>) -> Vec<String> {
+    [SBATCH, "--parsable"].map(str::to_owned).into_iter().chain(arguments).collect()
 }
 
 /// Submits shards; the number of their job.
 pub(crate) fn submit_shards(shards: &[u64], script: &str) -> Result<String, ClusterError> {
-    submit(&array(shards, script)[1..])
+    submit(&array(shards, script))
 }
 
-/// Submits the merge; the number of its job.
-///
-/// - `behind`: the job at whose end it begins
-pub(crate) fn submit_merge(script: &str, behind: Option<&str>) -> Result<String, ClusterError> {
-    let [_, parsable] = SUBMIT.map(str::to_owned);
-    let dependency = behind.map(|id| format!("--dependency=afterany:{id}"));
-    submit(&[parsable].into_iter().chain(dependency).chain([script.to_owned()]).collect::<Vec<_>>())
+/// Submits the merge behind the job of the shards; the number of its own.
+pub(crate) fn submit_merge(script: &str, job: &str) -> Result<String, ClusterError> {
+    submit(&behind(job, script))
 }
 
 /// The number of a job, which is on the last line; in a federation the name of the cluster stands behind it.
-fn submit(arguments: &[String]) -> Result<String, ClusterError> {
-    let said = answer("sbatch", arguments)?;
+fn submit(command: &[String]) -> Result<String, ClusterError> {
+    let said = answer(SBATCH, &command[1..])?;
     let number = said.lines().last().unwrap_or_default().split(';').next().unwrap_or_default().trim();
     let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-    if is_number { Ok(number.to_owned()) } else { Err(ClusterError::Refused { program: "sbatch", said }) }
+    if is_number { Ok(number.to_owned()) } else { Err(ClusterError::Refused { program: SBATCH, said }) }
 }
 
 /// The shards of these jobs that are in the queue.

@@ -115,7 +115,7 @@ impl Submission {
         self.folder.join(MERGE)
     }
 
-    /// Gives the shards that are submitted from now on another limit of time.
+    /// Gives the shards that are submitted from now on another limit of time, and writes the scripts anew.
     ///
     /// # Errors
     /// [`ClusterError::Write`].
@@ -127,11 +127,8 @@ impl Submission {
     fn write_scripts(&self) -> Result<(), ClusterError> {
         let Self { work, resources, .. } = self;
         let logs = self.folder.join(LOGS);
-        fs::create_dir_all(&logs)
-            .map_err(|error| ClusterError::Write { path: logs.clone(), reason: error.to_string() })?;
-        // The scripts may run in any folder.
-        let logs =
-            logs.canonicalize().map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
+        fs::create_dir_all(&logs).map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
+        let logs = self.path(LOGS)?;
         let (of_shard, of_merge) = match self.engine {
             Engine::Slurm => (slurm::directives(work, resources), slurm::merge_directives(work, resources)),
             _ => (Vec::new(), Vec::new()),
@@ -150,7 +147,7 @@ impl Submission {
         fs::write(&path, text).map_err(|error| ClusterError::Write { path, reason: error.to_string() })
     }
 
-    /// The whole path of a file of it.
+    /// The whole path of a file of it: the scripts may run in any folder.
     fn path(&self, name: &str) -> Result<String, ClusterError> {
         let path = self.folder.join(name);
         let whole = path.canonicalize().unwrap_or(path);
@@ -169,8 +166,8 @@ impl Submission {
         Ok(match self.engine {
             Engine::Slurm => vec![
                 command(&slurm::array(shards, &shard))?,
-                // The shell fills the job in.
-                format!("{} --dependency=afterany:JOB {}", slurm::SUBMIT.join(" "), script::quoted(&merge)?),
+                // JOB stands for what the first command prints.
+                command(&slurm::behind("JOB", &merge))?,
             ],
             Engine::Hyperqueue => {
                 vec![command(&hyperqueue::command(&self.path(hyperqueue::FILE)?, &self.work, &self.resources, shards))?]
@@ -180,40 +177,33 @@ impl Submission {
         })
     }
 
-    /// Hands shards to the engine, and the merge behind them, which runs whatever becomes of the shards.
+    /// Hands shards to the engine, and the merge behind them. Slurm runs it whatever becomes of the shards, `HyperQueue` only if none fails.
     ///
     /// # Errors
     /// [`ClusterError::NoProgram`], [`ClusterError::Refused`], [`ClusterError::Write`].
     pub fn submit(&mut self, shards: &[u64]) -> Result<Submitted, ClusterError> {
-        // What cannot be kept is not submitted.
-        self.keep()?;
-        let mut job = match self.engine {
-            Engine::Slurm if shards.is_empty() => {
-                Job { id: slurm::submit_merge(&self.path(MERGE)?, None)?, merge_id: None, shards: String::new() }
-            }
-            Engine::Slurm => {
-                Job { id: slurm::submit_shards(shards, &self.path(SHARD)?)?, merge_id: None, shards: ranges(shards) }
-            }
+        // What cannot be recorded is not submitted.
+        self.save()?;
+        let id = match self.engine {
+            Engine::Slurm => slurm::submit_shards(shards, &self.path(SHARD)?)?,
             Engine::Hyperqueue => {
-                let script = self.path(hyperqueue::FILE)?;
-                let id = hyperqueue::submit(&script, &self.work, &self.resources, shards)?;
-                Job { id, merge_id: None, shards: ranges(shards) }
+                hyperqueue::submit(&self.path(hyperqueue::FILE)?, &self.work, &self.resources, shards)?
             }
             Engine::Parallel | Engine::Kubernetes => return Ok(Submitted::ByHand(self.commands(shards)?)),
         };
+        let mut job = Job { id, merge_id: None, shards: ranges(shards) };
         self.jobs.push(job.clone());
-        self.keep()?;
-        if self.engine == Engine::Slurm && !shards.is_empty() {
-            let merge_id = slurm::submit_merge(&self.path(MERGE)?, Some(&job.id))?;
-            job.merge_id = Some(merge_id);
+        self.save()?;
+        if self.engine == Engine::Slurm {
+            job.merge_id = Some(slurm::submit_merge(&self.path(MERGE)?, &job.id)?);
             self.jobs.pop();
             self.jobs.push(job.clone());
-            self.keep()?;
+            self.save()?;
         }
         Ok(Submitted::Job(job))
     }
 
-    fn keep(&self) -> Result<(), ClusterError> {
+    fn save(&self) -> Result<(), ClusterError> {
         let wrong = |error: serde_json::Error| ClusterError::Write { path: FILE.into(), reason: error.to_string() };
         self.write(FILE, &(serde_json::to_string_pretty(self).map_err(wrong)? + "\n"))
     }
