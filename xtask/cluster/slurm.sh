@@ -17,7 +17,16 @@ end() {
     [ -f "$1" ] || return 0
     pid=$(cat "$1")
     kill "-$2" "$pid" 2> /dev/null || return 0
-    while kill -0 "$pid" 2> /dev/null; do sleep 0.1; done
+    for _ in $(seq 100); do
+        kill -0 "$pid" 2> /dev/null || break
+        sleep 0.1
+    done
+    if kill -0 "$pid" 2> /dev/null; then
+        echo "process $pid of $1 does not end" >&2
+        exit 1
+    fi
+    # The number may be another process's soon.
+    rm -f "$1"
 }
 
 case $action in
@@ -80,7 +89,9 @@ kill)
     end "$dir/run/slurmd_$3.pid" KILL
     # Without its daemon a step would go on. Its processes are known by their environment; the one that holds them, their parent, goes
     # first, or it would report that the task has failed.
-    processes=$(grep -lzx "SLURMD_NODENAME=$3" /proc/[0-9]*/environ 2> /dev/null | cut -d / -f 3)
+    # Those of another Slurm, whose nodes have the same names, have another configuration.
+    processes=$(grep -lzx "SLURMD_NODENAME=$3" /proc/[0-9]*/environ 2> /dev/null \
+        | xargs -r grep -lzx "SLURM_CONF=$SLURM_CONF" 2> /dev/null | cut -d / -f 3)
     for process in $processes; do
         parent=$(ps -o ppid= -p "$process" | tr -d ' ')
         case $(ps -o args= -p "${parent:-1}") in

@@ -201,10 +201,13 @@ impl Site {
 
     /// Waits until a good part of the units is done, and another is not.
     fn wait_until_midway(&self, question: &[&str]) -> Result<()> {
+        let share = std::cell::Cell::new(0.0);
         self.wait(question, |state| {
-            let (done, total) = (state["done"].as_f64().unwrap_or(0.0), state["total"].as_f64().unwrap_or(1.0));
-            (0.2..0.8).contains(&(done / total))
-        })
+            share.set(state["done"].as_f64().unwrap_or(0.0) / state["total"].as_f64().unwrap_or(1.0));
+            share.get() >= 0.2
+        })?;
+        ensure!(share.get() < 0.8, "{question:?}: was nearly done when it was first seen: choose more --trials");
+        Ok(())
     }
 
     fn tool(&self, action: &[&str]) -> Result<()> {
@@ -222,8 +225,8 @@ impl Site {
             self.variables = vec![("SLURM_CONF", Path::new(&dir).join("slurm.conf"))];
             let started = self.tool(&["start", &dir, nodes]);
             let done = started.and_then(|()| self.on_slurm(nodes, &dir, alone_s, files));
-            self.tool(&["stop", &dir])?;
-            done?;
+            // What went wrong first is what is said.
+            done.and(self.tool(&["stop", &dir]))?;
         }
         self.variables.clear();
         Ok(())

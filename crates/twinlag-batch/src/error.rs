@@ -60,6 +60,8 @@ pub enum BatchError {
     Divisions { first: PathBuf, second: PathBuf },
     #[error("{} is of shard {shard}, which has a part of its own: remove this one, and run the shard of its name", path.display())]
     Twice { path: PathBuf, shard: Shard },
+    #[error("there are no parts beside the table: run the shards first")]
+    NoParts,
     #[error("{units} of {all} units are missing, first {first}: run shard {shards} of {of}")]
     Incomplete { units: usize, all: usize, first: String, shards: String, of: u64 },
     #[error("{}: expected the journal of a batch, got a file that does not begin as one; choose another table", path.display())]

@@ -136,7 +136,10 @@ impl Journal {
         if let Some(was) = was {
             was.expect_same(&header, &journal.path)?;
         }
-        journal.file.set_len(journal.end).map_err(unwritable)?;
+        // One that has nothing to be cut off keeps its time of change.
+        if journal.file.metadata().map_err(unwritable)?.len() != journal.end {
+            journal.file.set_len(journal.end).map_err(unwritable)?;
+        }
         if journal.end == 0 {
             journal.write_line(&text_of(&header, path)?)?;
         }

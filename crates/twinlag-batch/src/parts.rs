@@ -78,8 +78,9 @@ impl Parts {
     ///
     /// # Errors
     /// [`BatchError::Divisions`], [`BatchError::Twice`], [`BatchError::Foreign`], [`BatchError::DamagedPart`] and [`BatchError::Busy`], each
-    /// with the part; [`BatchError::Incomplete`] with the shards to run again.
+    /// with the part; [`BatchError::NoParts`]; [`BatchError::Incomplete`] with the shards to run again.
     pub fn open(parts: &[(Shard, PathBuf)], manifest: &Manifest) -> Result<Self, BatchError> {
+        let Some((division, _)) = parts.first() else { return Err(BatchError::NoParts) };
         if let Some(pair) = parts.windows(2).find(|pair| pair[0].0.of() != pair[1].0.of()) {
             return Err(BatchError::Divisions { first: pair[0].1.clone(), second: pair[1].1.clone() });
         }
@@ -91,7 +92,7 @@ impl Parts {
             out.places.extend(journal.keys().map(|unit| (unit.clone(), out.parts.len())));
             out.parts.push(journal);
         }
-        out.expect_all(parts.first().map_or(Shard::WHOLE, |(shard, _)| *shard), manifest)?;
+        out.expect_all(*division, manifest)?;
         Ok(out)
     }
 

@@ -3,6 +3,7 @@
 mod question;
 mod said;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read as _;
 use std::num::{NonZeroU32, NonZeroUsize};
@@ -16,8 +17,9 @@ use twinlag::diagnosis::Identifier;
 use twinlag::record::ColumnRef;
 use twinlag_batch::{
     Answers, BatchError, Begin, Fleet, Found, GroupBy, Journal, Manifest, Outcome, PartOf, Row, Unit, Verb as RowVerb,
-    find, is_of_batch, name_of, part_path, run as run_units, write_csv, write_parquet,
+    find, is_of_batch, name_of, part_path, parts_beside, run as run_units, write_csv, write_parquet,
 };
+use twinlag_cluster::Work;
 use twinlag_pages::{fleet_report, is_fleet_report};
 use twinlag_study::Shard;
 
@@ -143,7 +145,7 @@ struct Division {
     /// Say how far the shards are that were submitted with --engine.
     #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "resubmit", "report", "force", "threads"])]
     status: bool,
-    /// Submit again the shards that are missing: not done, and not in the engine's hands any more.
+    /// Submit again the shards that are missing, which are neither done nor waiting nor running, and the merge.
     #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "report", "force", "threads"])]
     resubmit: bool,
 }
@@ -187,6 +189,7 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     if command.cluster.engine.is_some() {
         return submit(command, &question, &asked, &journal_path, console);
     }
+    let is_divided = command.division.shard.is_some() && shards::manifest_path(table).exists();
     let Scope { manifest, files, units, part_of } = Scope::of(command, &question, &asked, &journal_path, console)?;
     let begin = match (command.course.resume, command.course.force) {
         (true, _) => Begin::Resume,
@@ -194,12 +197,10 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         _ => Begin::Create,
     };
     let gas_files = question.gas_files(&files)?;
-    let is_resumed = command.course.resume && journal_path.exists();
-    if let Some(gas) = gas_files.values().find(|gas| gas.exists()).filter(|_| !is_resumed && !command.course.force) {
-        return Err(Failure::Usage(format!(
-            "{} exists: choose another folder for --gas, or add --force",
-            gas.display()
-        )));
+    // A part that was removed leaves the gas temperatures of its records behind.
+    let is_resumed = command.course.resume && (journal_path.exists() || is_divided);
+    if !is_resumed {
+        command.expect_no_gas(&gas_files)?;
     }
     let mut journal = match part_of {
         Some(part_of) => Journal::open_part(&journal_path, &asked, part_of, begin)?,
@@ -269,16 +270,7 @@ impl Scope {
         };
         let manifest = command.manifest(question, asked, journal, console)?;
         let units = manifest.units_of(shard);
-        let (unlisted, _) = command.records(manifest.unlisted(find(&command.what)?), journal)?;
-        if !unlisted.is_empty() {
-            let (count, path) = (unlisted.len(), shards::manifest_path(&command.out[0]));
-            console.note(|| {
-                format!(
-                    "not asked for: {count} files that {} does not list; remove it and all parts beside it to divide the batch anew",
-                    path.display()
-                )
-            });
-        }
+        command.note_unlisted(&manifest, journal, console)?;
         let files = manifest.files_of(shard);
         let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard };
         Ok(Self { manifest: Some(manifest), files, units, part_of: Some(part_of) })
@@ -294,15 +286,21 @@ fn submit(
     console: Console,
 ) -> Result<u8, Failure> {
     let table = &command.out[0];
-    let manifest_path = shards::manifest_path(table);
-    if manifest_path.exists() && !command.course.resume {
+    let parts = parts_beside(table)?;
+    if let Some((shard, part)) = parts.first().filter(|_| !command.course.resume) {
         return Err(Failure::Usage(format!(
-            "{} is there from an earlier run: go on with it (option --resume), or remove it and all parts beside it",
-            manifest_path.display()
+            "{} is there from an earlier run, of {} shards: go on with them (option --resume), or remove all parts and {}",
+            part.display(),
+            shard.of(),
+            shards::manifest_path(table).display()
         )));
     }
-    question.gas_files(&[])?;
-    command.manifest(question, asked, journal, console)?;
+    let shards = command.cluster.shards();
+    if let Some((_, part)) = parts.iter().find(|(shard, _)| shard.of() != shards) {
+        return Err(Failure::Usage(format!("{}: is of another number of shards; remove it", part.display())));
+    }
+    let manifest = command.manifest(question, asked, journal, console)?;
+    command.note_unlisted(&manifest, journal, console)?;
     let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();
     let mut shard = submission::arguments_without("batch", &[dropped, Cluster::options()].concat())?;
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
@@ -310,7 +308,7 @@ fn submit(
     let place = shard.iter().position(|argument| argument == "batch").map_or(0, |place| place + 1);
     shard.splice(
         place..place,
-        ["--resume".to_owned(), "--quiet".to_owned(), "--threads".to_owned(), threads.to_string()],
+        ["--shard", Work::SHARD, "--resume", "--quiet", "--threads", &threads.to_string()].map(str::to_owned),
     );
     let mut merge = vec!["batch".to_owned(), "--merge".to_owned()];
     for (option, path) in command.outputs() {
@@ -329,11 +327,12 @@ fn follow(command: &Batch, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     let scripts = shards::submission_path(table);
     let progress = |of| shards::progress_of(table, of);
+    let result = is_written(table).then_some(table.as_path());
     if command.division.resubmit {
-        return submission::resubmit(&scripts, progress, command.cluster.time_limit, console);
+        return submission::resubmit(&scripts, progress, result, command.cluster.time_limit, console);
     }
     let is_grouped = shards::manifest_path(table).exists() && !shards::asked(table)?["group_by"].is_null();
-    submission::status(&scripts, progress, unit_name(is_grouped), is_written(table), console)
+    submission::status(&scripts, progress, unit_name(is_grouped), result, console)
 }
 
 /// Makes the table of all parts of a batch.
@@ -452,8 +451,37 @@ impl Batch {
     ) -> Result<Manifest, Failure> {
         shards::manifest(&self.out[0], &self.what, asked, || {
             let (files, units) = self.units(question, journal, console)?;
+            if !self.course.resume {
+                self.expect_no_gas(&question.gas_files(&files)?)?;
+            }
             shards::listed(&self.what, asked, &units, &files, self.course.threads, console)
         })
+    }
+
+    /// Says which files have come since a batch was divided.
+    fn note_unlisted(&self, manifest: &Manifest, journal: &Path, console: Console) -> Result<(), Failure> {
+        let (unlisted, _) = self.records(manifest.unlisted(find(&self.what)?), journal)?;
+        if !unlisted.is_empty() {
+            let (count, path) = (unlisted.len(), shards::manifest_path(&self.out[0]));
+            console.note(|| {
+                format!(
+                    "not asked for: {count} files that {} does not list; remove it and all parts beside it to divide the batch anew",
+                    path.display()
+                )
+            });
+        }
+        Ok(())
+    }
+
+    /// Refuses to write a gas temperature over a file that is there.
+    fn expect_no_gas(&self, gas_files: &BTreeMap<PathBuf, PathBuf>) -> Result<(), Failure> {
+        match gas_files.values().find(|gas| gas.exists()).filter(|_| !self.course.force) {
+            None => Ok(()),
+            Some(gas) => {
+                let gas = gas.display();
+                Err(Failure::Usage(format!("{gas} exists: choose another folder for --gas, or add --force")))
+            }
+        }
     }
 
     /// The records among files, and what other batches have written among them.
@@ -518,7 +546,9 @@ impl From<BatchError> for Failure {
                 Self::Usage(text)
             }
             BatchError::Damaged { .. } => Self::File(format!("{text} (option --force)")),
-            BatchError::Incomplete { .. } => Self::NotYet(format!("{text} (options --shard, --resume)")),
+            BatchError::Incomplete { .. } | BatchError::NoParts => {
+                Self::NotYet(format!("{text} (options --shard, --resume)"))
+            }
             BatchError::Busy { .. } => Self::NotYet(text),
             BatchError::NothingFound { .. }
             | BatchError::Empty { .. }

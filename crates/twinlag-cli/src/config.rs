@@ -29,6 +29,19 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
     let program = Arguments::command();
     let globals: Vec<&str> = program.get_arguments().filter(|a| a.is_global_set()).filter_map(Arg::get_long).collect();
     let has = |command: &Command, name: &str| has_option(command, name) || globals.contains(&name);
+    // What the command line asks decides which options there are.
+    let is_excluded = |command: &Command, name: &str| {
+        let named = |name: &str| command.get_arguments().find(|argument| argument.get_long() == Some(name));
+        let Some(option) = named(name) else { return false };
+        let given =
+            command.get_arguments().filter(|other| other.get_long().is_some_and(|name| is_given(&arguments, name)));
+        given.into_iter().any(|given| {
+            let excludes = |one: &Arg, other: &Arg| {
+                command.get_arg_conflicts_with(one).iter().any(|a| a.get_id() == other.get_id())
+            };
+            excludes(given, option) || excludes(option, given)
+        })
+    };
     // Of a command within another, as `study run`, each has a name.
     let mut path: Vec<(usize, &Command)> = Vec::new();
     for (place, argument) in arguments.iter().enumerate().skip(1) {
@@ -52,7 +65,7 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
                     if !has(named, key) {
                         return Err(wrong(format!("[{}] has no option --{key}", named.get_name())));
                     }
-                    if is_asked(named) && has(command, key) {
+                    if is_asked(named) && has(command, key) && !is_excluded(command, key) {
                         add(&mut added, &arguments, key, value).map_err(wrong)?;
                     }
                 }
@@ -63,7 +76,7 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
                 }
                 let own = path.iter().filter_map(|(_, command)| keys.get(command.get_name())?.as_table());
                 let is_own = own.into_iter().any(|own| own.contains_key(key));
-                if has(command, key) && !is_own {
+                if has(command, key) && !is_own && !is_excluded(command, key) {
                     add(&mut added, &arguments, key, value).map_err(wrong)?;
                 }
             }

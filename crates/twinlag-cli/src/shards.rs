@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
-use twinlag_batch::{Found, Manifest, Parts, Unit, done_in_part, parts_beside};
+use twinlag_batch::{Found, Manifest, Parts, Unit, done_in_part, part_path, parts_beside};
 use twinlag_study::Shard;
 
 use crate::console::Console;
@@ -107,7 +107,7 @@ pub(crate) fn progress_of(table: &Path, of: u64) -> Result<Vec<ShardProgress>, F
     let manifest = read(&manifest_path(table))?;
     let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
-        ShardProgress { total, done: done.map_err(|error| error.to_string()) }
+        ShardProgress { total, done: done.map_err(|error| error.to_string()), part: part_path(table, shard) }
     };
     Ok(Shard::all(of).zip(manifest.units_of_shards(of)).map(progress).collect())
 }

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use schemars::JsonSchema;
 use serde::Serialize;
+use twinlag_cluster::Work;
 use twinlag_experiment::{Experiment, ExperimentError, Plan, Row, Table, write};
 use twinlag_study::{Options, Part, Shard, Study as _, StudyError};
 
@@ -39,7 +40,7 @@ pub(crate) enum Study {
         /// The folder that holds the parts.
         dir: PathBuf,
     },
-    /// Submit again the shards that are missing: not done, and not in the engine's hands any more.
+    /// Submit again the shards that are missing, which are neither done nor waiting nor running, and the merge.
     Resubmit {
         /// The folder that holds the parts.
         dir: PathBuf,
@@ -108,11 +109,12 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
         Study::Merge { dir } => merge(dir, console),
         Study::Submit(command) => submit(command, console),
         Study::Status { dir } => {
-            let merged = dir.join(RESULTS).exists();
-            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", merged, console)
+            let result = dir.join(RESULTS);
+            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", Some(&result), console)
         }
         Study::Resubmit { dir, time_limit } => {
-            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), *time_limit, console)
+            let result = dir.join(RESULTS);
+            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), Some(&result), *time_limit, console)
         }
     }
 }
@@ -121,18 +123,28 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
 const PLAN: &str = "plan.toml";
 /// The results.
 const RESULTS: &str = "results.json";
+/// What parts say made them.
+const PROGRAM: &str = env!("TWINLAG_VERSION");
 /// The folder of what was submitted.
 const SUBMISSION: &str = "submission";
 
 /// Submits all shards.
 fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
     expect_no_results(&command.out)?;
+    let shards = command.cluster.shards();
+    if let Some(part) = parts_in(&command.out).unwrap_or_default().iter().find(|(shard, _)| shard.of() != shards) {
+        let part = part.1.display();
+        return Err(Failure::Usage(format!(
+            "{part}: is of another number of shards; remove it, or name another folder"
+        )));
+    }
     let plan = prepare(&command.plan, &command.out)?;
     let (out, copy) = (submission::text(&command.out)?, submission::text(command.out.join(PLAN))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
-    let shard = ["study", "run", &copy, "--out", &out, "--resume", "--quiet", "--threads", &threads]
-        .map(str::to_owned)
-        .to_vec();
+    let shard =
+        ["study", "run", &copy, "--out", &out, "--shard", Work::SHARD, "--resume", "--quiet", "--threads", &threads]
+            .map(str::to_owned)
+            .to_vec();
     let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
     let work = command.cluster.work(&plan.name, shard, merge)?;
     command.cluster.submit(&command.out.join(SUBMISSION), work, console)
@@ -143,9 +155,10 @@ fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let (plan, _) = read(&dir.join(PLAN))?;
     let experiment = Experiment::new(&plan)?;
     let progress = |shard: Shard| {
-        let path = dir.join(shard.file_name());
-        let done = if path.exists() { Part::read(&path).map(|part| part.done()) } else { Ok(0) };
-        Ok(ShardProgress { total: shard.trials(&experiment)?, done: done.map_err(|error| error.to_string()) })
+        let part = dir.join(shard.file_name());
+        let read = || Part::read_of(&experiment, shard, PROGRAM, &part).map(|part| part.done());
+        let done = if part.exists() { read().map_err(|error| error.to_string()) } else { Ok(0) };
+        Ok(ShardProgress { total: shard.trials(&experiment)?, done, part })
     };
     Shard::all(of).map(progress).collect()
 }
@@ -197,7 +210,7 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
         shard,
         checkpoint: Some(part.clone()),
         resume: run.resume,
-        program: env!("TWINLAG_VERSION").to_owned(),
+        program: PROGRAM.to_owned(),
         ..Options::default()
     };
     let bar = progress::bar(console).with_message("trials");
@@ -219,15 +232,11 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
 fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     let (plan, _) = read(&dir.join(PLAN))?;
     let name = dir.display();
-    let entries = fs::read_dir(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
-    let mut parts: Vec<PathBuf> =
-        entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| shard_of(p).is_some()).collect();
-    // Neighbours merge at once.
-    parts.sort_by_key(|path| shard_of(path).map(|shard| (shard.of(), shard.index())));
+    let parts = parts_in(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
     if parts.is_empty() {
         return Err(Failure::File(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
-    let results = twinlag_study::merge(&parts)?;
+    let results = twinlag_study::merge(parts.iter().map(|(_, path)| path))?;
     let experiment = Experiment::new(&plan)?;
     if results.header().plan() != experiment.plan() {
         return Err(Failure::File(format!(
@@ -242,9 +251,16 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The shard whose part is in a file.
-fn shard_of(path: &Path) -> Option<Shard> {
-    path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name)
+/// The parts in a folder, neighbours side by side: these merge at once.
+fn parts_in(dir: &Path) -> std::io::Result<Vec<(Shard, PathBuf)>> {
+    let mut parts = Vec::new();
+    for entry in fs::read_dir(dir)? {
+        let path = entry?.path();
+        let shard = path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name);
+        parts.extend(shard.map(|shard| (shard, path)));
+    }
+    parts.sort_by_key(|(shard, _)| (shard.of(), shard.index()));
+    Ok(parts)
 }
 
 fn say(console: Console, answer: &impl Serialize, text: String) -> Result<(), Failure> {
@@ -266,8 +282,11 @@ impl From<StudyError> for Failure {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Exists { .. } => Self::Usage(error.to_string()),
-            StudyError::Incomplete { .. } => Self::NotYet(error.to_string()),
-            StudyError::Damaged { .. } | StudyError::OtherStudy { .. } => Self::File(error.to_string()),
+            StudyError::Incomplete { .. } | StudyError::Busy { .. } => Self::NotYet(error.to_string()),
+            StudyError::Damaged { .. }
+            | StudyError::OtherStudy { .. }
+            | StudyError::Read { .. }
+            | StudyError::Twice { .. } => Self::File(error.to_string()),
             _ => Self::Other(error.to_string()),
         }
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args, Command, CommandFactory};
 use schemars::JsonSchema;
 use serde::Serialize;
-use twinlag_cluster::{ClusterError, Engine, Resources, State, Submission, Submitted, Work};
+use twinlag_cluster::{ClusterError, Engine, Queue, Resources, State, Submission, Submitted, Work};
 use twinlag_study::ranges;
 
 use crate::arguments::Arguments;
@@ -47,7 +47,7 @@ pub(crate) struct Cluster {
     /// An option of the engine's own, such as --engine-option=--partition=short; may be repeated.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true, requires = "engine")]
     engine_option: Vec<String>,
-    /// Write the scripts, and print the commands that would submit them.
+    /// Write the scripts, and print the command that would submit them.
     #[arg(long, requires = "engine")]
     dry_run: bool,
 }
@@ -63,11 +63,11 @@ pub(crate) struct SubmissionAnswer {
     scripts: PathBuf,
     /// Indices of the shards, as ranges, such as `0-2,9`.
     shards: String,
-    /// The engine's name of the job that has the shards; null if it is started by hand.
+    /// The engine's name of the job that has the shards; null if there are none, or if it is started by hand.
     job: Option<String>,
     /// The engine's name of the job that joins the parts; null if it is in the other one, or started by hand.
     merge_job: Option<String>,
-    /// Commands that start it, where that is done by hand.
+    /// Lines for a shell that start it, where that is done by hand.
     commands: Vec<String>,
 }
 
@@ -90,19 +90,63 @@ pub(crate) struct SubmissionStatus {
     shards: Vec<ShardStatus>,
 }
 
+/// How far a shard is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum ShardState {
+    /// All its units are done.
+    Done,
+    /// Not done, and started by the engine.
+    Running,
+    /// Not done, and in the engine's queue.
+    Waiting,
+    /// Not done, and neither running nor waiting.
+    Missing,
+    /// Not done, and the engine cannot be asked whether it runs or waits.
+    Unknown,
+    /// Its part is not of this work, or is damaged.
+    Unusable,
+}
+
+impl ShardState {
+    const ALL: [(Self, &str); 6] = [
+        (Self::Done, "done"),
+        (Self::Running, "running"),
+        (Self::Waiting, "waiting"),
+        (Self::Missing, "missing"),
+        (Self::Unknown, "unknown"),
+        (Self::Unusable, "unusable"),
+    ];
+
+    /// - `queue`: what has not ended; `None` of an engine that cannot be asked
+    fn of(shard: u64, progress: &ShardProgress, queue: Option<&Queue>) -> Self {
+        if progress.done.is_err() {
+            return Self::Unusable;
+        }
+        if progress.is_done() {
+            return Self::Done;
+        }
+        match queue.map(|queue| queue.shards.get(&shard)) {
+            Some(Some(State::Running)) => Self::Running,
+            Some(Some(State::Waiting)) => Self::Waiting,
+            Some(None) => Self::Missing,
+            None => Self::Unknown,
+        }
+    }
+}
+
 /// A shard.
 #[derive(Serialize, JsonSchema)]
 struct ShardStatus {
     /// Its index, from 0.
     shard: u64,
-    /// `done`; `running` or `waiting` by the engine; `missing`: neither done nor in the engine's hands; `unknown`: not done, and the
-    /// engine cannot be asked; `unusable`: its part is not of this work, or damaged.
-    state: &'static str,
+    /// How far it is.
+    state: ShardState,
     /// Number of units done.
     done: u64,
     /// Number of its units.
     total: u64,
-    /// Why it is unusable.
+    /// Why it is unusable; of one that is missing or unknown, the last line of its log.
     because: Option<String>,
 }
 
@@ -111,6 +155,8 @@ pub(crate) struct ShardProgress {
     pub(crate) total: u64,
     /// Why its part cannot be used, if not how many units are done.
     pub(crate) done: Result<u64, String>,
+    /// The part.
+    pub(crate) part: PathBuf,
 }
 
 impl ShardProgress {
@@ -119,7 +165,23 @@ impl ShardProgress {
     }
 }
 
+/// Whether the parts have been joined: all are done, and the result is no older than any.
+///
+/// - `result`: where it is; `None` if there is none
+fn is_merged(progress: &[ShardProgress], result: Option<&Path>) -> bool {
+    let written = |path: &Path| path.metadata().and_then(|file| file.modified());
+    let Some(Ok(result)) = result.map(written) else { return false };
+    let is_older = |part: &Path| written(part).is_ok_and(|part| part <= result);
+    // A shard of no units has no part.
+    progress.iter().all(|shown| shown.is_done() && (shown.total == 0 || is_older(&shown.part)))
+}
+
 impl Cluster {
+    /// Number of shards.
+    pub(crate) fn shards(&self) -> u64 {
+        self.shards.map_or(1, NonZeroU64::get)
+    }
+
     /// What is submitted.
     ///
     /// - `shard`, `merge`: arguments of the program
@@ -147,7 +209,7 @@ impl Cluster {
         let all: Vec<u64> = (0..work.shards.get()).collect();
         let mut submission = Submission::prepare(scripts, engine, work, resources)?;
         let submitted =
-            if self.dry_run { Submitted::ByHand(submission.commands(&all)?) } else { submission.submit(&all)? };
+            if self.dry_run { Submitted::ByHand(submission.command(&all)?) } else { submission.submit(&all)? };
         say(&submission, &all, submitted, console)
     }
 
@@ -158,36 +220,43 @@ impl Cluster {
     }
 }
 
-/// Submits again what is missing: shards that are not done, and that the engine does not have any more.
+/// Submits again what is missing: shards that are not done, and that the engine does not have any more, and the merge.
 ///
 /// - `progress`: what each shard of so many has left
+/// - `result`: where the result is; `None` if there is none
 pub(crate) fn resubmit(
     scripts: &Path,
     progress: impl FnOnce(u64) -> Result<Vec<ShardProgress>, Failure>,
+    result: Option<&Path>,
     time_limit: Option<NonZeroU32>,
     console: Console,
 ) -> Result<u8, Failure> {
-    let mut submission = Submission::open(scripts)?;
-    // A shard that ends in between is done, not missing.
-    let states = submission.states()?.unwrap_or_default();
+    let mut submission = Submission::resume(scripts)?;
+    // Asked first: a shard that ends in between is done, not missing.
+    let queue = submission.queue()?;
     let progress = progress(submission.work().shards.get())?;
     if let Some(reason) = progress.iter().find_map(|shown| shown.done.as_ref().err()) {
         return Err(Failure::File(reason.clone()));
     }
-    let missing: Vec<u64> = (0..)
-        .zip(&progress)
-        .filter(|(shard, shown)| !shown.is_done() && !states.contains_key(shard))
-        .map(|(shard, _)| shard)
-        .collect();
-    if missing.is_empty() {
+    let is_missing = |shard: u64, shown: &ShardProgress| {
+        matches!(ShardState::of(shard, shown, queue.as_ref()), ShardState::Missing | ShardState::Unknown)
+    };
+    let missing: Vec<u64> =
+        (0..).zip(&progress).filter(|(shard, shown)| is_missing(*shard, shown)).map(|(shard, _)| shard).collect();
+    let (is_running, is_merging) =
+        queue.map_or((false, false), |queue| (!queue.shards.is_empty(), queue.merge.is_some()));
+    if missing.is_empty() && (is_running || is_merging || is_merged(&progress, result)) {
         console.note(|| {
-            if states.is_empty() {
-                let merge = submission.merge_script();
-                format!("nothing is missing: all shards are done; if there is no result, run `sh {}`", merge.display())
-            } else {
-                "nothing is missing: all shards are done, wait or run".to_owned()
-            }
+            let what = match (is_running, is_merging) {
+                (true, _) => "all shards are done, wait or run",
+                (false, true) => "all shards are done, and the merge waits or runs",
+                (false, false) => "all shards are done, and the result is there",
+            };
+            format!("nothing is missing: {what}")
         });
+        if console.json {
+            print::json(&SubmissionAnswer::of(&submission, &[]))?;
+        }
         return Ok(0);
     }
     if let Some(time_min) = time_limit {
@@ -197,70 +266,78 @@ pub(crate) fn resubmit(
     say(&submission, &missing, submitted, console)
 }
 
+impl SubmissionAnswer {
+    /// What is said where nothing was submitted.
+    fn of(submission: &Submission, shards: &[u64]) -> Self {
+        Self {
+            schema: "twinlag.submission/1",
+            engine: submission.engine().name(),
+            scripts: submission.folder().to_owned(),
+            shards: ranges(shards),
+            job: None,
+            merge_job: None,
+            commands: Vec::new(),
+        }
+    }
+}
+
 fn say(submission: &Submission, shards: &[u64], submitted: Submitted, console: Console) -> Result<u8, Failure> {
-    let (job, commands) = match submitted {
-        Submitted::Job(job) => (Some(job), Vec::new()),
-        Submitted::ByHand(commands) => (None, commands),
-    };
-    let answer = SubmissionAnswer {
-        schema: "twinlag.submission/1",
-        engine: submission.engine().name(),
-        scripts: submission.folder().to_owned(),
-        shards: ranges(shards),
-        job: job.as_ref().map(|job| job.id.clone()),
-        merge_job: job.and_then(|job| job.merge_id),
-        commands,
-    };
+    let mut answer = SubmissionAnswer::of(submission, shards);
+    match submitted {
+        Submitted::Job(job) => (answer.job, answer.merge_job) = (job.id, job.merge_id),
+        Submitted::ByHand(command) => answer.commands.push(command),
+    }
     if console.json {
         print::json(&answer)?;
         return Ok(0);
     }
-    let SubmissionAnswer { scripts, shards, job, merge_job, commands, .. } = answer;
-    let scripts = scripts.display();
-    if let Some(job) = job {
-        let merge = merge_job.map_or(String::new(), |merge| format!(", and the merge as job {merge}"));
-        print::on_stdout(&format!("shards {shards} are submitted as job {job}{merge}; scripts and logs: {scripts}\n"))?;
-    } else {
-        console.note(|| format!("scripts: {scripts}; these commands start shards {shards}, and the merge:"));
-        print::on_stdout(&(commands.join("\n") + "\n"))?;
-    }
+    let scripts = answer.scripts.display();
+    let what =
+        if shards.is_empty() { "the merge".to_owned() } else { format!("shards {}, and the merge", answer.shards) };
+    let text = match (&answer.job, &answer.merge_job) {
+        (None, None) => {
+            console.note(|| format!("scripts: {scripts}; this starts {what}:"));
+            answer.commands.join("\n")
+        }
+        (Some(job), None) => format!("submitted as job {job}: {what}; scripts and logs: {scripts}"),
+        (None, Some(merge)) => format!("submitted as job {merge}: {what}; scripts and logs: {scripts}"),
+        (Some(job), Some(merge)) => format!("submitted as jobs {job} and {merge}: {what}; scripts and logs: {scripts}"),
+    };
+    print::on_stdout(&(text + "\n"))?;
     Ok(0)
 }
 
 /// Says how far the shards are. Ends with exit code 75 while there is no result.
 ///
 /// - `progress`: what each shard of so many has left
+/// - `result`: where the result is; `None` if there is none
 pub(crate) fn status(
     scripts: &Path,
     progress: impl FnOnce(u64) -> Result<Vec<ShardProgress>, Failure>,
     units: &'static str,
-    merged: bool,
+    result: Option<&Path>,
     console: Console,
 ) -> Result<u8, Failure> {
     let submission = Submission::open(scripts)?;
-    let states = match submission.states() {
+    let queue = match submission.queue() {
         Err(error) => {
             console.note(|| format!("whether shards wait or run is not known: {error}"));
             None
         }
-        Ok(states) => states,
+        Ok(queue) => queue,
     };
     let progress = progress(submission.work().shards.get())?;
+    let merged = is_merged(&progress, result);
     let of_shard = |(shard, shown): (u64, ShardProgress)| {
-        let state = match (&shown.done, states.as_ref().map(|states| states.get(&shard))) {
-            (Err(_), _) => "unusable",
-            (Ok(done), _) if *done == shown.total => "done",
-            (_, Some(Some(State::Running))) => "running",
-            (_, Some(Some(State::Waiting))) => "waiting",
-            (_, Some(None)) => "missing",
-            (_, None) => "unknown",
-        };
+        let state = ShardState::of(shard, &shown, queue.as_ref());
         let done = *shown.done.as_ref().unwrap_or(&0);
-        ShardStatus { shard, state, done, total: shown.total, because: shown.done.err() }
+        let because = match state {
+            ShardState::Missing | ShardState::Unknown => submission.last_line_of(shard),
+            _ => shown.done.err(),
+        };
+        ShardStatus { shard, state, done, total: shown.total, because }
     };
     let shards: Vec<ShardStatus> = (0..).zip(progress).map(of_shard).collect();
-    // A result that was there before some of the parts is not theirs.
-    let merged = merged && shards.iter().all(|shard| shard.state == "done");
     let (done, total) = shards.iter().fold((0, 0), |(done, total), shard| (done + shard.done, total + shard.total));
     let schema = "twinlag.submission-status/1";
     let engine = submission.engine().name();
@@ -273,22 +350,29 @@ pub(crate) fn status(
     Ok(if merged { 0 } else { 75 })
 }
 
+/// Most reasons that are shown.
+const SHOWN_REASONS: usize = 5;
+
 impl SubmissionStatus {
     fn in_words(&self) -> String {
         let Self { engine, units, done, total, merged, shards, .. } = self;
-        let count = shards.len();
-        let of_state = |state: &&str| {
+        let row = |(state, name): &(ShardState, &str)| {
             let of: Vec<u64> = shards.iter().filter(|shard| shard.state == *state).map(|shard| shard.shard).collect();
-            (!of.is_empty()).then(|| vec![(*state).to_owned(), of.len().to_string(), ranges(&of)])
+            (!of.is_empty()).then(|| vec![(*name).to_owned(), of.len().to_string(), ranges(&of)])
         };
-        let rows: Vec<_> =
-            ["done", "running", "waiting", "missing", "unknown", "unusable"].iter().filter_map(of_state).collect();
-        let because = shards.iter().filter_map(|shard| shard.because.clone());
+        let rows: Vec<_> = ShardState::ALL.iter().filter_map(row).collect();
+        let reasons: Vec<String> = shards
+            .iter()
+            .filter_map(|shard| Some(format!("shard {}: {}", shard.shard, shard.because.as_ref()?)))
+            .collect();
+        let more = reasons.len().saturating_sub(SHOWN_REASONS);
+        let more = (more > 0).then(|| format!("... and {more} more, in the answer of --json"));
         let end = if *merged { "the result is there\n" } else { "no result yet\n" };
-        let lines = columns(&rows, |column| column != 1).into_iter().chain(because).map(|line| format!("  {line}"));
-        [format!("{engine}: {done} of {total} {units} in {count} shards")]
+        let lines = columns(&rows, |column| column != 1);
+        let lines = lines.into_iter().chain(reasons.into_iter().take(SHOWN_REASONS)).chain(more);
+        [format!("{engine}: {done} of {total} {units} in {} shards", shards.len())]
             .into_iter()
-            .chain(lines)
+            .chain(lines.map(|line| format!("  {line}")))
             .chain([end.to_owned()])
             .collect::<Vec<_>>()
             .join("\n")
@@ -308,7 +392,7 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
     };
     let (mut kept, mut is_value, mut is_over) = (Vec::new(), false, false);
     for argument in config::with_config(std::env::args_os().collect())?.into_iter().skip(1) {
-        let argument = text(&argument)?;
+        let argument = argument.to_str().ok_or_else(|| no_unicode(&argument))?.to_owned();
         if std::mem::take(&mut is_value) {
             continue;
         }
@@ -323,11 +407,15 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
     Ok(kept)
 }
 
-/// A name as a script has it.
-pub(crate) fn text(name: impl AsRef<OsStr>) -> Result<String, Failure> {
-    let name = name.as_ref();
-    let text = name.to_str().map(str::to_owned);
-    text.ok_or_else(|| Failure::Usage(format!("{}: is no Unicode, as a script needs it", name.display())))
+/// A path as an argument in a script; one that begins with a hyphen would be taken for an option.
+pub(crate) fn text(path: impl AsRef<Path>) -> Result<String, Failure> {
+    let path = path.as_ref();
+    let text = path.to_str().ok_or_else(|| no_unicode(path.as_os_str()))?;
+    Ok(if text.starts_with('-') { format!("./{text}") } else { text.to_owned() })
+}
+
+fn no_unicode(name: &OsStr) -> Failure {
+    Failure::Usage(format!("{}: is no Unicode, as a script needs it", name.display()))
 }
 
 /// What was submitted depends on how the program was called; what an engine refuses does not.
@@ -335,8 +423,13 @@ impl From<ClusterError> for Failure {
     fn from(error: ClusterError) -> Self {
         let text = error.to_string();
         match error {
-            ClusterError::Exists { .. } | ClusterError::NoText { .. } => Self::Usage(text),
-            ClusterError::NotSubmitted { .. } | ClusterError::Damaged { .. } => Self::File(text),
+            ClusterError::Exists { .. } | ClusterError::NoText { .. } | ClusterError::NotOfEngine { .. } => {
+                Self::Usage(text)
+            }
+            ClusterError::NotSubmitted { .. } | ClusterError::Damaged { .. } | ClusterError::Read { .. } => {
+                Self::File(text)
+            }
+            ClusterError::Busy { .. } => Self::NotYet(text),
             _ => Self::Other(text),
         }
     }

@@ -1,5 +1,6 @@
-//! The engines, and what they say of a shard.
+//! The engines, and what they say of shards.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
@@ -58,4 +59,14 @@ pub enum State {
     Waiting,
     /// Started, and not ended.
     Running,
+}
+
+/// What an engine has of a submission.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Queue {
+    /// The shards that have not ended.
+    pub shards: BTreeMap<u64, State>,
+    /// The merge, if it has not ended.
+    pub merge: Option<State>,
 }

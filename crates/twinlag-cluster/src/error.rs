@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::engine::Engine;
+
 /// Why work could not be submitted, or nothing could be learnt of it.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "each message names its fields")]
@@ -21,6 +23,10 @@ pub enum ClusterError {
     NotSubmitted { path: PathBuf },
     #[error("{}: expected what an earlier submission has written: {reason}", path.display())]
     Damaged { path: PathBuf, reason: String },
+    #[error("{}: another process submits from here: wait until it ends", path.display())]
+    Busy { path: PathBuf },
+    #[error("{option} means nothing to {engine}: {instead}")]
+    NotOfEngine { option: &'static str, engine: Engine, instead: &'static str },
     #[error("{}: cannot be read: {reason}", path.display())]
     Read { path: PathBuf, reason: String },
     #[error("{}: cannot be written: {reason}", path.display())]

@@ -20,15 +20,24 @@ pub(crate) fn quoted(word: &str) -> Result<String, ClusterError> {
     Ok(quoted.into_owned())
 }
 
-/// A path as a shell takes it.
-pub(crate) fn quoted_path(path: &Path) -> Result<String, ClusterError> {
-    let text = path.to_str().ok_or_else(|| ClusterError::NoText { text: path.to_string_lossy().into_owned() })?;
-    quoted(text)
+/// Words as a shell takes them.
+pub(crate) fn command(words: &[String]) -> Result<String, ClusterError> {
+    Ok(words.iter().map(|word| quoted(word)).collect::<Result<Vec<_>, _>>()?.join(" "))
 }
 
-fn command(arguments: &[String]) -> Result<String, ClusterError> {
-    let words = arguments.iter().map(|word| quoted(word)).collect::<Result<Vec<_>, _>>()?;
-    Ok(format!("\"${{TWINLAG:-$program}}\" {}", words.join(" ")))
+/// A path as text.
+pub(crate) fn text(path: &Path) -> Result<&str, ClusterError> {
+    path.to_str().ok_or_else(|| ClusterError::NoText { text: path.to_string_lossy().into_owned() })
+}
+
+/// What runs the program with arguments that a shell takes.
+fn program(arguments: &str) -> String {
+    format!("\"${{TWINLAG:-$program}}\" {arguments}")
+}
+
+/// The name of the log of a shard.
+pub(crate) fn log_of(shard: impl std::fmt::Display) -> String {
+    format!("shard-{shard}.log")
 }
 
 /// The beginning of each script.
@@ -45,7 +54,7 @@ fn head(
     [logs, log]: [&str; 2],
 ) -> Result<String, ClusterError> {
     let directives: String = directives.iter().flat_map(|line| [line, "\n"]).collect();
-    let (program, folder, logs) = (quoted_path(&work.program)?, quoted_path(&work.folder)?, quoted(logs)?);
+    let (program, folder, logs) = (quoted(text(&work.program)?)?, quoted(text(&work.folder)?)?, quoted(logs)?);
     Ok(format!(
         "#!/bin/sh\n{directives}# {about}\n{first}set -eu\nprogram={program}\nlogs={logs}\nexec >> \"$logs/{log}\" 2>&1\ncd {folder}\n"
     ))
@@ -56,13 +65,17 @@ pub(crate) fn shard(work: &Work, directives: &[String], logs: &str) -> Result<St
     let shards = work.shards;
     let about = format!("One shard of {shards}, counted from 0: the first argument, or the task of an array.");
     let first = "shard=\"${1:-${SLURM_ARRAY_TASK_ID:-${JOB_COMPLETION_INDEX:?expected the number of a shard}}}\"\n";
-    let head = head(work, &about, directives, first, [logs, "shard-$shard.log"])?;
-    Ok(format!("{head}exec {} --shard \"$shard/{shards}\"\n", command(&work.shard)?))
+    let head = head(work, &about, directives, first, [logs, &log_of("$shard")])?;
+    let place = work.shard.iter().position(|word| word == Work::SHARD).unwrap_or(work.shard.len());
+    let (before, behind) = (&work.shard[..place], work.shard.get(place + 1..).unwrap_or_default());
+    let words = [command(before)?, format!("\"$shard/{shards}\""), command(behind)?];
+    let arguments = words.into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" ");
+    Ok(format!("{head}exec {}\n", program(&arguments)))
 }
 
 /// The script that joins the parts. Where one is missing it ends with 1, not with [`AGAIN`]: waiting does not bring the part.
 pub(crate) fn merge(work: &Work, directives: &[String], logs: &str) -> Result<String, ClusterError> {
     let head = head(work, "Joins the parts of all shards.", directives, "", [logs, "merge.log"])?;
-    let command = command(&work.merge)?;
+    let command = program(&command(&work.merge)?);
     Ok(format!("{head}{command} || {{ code=$?; [ $code -ne {AGAIN} ] || code=1; exit $code; }}\n"))
 }

@@ -1,27 +1,30 @@
 //! What was submitted, kept beside its scripts.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::io::ErrorKind;
+use std::fs::{self, File, TryLockError};
+use std::io::{ErrorKind, Write as _};
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::{Deserialize, Serialize};
+use tempfile::Builder;
 use twinlag_study::ranges;
 
-use crate::engine::{Engine, State};
+use crate::engine::{Engine, Queue};
 use crate::error::ClusterError;
 use crate::script::{self, LOGS, MERGE, SHARD};
 use crate::work::{Resources, Work};
 use crate::{hyperqueue, kubernetes, parallel, slurm};
 
 /// Name and number of the format.
-const SCHEMA: &str = "twinlag.submitted/1";
+const SCHEMA: &str = "twinlag.submitted/2";
 /// The file of what was submitted.
 const FILE: &str = "submission.json";
+/// The file that the process that submits has locked.
+const LOCK: &str = "lock";
 
 /// Work in the hands of an engine: its scripts in a folder of their own, and its jobs.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub struct Submission {
     schema: String,
     version: String,
@@ -31,17 +34,23 @@ pub struct Submission {
     jobs: Vec<Job>,
     #[serde(skip)]
     folder: PathBuf,
+    /// The right to submit; `None` of one that was opened to look at it.
+    #[serde(skip)]
+    lock: Option<File>,
 }
 
 /// What an engine has taken.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
+    /// The shards, as ranges; empty of a merge alone.
+    pub shards: String,
     /// The engine's name of the job that has the shards.
-    pub id: String,
+    pub id: Option<String>,
     /// The engine's name of the job that joins the parts; `None` where it is part of the other.
     pub merge_id: Option<String>,
-    /// The shards, as ranges.
-    pub shards: String,
+    /// The cluster that has taken it, of several that Slurm was to choose from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cluster: Option<String>,
 }
 
 /// What came of a submission.
@@ -49,16 +58,21 @@ pub struct Job {
 pub enum Submitted {
     /// The engine has taken it.
     Job(Job),
-    /// These commands start it, once what they need is filled in.
-    ByHand(Vec<String>),
+    /// This line of a shell starts it, once what it needs is filled in.
+    ByHand(String),
 }
 
 impl Submission {
     /// Writes the scripts into a folder, which is created where necessary. Nothing is submitted.
     ///
     /// # Errors
-    /// [`ClusterError::Exists`] if an engine has taken something from there; [`ClusterError::NoText`], [`ClusterError::Write`].
+    /// [`ClusterError::Exists`] if an engine has taken something from there; [`ClusterError::Busy`], [`ClusterError::NotOfEngine`],
+    /// [`ClusterError::NoText`], [`ClusterError::Write`].
     pub fn prepare(folder: &Path, engine: Engine, work: Work, resources: Resources) -> Result<Self, ClusterError> {
+        resources.check_for(engine)?;
+        let logs = folder.join(LOGS);
+        fs::create_dir_all(&logs).map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
+        let lock = Some(lock(folder)?);
         match Self::open(folder) {
             Err(ClusterError::NotSubmitted { .. }) => {}
             // The engine has taken nothing.
@@ -66,12 +80,13 @@ impl Submission {
             _ => return Err(ClusterError::Exists { path: folder.join(FILE) }),
         }
         let (schema, version) = (SCHEMA.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-        let submission = Self { schema, version, engine, work, resources, jobs: Vec::new(), folder: folder.to_owned() };
+        let folder = folder.to_owned();
+        let submission = Self { schema, version, engine, work, resources, jobs: Vec::new(), folder, lock };
         submission.write_scripts()?;
         Ok(submission)
     }
 
-    /// What was submitted from a folder.
+    /// What was submitted from a folder, to look at it.
     ///
     /// # Errors
     /// [`ClusterError::NotSubmitted`], [`ClusterError::Read`], [`ClusterError::Damaged`].
@@ -88,6 +103,18 @@ impl Submission {
         }
         folder.clone_into(&mut submission.folder);
         Ok(submission)
+    }
+
+    /// What was submitted from a folder, to submit more of it. No other process submits from there as long as this lives.
+    ///
+    /// # Errors
+    /// [`ClusterError::Busy`], and those of [`Self::open`].
+    pub fn resume(folder: &Path) -> Result<Self, ClusterError> {
+        if !folder.join(FILE).exists() {
+            return Err(ClusterError::NotSubmitted { path: folder.join(FILE) });
+        }
+        let lock = Some(lock(folder)?);
+        Ok(Self { lock, ..Self::open(folder)? })
     }
 
     /// The engine.
@@ -110,97 +137,125 @@ impl Submission {
         &self.folder
     }
 
-    /// The script that joins the parts.
-    pub fn merge_script(&self) -> PathBuf {
-        self.folder.join(MERGE)
+    /// The last line that a shard has said; `None` where it has said nothing.
+    pub fn last_line_of(&self, shard: u64) -> Option<String> {
+        let log = fs::read(self.folder.join(LOGS).join(script::log_of(shard))).ok()?;
+        let log = String::from_utf8_lossy(&log);
+        log.lines().rev().map(str::trim).find(|line| !line.is_empty()).map(str::to_owned)
     }
 
     /// Gives the shards that are submitted from now on another limit of time, and writes the scripts anew.
     ///
     /// # Errors
     /// [`ClusterError::Write`].
-    pub fn limit_time(&mut self, time_min: std::num::NonZeroU32) -> Result<(), ClusterError> {
+    pub fn limit_time(&mut self, time_min: NonZeroU32) -> Result<(), ClusterError> {
         self.resources.time_min = time_min;
         self.write_scripts()
     }
 
     fn write_scripts(&self) -> Result<(), ClusterError> {
         let Self { work, resources, .. } = self;
-        let logs = self.folder.join(LOGS);
-        fs::create_dir_all(&logs).map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
         let logs = self.path(LOGS)?;
         let (of_shard, of_merge) = match self.engine {
-            Engine::Slurm => (slurm::directives(work, resources), slurm::merge_directives(work, resources)),
+            Engine::Slurm => (slurm::directives(work, resources), slurm::merge_directives(work)),
             _ => (Vec::new(), Vec::new()),
         };
         self.write(SHARD, &script::shard(work, &of_shard, &logs)?)?;
         self.write(MERGE, &script::merge(work, &of_merge, &logs)?)?;
         match self.engine {
             Engine::Hyperqueue => self.write(hyperqueue::FILE, hyperqueue::SCRIPT),
-            Engine::Kubernetes => self.write(kubernetes::FILE, &kubernetes::job(work, resources, &self.path(SHARD)?)),
-            _ => Ok(()),
+            Engine::Kubernetes => {
+                let job = self.folder.join(kubernetes::FILE);
+                // What was filled in stays.
+                if job.exists() && !self.jobs.is_empty() {
+                    return Ok(());
+                }
+                self.write(kubernetes::FILE, &kubernetes::job(work, resources, &self.path(SHARD)?)?)
+            }
+            Engine::Slurm | Engine::Parallel => Ok(()),
         }
     }
 
+    /// Writes a file in one piece: a shell may be reading the old one.
     fn write(&self, name: &str, text: &str) -> Result<(), ClusterError> {
         let path = self.folder.join(name);
-        fs::write(&path, text).map_err(|error| ClusterError::Write { path, reason: error.to_string() })
+        let write = || {
+            let new = |path: &Path| File::options().write(true).create_new(true).open(path);
+            let mut file = Builder::new().prefix(&format!("{name}.tmp-")).make_in(&self.folder, new)?;
+            file.write_all(text.as_bytes())?;
+            file.persist(&path)?;
+            Ok(())
+        };
+        write().map_err(|error: std::io::Error| ClusterError::Write { path: path.clone(), reason: error.to_string() })
     }
 
     /// The whole path of a file of it: the scripts may run in any folder.
     fn path(&self, name: &str) -> Result<String, ClusterError> {
         let path = self.folder.join(name);
         let whole = path.canonicalize().unwrap_or(path);
-        whole.to_str().map(str::to_owned).ok_or_else(|| ClusterError::NoText { text: whole.to_string_lossy().into() })
+        script::text(&whole).map(str::to_owned)
     }
 
-    /// The commands that submit these shards, as a shell takes them.
+    /// The line of a shell that submits these shards and the merge behind them; without shards, the merge alone.
     ///
     /// # Errors
     /// [`ClusterError::NoText`].
-    pub fn commands(&self, shards: &[u64]) -> Result<Vec<String>, ClusterError> {
+    pub fn command(&self, shards: &[u64]) -> Result<String, ClusterError> {
         let [shard, merge] = [self.path(SHARD)?, self.path(MERGE)?];
-        let command = |words: &[String]| -> Result<String, ClusterError> {
-            Ok(words.iter().map(|word| script::quoted(word)).collect::<Result<Vec<_>, _>>()?.join(" "))
-        };
-        Ok(match self.engine {
-            Engine::Slurm => vec![
-                command(&slurm::array(shards, &shard))?,
-                // JOB stands for what the first command prints.
-                command(&slurm::behind("JOB", &merge))?,
-            ],
+        let in_shell = [&*script::quoted(&shard)?, &*script::quoted(&merge)?];
+        match self.engine {
+            Engine::Slurm => slurm::command(&self.resources, shards, [&shard, &merge]),
             Engine::Hyperqueue => {
-                vec![command(&hyperqueue::command(&self.path(hyperqueue::FILE)?, &self.work, &self.resources, shards))?]
+                let submit = self.path(hyperqueue::FILE)?;
+                script::command(&hyperqueue::command(&submit, &self.work, &self.resources, shards))
             }
-            Engine::Parallel => parallel::commands(&script::quoted(&shard)?, &script::quoted(&merge)?, shards),
-            Engine::Kubernetes => kubernetes::commands(&script::quoted(&self.path(kubernetes::FILE)?)?),
-        })
+            Engine::Parallel => parallel::command(&self.resources, shards, in_shell),
+            Engine::Kubernetes => {
+                let job = script::quoted(&self.path(kubernetes::FILE)?)?;
+                Ok(kubernetes::command(shards, [&job, in_shell[1]]))
+            }
+        }
     }
 
-    /// Hands shards to the engine, and the merge behind them. Slurm runs it whatever becomes of the shards, `HyperQueue` only if none fails.
+    /// Hands shards to the engine, and the merge behind them, which runs whatever becomes of the shards; without shards, the merge alone.
     ///
     /// # Errors
-    /// [`ClusterError::NoProgram`], [`ClusterError::Refused`], [`ClusterError::Write`].
+    /// [`ClusterError::Busy`] of one that was [opened](Self::open) to look at it; [`ClusterError::NoProgram`], [`ClusterError::Refused`],
+    /// [`ClusterError::Write`].
     pub fn submit(&mut self, shards: &[u64]) -> Result<Submitted, ClusterError> {
+        if self.lock.is_none() {
+            return Err(ClusterError::Busy { path: self.folder.clone() });
+        }
         // What cannot be recorded is not submitted.
         self.save()?;
-        let id = match self.engine {
-            Engine::Slurm => slurm::submit_shards(shards, &self.path(SHARD)?)?,
+        let mut job = Job { shards: ranges(shards), ..Job::default() };
+        match self.engine {
+            Engine::Slurm => self.submit_to_slurm(shards, job).map(Submitted::Job),
             Engine::Hyperqueue => {
-                hyperqueue::submit(&self.path(hyperqueue::FILE)?, &self.work, &self.resources, shards)?
+                let script = self.path(hyperqueue::FILE)?;
+                job.id = Some(hyperqueue::submit(&script, &self.work, &self.resources, shards)?);
+                self.jobs.push(job.clone());
+                self.save()?;
+                Ok(Submitted::Job(job))
             }
-            Engine::Parallel | Engine::Kubernetes => return Ok(Submitted::ByHand(self.commands(shards)?)),
-        };
-        let mut job = Job { id, merge_id: None, shards: ranges(shards) };
-        self.jobs.push(job.clone());
-        self.save()?;
-        if self.engine == Engine::Slurm {
-            job.merge_id = Some(slurm::submit_merge(&self.path(MERGE)?, &job.id)?);
-            self.jobs.pop();
+            Engine::Parallel | Engine::Kubernetes => Ok(Submitted::ByHand(self.command(shards)?)),
+        }
+    }
+
+    /// Each job is recorded before the next is submitted.
+    fn submit_to_slurm(&mut self, shards: &[u64], mut job: Job) -> Result<Job, ClusterError> {
+        if !shards.is_empty() {
+            let taken = slurm::submit_shards(&self.resources, shards, &self.path(SHARD)?)?;
+            (job.id, job.cluster) = (Some(taken.id), taken.cluster);
             self.jobs.push(job.clone());
             self.save()?;
+            self.jobs.pop();
         }
-        Ok(Submitted::Job(job))
+        let taken = slurm::submit_merge(&self.resources, Some(&job), &self.path(MERGE)?)?;
+        (job.merge_id, job.cluster) = (Some(taken.id), taken.cluster.or(job.cluster));
+        self.jobs.push(job.clone());
+        self.save()?;
+        Ok(job)
     }
 
     fn save(&self) -> Result<(), ClusterError> {
@@ -208,15 +263,26 @@ impl Submission {
         self.write(FILE, &(serde_json::to_string_pretty(self).map_err(wrong)? + "\n"))
     }
 
-    /// The shards that wait or run; `None` of an engine that cannot be asked.
+    /// What has not ended; `None` of an engine that cannot be asked.
     ///
     /// # Errors
     /// [`ClusterError::NoProgram`], [`ClusterError::Refused`].
-    pub fn states(&self) -> Result<Option<BTreeMap<u64, State>>, ClusterError> {
+    pub fn queue(&self) -> Result<Option<Queue>, ClusterError> {
         match self.engine {
-            Engine::Slurm => slurm::states(&self.jobs).map(Some),
+            Engine::Slurm => slurm::queue(&self.jobs).map(Some),
             _ => Ok(None),
         }
+    }
+}
+
+/// The right to submit from a folder. On a file system without locks each process has it.
+fn lock(folder: &Path) -> Result<File, ClusterError> {
+    let path = folder.join(LOCK);
+    let file = File::options().write(true).create(true).truncate(false).open(&path);
+    let file = file.map_err(|error| ClusterError::Write { path, reason: error.to_string() })?;
+    match file.try_lock() {
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(ClusterError::Busy { path: folder.to_owned() }),
     }
 }
 

@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use crate::engine::Engine;
+use crate::error::ClusterError;
+
 /// Work that is divided into shards.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Work {
@@ -14,12 +17,17 @@ pub struct Work {
     pub folder: PathBuf,
     /// The program; on a machine that has it elsewhere, the variable `TWINLAG` says where.
     pub program: PathBuf,
-    /// Its arguments for a shard, to which `--shard K/N` is added.
+    /// Its arguments for a shard, with [`Self::SHARD`] in the place of which shard it is.
     pub shard: Vec<String>,
     /// Its arguments that join the parts of all shards.
     pub merge: Vec<String>,
     /// Number of shards.
     pub shards: NonZeroU64,
+}
+
+impl Work {
+    /// What stands in [`Self::shard`] for the shard, `K/N` with K counted from 0: the first argument that is this.
+    pub const SHARD: &'static str = "{shard}";
 }
 
 /// What a shard needs.
@@ -43,5 +51,20 @@ impl Resources {
     pub fn of_minutes(time_min: u32) -> Self {
         let time_min = NonZeroU32::new(time_min).expect("a shard takes some time");
         Self { time_min, cpus: NonZeroU32::MIN, memory: None, options: Vec::new() }
+    }
+
+    /// Refuses what an engine would not heed.
+    pub(crate) fn check_for(&self, engine: Engine) -> Result<(), ClusterError> {
+        let not = |option, instead| Err(ClusterError::NotOfEngine { option, engine, instead });
+        match engine {
+            Engine::Parallel if self.memory.is_some() => {
+                not("--memory", "leave it out; --engine-option=--memfree=2G starts a shard only where so much is free")
+            }
+            Engine::Hyperqueue if self.memory.is_some() => {
+                not("--memory", "leave it out, and choose the workers by it")
+            }
+            Engine::Kubernetes if !self.options.is_empty() => not("--engine-option", "write it into job.yaml"),
+            _ => Ok(()),
+        }
     }
 }

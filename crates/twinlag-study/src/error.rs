@@ -46,6 +46,8 @@ pub enum StudyError {
     Scratch { cell: usize, cause: Failure },
     #[error("{} exists: resume it, or use another directory", path.display())]
     Exists { path: PathBuf },
+    #[error("{} is being written by another process: wait until that ends", path.display())]
+    Busy { path: PathBuf },
     #[error("{} could not be read: {cause}", path.display())]
     Read { path: PathBuf, cause: std::io::Error },
     #[error("{} could not be written: {cause}", path.display())]

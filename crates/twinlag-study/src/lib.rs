@@ -71,11 +71,11 @@
 //!
 //! A [`Shard`] `k/n` owns the `k`-th of `n` contiguous ranges of the blocks of all cells. [`run()`]
 //! keeps a [`Part`] on disk: it is replaced, never edited, so that there is a whole one at every
-//! moment. The part of a finished shard is its result. [`merge`] joins parts in any order and says
-//! which shards are missing. [`replay`] runs a single trial again.
+//! moment, and one process at a time writes it. The part of a finished shard is its result. [`merge`] joins parts in any order and says
 
 mod error;
 mod forest;
+mod lock;
 mod moments;
 mod part;
 mod rate;

@@ -2,12 +2,13 @@
 
 use std::fmt;
 use std::fs;
-use std::io::Write;
+use std::io::{self, Write};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
+use tempfile::{Builder, NamedTempFile};
 
 use crate::error::{Gap, StudyError};
 use crate::forest::{Forest, ForestError};
@@ -173,28 +174,44 @@ impl Part {
         serde_json::from_slice(part).map_err(|error| damaged(error.to_string()))
     }
 
+    /// Reads the part of a shard of a study.
+    ///
+    /// - `program`: [`Options::program`](crate::Options) of its run
+    ///
+    /// # Errors
+    /// [`StudyError::OtherStudy`] if it is of another study, shard or program; those of [`Self::read`]; [`StudyError::Empty`],
+    /// [`StudyError::TooLarge`], [`StudyError::SameName`] for an invalid study.
+    pub fn read_of<S: Study>(study: &S, shard: Shard, program: &str, path: &Path) -> Result<Self, StudyError> {
+        Self::empty(Header::of(study)?, shard, program).read_same(path)
+    }
+
+    /// Reads a part of the study, the shard and the program of this one.
+    pub(crate) fn read_same(&self, path: &Path) -> Result<Self, StudyError> {
+        let found = Self::read(path)?;
+        self.expect_same_study(&found, path)?;
+        expect_equal("shard", &self.shard, &found.shard, path)?;
+        Ok(found)
+    }
+
     /// Writes the part, in place of an older one if there is one. At every moment there is the old
     /// file or the new one.
     ///
-    /// A process that is killed here leaves a file `<path>.tmp-<process>` behind, which can be
-    /// deleted.
+    /// A process that is killed here leaves a file `<path>.tmp-*` behind, which can be deleted.
     ///
     /// # Errors
     /// [`StudyError::Write`].
     pub fn write(&self, path: &Path) -> Result<(), StudyError> {
-        let mut temporary = path.as_os_str().to_owned();
-        temporary.push(format!(".tmp-{}", std::process::id()));
-        let temporary = PathBuf::from(temporary);
         let write = || {
             let part = serde_json::to_string(self)? + "\n";
             let first = FirstLine { schema: FILE_SCHEMA.to_owned(), sha256: sha256(part.as_bytes()) };
-            let mut file = fs::File::create(&temporary)?;
+            let mut file = temporary_beside(path)?;
             file.write_all(format!("{}\n{part}", serde_json::to_string(&first)?).as_bytes())?;
             // Else a power failure could leave the new name with no content.
-            file.sync_all()?;
-            fs::rename(&temporary, path)
+            file.as_file().sync_all()?;
+            file.persist(path)?;
+            Ok(())
         };
-        write().map_err(|cause| StudyError::Write { path: path.into(), cause })
+        write().map_err(|cause: io::Error| StudyError::Write { path: path.into(), cause })
     }
 
     /// What study this is a part of.
@@ -242,12 +259,6 @@ impl Part {
         finish(self, Some(shards))
     }
 
-    /// Refuses to go on from a part, at `path`, of another study, shard or program.
-    pub(crate) fn expect_same(&self, found: &Self, path: &Path) -> Result<(), StudyError> {
-        self.expect_same_study(found, path)?;
-        expect_equal("shard", &self.shard, &found.shard, path)
-    }
-
     /// Refuses a part, at `path`, of another study or program.
     fn expect_same_study(&self, found: &Self, path: &Path) -> Result<(), StudyError> {
         self.header.expect_same(&found.header, path)?;
@@ -290,6 +301,15 @@ fn expect_equal<T: PartialEq + fmt::Display>(
         return Ok(());
     }
     Err(StudyError::OtherStudy { path: path.into(), what, expected: expected.to_string(), got: got.to_string() })
+}
+
+/// A new file of a name that no other process takes, with the permissions of any new file.
+fn temporary_beside(path: &Path) -> io::Result<NamedTempFile<fs::File>> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut prefix = path.file_name().unwrap_or_default().to_owned();
+    prefix.push(".tmp-");
+    let new = |path: &Path| fs::File::options().write(true).create_new(true).open(path);
+    Builder::new().prefix(&prefix).make_in(folder, new)
 }
 
 fn sha256(bytes: &[u8]) -> String {

@@ -14,6 +14,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crate::error::StudyError;
+use crate::lock::Lock;
 use crate::part::{Header, Part};
 use crate::shard::Shard;
 use crate::study::{Failure, Outcome, Study};
@@ -74,7 +75,7 @@ pub struct Progress {
 ///
 /// # Errors
 /// [`StudyError::Trial`] or [`StudyError::Scratch`], the first in order of the blocks, on any
-/// number of threads; what was done is in the checkpoint. [`StudyError::Exists`],
+/// number of threads; what was done is in the checkpoint. [`StudyError::Busy`], [`StudyError::Exists`],
 /// [`StudyError::OtherStudy`], [`StudyError::Damaged`] before anything is run.
 /// [`StudyError::Write`]. [`StudyError::Empty`], [`StudyError::TooLarge`], [`StudyError::SameName`]
 /// for an invalid study.
@@ -85,6 +86,8 @@ pub fn run<S: Study>(
 ) -> Result<Part, StudyError> {
     let started = Instant::now();
     let header = Header::of(study)?;
+    // Held until the part is written.
+    let _lock = options.checkpoint.as_deref().map(Lock::of).transpose()?;
     let mut part = open(&header, options)?;
     let queue = Queue::new(&part);
     let own = options.shard.range(header.jobs());
@@ -165,11 +168,7 @@ fn open(header: &Header, options: &Options) -> Result<Part, StudyError> {
     match (path.try_exists(), options.resume) {
         (Err(cause), _) => Err(StudyError::Read { path: path.clone(), cause }),
         (Ok(true), false) => Err(StudyError::Exists { path: path.clone() }),
-        (Ok(true), true) => {
-            let found = Part::read(path)?;
-            part.expect_same(&found, path)?;
-            Ok(found)
-        }
+        (Ok(true), true) => part.read_same(path),
         // Written at once, so that a directory that cannot be written to shows before the work is
         // done.
         (Ok(false), _) => part.write(path).map(|()| part),

@@ -16,8 +16,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sha2::{Digest as _, Sha256};
 use twinlag_study::{
-    Failure, Forest, Kind, Options, Outcome, Part, Quantity, Results, Shard, Study, StudyError, Tally, merge, replay,
-    run,
+    Failure, Forest, Kind, Options, Outcome, Part, Progress, Quantity, Results, Shard, Study, StudyError, Tally, merge,
+    replay, run,
 };
 
 /// Numbers of very different size, so that their sums depend on the order of additions; the last block is short.
@@ -352,6 +352,42 @@ fn an_existing_part_is_not_overwritten_unasked() {
     assert_eq!(fs::read(&path).unwrap(), before);
     let nowhere = Options { checkpoint: Some(dir.join("no/such/part.json")), ..options };
     assert!(matches!(run(&NOISE, &nowhere, |_| panic!("nothing should run")), Err(StudyError::Write { .. })));
+}
+
+/// An engine that has lost sight of a machine starts a shard again while the first process still runs.
+#[test]
+fn two_processes_do_not_write_one_part() {
+    let path = directory("busy").join("part.json");
+    let options = Options { checkpoint: Some(path.clone()), resume: true, every: Duration::ZERO, ..options(2) };
+    let mut refused = 0;
+    let again = |_: Progress| {
+        let error = run(&NOISE, &options, |_| panic!("nothing should run")).unwrap_err();
+        assert!(matches!(&error, StudyError::Busy { path: busy } if *busy == path), "{error}");
+        refused += 1;
+        ControlFlow::Continue(())
+    };
+    let part = run(&NOISE, &options, again).unwrap();
+    assert!(refused > 0 && part.into_results().unwrap().to_json() == reference());
+    // It can be taken up again, and nothing is left beside it.
+    assert!(run(&NOISE, &options, go_on).is_ok());
+    assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+}
+
+/// What says how far a shard is reads its part as that of the study that is asked for.
+#[test]
+fn a_part_is_read_as_one_of_its_study() {
+    let dir = directory("read-of");
+    let paths = shards(&dir, &NOISE, 2);
+    let shard = |index| Shard::new(index, 2).unwrap();
+    assert!(Part::read_of(&NOISE, shard(0), "1", &paths[0]).unwrap().is_complete());
+    let other = Noise { seed: 8, ..NOISE };
+    for (read, is) in [
+        (Part::read_of(&other, shard(0), "1", &paths[0]), "plan"),
+        (Part::read_of(&NOISE, shard(1), "1", &paths[0]), "shard"),
+        (Part::read_of(&NOISE, shard(0), "2", &paths[0]), "program"),
+    ] {
+        assert!(matches!(read, Err(StudyError::OtherStudy { what, .. }) if what == is), "{is}");
+    }
 }
 
 #[test]

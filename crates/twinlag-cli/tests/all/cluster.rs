@@ -13,16 +13,23 @@ const SBATCH: &str = r#"#!/bin/sh
 echo "$@" >> "$HERE/submitted"
 [ -f "$HERE/refused" ] && { cat "$HERE/refused" >&2; exit 1; }
 job=$(wc -l < "$HERE/submitted")
-case $2 in
---array)
-    for range in $(echo "$3" | tr , ' '); do
+array=
+for word; do
+    case $word in
+    --array=*) array=${word#--array=} ;;
+    --*) ;;
+    *) script=$word ;;
+    esac
+done
+if [ -n "$array" ]; then
+    for range in $(echo "$array" | tr , ' '); do
         for task in $(seq "${range%-*}" "${range#*-}"); do
-            grep -qx "$task" "$HERE/lost" 2> /dev/null || SLURM_ARRAY_TASK_ID=$task sh "$4"
+            grep -qx "$task" "$HERE/lost" 2> /dev/null || SLURM_ARRAY_TASK_ID=$task sh "$script"
         done
     done
-    ;;
-*) sh "$3" ;;
-esac
+elif [ ! -f "$HERE/no-merge" ]; then
+    sh "$script"
+fi
 echo "$job;loop"
 "#;
 
@@ -68,7 +75,7 @@ fn shards_of_a_study_that_are_lost_are_missing_until_they_are_submitted_again() 
     let json = answer.json();
     assert_eq!((&json["job"], &json["merge_job"], &json["shards"]), (&"1".into(), &"2".into(), &"0-2".into()));
     let submitted = cluster.submitted();
-    assert!(submitted.contains("--array 0-2 ") && submitted.contains("--dependency=afterany:1 "), "{submitted}");
+    assert!(submitted.contains("--array=0-2 ") && submitted.contains("--dependency=afterany:1 "), "{submitted}");
     let script = String::from_utf8(bench.read("out/submission/shard.sh")).expect("text");
     for line in ["#SBATCH --requeue", "#SBATCH --time=5", "#SBATCH --cpus-per-task=2", "--threads 2"] {
         assert!(script.contains(line), "{line} in {script}");
@@ -90,8 +97,8 @@ fn shards_of_a_study_that_are_lost_are_missing_until_they_are_submitted_again() 
         fs::remove_file(bench.path(file)).expect("there");
     }
     let again = cluster.run(&["study", "resubmit", "out", "--time-limit", "7"]);
-    assert!(again.code == 0 && again.stdout.starts_with("shards 1 are submitted"), "{again:#?}");
-    assert!(cluster.submitted().contains("--array 1 "));
+    assert!(again.code == 0 && again.stdout.contains("shards 1, and the merge"), "{again:#?}");
+    assert!(cluster.submitted().contains("--array=1 "));
     assert!(String::from_utf8(bench.read("out/submission/shard.sh")).expect("text").contains("--time=7"));
     let after = status();
     assert!(after.code == 0 && after.stdout.contains("the result is there"), "{after:#?}");
@@ -114,7 +121,7 @@ fn a_damaged_part_is_named_and_not_overwritten() {
     fs::remove_file(bench.path("out/part-0-of-3.json")).expect("there");
     fs::remove_file(bench.path("lost")).expect("there");
     assert_eq!(cluster.run(&["study", "resubmit", "out"]).code, 0);
-    assert!(cluster.submitted().contains("--array 0,2 "));
+    assert!(cluster.submitted().contains("--array=0,2 "));
     assert_eq!(cluster.run(&["study", "status", "out"]).code, 0);
 }
 
@@ -159,19 +166,24 @@ fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
     let batch = ["batch", "the $runs", "--verb", "diagnose", "--without", "slow-mode"];
     assert_eq!(bench.run(&[&batch[..], &["--out", "whole.csv"]].concat()).code, 0);
     let outs = ["--out", "the $runs/t.csv", "--report", "t.html", "--threads", "2"];
-    let engine = ["--engine", "slurm", "--shards", "2", "--time-limit", "5", "--engine-option=--partition=short"];
+    let engine = ["--engine", "slurm", "--shards", "2", "--time-limit", "5", "--engine-option=--comment=it is #1"];
     let submitted = cluster.run(&[&batch[..], &outs, &engine].concat());
     assert_eq!(submitted.code, 0, "{submitted:#?}");
     assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
     assert!(bench.has("t.html"));
     let script = String::from_utf8(bench.read("the $runs/t.csv.submission/shard.sh")).expect("text");
-    assert!(script.contains("#SBATCH --partition=short") && !script.contains("t.html"), "{script}");
+    assert!(!script.contains("t.html"), "{script}");
+    // Of both, as an argument: what is in it is nobody's to quote.
+    assert_eq!(cluster.submitted().matches("'--comment=it is #1'").count(), 0);
+    assert_eq!(cluster.submitted().matches("--comment=it is #1").count(), 2);
     let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv", "--json"]);
     assert_eq!(status.code, 0, "{status:#?}");
     let json = status.json();
     assert_eq!((&json["done"], &json["total"], &json["units"]), (&3.into(), &3.into(), &"records".into()));
     let resubmit = ["batch", "--resubmit", "--out", "the $runs/t.csv", "--time-limit", "7"];
-    cluster.run(&resubmit).says(&["nothing is missing", "merge.sh"]);
+    cluster.run(&resubmit).says(&["nothing is missing", "the result is there"]);
+    let json = cluster.run(&[&resubmit[..], &["--json"]].concat()).json();
+    assert_eq!((&json["shards"], &json["job"]), (&"".into(), &serde_json::Value::Null));
     // Failed: the merge of what was submitted again refused to replace the table of the one before, which was taken for the result.
     fs::remove_file(bench.path("the $runs/t.csv.part-1-of-2")).expect("there");
     let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv"]);
@@ -184,7 +196,105 @@ fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
     assert_eq!(bench.read("the $runs/t.csv"), bench.read("whole.csv"));
     let again = cluster.run(&[&batch[..], &["--out", "the $runs/t.csv", "--force"], &engine].concat());
     assert_eq!(again.code, 2, "{again:#?}");
-    again.says(&["t.csv.manifest", "--resume"]);
+    again.says(&["t.csv.part-0-of-2", "t.csv.manifest", "--resume"]);
+}
+
+/// What `--` ends are names, whatever they begin with, and which shard it is does not stand among them.
+#[test]
+fn names_may_begin_with_a_hyphen() {
+    let cluster = Cluster::new(Bench::with("hyphen", "-plan.toml", STUDY));
+    let bench = &cluster.bench;
+    bench.write("-record.csv", Trace::GOOD.csv());
+    let batch =
+        ["batch", "--out", "t.csv", "--engine", "slurm", "--shards", "1", "--time-limit", "5", "--", "-record.csv"];
+    assert_eq!(cluster.run(&batch).code, 0);
+    assert!(bench.has("t.csv"), "{}", String::from_utf8_lossy(&bench.read("t.csv.submission/logs/shard-0.log")));
+    let study = [
+        "study",
+        "submit",
+        "--out=-out",
+        "--engine",
+        "slurm",
+        "--shards",
+        "1",
+        "--time-limit",
+        "5",
+        "--",
+        "-plan.toml",
+    ];
+    assert_eq!(cluster.run(&study).code, 0);
+    assert!(bench.has("-out/results.json"));
+}
+
+/// The merge can be lost as any job: then it alone is submitted again. Until then an old result is not taken for that of the shards.
+#[test]
+fn a_merge_that_is_lost_is_submitted_again() {
+    let cluster = Cluster::new(Bench::with("lost-merge", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    bench.write("no-merge", "");
+    assert_eq!(cluster.run(&[&SUBMIT[..], &["--shards", "2"]].concat()).code, 0);
+    bench.write("queue", "2 N/A PENDING\n");
+    cluster.run(&["study", "resubmit", "out"]).says(&["nothing is missing", "the merge waits or runs"]);
+    for file in ["queue", "no-merge"] {
+        fs::remove_file(bench.path(file)).expect("there");
+    }
+    let again = cluster.run(&["study", "resubmit", "out", "--json"]);
+    let json = again.json();
+    assert_eq!((&json["job"], &json["merge_job"]), (&serde_json::Value::Null, &"3".into()), "{again:#?}");
+    assert!(!cluster.submitted().lines().last().expect("a line").contains("--dependency"));
+    assert_eq!(cluster.run(&["study", "status", "out"]).code, 0);
+    // A part that is newer than the result.
+    let part = bench.read("out/part-1-of-2.json");
+    let result = fs::metadata(bench.path("out/results.json")).and_then(|file| file.modified()).expect("a time");
+    let file = fs::File::options().write(true).open(bench.path("out/part-1-of-2.json")).expect("ours");
+    file.set_modified(result + std::time::Duration::from_secs(1)).expect("ours");
+    assert_eq!(cluster.run(&["study", "status", "out"]).code, 75);
+    assert_eq!(bench.read("out/part-1-of-2.json"), part);
+}
+
+/// Parts of another division, of another program, and options that an engine would not heed are refused before anything is submitted.
+#[test]
+fn what_would_fail_later_is_refused_at_once() {
+    let cluster = Cluster::new(Bench::with("early", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "out", "--shard", "0/3"]).code, 0);
+    let submit = [&SUBMIT[..], &["--shards", "2"]].concat();
+    let refused = cluster.run(&submit);
+    assert_eq!(refused.code, 2, "{refused:#?}");
+    refused.says(&["part-0-of-3.json", "another number of shards"]);
+    for (engine, option) in
+        [("parallel", "--memory=2G"), ("hyperqueue", "--memory=2G"), ("kubernetes", "--engine-option=--x")]
+    {
+        let refused = cluster.run(&[&SUBMIT[..6], &[engine, "--time-limit=5", "--shards=3", option]].concat());
+        assert_eq!(refused.code, 2, "{refused:#?}");
+        refused.says(&[engine, option.split('=').next().expect("a name")]);
+    }
+    assert!(!bench.has("submitted"));
+    // Options of a file that are for a run are none of a question about it.
+    bench.write("lab.toml", "[batch]\nverb = \"diagnose\"\n");
+    let status = bench.run(&["batch", "--status", "--out", "t.csv", "--config", "lab.toml"]);
+    assert_eq!(status.code, 3, "{status:#?}");
+    status.says(&["nothing was submitted"]);
+}
+
+/// As after a shard was lost, or its part damaged.
+#[test]
+fn a_shard_whose_part_is_gone_writes_its_gas_temperatures_again() {
+    let cluster = Cluster::new(Bench::with("gas", "a.csv", Trace::GOOD.csv()));
+    let bench = &cluster.bench;
+    let batch = ["batch", "a.csv", "--verb", "compensate", "--gas", "gas", "--out", "t.csv"];
+    let engine = ["--engine", "slurm", "--shards", "1", "--time-limit", "5"];
+    assert_eq!(cluster.run(&[&batch[..], &engine].concat()).code, 0);
+    let table = bench.read("t.csv");
+    fs::remove_file(bench.path("t.csv.part-0-of-1")).expect("there");
+    assert_eq!(cluster.run(&["batch", "--resubmit", "--out", "t.csv"]).code, 0);
+    assert!(bench.has("t.csv.part-0-of-1"));
+    assert_eq!(bench.read("t.csv"), table);
+    // To a folder that has the gas temperatures of another batch.
+    let other = cluster.run(&[&batch[..7], &["other.csv"], &engine].concat());
+    assert_eq!(other.code, 2, "{other:#?}");
+    other.says(&["a.csv.gas.csv exists", "--force"]);
+    assert!(!bench.has("other.csv.manifest"));
 }
 
 /// The commands that are printed do what submitting does.
@@ -195,7 +305,7 @@ fn commands_of_a_dry_run_can_be_typed() {
     assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "whole"]).code, 0);
     let dry = cluster.run(&[&SUBMIT[..], &["--shards", "2", "--dry-run"]].concat());
     assert_eq!(dry.code, 0, "{dry:#?}");
-    assert!(!bench.has("submitted") && dry.stdout.starts_with("sbatch --parsable --array 0-1 "), "{dry:#?}");
+    assert!(!bench.has("submitted") && dry.stdout.starts_with("job=$(sbatch --parsable '--array=0-1' "), "{dry:#?}");
     for engine in ["parallel", "kubernetes", "hyperqueue"] {
         let answer =
             cluster.run(&[&SUBMIT[..6], &[engine, "--shards", "2", "--time-limit", "5", "--dry-run"]].concat());
@@ -208,5 +318,17 @@ fn commands_of_a_dry_run_can_be_typed() {
     }
     let merge = std::process::Command::new("sh").arg(bench.path("out/submission/merge.sh")).status();
     assert!(merge.expect("a shell").success());
+    assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
+    // As it is printed.
+    for folder in ["out/submission", "out/part-0-of-2.json", "out/part-1-of-2.json", "out/results.json"] {
+        let path = bench.path(folder);
+        if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) }.expect("ours");
+    }
+    let dry = cluster.run(&[&SUBMIT[..], &["--shards", "2", "--dry-run"]].concat());
+    let mut typed = std::process::Command::new("sh");
+    typed.args(["-c", &dry.stdout]).env("PATH", &cluster.path).env("HERE", bench.path("")).current_dir(bench.path(""));
+    assert!(typed.status().expect("a shell").success());
+    let submitted = cluster.submitted();
+    assert!(submitted.contains("--dependency=afterany:1 "), "{submitted}");
     assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
 }
