@@ -11,7 +11,7 @@ use crate::plan::PlanAnswer;
 use crate::print;
 use crate::shards::BatchPart;
 use crate::simulate::Simulation;
-use crate::study::{StudyAnswer, StudyPart};
+use crate::study::{StudyAnswer, StudyPart, StudyPlan};
 use crate::submission::{SubmissionAnswer, SubmissionStatus};
 
 /// What can be described.
@@ -41,6 +41,8 @@ pub(crate) enum Name {
     Study,
     /// The answer of `study run` with --shard.
     StudyPart,
+    /// The answer of `study plan`.
+    StudyPlan,
     /// The answer of `study submit` and `study resubmit`, and of `batch` with --engine and --resubmit.
     Submission,
     /// The answer of `study status` and of `batch` with --status.
@@ -63,6 +65,7 @@ pub(crate) fn run(name: Name) -> Result<u8, Failure> {
         Name::Simulation => generator.into_root_schema_for::<Simulation>(),
         Name::Study => generator.into_root_schema_for::<StudyAnswer>(),
         Name::StudyPart => generator.into_root_schema_for::<StudyPart>(),
+        Name::StudyPlan => generator.into_root_schema_for::<StudyPlan>(),
         Name::Submission => generator.into_root_schema_for::<SubmissionAnswer>(),
         Name::SubmissionStatus => generator.into_root_schema_for::<SubmissionStatus>(),
     };

@@ -1,7 +1,9 @@
-//! `twinlag study run PLAN.toml --out DIR`, `twinlag study merge DIR`, and shards on a cluster.
+//! `twinlag study run PLAN.toml --out DIR`, `twinlag study merge DIR`, what a study will take, and shards on a cluster.
 //!
 //! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. A run
 //! without shards merges its only part itself. What was submitted is in the folder `submission` within.
+
+mod plan;
 
 use std::ffi::OsStr;
 use std::fs;
@@ -18,8 +20,11 @@ use twinlag_study::{Options, Part, Shard, Study as _, StudyError};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::study::plan::Planning;
 use crate::submission::{self, Cluster, ShardProgress};
 use crate::{output, print, progress};
+
+pub(crate) use crate::study::plan::StudyPlan;
 
 /// What to do with a Monte-Carlo study.
 #[derive(Debug, Subcommand)]
@@ -32,6 +37,8 @@ pub(crate) enum Study {
         /// The folder that holds the parts.
         dir: PathBuf,
     },
+    /// Run a few trials, and say what the whole study will take, and in how many shards.
+    Plan(Planning),
     /// Run all shards of a study on a cluster, and the merge behind them.
     #[command(mut_arg("engine", |engine| engine.required(true)))]
     Submit(Submit),
@@ -107,6 +114,7 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
     match command {
         Study::Run(run) => start(run, console),
         Study::Merge { dir } => merge(dir, console),
+        Study::Plan(planning) => plan::run(planning, console),
         Study::Submit(command) => submit(command, console),
         Study::Status { dir } => {
             let result = dir.join(RESULTS);

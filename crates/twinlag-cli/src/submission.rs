@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::print;
 
 /// Most shards of one submission; chosen: engines take some thousand, and each has a file.
-const MAX_SHARDS: u64 = 1_000_000;
+pub(crate) const MAX_SHARDS: u64 = 1_000_000;
 
 fn shards(text: &str) -> Result<NonZeroU64, String> {
     let shards = text.parse().ok().filter(|shards: &NonZeroU64| shards.get() <= MAX_SHARDS);

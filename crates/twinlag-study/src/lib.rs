@@ -72,12 +72,14 @@
 //! A [`Shard`] `k/n` owns the `k`-th of `n` contiguous ranges of the blocks of all cells. [`run()`]
 //! keeps a [`Part`] on disk: it is replaced, never edited, so that there is a whole one at every
 //! moment, and one process at a time writes it. The part of a finished shard is its result. [`merge`] joins parts in any order and says
+//! which shards are missing. [`replay`] runs a single trial again. [`pilot()`] says beforehand what shards take.
 
 mod error;
 mod forest;
 mod lock;
 mod moments;
 mod part;
+mod pilot;
 mod rate;
 mod run;
 mod shard;
@@ -89,6 +91,7 @@ pub use error::{Gap, StudyError};
 pub use forest::{Forest, ForestError, Merge};
 pub use moments::Moments;
 pub use part::{Header, Part, Results, merge};
+pub use pilot::{Cost, Pilot, PilotOptions, Time, pilot};
 pub use rate::Rate;
 pub use run::{Options, Progress, replay, run};
 pub use shard::{Shard, ranges};

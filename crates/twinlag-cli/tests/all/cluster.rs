@@ -332,3 +332,29 @@ fn commands_of_a_dry_run_can_be_typed() {
     assert!(submitted.contains("--dependency=afterany:1 "), "{submitted}");
     assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
 }
+
+/// The time of five trials or more of each cell cannot be told beforehand; what follows from it can.
+#[test]
+fn what_a_study_takes_is_planned_from_a_few_trials() {
+    let bench = Bench::with(
+        "plan",
+        "plan.toml",
+        STUDY.replace("trials = 30", "trials = 100000000").replace("block = 10", "block = 1000"),
+    );
+    let plan = ["study", "plan", "plan.toml", "--pilot-seconds", "1", "--json"];
+    let answer = bench.run(&plan);
+    assert_eq!(answer.code, 0, "{answer:#?}");
+    let json = answer.json();
+    let number = |name: &str| json[name].as_f64().expect("a number");
+    let [low, high] = [0, 1].map(|end| json["core_hours_interval"][end].as_f64().expect("a number"));
+    assert!(low <= number("core_hours") && number("core_hours") <= high);
+    assert!(number("pilot_trials") >= 6.0 && number("trials") == 1e8);
+    // Shards of half an hour have all of the time.
+    let minutes = number("shards") * number("longest_shard_min");
+    assert!((minutes / 60.0 / number("core_hours") - 1.0).abs() < 0.05 && number("longest_shard_min") < 31.0);
+    assert!(number("time_limit_min") >= number("longest_shard_min"));
+    assert!(number("largest_part_bytes") * number("shards") >= number("bytes"));
+    let words = bench.run(&plan[..5]).stdout;
+    assert!(words.contains("--shards") && words.contains("at the speed of this pilot"), "{words}");
+    bench.refuses(3, &["study", "plan", "nowhere.toml"], &["nowhere.toml"]);
+}

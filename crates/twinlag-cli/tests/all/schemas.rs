@@ -88,6 +88,8 @@ fn answers_of_the_other_verbs_are_as_their_schemas_say() {
     fits(&schema(&bench, "study-part"), &run("0/2").json());
     assert_eq!(run("1/2").code, 0);
     fits(&schema(&bench, "study"), &bench.run(&["study", "merge", "study", "--json"]).json());
+    let plan = ["study", "plan", "study.toml", "--pilot-seconds", "1", "--json"];
+    fits(&schema(&bench, "study-plan"), &bench.run(&plan).json());
     let submit = ["study", "submit", "study.toml", "--out", "other", "--engine", "parallel", "--shards", "2"];
     let submitted = bench.run(&[&submit[..], &["--time-limit", "5", "--json"]].concat());
     fits(&schema(&bench, "submission"), &submitted.json());
