@@ -1,6 +1,7 @@
 //! How long a fit and a trial take (Criterion, `benches/fits.rs`), the fits beside the SciPy script that a user would otherwise
 //! write: same record, same cost, same start, same minimum, in one run.
 
+mod merge;
 pub(crate) mod scale;
 mod smoother;
 mod stream;
@@ -51,6 +52,9 @@ pub(crate) struct Bench {
     /// Times one pass of filter and smoother over 1e5 samples in place of the fits, beside the same in NumPy.
     #[arg(long, conflicts_with_all = ["million", "diagnose", "stream"])]
     smoother: bool,
+    /// Times the merge of a study whose parts have one block each in place of the fits: of so many parts, and of a tenth.
+    #[arg(long, value_name = "PARTS", conflicts_with_all = ["million", "diagnose", "stream", "smoother"])]
+    merge: Option<u64>,
     #[command(flatten)]
     long: Long,
     /// One step of `--scale`, in a process of its own.
@@ -101,6 +105,9 @@ pub(crate) fn run(arguments: &Bench) -> Result<()> {
     }
     if arguments.stream {
         return stream::run();
+    }
+    if let Some(parts) = arguments.merge {
+        return merge::run(parts);
     }
     if arguments.smoother {
         return smoother::run();

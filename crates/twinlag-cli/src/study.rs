@@ -5,7 +5,6 @@
 
 mod plan;
 
-use std::ffi::OsStr;
 use std::fs;
 use std::num::NonZeroU32;
 use std::ops::ControlFlow;
@@ -140,10 +139,11 @@ const SUBMISSION: &str = "submission";
 fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
     expect_no_results(&command.out)?;
     let shards = command.cluster.shards();
-    if let Some(part) = parts_in(&command.out).unwrap_or_default().iter().find(|(shard, _)| shard.of() != shards) {
-        let part = part.1.display();
+    if let Some(part) = parts_in(&command.out).unwrap_or_default().iter().find(|part| part.of() != shards) {
+        let part = command.out.join(part.file_name());
         return Err(Failure::Usage(format!(
-            "{part}: is of another number of shards; remove it, or name another folder"
+            "{}: is of another number of shards; remove it, or name another folder",
+            part.display()
         )));
     }
     let plan = prepare(&command.plan, &command.out)?;
@@ -244,7 +244,7 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     if parts.is_empty() {
         return Err(Failure::File(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
-    let results = twinlag_study::merge(parts.iter().map(|(_, path)| path))?;
+    let results = twinlag_study::merge(parts.iter().map(|part| dir.join(part.file_name())))?;
     let experiment = Experiment::new(&plan)?;
     if results.header().plan() != experiment.plan() {
         return Err(Failure::File(format!(
@@ -259,15 +259,13 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The parts in a folder, neighbours side by side: these merge at once.
-fn parts_in(dir: &Path) -> std::io::Result<Vec<(Shard, PathBuf)>> {
+/// The shards whose parts are in a folder, neighbours side by side: these merge at once.
+fn parts_in(dir: &Path) -> std::io::Result<Vec<Shard>> {
     let mut parts = Vec::new();
     for entry in fs::read_dir(dir)? {
-        let path = entry?.path();
-        let shard = path.file_name().and_then(OsStr::to_str).and_then(Shard::of_file_name);
-        parts.extend(shard.map(|shard| (shard, path)));
+        parts.extend(entry?.file_name().to_str().and_then(Shard::of_file_name));
     }
-    parts.sort_by_key(|(shard, _)| (shard.of(), shard.index()));
+    parts.sort_by_key(|shard| (shard.of(), shard.index()));
     Ok(parts)
 }
 
