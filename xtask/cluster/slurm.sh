@@ -12,16 +12,21 @@ action=$1
 dir=$2
 export SLURM_CONF="$dir/slurm.conf"
 
+# Whether a process has not ended, waited for or not.
+runs() {
+    state=$(ps -o state= -p "$1") && [ "${state#Z}" = "$state" ]
+}
+
 # Ends the process of a file, and waits for its end.
 end() {
     [ -f "$1" ] || return 0
     pid=$(cat "$1")
     kill "-$2" "$pid" 2> /dev/null || return 0
     for _ in $(seq 100); do
-        kill -0 "$pid" 2> /dev/null || break
+        runs "$pid" || break
         sleep 0.1
     done
-    if kill -0 "$pid" 2> /dev/null; then
+    if runs "$pid"; then
         echo "process $pid of $1 does not end" >&2
         exit 1
     fi
@@ -91,11 +96,11 @@ kill)
     # first, or it would report that the task has failed.
     # Those of another Slurm, whose nodes have the same names, have another configuration.
     processes=$(grep -lzx "SLURMD_NODENAME=$3" /proc/[0-9]*/environ 2> /dev/null \
-        | xargs -r grep -lzx "SLURM_CONF=$SLURM_CONF" 2> /dev/null | cut -d / -f 3)
+        | xargs -r grep -lzxF "SLURM_CONF=$SLURM_CONF" 2> /dev/null | cut -d / -f 3)
     for process in $processes; do
         parent=$(ps -o ppid= -p "$process" | tr -d ' ')
         case $(ps -o args= -p "${parent:-1}") in
-        slurmstepd*) kill -KILL "$parent" ;;
+        slurmstepd*) kill -KILL "$parent" 2> /dev/null || true ;;
         esac
     done
     for process in $processes; do kill -KILL "$process" 2> /dev/null || true; done

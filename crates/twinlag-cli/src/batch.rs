@@ -128,9 +128,27 @@ pub(crate) struct Batch {
 }
 
 /// What a run on its own is of, and nothing else goes with.
-const OF_RUN: [&str; 15] = [
-    "what", "verb", "group_by", "gas", "keep", "model", "without", "form", "trust", "resume", "shard", "engine",
-    "Columns", "Method", "Physics",
+const OF_RUN: [&str; 20] = [
+    "what",
+    "verb",
+    "group_by",
+    "gas",
+    "keep",
+    "model",
+    "without",
+    "form",
+    "trust",
+    "resume",
+    "shard",
+    "engine",
+    "shards",
+    "cpus",
+    "memory",
+    "engine_option",
+    "dry_run",
+    "Columns",
+    "Method",
+    "Physics",
 ];
 
 /// The shards of a batch; no cell of the table depends on them.
@@ -140,10 +158,10 @@ struct Division {
     #[arg(long, value_name = "K/N", allow_hyphen_values = true, conflicts_with_all = ["report", "engine"])]
     shard: Option<Shard>,
     /// Make the table of the parts that shards have left beside it.
-    #[arg(long, conflicts_with_all = OF_RUN)]
+    #[arg(long, conflicts_with_all = OF_RUN, conflicts_with = "time_limit")]
     merge: bool,
     /// Say how far the shards are that were submitted with --engine.
-    #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "resubmit", "report", "force", "threads"])]
+    #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "resubmit", "report", "force", "threads", "time_limit"])]
     status: bool,
     /// Submit again the shards that are missing, which are neither done nor waiting nor running, and the merge.
     #[arg(long, conflicts_with_all = OF_RUN, conflicts_with_all = ["merge", "report", "force", "threads"])]
@@ -347,6 +365,21 @@ fn merge_parts(command: &Batch, console: Console) -> Result<u8, Failure> {
     finish(command, &manifest.units(), &mut parts, verb, unit_name, console)
 }
 
+/// Writes a table, as text or as Parquet by its ending.
+fn write_table(out: &Path, units: &[Unit], answers: &mut impl Answers, verb: RowVerb) -> Result<(), Failure> {
+    output::replace(out, |file| {
+        let written = if is_parquet(out) {
+            write_parquet(units, answers, verb, file)
+        } else {
+            write_csv(units, answers, verb, std::io::BufWriter::new(file))
+        };
+        written.map_err(|error| match error {
+            BatchError::Table { .. } => Failure::Other(format!("{}: {error}", out.display())),
+            error => error.into(),
+        })
+    })
+}
+
 /// Writes the table and the summary, and says what came of it.
 fn finish(
     command: &Batch,
@@ -356,26 +389,17 @@ fn finish(
     unit_name: &'static str,
     console: Console,
 ) -> Result<u8, Failure> {
-    for out in &command.out {
-        output::replace(out, |file| {
-            let written = if is_parquet(out) {
-                write_parquet(units, answers, verb, file)
-            } else {
-                write_csv(units, answers, verb, std::io::BufWriter::new(file))
-            };
-            written.map_err(|error| match error {
-                BatchError::Table { .. } => Failure::Other(format!("{}: {error}", out.display())),
-                error => error.into(),
-            })
-        })?;
-    }
+    // The first table last: where it is, all is.
+    let [first, others @ ..] = &command.out[..] else { unreachable!("one is required") };
+    others.iter().try_for_each(|out| write_table(out, units, answers, verb))?;
     let fleet = Fleet::of(units, answers)?;
     if let Some(path) = &command.report {
         let making = report::making(&[] as &[&Path], command.is_static);
-        let title = command.out[0].display().to_string();
+        let title = first.display().to_string();
         let made_by = ["twinlag", env!("CARGO_PKG_VERSION")];
         output::write(path, fleet_report(&fleet, &title, unit_name, made_by, &making)?)?;
     }
+    write_table(first, units, answers, verb)?;
     say(command, unit_name, &fleet, console)?;
     let outcome = match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
         (0, 0, 0) => Outcome::Unusable,
@@ -451,9 +475,7 @@ impl Batch {
     ) -> Result<Manifest, Failure> {
         shards::manifest(&self.out[0], &self.what, asked, || {
             let (files, units) = self.units(question, journal, console)?;
-            if !self.course.resume {
-                self.expect_no_gas(&question.gas_files(&files)?)?;
-            }
+            self.expect_no_gas(&question.gas_files(&files)?)?;
             shards::listed(&self.what, asked, &units, &files, self.course.threads, console)
         })
     }

@@ -242,7 +242,7 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     let name = dir.display();
     let parts = parts_in(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
     if parts.is_empty() {
-        return Err(Failure::File(format!("{name}: holds no part of a study; run `twinlag study run` first")));
+        return Err(Failure::NotYet(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
     let results = twinlag_study::merge(parts.iter().map(|part| dir.join(part.file_name())))?;
     let experiment = Experiment::new(&plan)?;

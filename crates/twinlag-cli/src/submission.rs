@@ -243,14 +243,14 @@ pub(crate) fn resubmit(
     };
     let missing: Vec<u64> =
         (0..).zip(&progress).filter(|(shard, shown)| is_missing(*shard, shown)).map(|(shard, _)| shard).collect();
-    let (is_running, is_merging) =
-        queue.map_or((false, false), |queue| (!queue.shards.is_empty(), queue.merge.is_some()));
-    if missing.is_empty() && (is_running || is_merging || is_merged(&progress, result)) {
+    let is_merging = queue.is_some_and(|queue| queue.merge.is_some());
+    // A merge that was lost is missing even while shards run.
+    if missing.is_empty() && (is_merging || is_merged(&progress, result)) {
         console.note(|| {
-            let what = match (is_running, is_merging) {
-                (true, _) => "all shards are done, wait or run",
-                (false, true) => "all shards are done, and the merge waits or runs",
-                (false, false) => "all shards are done, and the result is there",
+            let what = if is_merging {
+                "all shards are done, wait or run, and so does the merge"
+            } else {
+                "all shards are done, and the result is there"
             };
             format!("nothing is missing: {what}")
         });

@@ -1,6 +1,6 @@
 //! The engines, and what they say of shards.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 
@@ -67,6 +67,8 @@ pub enum State {
 pub struct Queue {
     /// The shards that have not ended.
     pub shards: BTreeMap<u64, State>,
+    /// The jobs that have these shards.
+    pub jobs: BTreeSet<String>,
     /// The merge, if it has not ended.
     pub merge: Option<State>,
 }

@@ -25,6 +25,10 @@ pub enum ClusterError {
     Damaged { path: PathBuf, reason: String },
     #[error("{}: another process submits from here: wait until it ends", path.display())]
     Busy { path: PathBuf },
+    #[error("{}: was opened to look at it, not to submit more", path.display())]
+    LookedAt { path: PathBuf },
+    #[error("the arguments of a shard do not say where the shard stands: expected the word {}", crate::Work::SHARD)]
+    NoShard,
     #[error("{option} means nothing to {engine}: {instead}")]
     NotOfEngine { option: &'static str, engine: Engine, instead: &'static str },
     #[error("{}: cannot be read: {reason}", path.display())]

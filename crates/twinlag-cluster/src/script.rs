@@ -66,8 +66,8 @@ pub(crate) fn shard(work: &Work, directives: &[String], logs: &str) -> Result<St
     let about = format!("One shard of {shards}, counted from 0: the first argument, or the task of an array.");
     let first = "shard=\"${1:-${SLURM_ARRAY_TASK_ID:-${JOB_COMPLETION_INDEX:?expected the number of a shard}}}\"\n";
     let head = head(work, &about, directives, first, [logs, &log_of("$shard")])?;
-    let place = work.shard.iter().position(|word| word == Work::SHARD).unwrap_or(work.shard.len());
-    let (before, behind) = (&work.shard[..place], work.shard.get(place + 1..).unwrap_or_default());
+    let place = work.shard.iter().position(|word| word == Work::SHARD).ok_or(ClusterError::NoShard)?;
+    let (before, behind) = (&work.shard[..place], &work.shard[place + 1..]);
     let words = [command(before)?, format!("\"$shard/{shards}\""), command(behind)?];
     let arguments = words.into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" ");
     Ok(format!("{head}exec {}\n", program(&arguments)))

@@ -87,13 +87,17 @@ pub(crate) fn submit_shards(resources: &Resources, shards: &[u64], script: &str)
 
 /// Submits the merge.
 ///
-/// - `behind`: the job of the shards, if it waits for one
-pub(crate) fn submit_merge(resources: &Resources, behind: Option<&Job>, script: &str) -> Result<Taken, ClusterError> {
-    let dependency = |job: &Job| job.id.as_ref().map(|id| format!("--dependency=afterany:{id}"));
-    // Where the shards are, whichever of several clusters has taken them.
-    let cluster = |job: &Job| job.cluster.as_ref().map(|cluster| format!("--clusters={cluster}"));
-    let after = behind.into_iter().flat_map(|job| [dependency(job), cluster(job)]).flatten();
-    Taken::by(&sbatch(resources, after, script))
+/// - `behind`: the jobs that it waits for
+/// - `cluster`: where they are, whichever of several clusters has taken them
+pub(crate) fn submit_merge(
+    resources: &Resources,
+    behind: &[String],
+    cluster: Option<&str>,
+    script: &str,
+) -> Result<Taken, ClusterError> {
+    let dependency = (!behind.is_empty()).then(|| format!("--dependency=afterany:{}", behind.join(":")));
+    let cluster = cluster.map(|cluster| format!("--clusters={cluster}"));
+    Taken::by(&sbatch(resources, dependency.into_iter().chain(cluster), script))
 }
 
 /// What Slurm has taken.
@@ -142,6 +146,7 @@ fn queue_in(listed: &str, jobs: &[Job]) -> Queue {
         if let (true, Ok(shard)) = (jobs.iter().any(|job| is(&job.id)), task.parse()) {
             let known = queue.shards.entry(shard).or_insert(state);
             *known = state.max(*known);
+            queue.jobs.insert(id.to_owned());
         } else if jobs.iter().any(|job| is(&job.merge_id)) {
             queue.merge = queue.merge.max(Some(state));
         }
@@ -174,6 +179,7 @@ mod tests {
         let queue = queue_in(listed, &[job("12", "13"), job("14", "15")]);
         assert_eq!(queue.shards, BTreeMap::from([(0, State::Running), (3, State::Running)]));
         assert_eq!(queue.merge, Some(State::Waiting));
+        assert_eq!(queue.jobs.into_iter().collect::<Vec<_>>(), ["12", "14"]);
     }
 
     #[test]

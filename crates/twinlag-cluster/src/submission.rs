@@ -39,6 +39,12 @@ pub struct Submission {
     lock: Option<File>,
 }
 
+/// The name of the format.
+#[derive(Deserialize)]
+struct Named {
+    schema: String,
+}
+
 /// What an engine has taken.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
@@ -77,7 +83,12 @@ impl Submission {
             Err(ClusterError::NotSubmitted { .. }) => {}
             // The engine has taken nothing.
             Ok(earlier) if earlier.jobs.is_empty() => {}
-            _ => return Err(ClusterError::Exists { path: folder.join(FILE) }),
+            Ok(_) => return Err(ClusterError::Exists { path: folder.join(FILE) }),
+            Err(error) => return Err(error),
+        }
+        let job = folder.join(kubernetes::FILE);
+        if fs::read_to_string(&job).is_ok_and(|job| kubernetes::is_filled_in(&job)) {
+            return Err(ClusterError::Exists { path: job });
         }
         let (schema, version) = (SCHEMA.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
         let folder = folder.to_owned();
@@ -97,10 +108,13 @@ impl Submission {
             _ => ClusterError::Read { path: path.clone(), reason: error.to_string() },
         })?;
         let damaged = |reason| ClusterError::Damaged { path: path.clone(), reason };
-        let mut submission: Self = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        if submission.schema != SCHEMA {
-            return Err(damaged(format!("expected {SCHEMA}, found {}", submission.schema)));
+        let wrong = |error: serde_json::Error| damaged(error.to_string());
+        // Of another format nothing but its name is known.
+        let Named { schema } = serde_json::from_str(&text).map_err(wrong)?;
+        if schema != SCHEMA {
+            return Err(damaged(format!("expected {SCHEMA}, found {schema}")));
         }
+        let mut submission: Self = serde_json::from_str(&text).map_err(wrong)?;
         folder.clone_into(&mut submission.folder);
         Ok(submission)
     }
@@ -147,10 +161,15 @@ impl Submission {
     /// Gives the shards that are submitted from now on another limit of time, and writes the scripts anew.
     ///
     /// # Errors
-    /// [`ClusterError::Write`].
+    /// [`ClusterError::LookedAt`], [`ClusterError::Write`].
     pub fn limit_time(&mut self, time_min: NonZeroU32) -> Result<(), ClusterError> {
+        self.expect_lock()?;
         self.resources.time_min = time_min;
         self.write_scripts()
+    }
+
+    fn expect_lock(&self) -> Result<(), ClusterError> {
+        if self.lock.is_some() { Ok(()) } else { Err(ClusterError::LookedAt { path: self.folder.clone() }) }
     }
 
     fn write_scripts(&self) -> Result<(), ClusterError> {
@@ -165,12 +184,11 @@ impl Submission {
         match self.engine {
             Engine::Hyperqueue => self.write(hyperqueue::FILE, hyperqueue::SCRIPT),
             Engine::Kubernetes => {
-                let job = self.folder.join(kubernetes::FILE);
-                // What was filled in stays.
-                if job.exists() && !self.jobs.is_empty() {
-                    return Ok(());
-                }
-                self.write(kubernetes::FILE, &kubernetes::job(work, resources, &self.path(SHARD)?)?)
+                let job = match fs::read_to_string(self.folder.join(kubernetes::FILE)) {
+                    Ok(job) if kubernetes::is_filled_in(&job) => kubernetes::with_limit(&job, resources),
+                    _ => kubernetes::job(work, resources, &self.path(SHARD)?)?,
+                };
+                self.write(kubernetes::FILE, &job)
             }
             Engine::Slurm | Engine::Parallel => Ok(()),
         }
@@ -217,15 +235,14 @@ impl Submission {
         }
     }
 
-    /// Hands shards to the engine, and the merge behind them, which runs whatever becomes of the shards; without shards, the merge alone.
+    /// Hands shards to the engine, and the merge behind them and behind what the engine still has; without shards, the merge alone. The
+    /// merge runs whatever becomes of the shards, but for one that has lost more workers of `HyperQueue` than it may.
     ///
     /// # Errors
-    /// [`ClusterError::Busy`] of one that was [opened](Self::open) to look at it; [`ClusterError::NoProgram`], [`ClusterError::Refused`],
-    /// [`ClusterError::Write`].
+    /// [`ClusterError::LookedAt`] of one that was [opened](Self::open) to look at it; [`ClusterError::NoProgram`],
+    /// [`ClusterError::Refused`], [`ClusterError::Write`].
     pub fn submit(&mut self, shards: &[u64]) -> Result<Submitted, ClusterError> {
-        if self.lock.is_none() {
-            return Err(ClusterError::Busy { path: self.folder.clone() });
-        }
+        self.expect_lock()?;
         // What cannot be recorded is not submitted.
         self.save()?;
         let mut job = Job { shards: ranges(shards), ..Job::default() };
@@ -244,15 +261,21 @@ impl Submission {
 
     /// Each job is recorded before the next is submitted.
     fn submit_to_slurm(&mut self, shards: &[u64], mut job: Job) -> Result<Job, ClusterError> {
+        // Those of earlier submissions that have not ended.
+        let mut behind: Vec<String> = slurm::queue(&self.jobs)?.jobs.into_iter().collect();
+        job.cluster = self.jobs.last().and_then(|earlier| earlier.cluster.clone());
         if !shards.is_empty() {
             let taken = slurm::submit_shards(&self.resources, shards, &self.path(SHARD)?)?;
+            behind.push(taken.id.clone());
             (job.id, job.cluster) = (Some(taken.id), taken.cluster);
             self.jobs.push(job.clone());
             self.save()?;
+        }
+        let taken = slurm::submit_merge(&self.resources, &behind, job.cluster.as_deref(), &self.path(MERGE)?)?;
+        (job.merge_id, job.cluster) = (Some(taken.id), taken.cluster.or(job.cluster));
+        if !shards.is_empty() {
             self.jobs.pop();
         }
-        let taken = slurm::submit_merge(&self.resources, Some(&job), &self.path(MERGE)?)?;
-        (job.merge_id, job.cluster) = (Some(taken.id), taken.cluster.or(job.cluster));
         self.jobs.push(job.clone());
         self.save()?;
         Ok(job)

@@ -143,6 +143,23 @@ impl<T> Forest<T> {
     }
 }
 
+/// The blocks of each node that a forest over `blocks` blocks has of neighbours, in order.
+pub(crate) fn nodes_of(range: Range<u64>, blocks: u64) -> impl Iterator<Item = Range<u64>> {
+    let mut start = range.start;
+    std::iter::from_fn(move || {
+        if start >= range.end {
+            return None;
+        }
+        // The largest node that begins there and is all of it in the range; what lies beyond the last block is missing nowhere.
+        let end_of = |level: u32| start.saturating_add(1 << level).min(blocks);
+        let highest = start.trailing_zeros().min(62);
+        let level = (0..=highest).rev().find(|level| end_of(*level) <= range.end).unwrap_or(0);
+        let node = start..end_of(level);
+        start = node.end;
+        Some(node)
+    })
+}
+
 impl<T: Merge> Forest<T> {
     /// Adds the piece of one block.
     ///
@@ -314,6 +331,21 @@ mod tests {
                 (first..first + length).for_each(|block| forest.insert(block, leaf(block)).unwrap());
                 let (got, most) = (forest.nodes().len() as u32, 2 * length.ilog2() + 1);
                 assert!(got <= most, "{length} blocks from {first}: got {got} nodes, at most {most}");
+            }
+        }
+    }
+
+    /// The oracle is the forest itself, of a number of blocks that is a power of two and of others.
+    #[test]
+    fn the_nodes_of_a_run_are_foreseen() {
+        for blocks in [1, 2, 13, 32, 37] {
+            for first in 0..blocks {
+                for end in first + 1..=blocks {
+                    let mut forest = Forest::new(blocks);
+                    (first..end).for_each(|block| forest.insert(block, leaf(block)).unwrap());
+                    let are: Vec<_> = forest.nodes().map(|(covers, _)| covers).collect();
+                    assert_eq!(nodes_of(first..end, blocks).collect::<Vec<_>>(), are, "{first} to {end} of {blocks}");
+                }
             }
         }
     }

@@ -91,7 +91,7 @@ pub use error::{Gap, StudyError};
 pub use forest::{Forest, ForestError, Merge};
 pub use moments::Moments;
 pub use part::{Header, Part, Results, merge};
-pub use pilot::{Cost, Pilot, PilotOptions, Time, pilot};
+pub use pilot::{Pilot, PilotCost, PilotOptions, PilotTime, pilot};
 pub use rate::Rate;
 pub use run::{Options, Progress, replay, run};
 pub use shard::{Shard, ranges};

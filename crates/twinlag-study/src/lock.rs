@@ -1,9 +1,12 @@
-//! The right to write a part, which one process has at a time.
+//! A lock: one process at a time writes a part.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use crate::error::StudyError;
+
+/// Most times that a file is locked which another process has just removed; chosen: more than ever happens.
+const MAX_TRIES: u32 = 100;
 
 /// The right to write a part, as long as this lives.
 ///
@@ -25,7 +28,7 @@ impl Lock {
         path.push(".lock");
         let path = PathBuf::from(path);
         let unwritable = |cause| StudyError::Write { path: path.clone(), cause };
-        loop {
+        for _ in 0..MAX_TRIES {
             let file = File::options().write(true).create(true).truncate(false).open(&path).map_err(unwritable)?;
             match file.try_lock() {
                 Ok(()) | Err(TryLockError::Error(_)) => {}
@@ -41,6 +44,7 @@ impl Lock {
                 Err(cause) => return Err(unwritable(cause)),
             }
         }
+        Err(StudyError::Busy { path: part.to_owned() })
     }
 }
 
@@ -81,6 +85,7 @@ mod tests {
                         let Ok(lock) = Lock::of(&part) else { continue };
                         assert_eq!(holders.fetch_add(1, std::sync::atomic::Ordering::SeqCst), 0);
                         had.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+                        std::thread::yield_now();
                         holders.fetch_sub(1, std::sync::atomic::Ordering::SeqCst);
                         drop(lock);
                     }

@@ -274,7 +274,7 @@ fn block<S: Study>(
 }
 
 /// What a panic said.
-fn told(panic: &(dyn Any + Send)) -> Failure {
+pub(crate) fn told(panic: &(dyn Any + Send)) -> Failure {
     let message = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("it panicked: {}", message.unwrap_or("without a message")).into()
 }

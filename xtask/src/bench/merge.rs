@@ -67,8 +67,8 @@ pub(crate) fn run(parts: u64) -> Result<()> {
     for of in [parts / 10, parts] {
         ensure!(of > 0, "there are too few parts to take a tenth of them");
         let folder = tempfile::tempdir()?;
-        let before = peak_mb();
         write(folder.path(), of)?;
+        let before = peak_mb();
         let paths = || Shard::all(of).map(|shard| folder.path().join(shard.file_name()));
         let bytes: u64 = paths().map(|path| path.metadata().map_or(0, |file| file.len())).sum();
         let start = Instant::now();

@@ -1,7 +1,6 @@
 //! `twinlag study plan PLAN.toml`: what a study will take, from a few of its trials.
 
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -9,17 +8,20 @@ use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
 use twinlag_experiment::Experiment;
-use twinlag_study::{Cost, PilotOptions, Study as _, Time, pilot};
+use twinlag_study::{PilotCost, PilotOptions, PilotTime, Study as _, pilot};
 
 use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::submission::MAX_SHARDS;
+use crate::submission::{self, MAX_SHARDS};
 use crate::{print, progress};
 
-/// How much longer than the longest shard the limit is; chosen, since processors may be slower than in the pilot: ten minutes apart, those
-/// of one machine were as 34 to 44.
+/// How many times the upper end of the longest shard the limit is; chosen, since processors may be slower than in the pilot: the same machine
+/// took 34 and then 44 seconds for the same trials.
 const LIMIT_FACTOR: f64 = 2.0;
+
+/// Most tasks of an array of jobs, where the configuration of Slurm says nothing else (`MaxArraySize` is 1001).
+const SLURM_TASKS: u64 = 1001;
 
 #[derive(Debug, Args)]
 pub(crate) struct Planning {
@@ -31,7 +33,7 @@ pub(crate) struct Planning {
     /// How long a shard should take, in minutes.
     #[arg(long, value_name = "MINUTES", default_value = "30")]
     shard_minutes: NonZeroU32,
-    /// How long the pilot should take, in seconds; five trials of each cell are run in any case.
+    /// How long the pilot should take, in seconds; six trials of each cell are run in any case.
     #[arg(long, value_name = "SECONDS", default_value = "20")]
     pilot_seconds: NonZeroU32,
 }
@@ -82,7 +84,6 @@ pub(super) fn run(planning: &Planning, console: Console) -> Result<u8, Failure> 
     bar.set_length(cells as u64);
     let pilot = pilot(&experiment, PilotOptions { threads, time }, |done| {
         bar.set_position(done as u64);
-        ControlFlow::Continue(())
     });
     bar.finish_and_clear();
     let pilot = pilot?;
@@ -91,15 +92,15 @@ pub(super) fn run(planning: &Planning, console: Console) -> Result<u8, Failure> 
     let whole = pilot.cost(1);
     let wanted = (whole.total.s / core_s_of_shard).ceil() as u64;
     let shards = wanted.clamp(1, MAX_SHARDS.min(pilot.blocks()));
-    let Cost { total, longest, bytes, largest_bytes } = pilot.cost(shards);
-    let in_units = |Time { s, interval_s }: Time, unit_s: f64| (s / unit_s, interval_s.map(|s| s / unit_s));
+    let PilotCost { total, longest, bytes, largest_bytes } = pilot.cost(shards);
+    let in_units = |PilotTime { s, interval_s }: PilotTime, unit_s: f64| (s / unit_s, interval_s.map(|s| s / unit_s));
     let (core_hours, core_hours_interval) = in_units(total, 3600.0);
-    let minute_s = 60.0 * f64::from(planning.cpus.get());
-    let (longest_shard_min, longest_shard_min_interval) = in_units(longest, minute_s);
+    let (longest_shard_min, longest_shard_min_interval) = in_units(longest, 60.0);
     let time_limit_min = (LIMIT_FACTOR * longest_shard_min_interval[1]).ceil().max(1.0) as u64;
+    let file = submission::text(&planning.plan)?;
+    let file = shlex::try_quote(&file).map_err(|error| Failure::Usage(format!("{file}: {error}")))?;
     let command = format!(
-        "twinlag study submit {} --out DIR --engine slurm --shards {shards} --time-limit {time_limit_min} --cpus {}",
-        planning.plan.display(),
+        "twinlag study submit {file} --out DIR --engine slurm --shards {shards} --time-limit {time_limit_min} --cpus {}",
         planning.cpus
     );
     let answer = StudyPlan {
@@ -123,6 +124,11 @@ pub(super) fn run(planning: &Planning, console: Console) -> Result<u8, Failure> 
         print::json(&answer)?;
     } else {
         print::on_stdout(&answer.in_words())?;
+    }
+    if shards > SLURM_TASKS {
+        console.note(|| {
+            format!("Slurm takes {SLURM_TASKS} tasks of an array, or what its MaxArraySize says: a longer --shard-minutes gives fewer shards")
+        });
     }
     Ok(0)
 }
@@ -155,7 +161,7 @@ impl StudyPlan {
                 "longest shard",
                 &format!("{} min, 95 % {} to {}", number(self.longest_shard_min), number(shortest), number(longest)),
             ],
-            ["memory of each", &memory],
+            ["memory of this pilot", &memory],
             [
                 "parts",
                 &format!("about {} in all, the largest {}", megabytes(self.bytes), megabytes(self.largest_part_bytes)),

@@ -89,10 +89,15 @@ fn shards_of_a_study_that_are_lost_are_missing_until_they_are_submitted_again() 
     for words in ["20 of 30 trials in 3 shards", "done     2  0,2", "missing  1  1", "no result yet"] {
         assert!(before.stdout.contains(words), "{words} in {before:#?}");
     }
-    // One that the engine still has is not sent again.
-    bench.write("queue", "1 1 RUNNING\n7 1 PENDING\n");
+    // One that the engine still has is not sent again, and neither is the merge.
+    bench.write("queue", "1 1 RUNNING\n7 1 PENDING\n2 N/A PENDING\n");
     assert!(status().stdout.contains("running  1  1"));
     cluster.run(&["study", "resubmit", "out"]).says(&["nothing is missing"]);
+    // A merge that the engine has no more is, behind what still runs.
+    bench.write("queue", "1 1 RUNNING\n");
+    let merge = cluster.run(&["study", "resubmit", "out"]);
+    assert!(merge.code == 0 && merge.stdout.contains("as job 3: the merge"), "{merge:#?}");
+    assert!(cluster.submitted().lines().last().expect("a line").contains("--dependency=afterany:1 "));
     for file in ["queue", "lost"] {
         fs::remove_file(bench.path(file)).expect("there");
     }
@@ -173,7 +178,7 @@ fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
     assert!(bench.has("t.html"));
     let script = String::from_utf8(bench.read("the $runs/t.csv.submission/shard.sh")).expect("text");
     assert!(!script.contains("t.html"), "{script}");
-    // Of both, as an argument: what is in it is nobody's to quote.
+    // Slurm gets it as one argument, of both jobs.
     assert_eq!(cluster.submitted().matches("'--comment=it is #1'").count(), 0);
     assert_eq!(cluster.submitted().matches("--comment=it is #1").count(), 2);
     let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv", "--json"]);
@@ -234,7 +239,7 @@ fn a_merge_that_is_lost_is_submitted_again() {
     bench.write("no-merge", "");
     assert_eq!(cluster.run(&[&SUBMIT[..], &["--shards", "2"]].concat()).code, 0);
     bench.write("queue", "2 N/A PENDING\n");
-    cluster.run(&["study", "resubmit", "out"]).says(&["nothing is missing", "the merge waits or runs"]);
+    cluster.run(&["study", "resubmit", "out"]).says(&["nothing is missing", "so does the merge"]);
     for file in ["queue", "no-merge"] {
         fs::remove_file(bench.path(file)).expect("there");
     }
@@ -271,7 +276,7 @@ fn what_would_fail_later_is_refused_at_once() {
     }
     assert!(!bench.has("submitted"));
     // Options of a file that are for a run are none of a question about it.
-    bench.write("lab.toml", "[batch]\nverb = \"diagnose\"\n");
+    bench.write("lab.toml", "[batch]\nverb = \"diagnose\"\nengine = \"slurm\"\nshards = 3\ntime-limit = 5\ncpus = 2\n");
     let status = bench.run(&["batch", "--status", "--out", "t.csv", "--config", "lab.toml"]);
     assert_eq!(status.code, 3, "{status:#?}");
     status.says(&["nothing was submitted"]);
@@ -333,7 +338,7 @@ fn commands_of_a_dry_run_can_be_typed() {
     assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
 }
 
-/// The time of five trials or more of each cell cannot be told beforehand; what follows from it can.
+/// How long trials take is not known beforehand; what follows from it is.
 #[test]
 fn what_a_study_takes_is_planned_from_a_few_trials() {
     let bench = Bench::with(
