@@ -105,6 +105,9 @@ pub(crate) fn manifest(
 /// What each of so many shards has left.
 pub(crate) fn progress_of(table: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let manifest = read(&manifest_path(table))?;
+    if let Some((_, part)) = parts_beside(table)?.into_iter().find(|(part, _)| part.of() != of) {
+        return Err(Failure::File(format!("{}: is of another number of shards than {of}; remove it", part.display())));
+    }
     let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
         ShardProgress { total, done: done.map_err(|error| error.to_string()), part: part_path(table, shard) }

@@ -116,12 +116,13 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
         Study::Plan(planning) => plan::run(planning, console),
         Study::Submit(command) => submit(command, console),
         Study::Status { dir } => {
-            let result = dir.join(RESULTS);
-            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", Some(&result), console)
+            let result = results_in(dir);
+            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", result.as_deref(), console)
         }
         Study::Resubmit { dir, time_limit } => {
-            let result = dir.join(RESULTS);
-            submission::resubmit(&dir.join(SUBMISSION), |of| progress_of(dir, of), Some(&result), *time_limit, console)
+            let result = results_in(dir);
+            let progress = |of| progress_of(dir, of);
+            submission::resubmit(&dir.join(SUBMISSION), progress, result.as_deref(), *time_limit, console)
         }
     }
 }
@@ -137,15 +138,8 @@ const SUBMISSION: &str = "submission";
 
 /// Submits all shards.
 fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
-    expect_no_results(&command.out)?;
-    let shards = command.cluster.shards();
-    if let Some(part) = parts_in(&command.out).unwrap_or_default().iter().find(|part| part.of() != shards) {
-        let part = command.out.join(part.file_name());
-        return Err(Failure::Usage(format!(
-            "{}: is of another number of shards; remove it, or name another folder",
-            part.display()
-        )));
-    }
+    expect_no_results(&read(&command.plan)?.0, &command.out)?;
+    expect_one_division(&command.out, command.cluster.shards()).map_err(Failure::Usage)?;
     let plan = prepare(&command.plan, &command.out)?;
     let (out, copy) = (submission::text(&command.out)?, submission::text(command.out.join(PLAN))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
@@ -162,21 +156,49 @@ fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
 fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let (plan, _) = read(&dir.join(PLAN))?;
     let experiment = Experiment::new(&plan)?;
+    expect_one_division(dir, of).map_err(Failure::File)?;
     let progress = |shard: Shard| {
         let part = dir.join(shard.file_name());
         let read = || Part::read_of(&experiment, shard, PROGRAM, &part).map(|part| part.done());
-        let done = if part.exists() { read().map_err(|error| error.to_string()) } else { Ok(0) };
+        let done = if part.exists() { read().map_err(|error| Failure::from(error).to_string()) } else { Ok(0) };
         Ok(ShardProgress { total: shard.trials(&experiment)?, done, part })
     };
     Shard::all(of).map(progress).collect()
 }
 
-fn expect_no_results(out: &Path) -> Result<(), Failure> {
-    if out.join(RESULTS).exists() {
-        let out = out.display();
-        return Err(Failure::Usage(format!("{out}: already holds results; name another folder, or remove them")));
+/// Refuses parts of another number of shards, saying which.
+fn expect_one_division(dir: &Path, of: u64) -> Result<(), String> {
+    match parts_in(dir).unwrap_or_default().into_iter().find(|part| part.of() != of) {
+        None => Ok(()),
+        Some(part) => {
+            let part = dir.join(part.file_name());
+            Err(format!(
+                "{}: is of another number of shards than {of}; remove it, or name another folder",
+                part.display()
+            ))
+        }
     }
-    Ok(())
+}
+
+/// Refuses to replace what the results of a plan would replace.
+fn expect_no_results(plan: &Plan, out: &Path) -> Result<(), Failure> {
+    let summaries = plan.summaries.iter().map(|summary| format!("{}.md", summary.file));
+    let pictures = plan.pictures.iter().map(|picture| format!("{}.svg", picture.file));
+    let names = [RESULTS, "results.csv"].map(str::to_owned).into_iter().chain(summaries).chain(pictures);
+    match names.map(|name| out.join(name)).find(|path| path.exists()) {
+        None => Ok(()),
+        Some(path) => {
+            let path = path.display();
+            Err(Failure::Usage(format!("{path} exists: name another folder, or remove it")))
+        }
+    }
+}
+
+/// Where the results are; `None` if they are not all there.
+fn results_in(dir: &Path) -> Option<PathBuf> {
+    let path = dir.join(RESULTS);
+    let table: Table = serde_json::from_slice(&fs::read(&path).ok()?).ok()?;
+    (!table.rows.is_empty() && dir.join("results.csv").exists()).then_some(path)
 }
 
 /// Reads the plan of a study, and puts it into the folder of the results.
@@ -206,12 +228,20 @@ fn read(path: &Path) -> Result<(Plan, String), Failure> {
 
 fn start(run: &Run, console: Console) -> Result<u8, Failure> {
     if !run.resume && run.shard.is_none() {
-        expect_no_results(&run.out)?;
+        expect_no_results(&read(&run.plan)?.0, &run.out)?;
     }
     let plan = prepare(&run.plan, &run.out)?;
     let experiment = Experiment::new(&plan)?;
     let out = run.out.display();
     let shard = run.shard.unwrap_or(Shard::WHOLE);
+    let is_other = |part: &Shard| *part != shard && part.overlaps(shard);
+    if let Some(part) = parts_in(&run.out).unwrap_or_default().into_iter().find(is_other) {
+        let part = run.out.join(part.file_name());
+        return Err(Failure::Usage(format!(
+            "{}: has trials that shard {shard} has as well; remove it, or name another folder",
+            part.display()
+        )));
+    }
     let part = run.out.join(shard.file_name());
     let options = Options {
         threads: run.threads.unwrap_or(Options::default().threads),
@@ -289,10 +319,10 @@ impl From<StudyError> for Failure {
         match error {
             StudyError::Exists { .. } => Self::Usage(error.to_string()),
             StudyError::Incomplete { .. } | StudyError::Busy { .. } => Self::NotYet(error.to_string()),
-            StudyError::Damaged { .. }
-            | StudyError::OtherStudy { .. }
-            | StudyError::Read { .. }
-            | StudyError::Twice { .. } => Self::File(error.to_string()),
+            StudyError::Damaged { .. } | StudyError::OtherStudy { .. } => {
+                Self::File(format!("{error}; remove it, and run its shard again"))
+            }
+            StudyError::Read { .. } | StudyError::Twice { .. } => Self::File(error.to_string()),
             _ => Self::Other(error.to_string()),
         }
     }

@@ -17,12 +17,9 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::print;
 
-/// Most shards of one submission; chosen: engines take some thousand, and each has a file.
-pub(crate) const MAX_SHARDS: u64 = 1_000_000;
-
 fn shards(text: &str) -> Result<NonZeroU64, String> {
-    let shards = text.parse().ok().filter(|shards: &NonZeroU64| shards.get() <= MAX_SHARDS);
-    shards.ok_or_else(|| format!("expected a number of shards from 1 to {MAX_SHARDS}"))
+    let shards = text.parse().ok().filter(|shards: &NonZeroU64| shards.get() <= Work::MAX_SHARDS);
+    shards.ok_or_else(|| format!("expected a number of shards from 1 to {}", Work::MAX_SHARDS))
 }
 
 /// Which engine runs the shards, and what each of them needs.

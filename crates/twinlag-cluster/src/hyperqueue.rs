@@ -30,5 +30,11 @@ pub(crate) fn command(script: &str, work: &Work, resources: &Resources, shards: 
 
 /// Submits shards; the number of the job.
 pub(crate) fn submit(script: &str, work: &Work, resources: &Resources, shards: &[u64]) -> Result<String, ClusterError> {
-    answer("python3", &command(script, work, resources, shards)[1..])
+    answer("python3", &command(script, work, resources, shards)[1..]).map_err(|error| match error {
+        // Before that stand the steps that led there.
+        ClusterError::Refused { program, said } => {
+            ClusterError::Refused { program, said: said.lines().last().unwrap_or_default().to_owned() }
+        }
+        other => other,
+    })
 }

@@ -45,7 +45,7 @@ struct Named {
     schema: String,
 }
 
-/// What an engine has taken.
+/// What an engine has taken, or what was printed to be started by hand.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
     /// The shards, as ranges; empty of a merge alone.
@@ -76,12 +76,12 @@ impl Submission {
     /// [`ClusterError::NoText`], [`ClusterError::Write`].
     pub fn prepare(folder: &Path, engine: Engine, work: Work, resources: Resources) -> Result<Self, ClusterError> {
         resources.check_for(engine)?;
-        let logs = folder.join(LOGS);
-        fs::create_dir_all(&logs).map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
+        fs::create_dir_all(folder)
+            .map_err(|error| ClusterError::Write { path: folder.to_owned(), reason: error.to_string() })?;
         let lock = Some(lock(folder)?);
         match Self::open(folder) {
             Err(ClusterError::NotSubmitted { .. }) => {}
-            // The engine has taken nothing.
+            // Nothing was submitted, or it was refused.
             Ok(earlier) if earlier.jobs.is_empty() => {}
             Ok(_) => return Err(ClusterError::Exists { path: folder.join(FILE) }),
             Err(error) => return Err(error),
@@ -115,6 +115,10 @@ impl Submission {
             return Err(damaged(format!("expected {SCHEMA}, found {schema}")));
         }
         let mut submission: Self = serde_json::from_str(&text).map_err(wrong)?;
+        let shards = submission.work.shards.get();
+        if shards > Work::MAX_SHARDS {
+            return Err(damaged(format!("expected at most {} shards, found {shards}", Work::MAX_SHARDS)));
+        }
         folder.clone_into(&mut submission.folder);
         Ok(submission)
     }
@@ -174,6 +178,8 @@ impl Submission {
 
     fn write_scripts(&self) -> Result<(), ClusterError> {
         let Self { work, resources, .. } = self;
+        let logs = self.folder.join(LOGS);
+        fs::create_dir_all(&logs).map_err(|error| ClusterError::Write { path: logs, reason: error.to_string() })?;
         let logs = self.path(LOGS)?;
         let (of_shard, of_merge) = match self.engine {
             Engine::Slurm => (slurm::directives(work, resources), slurm::merge_directives(work)),
@@ -243,7 +249,8 @@ impl Submission {
     /// [`ClusterError::Refused`], [`ClusterError::Write`].
     pub fn submit(&mut self, shards: &[u64]) -> Result<Submitted, ClusterError> {
         self.expect_lock()?;
-        // What cannot be recorded is not submitted.
+        // What cannot be recorded is not submitted. Scripts that are gone, or whose folder has another name by now, are written anew.
+        self.write_scripts()?;
         self.save()?;
         let mut job = Job { shards: ranges(shards), ..Job::default() };
         match self.engine {
@@ -255,7 +262,11 @@ impl Submission {
                 self.save()?;
                 Ok(Submitted::Job(job))
             }
-            Engine::Parallel | Engine::Kubernetes => Ok(Submitted::ByHand(self.command(shards)?)),
+            Engine::Parallel | Engine::Kubernetes => {
+                self.jobs.push(job);
+                self.save()?;
+                Ok(Submitted::ByHand(self.command(shards)?))
+            }
         }
     }
 

@@ -7,6 +7,7 @@ import argparse
 import datetime
 import os
 import pathlib
+import sys
 
 from hyperqueue import Client, Job
 from hyperqueue.ffi.protocol import ResourceRequest
@@ -44,7 +45,11 @@ def main():
         for shard in numbers(options.shards)
     ]
     job.program(["sh", str(here / "merge.sh")], stdout=None, stderr=None, deps=shards)
-    print(Client(server_dir=options.server_dir).submit(job).id)
+    try:
+        print(Client(server_dir=options.server_dir).submit(job).id)
+    except BaseException as error:
+        server = options.server_dir or "its own folder"
+        sys.exit(f"no server of HyperQueue takes it in {server}, where HQ_SERVER_DIR or --server-dir leads: {error}")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,8 @@ pub struct Work {
 impl Work {
     /// What stands in [`Self::shard`] for the shard, `K/N` with K counted from 0: the first argument that is this.
     pub const SHARD: &'static str = "{shard}";
+    /// Most shards; chosen: engines take some thousand, and each has a file.
+    pub const MAX_SHARDS: u64 = 1_000_000;
 }
 
 /// What a shard needs.

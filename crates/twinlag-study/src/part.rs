@@ -300,7 +300,26 @@ fn expect_equal<T: PartialEq + fmt::Display>(
     if expected == got {
         return Ok(());
     }
-    Err(StudyError::OtherStudy { path: path.into(), what, expected: expected.to_string(), got: got.to_string() })
+    let (expected, got) = where_they_differ(&expected.to_string(), &got.to_string());
+    Err(StudyError::OtherStudy { path: path.into(), what, expected, got })
+}
+
+/// Two texts as they are, or where they are long the parts in which they first differ.
+fn where_they_differ(one: &str, other: &str) -> (String, String) {
+    /// Most characters that are shown, and those before the difference.
+    const SHOWN: usize = 60;
+    const BEFORE: usize = 20;
+    if one.chars().count().max(other.chars().count()) <= SHOWN {
+        return (one.to_owned(), other.to_owned());
+    }
+    let same = one.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    let part = |text: &str| {
+        let start = same.saturating_sub(BEFORE);
+        let [before, behind] =
+            [start > 0, text.chars().count() > start + SHOWN].map(|cut| if cut { "..." } else { "" });
+        format!("{before}{}{behind}", text.chars().skip(start).take(SHOWN).collect::<String>())
+    };
+    (part(one), part(other))
 }
 
 /// A new file of a name that no other process takes, with the permissions of any new file.

@@ -249,7 +249,7 @@ impl Pilot {
         // Of a cell in several shards the mean time is known no better than of one in a single shard.
         let mut total = Sum::default();
         self.cells.iter().for_each(|cell| total.add(cell, self.header.trials()));
-        let mut longest = PilotTime { s: 0.0, interval_s: [0.0; 2] };
+        let (mut longest, mut longest_on, mut upper) = (Sum::default(), 1.0, 0.0_f64);
         let (mut bytes, mut largest_bytes) = (0.0, 0.0_f64);
         // A shard has nodes of a few sizes, each of which is worked out once.
         let mut of_node: HashMap<(usize, u64), f64> = HashMap::new();
@@ -278,15 +278,21 @@ impl Pilot {
             let count = range.end - range.start;
             if count > 0 {
                 // Threads that have no block left wait for the others.
-                let time = sum.on(count as f64 / count.div_ceil(threads) as f64);
-                if time.interval_s[1] > longest.interval_s[1] {
-                    longest = time;
+                let on = count as f64 / count.div_ceil(threads) as f64;
+                let two_errors = (sum.s + 2.0 * sum.variance.sqrt()) / on;
+                if two_errors > upper {
+                    (longest, longest_on, upper) = (sum, on, two_errors);
                 }
             }
             bytes += part;
             largest_bytes = largest_bytes.max(part);
         }
-        PilotCost { total: total.on(1.0), longest, bytes: bytes as u64, largest_bytes: largest_bytes as u64 }
+        PilotCost {
+            total: total.on(1.0),
+            longest: longest.on(longest_on),
+            bytes: bytes as u64,
+            largest_bytes: largest_bytes as u64,
+        }
     }
 }
 

@@ -23,6 +23,9 @@ use crate::tally::Tally;
 /// The longest time without a report of progress while trials run.
 const TICK: Duration = Duration::from_millis(100);
 
+/// Most threads that are started; chosen: more than any machine has processors.
+const MAX_THREADS: usize = 1 << 12;
+
 /// How to run a study. Nothing here changes a number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
@@ -101,8 +104,9 @@ pub fn run<S: Study>(
     let fence = AtomicU64::new(u64::MAX);
     let (mut failed, mut unwritten) = (None::<(u64, StudyError)>, None);
     thread::scope(|scope| {
-        let (sender, receiver): (_, Receiver<Report>) = sync_channel(options.threads.get());
-        for _ in 0..options.threads.get().min(queue.len().try_into().unwrap_or(usize::MAX)) {
+        let workers = options.threads.get().min(MAX_THREADS).min(queue.len().try_into().unwrap_or(usize::MAX));
+        let (sender, receiver): (_, Receiver<Report>) = sync_channel(workers);
+        for _ in 0..workers {
             let sender = sender.clone();
             scope.spawn(|| work(study, &header, &queue, &fence, sender));
         }

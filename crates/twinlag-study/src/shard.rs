@@ -84,6 +84,23 @@ impl Shard {
         Ok(self.range(header.jobs()).map(|job| header.job_trials(job)).sum())
     }
 
+    /// Whether there are trials that both would run, of a study with more blocks than shards.
+    ///
+    /// ```
+    /// use twinlag_study::Shard;
+    ///
+    /// let half = Shard::new(1, 2)?;
+    /// assert!(half.overlaps(Shard::WHOLE) && half.overlaps(Shard::new(1, 3)?));
+    /// assert!(!half.overlaps(Shard::new(1, 4)?));
+    /// # Ok::<(), twinlag_study::StudyError>(())
+    /// ```
+    pub fn overlaps(self, other: Self) -> bool {
+        let begins_before_end = |one: Self, other: Self| {
+            u128::from(one.index) * u128::from(other.of) < (u128::from(other.index) + 1) * u128::from(one.of)
+        };
+        begins_before_end(self, other) && begins_before_end(other, self)
+    }
+
     pub(crate) fn range(self, jobs: u64) -> Range<u64> {
         let edge = |k: u64| (u128::from(jobs) * u128::from(k) / u128::from(self.of)) as u64;
         edge(self.index)..edge(self.index + 1)

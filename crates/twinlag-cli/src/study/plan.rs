@@ -7,13 +7,14 @@ use std::time::Duration;
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
+use twinlag_cluster::Work;
 use twinlag_experiment::Experiment;
 use twinlag_study::{PilotCost, PilotOptions, PilotTime, Study as _, pilot};
 
 use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::submission::{self, MAX_SHARDS};
+use crate::submission;
 use crate::{print, progress};
 
 /// How many times the upper end of the longest shard the limit is; chosen, since processors may be slower than in the pilot: the same machine
@@ -91,7 +92,15 @@ pub(super) fn run(planning: &Planning, console: Console) -> Result<u8, Failure> 
     let core_s_of_shard = 60.0 * f64::from(planning.shard_minutes.get()) * f64::from(planning.cpus.get());
     let whole = pilot.cost(1);
     let wanted = (whole.total.s / core_s_of_shard).ceil() as u64;
-    let shards = wanted.clamp(1, MAX_SHARDS.min(pilot.blocks()));
+    if wanted > Work::MAX_SHARDS {
+        let hours = whole.total.s / 3600.0;
+        return Err(Failure::Usage(format!(
+            "{} h of processor time would be {wanted} shards, more than {}: choose a longer --shard-minutes, more --cpus, or fewer trials",
+            number(hours),
+            Work::MAX_SHARDS
+        )));
+    }
+    let shards = wanted.clamp(1, pilot.blocks());
     let PilotCost { total, longest, bytes, largest_bytes } = pilot.cost(shards);
     let in_units = |PilotTime { s, interval_s }: PilotTime, unit_s: f64| (s / unit_s, interval_s.map(|s| s / unit_s));
     let (core_hours, core_hours_interval) = in_units(total, 3600.0);

@@ -325,7 +325,9 @@ fn commands_of_a_dry_run_can_be_typed() {
     assert!(merge.expect("a shell").success());
     assert_eq!(bench.read("out/results.json"), bench.read("whole/results.json"));
     // As it is printed.
-    for folder in ["out/submission", "out/part-0-of-2.json", "out/part-1-of-2.json", "out/results.json"] {
+    for folder in
+        ["out/submission", "out/part-0-of-2.json", "out/part-1-of-2.json", "out/results.json", "out/results.csv"]
+    {
         let path = bench.path(folder);
         if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) }.expect("ours");
     }
@@ -362,4 +364,39 @@ fn what_a_study_takes_is_planned_from_a_few_trials() {
     let words = bench.run(&plan[..5]).stdout;
     assert!(words.contains("--shards") && words.contains("at the speed of this pilot"), "{words}");
     bench.refuses(3, &["study", "plan", "nowhere.toml"], &["nowhere.toml"]);
+}
+
+/// A second submission replaces no first, started by hand or not, and what was removed of the first is written anew.
+#[test]
+fn a_submission_is_not_replaced_and_its_scripts_are_written_anew() {
+    let cluster = Cluster::new(Bench::with("scripts", "plan.toml", STUDY));
+    let bench = &cluster.bench;
+    let by_hand = [&SUBMIT[..6], &["parallel", "--time-limit=5", "--shards=2"]].concat();
+    assert_eq!(cluster.run(&by_hand).code, 0);
+    assert_eq!(cluster.run(&by_hand).code, 2);
+    fs::rename(bench.path("out"), bench.path("moved")).expect("ours");
+    for gone in ["shard.sh", "merge.sh"] {
+        fs::remove_file(bench.path(&format!("moved/submission/{gone}"))).expect("there");
+    }
+    fs::remove_dir_all(bench.path("moved/submission/logs")).expect("there");
+    let again = cluster.run(&["study", "resubmit", "moved"]);
+    assert!(again.code == 0 && again.stdout.contains("moved/submission/shard.sh"), "{again:#?}");
+    for written in ["shard.sh", "merge.sh", "logs"] {
+        assert!(bench.has(&format!("moved/submission/{written}")), "{written}");
+    }
+}
+
+/// What a file of the user's is called in the folder of the results is for the user to say.
+#[test]
+fn a_study_replaces_no_file_that_is_not_its_own() {
+    let bench = Bench::with("own-file", "plan.toml", STUDY);
+    fs::create_dir(bench.path("out")).expect("a new folder");
+    bench.write("out/results.csv", "my,own\n");
+    bench.refuses(2, &["study", "run", "plan.toml", "--out", "out"], &["results.csv exists"]);
+    bench.refuses(2, &[&SUBMIT[..], &["--shards", "2"]].concat(), &["results.csv exists"]);
+    assert_eq!(bench.read("out/results.csv"), b"my,own\n");
+    // Nor are trials run that are there in another division.
+    assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "parts", "--shard", "0/2"]).code, 0);
+    bench.refuses(2, &["study", "run", "plan.toml", "--out", "parts", "--shard", "0/3"], &["part-0-of-2.json", "0/3"]);
+    assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "parts", "--shard", "2/4"]).code, 0);
 }

@@ -24,7 +24,7 @@ fn nothing_is_overwritten_without_being_asked() {
     assert_eq!(bench.run(&["study", "run", "plan.toml", "--out", "out"]).code, 0);
     let again = bench.run(&["study", "run", "plan.toml", "--out", "out"]);
     assert_eq!(again.code, 2);
-    assert!(again.stderr.contains("already holds results"), "{}", again.stderr);
+    assert!(again.stderr.contains("results.json exists"), "{}", again.stderr);
     bench.write("other.toml", STUDY.replace("trials = 30", "trials = 20"));
     let other = bench.run(&["study", "run", "other.toml", "--out", "out", "--shard", "0/2"]);
     assert_eq!(other.code, 2);
