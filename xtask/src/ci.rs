@@ -40,9 +40,6 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     println!("== experiments, a trial in each cell: {:.0} s", start.elapsed().as_secs_f64());
     book::run()?;
     if full {
-        // Documentation tests have no long ones, and those that are ignored are no programs.
-        let long = ["test", "--workspace", "--lib", "--bins", "--tests", "--", "--ignored"];
-        step("tests that take long", "cargo", &long)?;
         features()?;
         toolchains()?;
         // In release, which has the line tables that a profile is made of.

@@ -76,7 +76,6 @@ fn stated_variances_are_those_of_many_estimates() {
 /// As above with sensors of second order, both time constants and the second one of sensor 2 free, the gas broad enough to
 /// tell them apart. Same count, same tolerance.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn stated_variances_hold_for_sensors_of_second_order() {
     let (n, trials, std_k, free) = (1500, 400, [0.2, 0.15], [0, 1, 5]);
     let truth = [TAU_S[0], TAU_S[1], 1.0, 0.0, 0.004, 0.015];

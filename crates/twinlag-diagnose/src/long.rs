@@ -164,7 +164,6 @@ mod tests {
     /// Of a record that is searched in pieces the numbers are those of all of it: standard errors go with the root of the
     /// samples, of which pieces have two fifths, and values lie within five of them.
     #[test]
-    #[ignore = "long: cargo xtask ci --full"]
     fn what_pieces_show_is_fitted_to_all_of_a_long_record() {
         let (observations, settings) = (long_record(), Settings::default());
         let watch = |_: &str, _, _| ControlFlow::Continue(());

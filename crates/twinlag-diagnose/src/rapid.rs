@@ -179,7 +179,6 @@ mod tests {
     /// A swing of 6000 samples goes up and down ten times along the record, which nineteen coefficients cannot follow, and four times
     /// along a stretch. It is named, with where it was seen, and no number of the whole record is said to hold.
     #[test]
-    #[ignore = "long: cargo xtask ci --full"]
     fn what_swings_often_along_a_long_record_is_named_without_numbers() {
         let (observations, settings) = (swinging(10.0), Settings::default());
         let watch = |_: &str, _, _| ControlFlow::Continue(());

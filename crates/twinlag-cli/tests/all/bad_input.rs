@@ -704,7 +704,6 @@ fn intervals_of_a_single_tone_with_free_gain_hold() {
 
 /// Nothing happens but noise, the same or not in both channels: nothing is determined, so nothing is stated.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn white_noise_without_a_signal_determines_no_time_constant() {
     let bench = Bench::new("white");
     for seed in 0..6 {

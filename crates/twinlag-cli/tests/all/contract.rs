@@ -429,7 +429,6 @@ fn the_demo_needs_no_file_and_finds_the_effect_that_it_is_not_told_of() {
 /// Twenty seeds: each interval misses one in twenty times, both are in 90 % of the demos or more often; fewer than 14 of 20
 /// then have a chance of 1 in 400.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn the_demo_holds_for_other_seeds() {
     let bench = Bench::new("demo_seeds");
     let inside = (0..20).filter(|seed: &u32| {

@@ -102,7 +102,6 @@ fn biases_are_those_of_an_independent_implementation() {
 /// 2000 records at 5 % of noise: a variance of as many Gaussian values has a relative standard error of `√(2/1999)` = 3.2 %, and so
 /// has the covariance in units of the two deviations at most; five of these. The stated ones are averaged.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn stated_covariances_are_those_of_many_estimates() {
     let (clean, deviations) = sine(1500);
     let std_k = deviations.map(|d| 0.05 * d);

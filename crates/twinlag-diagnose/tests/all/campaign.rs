@@ -17,7 +17,6 @@ const MAX_NOISE_RMS: f64 = 1.06;
 
 /// The film's temperature is made of the gas of each record: of the record that is left out as well, which had no part in the estimate.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn time_constants_that_follow_the_film_do_so_in_a_record_that_was_left_out() {
     const EXPONENT: f64 = -1.8;
     let of = |seed: u64| {
@@ -37,7 +36,6 @@ fn time_constants_that_follow_the_film_do_so_in_a_record_that_was_left_out() {
 /// Noise of one record three times that of the others: each has its own levels, residuals are those of noise in each, and none
 /// contradicts.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn records_with_noise_of_their_own_agree() {
     let of = |seed: u64, noise_k: f64| {
         record(seed, |sensors| {
@@ -110,7 +108,6 @@ fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
 /// A sensor of 50 ms among records of one of 45 ms leaves a residual that looks like gas which both sensors do not share. No record left
 /// out shows such gas, so it is taken out, and the record is named.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_record_of_another_rig_is_no_noise() {
     let of = |seed: u64, second_s: f64| {
         let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 5.0, cutoff_hz: 200.0 });
@@ -143,7 +140,6 @@ fn of_two_records_none_is_named() {
 
 /// A gain of one record is no drift of all of them: the record is named, with what it shows alone.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn what_an_odd_record_shows_alone_is_said() {
     let of_another = record(SEED + 2, |sensors| sensors[1].gain = 1.02);
     let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
@@ -160,7 +156,6 @@ fn what_an_odd_record_shows_alone_is_said() {
 
 /// Someone exchanged the second sensor before the last record: that one is named, with its time constant.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_record_of_another_sensor_is_named() {
     let (joint, disagreeing) = disagreeing(|sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
     let told = told(&joint.diagnosis);
@@ -171,7 +166,6 @@ fn a_record_of_another_sensor_is_named() {
 
 /// One record has a delay that the others have not: it contradicts them on what is made of it, and they do not contradict each other.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn what_one_record_alone_has_is_told_by_that_record() {
     let (joint, disagreeing) = disagreeing(|sensors| sensors[1].delay_s = 3.0 * PERIOD_S);
     let told = told(&joint.diagnosis);
@@ -182,7 +176,6 @@ fn what_one_record_alone_has_is_told_by_that_record() {
 /// A reference junction that is warmer in each record: the calibration is none of the rig, though a fit of all records together finds
 /// something for the rest.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn an_offset_of_each_record_is_no_cause_of_all() {
     let of = |k: u32| {
         record(SEED + u64::from(k), |sensors| {

@@ -303,7 +303,6 @@ fn coloured_noise_of_the_fast_channel_is_not_put_into_the_other() {
 /// Failed: in the exhaust of an engine at 20 Hz a delay of 5 ms was given as 55 ms, a period more, and graded `go`; with seed 7 it was found
 /// as radiation. A period more fits as well, which is said.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_delay_is_no_period_longer() {
     const DELAY_S: f64 = 0.005;
     for seed in 1..=8 {

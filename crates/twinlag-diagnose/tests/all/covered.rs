@@ -44,7 +44,6 @@ fn a_gain_is_right_if_there_is_an_offset_as_well() {
 /// given, whichever of them is the cause. Failed: those of two records did not, where the intervals under another cause cover what
 /// records differ.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn time_constants_under_another_cause_are_covered() {
     let of = |seed: u64| record(seed, |sensors| sensors[1].offset_k = 2.0);
     let alone = (1..=4).map(|seed| found(&of(seed)));
@@ -83,7 +82,6 @@ fn mismatched(seed: u64, channel: &str) -> Observations {
 /// Where the loop finds the mismatch and its size by itself, time constants are as far from the truth as their standard errors say. How
 /// large the bias would be is known of many records (tests of `twinlag-model`).
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_mismatch_of_the_gas_leaves_no_bias() {
     let watch = |_: &str, _, _| std::ops::ControlFlow::Continue(());
     let diagnosed = |observations: &Observations| -> Diagnosis {

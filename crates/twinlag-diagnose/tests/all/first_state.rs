@@ -88,7 +88,6 @@ fn a_body_in_equilibrium_is_seen_to_be() {
 
 /// Each of several records has a first state of its own.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn of_several_records_each_began_somewhere() {
     let watch = |_: &str, _, _| ControlFlow::Continue(());
     let choice = |settled_s: [f64; 2]| {

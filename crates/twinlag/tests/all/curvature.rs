@@ -6,7 +6,6 @@ use twinlag::{DiagnoseOptions, diagnose};
 
 /// A reading is bent after its lag: which of the two is bent shows while the gas changes. Four standard errors.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_curvature_is_found_in_its_channel() {
     let gas = "kind = \"turbulence\"\nstd_k = 25.0\ncorner_hz = 1.0\ncutoff_hz = 60.0";
     let plain = |tau_s: f64| format!("time_constant_s = {tau_s}\nnoise = {{ std_k = 0.1 }}\n");

@@ -45,7 +45,6 @@ fn parameter(answer: &Diagnosis, name: &str) -> (f64, f64) {
 
 /// Ended in a panic: stretches that a delay makes too short were mistaken for others.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_missing_reading_near_the_start_is_no_obstacle() {
     let whole = rig(11, "", &format!("delay_s = {DELAY_S}"));
     for row in [8, 50, 107] {

@@ -35,7 +35,6 @@ fn only(answer: &Diagnosis, effect: Identifier, name: &str) -> [f64; 2] {
 /// The gas is carried over 60 mm, in 8.3 ms at most. Taken for a delay of the reading, it left the second time constant wrong by 0.3 %, now
 /// up, now down, and coloured noise was found. Four standard errors each.
 #[test]
-#[ignore = "long: cargo xtask ci --full"]
 fn a_distance_along_the_stream_delays_the_gas_and_not_the_reading() {
     let answer = diagnosed("downstream_m = 0.06");
     let [delay_s, error_s] = only(&answer, Identifier::SEPARATION, "delay_at_mean_flow");
