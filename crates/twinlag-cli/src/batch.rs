@@ -389,7 +389,7 @@ fn finish(
     unit_name: &'static str,
     console: Console,
 ) -> Result<u8, Failure> {
-    // The first table last: where it is, all is.
+    // The first table last: where it is, so are the others and the summary.
     let [first, others @ ..] = &command.out[..] else { unreachable!("one is required") };
     others.iter().try_for_each(|out| write_table(out, units, answers, verb))?;
     let fleet = Fleet::of(units, answers)?;

@@ -1,14 +1,13 @@
 //! What was submitted, kept beside its scripts.
 
 use std::fs::{self, File, TryLockError};
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde::{Deserialize, Serialize};
-use tempfile::Builder;
-use twinlag_study::ranges;
+use twinlag_study::{ranges, replace_file};
 
 use crate::engine::{Engine, Queue};
 use crate::error::ClusterError;
@@ -145,11 +144,6 @@ impl Submission {
         &self.work
     }
 
-    /// What was submitted, the first one first.
-    pub fn jobs(&self) -> &[Job] {
-        &self.jobs
-    }
-
     /// The folder of its scripts.
     pub fn folder(&self) -> &Path {
         &self.folder
@@ -203,14 +197,7 @@ impl Submission {
     /// Writes a file in one piece: a shell may be reading the old one.
     fn write(&self, name: &str, text: &str) -> Result<(), ClusterError> {
         let path = self.folder.join(name);
-        let write = || {
-            let new = |path: &Path| File::options().write(true).create_new(true).open(path);
-            let mut file = Builder::new().prefix(&format!("{name}.tmp-")).make_in(&self.folder, new)?;
-            file.write_all(text.as_bytes())?;
-            file.persist(&path)?;
-            Ok(())
-        };
-        write().map_err(|error: std::io::Error| ClusterError::Write { path: path.clone(), reason: error.to_string() })
+        replace_file(&path, text.as_bytes()).map_err(|error| ClusterError::Write { path, reason: error.to_string() })
     }
 
     /// The whole path of a file of it: the scripts may run in any folder.

@@ -1,15 +1,16 @@
 //! The results of an experiment as files.
 
 use std::fs;
-use std::io::Write as _;
 use std::path::Path;
+
+use twinlag_study::replace_file;
 
 use crate::error::ExperimentError;
 use crate::plan::Plan;
 use crate::table::Table;
 
 /// Writes `results.csv`, the plan's pictures and summaries, and `results.json` into `folder`, which
-/// is made if need be. Files of these names are replaced; `results.json` comes last and whole, so that where it is, all is.
+/// is made if need be. Files of these names are replaced; `results.json` comes last and whole, so a folder that holds it holds everything.
 ///
 /// # Errors
 /// [`ExperimentError::Write`]; whatever keeps a picture from being drawn.
@@ -24,14 +25,5 @@ pub fn write(plan: &Plan, table: &Table, folder: &Path) -> Result<(), Experiment
     plan.summaries.iter().try_for_each(|summary| put(&format!("{}.md", summary.file), summary.write(table)?))?;
     plan.pictures.iter().try_for_each(|picture| put(&format!("{}.svg", picture.file), picture.draw(table)?))?;
     let path = folder.join("results.json");
-    let text = table.to_json()?;
-    let write = || {
-        let new = |path: &Path| fs::File::options().write(true).create_new(true).open(path);
-        let mut file = tempfile::Builder::new().prefix("results.json.tmp-").make_in(folder, new)?;
-        file.write_all(text.as_bytes())?;
-        file.as_file().sync_all()?;
-        file.persist(&path)?;
-        Ok(())
-    };
-    write().map_err(|e: std::io::Error| ExperimentError::Write { path: path.clone(), reason: e.to_string() })
+    replace_file(&path, table.to_json()?.as_bytes()).map_err(|e| ExperimentError::Write { path, reason: e.to_string() })
 }

@@ -2,16 +2,15 @@
 
 use std::fmt;
 use std::fs;
-use std::io::{self, Write};
 use std::ops::Range;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use tempfile::{Builder, NamedTempFile};
 
 use crate::error::{Gap, StudyError};
 use crate::forest::{Forest, ForestError};
+use crate::replace::replace_file;
 use crate::shard::Shard;
 use crate::study::{Quantity, Study};
 use crate::tally::Tally;
@@ -193,10 +192,7 @@ impl Part {
         Ok(found)
     }
 
-    /// Writes the part, in place of an older one if there is one. At every moment there is the old
-    /// file or the new one.
-    ///
-    /// A process that is killed here leaves a file `<path>.tmp-*` behind, which can be deleted.
+    /// Writes the part, as [`replace_file`] does.
     ///
     /// # Errors
     /// [`StudyError::Write`].
@@ -204,14 +200,9 @@ impl Part {
         let write = || {
             let part = serde_json::to_string(self)? + "\n";
             let first = FirstLine { schema: FILE_SCHEMA.to_owned(), sha256: sha256(part.as_bytes()) };
-            let mut file = temporary_beside(path)?;
-            file.write_all(format!("{}\n{part}", serde_json::to_string(&first)?).as_bytes())?;
-            // Else a power failure could leave the new name with no content.
-            file.as_file().sync_all()?;
-            file.persist(path)?;
-            Ok(())
+            replace_file(path, format!("{}\n{part}", serde_json::to_string(&first)?).as_bytes())
         };
-        write().map_err(|cause: io::Error| StudyError::Write { path: path.into(), cause })
+        write().map_err(|cause| StudyError::Write { path: path.into(), cause })
     }
 
     /// What study this is a part of.
@@ -320,15 +311,6 @@ fn where_they_differ(one: &str, other: &str) -> (String, String) {
         format!("{before}{}{behind}", text.chars().skip(start).take(SHOWN).collect::<String>())
     };
     (part(one), part(other))
-}
-
-/// A new file of a name that no other process takes, with the permissions of any new file.
-fn temporary_beside(path: &Path) -> io::Result<NamedTempFile<fs::File>> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut prefix = path.file_name().unwrap_or_default().to_owned();
-    prefix.push(".tmp-");
-    let new = |path: &Path| fs::File::options().write(true).create_new(true).open(path);
-    Builder::new().prefix(&prefix).make_in(folder, new)
 }
 
 fn sha256(bytes: &[u8]) -> String {

@@ -225,11 +225,6 @@ impl Sum {
 }
 
 impl Pilot {
-    /// What the study is.
-    pub fn header(&self) -> &Header {
-        &self.header
-    }
-
     /// Trials that were run.
     pub fn trials(&self) -> u64 {
         self.cells.iter().map(|cell| cell.tally.trials()).sum()

@@ -18,7 +18,7 @@ use crate::submission;
 use crate::{print, progress};
 
 /// How many times the upper end of the longest shard the limit is; chosen, since processors may be slower than in the pilot: the same machine
-/// took 34 and then 44 seconds for the same trials.
+/// took 44 and then 34 seconds for the same trials.
 const LIMIT_FACTOR: f64 = 2.0;
 
 /// Most tasks of an array of jobs, where the configuration of Slurm says nothing else (`MaxArraySize` is 1001).

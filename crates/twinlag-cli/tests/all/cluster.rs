@@ -179,7 +179,6 @@ fn a_batch_on_a_cluster_gives_the_table_of_a_whole_run() {
     let script = String::from_utf8(bench.read("the $runs/t.csv.submission/shard.sh")).expect("text");
     assert!(!script.contains("t.html"), "{script}");
     // Slurm gets it as one argument, of both jobs.
-    assert_eq!(cluster.submitted().matches("'--comment=it is #1'").count(), 0);
     assert_eq!(cluster.submitted().matches("--comment=it is #1").count(), 2);
     let status = cluster.run(&["batch", "--status", "--out", "the $runs/t.csv", "--json"]);
     assert_eq!(status.code, 0, "{status:#?}");
@@ -249,12 +248,10 @@ fn a_merge_that_is_lost_is_submitted_again() {
     assert!(!cluster.submitted().lines().last().expect("a line").contains("--dependency"));
     assert_eq!(cluster.run(&["study", "status", "out"]).code, 0);
     // A part that is newer than the result.
-    let part = bench.read("out/part-1-of-2.json");
     let result = fs::metadata(bench.path("out/results.json")).and_then(|file| file.modified()).expect("a time");
     let file = fs::File::options().write(true).open(bench.path("out/part-1-of-2.json")).expect("ours");
     file.set_modified(result + std::time::Duration::from_secs(1)).expect("ours");
     assert_eq!(cluster.run(&["study", "status", "out"]).code, 75);
-    assert_eq!(bench.read("out/part-1-of-2.json"), part);
 }
 
 /// Parts of another division, of another program, and options that an engine would not heed are refused before anything is submitted.
