@@ -1,0 +1,26 @@
+//! What can keep a working copy and its store from agreeing.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why an object could not be fetched or stored.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "each message names its fields")]
+#[non_exhaustive]
+pub enum ObjectsError {
+    #[error("{url}: expected s3://BUCKET/PREFIX")]
+    NoUrl { url: String },
+    #[error("{url}: this program was built without object stores (feature s3)")]
+    NotBuilt { url: String },
+    #[error("{url}: the store cannot be used: {reason}")]
+    Unusable { url: String, reason: String },
+    #[error("{url}: cannot be read: {reason}")]
+    Read { url: String, reason: String },
+    #[error("{url}: cannot be written: {reason}")]
+    Write { url: String, reason: String },
+    #[error("{url}: another process has written it since this one has read it: wait until that one ends")]
+    Changed { url: String },
+    #[error("{}: cannot be read or written: {reason}", path.display())]
+    File { path: PathBuf, reason: String },
+}

@@ -1,0 +1,103 @@
+//! A store in memory some of whose requests fail.
+
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use async_trait::async_trait;
+use bytes::Bytes;
+use futures_util::stream::BoxStream;
+use object_store::memory::InMemory;
+use object_store::path::Path;
+use object_store::{
+    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
+    PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
+};
+
+/// How a request fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fault {
+    /// Nothing is done.
+    Refused,
+    /// All is done, and the answer is an error.
+    AnswerLost,
+    /// Nothing is done, from then on.
+    Gone,
+}
+
+/// A store of which one request fails, by its place from 0.
+#[derive(Debug)]
+pub(crate) struct Faulty {
+    store: InMemory,
+    place: u32,
+    fault: Fault,
+    asked: AtomicU32,
+}
+
+impl Faulty {
+    pub(crate) fn new(place: u32, fault: Fault) -> Arc<Self> {
+        Arc::new(Self { store: InMemory::new(), place, fault, asked: AtomicU32::new(0) })
+    }
+
+    /// The fault of the next request.
+    fn next(&self) -> Option<Fault> {
+        let place = self.asked.fetch_add(1, Ordering::SeqCst);
+        (place == self.place || (place > self.place && self.fault == Fault::Gone)).then_some(self.fault)
+    }
+
+    /// The answer of a request, unless it fails.
+    async fn answer<T>(&self, request: impl Future<Output = Result<T>>) -> Result<T> {
+        let failed = || Error::Generic { store: "faulty", source: "a fault that was injected".into() };
+        match self.next() {
+            None => request.await,
+            Some(Fault::AnswerLost) => request.await.and(Err(failed())),
+            Some(_) => Err(failed()),
+        }
+    }
+}
+
+impl fmt::Display for Faulty {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("faulty")
+    }
+}
+
+#[async_trait]
+impl ObjectStore for Faulty {
+    async fn put_opts(&self, location: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
+        self.answer(self.store.put_opts(location, payload, options)).await
+    }
+
+    async fn put_multipart_opts(
+        &self,
+        location: &Path,
+        options: PutMultipartOptions,
+    ) -> Result<Box<dyn MultipartUpload>> {
+        self.answer(self.store.put_multipart_opts(location, options)).await
+    }
+
+    async fn get_opts(&self, location: &Path, options: GetOptions) -> Result<GetResult> {
+        self.answer(self.store.get_opts(location, options)).await
+    }
+
+    async fn get_ranges(&self, location: &Path, ranges: &[Range<u64>]) -> Result<Vec<Bytes>> {
+        self.answer(self.store.get_ranges(location, ranges)).await
+    }
+
+    fn delete_stream(&self, locations: BoxStream<'static, Result<Path>>) -> BoxStream<'static, Result<Path>> {
+        self.store.delete_stream(locations)
+    }
+
+    fn list(&self, prefix: Option<&Path>) -> BoxStream<'static, Result<ObjectMeta>> {
+        self.store.list(prefix)
+    }
+
+    async fn list_with_delimiter(&self, prefix: Option<&Path>) -> Result<ListResult> {
+        self.answer(self.store.list_with_delimiter(prefix)).await
+    }
+
+    async fn copy_opts(&self, from: &Path, to: &Path, options: CopyOptions) -> Result<()> {
+        self.answer(self.store.copy_opts(from, to, options)).await
+    }
+}

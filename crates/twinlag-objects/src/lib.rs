@@ -1,0 +1,34 @@
+//! A folder of files that is kept in an object store, with a working copy on this machine.
+//!
+//! For a program that keeps its work in files, on machines that share no file system. [`WorkingCopy::open`] lists what is stored under a
+//! prefix, [`WorkingCopy::fetch`] brings what is needed, and [`WorkingCopy::store`] takes back what the program has written since.
+//! An object is replaced only if it is what this copy has last seen of it: of two processes that write the same, one goes on, and the
+//! other gets [`ObjectsError::Changed`], so that no lock is needed. What the files hold is the caller's business. A program that has
+//! folders that all its machines see needs none of this.
+//!
+//! Requests that fail for a while are repeated. A store may have done what it answers with an error, or not at all: after
+//! each error the object is read and compared.
+//!
+//! ```
+//! use twinlag_objects::{Store, WorkingCopy};
+//!
+//! let store = Store::in_memory("s3://bucket/study");
+//! let mut copy = WorkingCopy::open(&store)?;
+//! std::fs::write(copy.folder().join("part-0-of-2.json"), "half of it")?;
+//! copy.store("part-0-of-2.json")?;
+//!
+//! let mut elsewhere = WorkingCopy::open(&store)?;
+//! elsewhere.fetch(|name| name.starts_with("part-"))?;
+//! assert_eq!(std::fs::read_to_string(elsewhere.folder().join("part-0-of-2.json"))?, "half of it");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod copy;
+mod error;
+#[cfg(test)]
+mod faults;
+mod store;
+
+pub use copy::WorkingCopy;
+pub use error::ObjectsError;
+pub use store::Store;
