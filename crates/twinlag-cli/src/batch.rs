@@ -4,6 +4,7 @@ mod question;
 mod said;
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs;
 use std::io::Read as _;
 use std::num::{NonZeroU32, NonZeroUsize};
@@ -28,7 +29,8 @@ use crate::batch::question::{Question, failed};
 use crate::batch::said::say;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{Output, with_ending};
+use crate::output::{Output, folder_of, with_ending};
+use crate::place::{self, Place};
 use crate::shards::JOURNAL_ENDING;
 use crate::submission::{self, Cluster};
 use crate::{output, progress, report, shards};
@@ -188,27 +190,36 @@ const GAS_ENDING: &str = ".gas.csv";
 /// Within a batch, a record says nothing on its own.
 const SILENT: Console = Console { json: true, quiet: true };
 
-pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
-    let (table, Division { merge, status, resubmit, .. }) = (&command.out[0], &command.division);
-    if command.cluster.time_limit.is_some() && command.cluster.engine.is_none() && !resubmit {
+pub(crate) fn run(command: &mut Batch, console: Console) -> Result<u8, Failure> {
+    if command.cluster.time_limit.is_some() && command.cluster.engine.is_none() && !command.division.resubmit {
         return Err(Failure::Usage("--time-limit needs --engine or --resubmit".to_owned()));
     }
-    if *merge {
-        return merge_parts(command, console);
-    }
-    if *status || *resubmit {
-        return follow(command, console);
-    }
+    let given = folder_of(&command.out[0]).to_owned();
+    place::at(&given, |place| {
+        command.work_in(place)?;
+        let Division { merge, status, resubmit, .. } = command.division;
+        match (merge, status || resubmit) {
+            (true, _) => merge_parts(command, place, console),
+            (_, true) => follow(command, place, console),
+            _ => start(command, place, console),
+        }
+    })
+}
+
+/// Asks all units, or those of a shard, or submits the shards.
+fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Failure> {
+    let table = &command.out[0];
     let question = Question::of(command)?;
     let journal_path =
         command.division.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
     command.check_outputs(&journal_path)?;
     let asked = question.asked()?;
     if command.cluster.engine.is_some() {
-        return submit(command, &question, &asked, &journal_path, console);
+        return submit(command, &question, &asked, &journal_path, place, console);
     }
     let is_divided = command.division.shard.is_some() && shards::manifest_path(table).exists();
-    let Scope { manifest, files, units, part_of } = Scope::of(command, &question, &asked, &journal_path, console)?;
+    let Scope { manifest, files, units, part_of } =
+        Scope::of(command, &question, &asked, &journal_path, place, console)?;
     let begin = match (command.course.resume, command.course.force) {
         (true, _) => Begin::Resume,
         (_, true) => Begin::Replace,
@@ -227,7 +238,8 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
     match journal.other_units(&units) {
         0 => {}
         count => console.note(|| {
-            let (units, journal) = (question.unit_name(), journal_path.display());
+            let (units, journal) = (question.unit_name(), place.named(&journal_path));
+            let journal = journal.display();
             format!(
                 "not asked for now, and left out of the table: {count} of the earlier run's {units}, kept in {journal}"
             )
@@ -250,16 +262,22 @@ pub(crate) fn run(command: &Batch, console: Console) -> Result<u8, Failure> {
         Some(change) => failed(unit, &change),
         None => question.rows(unit, &gas_files),
     };
+    let mut stored = Ok(());
     let done = run_units(&units, &mut journal, command.course.threads, work, |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
+        if stored.is_ok() {
+            stored = place.store_so_far(&journal_path);
+        }
     });
     bar.finish_and_clear();
     let _ = panic::take_hook();
+    stored?;
+    place.store(&journal_path)?;
     done?;
     match command.division.shard {
-        Some(shard) => shards::say_done(table, &journal_path, shard, console).map(|()| 0),
-        None => finish(command, &units, &mut journal, question.verb.into(), question.unit_name(), console),
+        Some(shard) => shards::say_done(&place.named(table), &place.named(&journal_path), shard, console).map(|()| 0),
+        None => finish(command, &units, &mut journal, question.verb.into(), question.unit_name(), place, console),
     }
 }
 
@@ -280,15 +298,16 @@ impl Scope {
         question: &Question<'_>,
         asked: &Value,
         journal: &Path,
+        place: &mut Place,
         console: Console,
     ) -> Result<Self, Failure> {
         let Some(shard) = command.division.shard else {
             let (files, units) = command.units(question, journal, console)?;
             return Ok(Self { manifest: None, files, units, part_of: None });
         };
-        let manifest = command.manifest(question, asked, journal, console)?;
+        let manifest = command.manifest(question, asked, journal, place, console)?;
         let units = manifest.units_of(shard);
-        command.note_unlisted(&manifest, journal, console)?;
+        command.note_unlisted(&manifest, journal, place, console)?;
         let files = manifest.files_of(shard);
         let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard };
         Ok(Self { manifest: Some(manifest), files, units, part_of: Some(part_of) })
@@ -301,6 +320,7 @@ fn submit(
     question: &Question<'_>,
     asked: &Value,
     journal: &Path,
+    place: &mut Place,
     console: Console,
 ) -> Result<u8, Failure> {
     let table = &command.out[0];
@@ -317,33 +337,42 @@ fn submit(
     if let Some((_, part)) = parts.iter().find(|(shard, _)| shard.of() != shards) {
         return Err(Failure::Usage(format!("{}: is of another number of shards; remove it", part.display())));
     }
-    let manifest = command.manifest(question, asked, journal, console)?;
-    command.note_unlisted(&manifest, journal, console)?;
+    let manifest = command.manifest(question, asked, journal, place, console)?;
+    command.note_unlisted(&manifest, journal, place, console)?;
     let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();
     let mut shard = submission::arguments_without("batch", &[dropped, Cluster::options()].concat())?;
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN);
     // Behind the name of the command, whatever stands behind `--`.
-    let place = shard.iter().position(|argument| argument == "batch").map_or(0, |place| place + 1);
+    let behind = shard.iter().position(|argument| argument == "batch").map_or(0, |place| place + 1);
     shard.splice(
-        place..place,
+        behind..behind,
         ["--shard", Work::SHARD, "--resume", "--quiet", "--threads", &threads.to_string()].map(str::to_owned),
     );
     let mut merge = vec!["batch".to_owned(), "--merge".to_owned()];
     for (option, path) in command.outputs() {
-        merge.extend([option.to_owned(), submission::text(path)?]);
+        merge.extend([option.to_owned(), submission::text(place.named(path))?]);
     }
     merge.extend(command.is_static.then(|| "--static".to_owned()));
     // Nothing was there, or it was to be replaced: what is there then is of an earlier merge.
     merge.push("--force".to_owned());
     let name = table.file_stem().unwrap_or_default().to_string_lossy();
     let work = command.cluster.work(&name, shard, merge)?;
-    command.cluster.submit(&shards::submission_path(table), work, console)
+    command.cluster.submit(&scripts(table, place), work, console)
+}
+
+/// The folder of what was submitted; of a table that is stored elsewhere, it is in the folder in which the program runs.
+fn scripts(table: &Path, place: &Place) -> PathBuf {
+    let beside = shards::submission_path(table);
+    match beside.file_name() {
+        Some(name) if place.is_stored() => name.into(),
+        _ => beside,
+    }
 }
 
 /// Says how far the shards of a table are, or submits again what is missing of them.
-fn follow(command: &Batch, console: Console) -> Result<u8, Failure> {
+fn follow(command: &Batch, place: &Place, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
-    let scripts = shards::submission_path(table);
+    let scripts = scripts(table, place);
     let progress = |of| shards::progress_of(table, of);
     let result = is_written(table).then_some(table.as_path());
     if command.division.resubmit {
@@ -354,7 +383,7 @@ fn follow(command: &Batch, console: Console) -> Result<u8, Failure> {
 }
 
 /// Makes the table of all parts of a batch.
-fn merge_parts(command: &Batch, console: Console) -> Result<u8, Failure> {
+fn merge_parts(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     command.check_outputs(&shards::manifest_path(table))?;
     let (manifest, mut parts) = shards::all(table)?;
@@ -362,7 +391,7 @@ fn merge_parts(command: &Batch, console: Console) -> Result<u8, Failure> {
     let unit_name = unit_name(!asked["group_by"].is_null());
     let verb = serde_json::from_value(asked["verb"].clone())
         .map_err(|error| Failure::File(format!("{}: the parts ask nothing that is known: {error}", table.display())))?;
-    finish(command, &manifest.units(), &mut parts, verb, unit_name, console)
+    finish(command, &manifest.units(), &mut parts, verb, unit_name, place, console)
 }
 
 /// Writes a table, as text or as Parquet by its ending.
@@ -387,6 +416,7 @@ fn finish(
     answers: &mut impl Answers,
     verb: RowVerb,
     unit_name: &'static str,
+    place: &mut Place,
     console: Console,
 ) -> Result<u8, Failure> {
     // The first table last: where it is, so are the others and the summary.
@@ -395,12 +425,14 @@ fn finish(
     let fleet = Fleet::of(units, answers)?;
     if let Some(path) = &command.report {
         let making = report::making(&[] as &[&Path], command.is_static);
-        let title = first.display().to_string();
+        let title = place.named(first).display().to_string();
         let made_by = ["twinlag", env!("CARGO_PKG_VERSION")];
         output::write(path, fleet_report(&fleet, &title, unit_name, made_by, &making)?)?;
     }
     write_table(first, units, answers, verb)?;
-    say(command, unit_name, &fleet, console)?;
+    others.iter().chain(&command.report).chain([first]).try_for_each(|path| place.store(path))?;
+    let tables: Vec<PathBuf> = command.out.iter().map(|out| place.named(out)).collect();
+    say(&tables, unit_name, &fleet, console)?;
     let outcome = match (fleet.units.answered, fleet.units.undetermined, fleet.units.failed) {
         (0, 0, 0) => Outcome::Unusable,
         (0, 0, _) => Outcome::Failed,
@@ -411,6 +443,33 @@ fn finish(
 }
 
 impl Batch {
+    /// Takes what is in a place into its folder, and has the outputs written there.
+    fn work_in(&mut self, place: &mut Place) -> Result<(), Failure> {
+        if let Some(gas) = self.gas.as_ref().filter(|gas| place::is_url(gas)) {
+            return Err(Failure::Usage(format!("--gas {}: expected a folder that this machine sees", gas.display())));
+        }
+        let table = self.out[0].file_name().unwrap_or_default().to_owned();
+        let given = folder_of(&self.out[0]).to_owned();
+        let mut names = Vec::new();
+        for path in self.out.iter_mut().chain(&mut self.report).filter(|path| place::is_url(path)) {
+            let Some(name) = path.file_name().filter(|_| folder_of(path) == given).map(OsStr::to_owned) else {
+                return Err(Failure::Usage(format!(
+                    "{}: expected a name in {}, as the first table has",
+                    path.display(),
+                    given.display()
+                )));
+            };
+            *path = place.folder().join(&name);
+            names.push(name);
+        }
+        let table = Path::new(&table);
+        if let Some(shard) = self.division.shard {
+            let needed = [shards::manifest_path(table), part_path(table, shard)];
+            return place.fetch(|name| needed.iter().any(|needed| needed.as_os_str() == name));
+        }
+        place.fetch(|name| names.iter().any(|is| is == name) || shards::is_named_beside(table, name))
+    }
+
     /// Refuses outputs that could not be written or would overwrite something.
     fn check_outputs(&self, journal: &Path) -> Result<(), Failure> {
         if let Some(out) = self.out.iter().find(|out| !is_parquet(out) && !has_ending(out, "csv")) {
@@ -471,9 +530,10 @@ impl Batch {
         question: &Question<'_>,
         asked: &Value,
         journal: &Path,
+        place: &mut Place,
         console: Console,
     ) -> Result<Manifest, Failure> {
-        shards::manifest(&self.out[0], &self.what, asked, || {
+        shards::manifest(&self.out[0], &self.what, asked, place, || {
             let (files, units) = self.units(question, journal, console)?;
             self.expect_no_gas(&question.gas_files(&files)?)?;
             shards::listed(&self.what, asked, &units, &files, self.course.threads, console)
@@ -481,10 +541,16 @@ impl Batch {
     }
 
     /// Says which files have come since a batch was divided.
-    fn note_unlisted(&self, manifest: &Manifest, journal: &Path, console: Console) -> Result<(), Failure> {
+    fn note_unlisted(
+        &self,
+        manifest: &Manifest,
+        journal: &Path,
+        place: &Place,
+        console: Console,
+    ) -> Result<(), Failure> {
         let (unlisted, _) = self.records(manifest.unlisted(find(&self.what)?), journal)?;
         if !unlisted.is_empty() {
-            let (count, path) = (unlisted.len(), shards::manifest_path(&self.out[0]));
+            let (count, path) = (unlisted.len(), place.named(&shards::manifest_path(&self.out[0])));
             console.note(|| {
                 format!(
                     "not asked for: {count} files that {} does not list; remove it and all parts beside it to divide the batch anew",

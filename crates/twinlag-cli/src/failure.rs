@@ -43,6 +43,18 @@ impl Failure {
         if let Self::Line { excerpt, .. } = self { Some(excerpt) } else { None }
     }
 
+    /// The same with another message.
+    pub(crate) fn reworded(self, text: impl FnOnce(String) -> String) -> Self {
+        match self {
+            Self::Usage(is) => Self::Usage(text(is)),
+            Self::File(is) => Self::File(text(is)),
+            Self::Line { text: is, excerpt } => Self::Line { text: text(is), excerpt },
+            Self::Other(is) => Self::Other(text(is)),
+            Self::Undetermined(is) => Self::Undetermined(text(is)),
+            Self::NotYet(is) => Self::NotYet(text(is)),
+        }
+    }
+
     /// The failure of a verb on the record in `file`; a message about its readings begins with that name.
     pub(crate) fn in_file(error: twinlag::Error, file: &str) -> Self {
         use twinlag::Error::{Compensate, Cost, Estimate, Model, Noise};

@@ -14,6 +14,7 @@ use twinlag_study::Shard;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::output::{folder_of, new_part, with_ending};
+use crate::place::Place;
 use crate::submission::ShardProgress;
 use crate::{print, progress};
 
@@ -52,13 +53,15 @@ pub(crate) fn is_beside(table: &Path, file: &Path) -> bool {
     if submission.is_ok_and(|submission| file.canonicalize().is_ok_and(|file| file.starts_with(submission))) {
         return true;
     }
-    let is_named = |name: &str| {
-        let rest = table.file_name().and_then(|table| name.strip_prefix(table.to_str()?));
-        rest.is_some_and(|rest| [MANIFEST_ENDING, JOURNAL_ENDING].contains(&rest) || rest.starts_with(".part-"))
-    };
     let is_in = |folder: PathBuf| folder_of(file).canonicalize().is_ok_and(|is| is == folder);
-    file.file_name().and_then(|name| name.to_str()).is_some_and(is_named)
+    file.file_name().and_then(|name| name.to_str()).is_some_and(|name| is_named_beside(table, name))
         && folder_of(table).canonicalize().is_ok_and(is_in)
+}
+
+/// Whether the manifest of a table, its journal or one of its parts has this name.
+pub(crate) fn is_named_beside(table: &Path, name: &str) -> bool {
+    let rest = table.file_name().and_then(|table| name.strip_prefix(table.to_str()?));
+    rest.is_some_and(|rest| [MANIFEST_ENDING, JOURNAL_ENDING].contains(&rest) || rest.starts_with(".part-"))
 }
 
 /// Lists the units of a batch, with sizes and hashes of their files.
@@ -84,6 +87,7 @@ pub(crate) fn manifest(
     table: &Path,
     what: &[PathBuf],
     asked: &Value,
+    place: &mut Place,
     make: impl FnOnce() -> Result<Manifest, Failure>,
 ) -> Result<Manifest, Failure> {
     let path = manifest_path(table);
@@ -96,6 +100,7 @@ pub(crate) fn manifest(
             Err(error) if error.error.kind() != ErrorKind::AlreadyExists => return Err(failed(error.error)),
             _ => {}
         }
+        place.store_first(&path)?;
     }
     let manifest = read(&path)?;
     manifest.expect_same(&path, what, asked)?;
@@ -135,6 +140,8 @@ pub(crate) fn all(table: &Path) -> Result<(Manifest, Parts), Failure> {
 }
 
 /// Says that a shard is done.
+///
+/// - `table`, `part`: as the user would call them
 pub(crate) fn say_done(table: &Path, part: &Path, shard: Shard, console: Console) -> Result<(), Failure> {
     if console.json {
         let (part, shard) = (part.to_owned(), shard.to_string());

@@ -19,6 +19,8 @@ use twinlag_study::{Options, Part, Shard, Study as _, StudyError};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::output::with_ending;
+use crate::place::{self, Place};
 use crate::study::plan::Planning;
 use crate::submission::{self, Cluster, ShardProgress};
 use crate::{output, print, progress};
@@ -111,19 +113,20 @@ pub(crate) struct StudyPart {
 
 pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
     match command {
-        Study::Run(run) => start(run, console),
-        Study::Merge { dir } => merge(dir, console),
+        Study::Run(run) => place::at(&run.out, |place| start(run, place, console)),
+        Study::Merge { dir } => place::at(dir, |place| merge(place, console)),
         Study::Plan(planning) => plan::run(planning, console),
-        Study::Submit(command) => submit(command, console),
-        Study::Status { dir } => {
-            let result = results_in(dir);
-            submission::status(&dir.join(SUBMISSION), |of| progress_of(dir, of), "trials", result.as_deref(), console)
-        }
-        Study::Resubmit { dir, time_limit } => {
-            let result = results_in(dir);
-            let progress = |of| progress_of(dir, of);
-            submission::resubmit(&dir.join(SUBMISSION), progress, result.as_deref(), *time_limit, console)
-        }
+        Study::Submit(command) => place::at(&command.out, |place| submit(command, place, console)),
+        Study::Status { dir } => place::at(dir, |place| {
+            place.fetch(|_| true)?;
+            let (scripts, result) = (scripts(place), results_in(place.folder()));
+            submission::status(&scripts, |of| progress_of(place, of), "trials", result.as_deref(), console)
+        }),
+        Study::Resubmit { dir, time_limit } => place::at(dir, |place| {
+            place.fetch(|_| true)?;
+            let (scripts, result) = (scripts(place), results_in(place.folder()));
+            submission::resubmit(&scripts, |of| progress_of(place, of), result.as_deref(), *time_limit, console)
+        }),
     }
 }
 
@@ -131,16 +134,29 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
 const PLAN: &str = "plan.toml";
 /// The results.
 const RESULTS: &str = "results.json";
+/// The results as a table.
+const RESULTS_TABLE: &str = "results.csv";
 /// What parts say made them.
 const PROGRAM: &str = env!("TWINLAG_VERSION");
 /// The folder of what was submitted.
 const SUBMISSION: &str = "submission";
+/// How that folder ends on this machine, of results that are stored elsewhere.
+const SUBMISSION_ENDING: &str = ".submission";
+
+/// The folder of what was submitted; of results that are stored elsewhere, it is in the folder in which the program runs.
+fn scripts(place: &Place) -> PathBuf {
+    match place.named(place.folder()).file_name() {
+        Some(name) if place.is_stored() => with_ending(Path::new(name), SUBMISSION_ENDING),
+        _ => place.folder().join(SUBMISSION),
+    }
+}
 
 /// Submits all shards.
-fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
-    expect_no_results(&read(&command.plan)?.0, &command.out)?;
-    expect_one_division(&command.out, command.cluster.shards()).map_err(Failure::Usage)?;
-    let plan = prepare(&command.plan, &command.out)?;
+fn submit(command: &Submit, place: &mut Place, console: Console) -> Result<u8, Failure> {
+    place.fetch(|name| name == PLAN)?;
+    expect_no_results(&read(&command.plan)?.0, place)?;
+    expect_one_division(place, command.cluster.shards()).map_err(Failure::Usage)?;
+    let plan = prepare(&command.plan, place)?;
     let (out, copy) = (submission::text(&command.out)?, submission::text(command.out.join(PLAN))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
     let shard =
@@ -149,14 +165,15 @@ fn submit(command: &Submit, console: Console) -> Result<u8, Failure> {
             .to_vec();
     let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
     let work = command.cluster.work(&plan.name, shard, merge)?;
-    command.cluster.submit(&command.out.join(SUBMISSION), work, console)
+    command.cluster.submit(&scripts(place), work, console)
 }
 
 /// What each of so many shards has left.
-fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
+fn progress_of(place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
+    let dir = place.folder();
     let (plan, _) = read(&dir.join(PLAN))?;
     let experiment = Experiment::new(&plan)?;
-    expect_one_division(dir, of).map_err(Failure::File)?;
+    expect_one_division(place, of).map_err(Failure::File)?;
     let progress = |shard: Shard| {
         let part = dir.join(shard.file_name());
         let read = || Part::read_of(&experiment, shard, PROGRAM, &part).map(|part| part.done());
@@ -167,11 +184,11 @@ fn progress_of(dir: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
 }
 
 /// Refuses parts of another number of shards, saying which.
-fn expect_one_division(dir: &Path, of: u64) -> Result<(), String> {
-    match parts_in(dir).unwrap_or_default().into_iter().find(|part| part.of() != of) {
+fn expect_one_division(place: &Place, of: u64) -> Result<(), String> {
+    match parts_in(place).unwrap_or_default().into_iter().find(|part| part.of() != of) {
         None => Ok(()),
         Some(part) => {
-            let part = dir.join(part.file_name());
+            let part = place.folder().join(part.file_name());
             Err(format!(
                 "{}: is of another number of shards than {of}; remove it, or name another folder",
                 part.display()
@@ -180,16 +197,22 @@ fn expect_one_division(dir: &Path, of: u64) -> Result<(), String> {
     }
 }
 
-/// Refuses to replace what the results of a plan would replace.
-fn expect_no_results(plan: &Plan, out: &Path) -> Result<(), Failure> {
+/// The names of all results, `results.json` last: where it is, so are the others.
+fn result_names(plan: &Plan) -> Vec<String> {
     let summaries = plan.summaries.iter().map(|summary| format!("{}.md", summary.file));
     let pictures = plan.pictures.iter().map(|picture| format!("{}.svg", picture.file));
-    let names = [RESULTS, "results.csv"].map(str::to_owned).into_iter().chain(summaries).chain(pictures);
-    match names.map(|name| out.join(name)).find(|path| path.exists()) {
+    [RESULTS_TABLE.to_owned()].into_iter().chain(summaries).chain(pictures).chain([RESULTS.to_owned()]).collect()
+}
+
+/// Refuses to replace what the results of a plan would replace.
+fn expect_no_results(plan: &Plan, place: &Place) -> Result<(), Failure> {
+    let folder = place.folder().display();
+    let there = place.names().map_err(|error| Failure::File(format!("{folder}: cannot be read: {error}")))?;
+    match result_names(plan).into_iter().find(|name| there.contains(name)) {
         None => Ok(()),
-        Some(path) => {
-            let path = path.display();
-            Err(Failure::Usage(format!("{path} exists: name another folder, or remove it")))
+        Some(name) => {
+            let path = place.folder().join(name);
+            Err(Failure::Usage(format!("{} exists: name another folder, or remove it", path.display())))
         }
     }
 }
@@ -198,12 +221,13 @@ fn expect_no_results(plan: &Plan, out: &Path) -> Result<(), Failure> {
 fn results_in(dir: &Path) -> Option<PathBuf> {
     let path = dir.join(RESULTS);
     let table: Table = serde_json::from_slice(&fs::read(&path).ok()?).ok()?;
-    (!table.rows.is_empty() && dir.join("results.csv").exists()).then_some(path)
+    (!table.rows.is_empty() && dir.join(RESULTS_TABLE).exists()).then_some(path)
 }
 
 /// Reads the plan of a study, and puts it into the folder of the results.
-fn prepare(plan_file: &Path, out: &Path) -> Result<Plan, Failure> {
+fn prepare(plan_file: &Path, place: &mut Place) -> Result<Plan, Failure> {
     let (plan, text) = read(plan_file)?;
+    let out = place.folder();
     Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", plan_file.display())))?;
     fs::create_dir_all(out).map_err(|e| Failure::Other(format!("{}: cannot be created: {e}", out.display())))?;
     let copy = out.join(PLAN);
@@ -214,6 +238,7 @@ fn prepare(plan_file: &Path, out: &Path) -> Result<Plan, Failure> {
         Ok(_) => Ok(plan),
         Err(_) => {
             output::write(&copy, &text)?;
+            place.store_first(&copy)?;
             Ok(plan)
         }
     }
@@ -221,28 +246,29 @@ fn prepare(plan_file: &Path, out: &Path) -> Result<Plan, Failure> {
 
 fn read(path: &Path) -> Result<(Plan, String), Failure> {
     let name = path.display();
+    let (_place, path) = place::file(path)?;
     let text = fs::read_to_string(path).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
     let plan = Plan::from_toml(&text).map_err(|e| Failure::File(format!("{name}: {e}")))?;
     Ok((plan, text))
 }
 
-fn start(run: &Run, console: Console) -> Result<u8, Failure> {
-    if !run.resume && run.shard.is_none() {
-        expect_no_results(&read(&run.plan)?.0, &run.out)?;
-    }
-    let plan = prepare(&run.plan, &run.out)?;
-    let experiment = Experiment::new(&plan)?;
-    let out = run.out.display();
+fn start(run: &Run, place: &mut Place, console: Console) -> Result<u8, Failure> {
     let shard = run.shard.unwrap_or(Shard::WHOLE);
+    place.fetch(|name| name == PLAN || name == shard.file_name())?;
+    if !run.resume && run.shard.is_none() {
+        expect_no_results(&read(&run.plan)?.0, place)?;
+    }
+    let plan = prepare(&run.plan, place)?;
+    let experiment = Experiment::new(&plan)?;
     let is_other = |part: &Shard| *part != shard && part.overlaps(shard);
-    if let Some(part) = parts_in(&run.out).unwrap_or_default().into_iter().find(is_other) {
-        let part = run.out.join(part.file_name());
+    if let Some(part) = parts_in(place).unwrap_or_default().into_iter().find(is_other) {
+        let part = place.folder().join(part.file_name());
         return Err(Failure::Usage(format!(
             "{}: has trials that shard {shard} has as well; remove it, or name another folder",
             part.display()
         )));
     }
-    let part = run.out.join(shard.file_name());
+    let part = place.folder().join(shard.file_name());
     let options = Options {
         threads: run.threads.unwrap_or(Options::default().threads),
         shard,
@@ -252,25 +278,37 @@ fn start(run: &Run, console: Console) -> Result<u8, Failure> {
         ..Options::default()
     };
     let bar = progress::bar(console).with_message("trials");
+    let mut stored = Ok(());
     let done = twinlag_study::run(&experiment, &options, |p| {
         bar.set_length(p.total);
         bar.set_position(p.done);
-        ControlFlow::Continue(())
+        if stored.is_ok() {
+            stored = place.store_so_far(&part);
+        }
+        if stored.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     bar.finish_and_clear();
+    stored?;
+    // A trial that fails leaves what was done before it.
+    if part.exists() {
+        place.store(&part)?;
+    }
     done?;
     if run.shard.is_some() {
+        let (part, out) = (place.named(&part), run.out.display());
         let text = format!("{}: done; when all parts are done, run `twinlag study merge {out}`", part.display());
         say(console, &StudyPart { schema: "twinlag.study-part/1", part, shard: shard.to_string() }, text)?;
         return Ok(0);
     }
-    merge(&run.out, console)
+    merge(place, console)
 }
 
-fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
+fn merge(place: &mut Place, console: Console) -> Result<u8, Failure> {
+    place.fetch(|name| name == PLAN || Shard::of_file_name(name).is_some())?;
+    let dir = place.folder();
     let (plan, _) = read(&dir.join(PLAN))?;
     let name = dir.display();
-    let parts = parts_in(dir).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
+    let parts = parts_in(place).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
     if parts.is_empty() {
         return Err(Failure::NotYet(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
@@ -283,18 +321,19 @@ fn merge(dir: &Path, console: Console) -> Result<u8, Failure> {
     }
     let table = Table::of(&experiment, &results)?;
     write(&plan, &table, dir)?;
+    let dir = dir.to_owned();
+    result_names(&plan).iter().try_for_each(|name| place.store(&dir.join(name)))?;
+    let out = place.named(&dir);
     let trials: u64 = results.cells().iter().map(twinlag_study::Tally::trials).sum();
-    let text = format!("{name}: {trials} trials in {} cells: results.json, results.csv", results.cells().len());
-    say(console, &StudyAnswer { schema: "twinlag.study/1", out: dir.to_owned(), trials, rows: table.rows }, text)?;
+    let (name, cells) = (out.display(), results.cells().len());
+    let text = format!("{name}: {trials} trials in {cells} cells: {RESULTS}, {RESULTS_TABLE}");
+    say(console, &StudyAnswer { schema: "twinlag.study/1", out, trials, rows: table.rows }, text)?;
     Ok(0)
 }
 
-/// The shards whose parts are in a folder, neighbours side by side: these merge at once.
-fn parts_in(dir: &Path) -> std::io::Result<Vec<Shard>> {
-    let mut parts = Vec::new();
-    for entry in fs::read_dir(dir)? {
-        parts.extend(entry?.file_name().to_str().and_then(Shard::of_file_name));
-    }
+/// The shards whose parts are there, neighbours side by side: these merge at once.
+fn parts_in(place: &Place) -> std::io::Result<Vec<Shard>> {
+    let mut parts: Vec<Shard> = place.names()?.iter().filter_map(|name| Shard::of_file_name(name)).collect();
     parts.sort_by_key(|shard| (shard.of(), shard.index()));
     Ok(parts)
 }

@@ -7,7 +7,6 @@ use serde::Serialize;
 use twinlag::diagnosis::Grade;
 use twinlag_batch::{Fleet, Member, MemberTau};
 
-use super::Batch;
 use crate::columns::columns;
 use crate::console::Console;
 use crate::failure::Failure;
@@ -37,12 +36,14 @@ pub(crate) struct BatchAnswer {
 }
 
 /// Says what came of it.
-pub(super) fn say(command: &Batch, unit_name: &'static str, fleet: &Fleet, console: Console) -> Result<(), Failure> {
+///
+/// - `tables`: as the user would call them
+pub(super) fn say(tables: &[PathBuf], unit_name: &'static str, fleet: &Fleet, console: Console) -> Result<(), Failure> {
     let counts = &fleet.units;
     if console.json {
         return print::json(&BatchAnswer {
             schema: "twinlag.batch/1",
-            out: command.out.clone(),
+            out: tables.to_owned(),
             units: unit_name,
             answered: counts.answered,
             undetermined: counts.undetermined,
@@ -52,7 +53,7 @@ pub(super) fn say(command: &Batch, unit_name: &'static str, fleet: &Fleet, conso
             contradicting_records: fleet.contradicting.len(),
         });
     }
-    let names: Vec<String> = command.out.iter().map(|out| out.display().to_string()).collect();
+    let names: Vec<String> = tables.iter().map(|out| out.display().to_string()).collect();
     let unit = if counts.total() == 1 { unit_name.trim_end_matches('s') } else { unit_name };
     let mut lines = vec![format!(
         "{}: {} {}: {} answered, {} undetermined, {} unusable, {} failed",
