@@ -1,6 +1,9 @@
 //! Studies and batches on real engines on this machine: the same bytes as one process, with nodes and workers killed.
 //!
-//! Slurm with one and with three virtual nodes, `HyperQueue`, and GNU parallel; what is not installed is named, with how to install it.
+//! Slurm with one and with three virtual nodes, `HyperQueue`, GNU parallel, and an object store; what is not installed is named, with how to
+//! install it.
+
+mod objects;
 
 use std::fs;
 use std::io::{BufRead as _, BufReader};
@@ -61,11 +64,11 @@ pub(crate) struct Cluster {
     /// Files of the fleet, of which one in ten is damaged, ten to a rig.
     #[arg(long, default_value_t = FILES)]
     files: usize,
-    /// The program to run; by default that of the last build in debug.
+    /// The program to run; by default that of the last build in debug, and for object stores one with the feature `s3`.
     #[arg(long)]
     program: Option<PathBuf>,
-    /// Only this engine.
-    #[arg(long, value_parser = ["slurm", "hyperqueue", "parallel"])]
+    /// Only this engine, or only object stores.
+    #[arg(long, value_parser = ["slurm", "hyperqueue", "parallel", "objects"])]
     only: Option<String>,
 }
 
@@ -132,6 +135,12 @@ pub(crate) fn run(cluster: &Cluster) -> Result<()> {
         } else {
             println!("SKIPPED: parallel; `apt-get install parallel` installs it");
         }
+    }
+    if wants("objects") {
+        if cluster.program.is_none() {
+            site.program = objects::program()?;
+        }
+        site.objects(cluster.files)?;
     }
     Ok(())
 }

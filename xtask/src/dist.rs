@@ -147,6 +147,8 @@ fn compiled(target: &str, build: &Path) -> Result<PathBuf> {
             "--locked",
             "--package",
             "twinlag-cli",
+            "--features",
+            "s3",
             "--target",
             target,
             "--target-dir",

@@ -66,7 +66,8 @@ enum Task {
     Bench(bench::Bench),
     /// Simulates a fleet of records of many rigs, one file in ten damaged, to measure `twinlag batch` on.
     Fleet(fleet::Fleet),
-    /// Runs a study and a batch on Slurm, `HyperQueue` and GNU parallel on this machine, and kills nodes: the bytes have to be the same.
+    /// Runs a study and a batch on Slurm, `HyperQueue`, GNU parallel and an object store on this machine, and kills nodes: the bytes have to
+    /// be the same.
     Cluster(cluster::Cluster),
     /// Samples where the time of each verb goes, and writes the book's page on it.
     Profile(profile::Profile),

@@ -72,6 +72,8 @@ table as TABLE.part-K-of-N. The first shard lists the files with sizes and hashe
 makes the table of all parts: the same, to the byte, as without shards. --engine submits all shards and the merge to a cluster;
 --status says how far they are, and --resubmit submits again what is missing.
 
+Tables, summary and parts may be in an object store (--out s3://BUCKET/PREFIX/TABLE.csv); records are files.
+
 What is done is kept in TABLE.journal. A run that was stopped goes on with --resume, and gives the same table; so does a run
 after files have been added or changed, which asks only of those.
 
@@ -356,7 +358,8 @@ fn submit(
     // Nothing was there, or it was to be replaced: what is there then is of an earlier merge.
     merge.push("--force".to_owned());
     let name = table.file_stem().unwrap_or_default().to_string_lossy();
-    let work = command.cluster.work(&name, shard, merge)?;
+    // The records are in files.
+    let work = command.cluster.work(&name, false, shard, merge)?;
     command.cluster.submit(&scripts(table, place), work, console)
 }
 

@@ -1,6 +1,6 @@
 //! Where results are kept: a folder that this machine sees, or a prefix of an object store.
 //!
-//! What is stored elsewhere is worked on in a folder of this machine, and is stored again when it is done, and each minute. The rest of
+//! What is stored elsewhere is worked on in a folder of this machine, and is stored again when it is done, and every some seconds. The rest of
 //! the program sees paths of that folder; messages and answers name what the user has named.
 
 use std::ffi::OsString;
@@ -13,9 +13,11 @@ use twinlag_objects::{ObjectsError, Store, WorkingCopy};
 use crate::failure::Failure;
 use crate::output::folder_of;
 
-/// How long what is done may be on this machine alone while there is more to do; chosen: no more is lost if the machine is, and a store
-/// may charge for each time.
-const STORED_EVERY: Duration = Duration::from_secs(60);
+/// How long what is done may be on this machine alone while there is more to do; chosen: no more is lost if the machine is, and stores
+/// charge for each time.
+const STORED_EVERY: Duration = Duration::from_secs(10);
+/// How many times as long as it took to store is waited before the next time, at least; chosen: storing takes one part in twenty.
+const WAIT_FACTOR: u32 = 20;
 
 /// A place of results.
 #[derive(Debug)]
@@ -24,7 +26,8 @@ pub(crate) struct Place {
     given: PathBuf,
     /// Of what is in an object store.
     copy: Option<WorkingCopy>,
-    stored: Instant,
+    /// When what is done is to be stored again.
+    next: Instant,
 }
 
 /// Whether a path is a URL.
@@ -43,7 +46,7 @@ impl Place {
     pub(crate) fn open(given: &Path) -> Result<Self, Failure> {
         let url = given.to_str().filter(|_| is_url(given));
         let copy = url.map(|url| WorkingCopy::open(&Store::of_url(url)?)).transpose()?;
-        Ok(Self { given: given.to_owned(), copy, stored: Instant::now() })
+        Ok(Self { given: given.to_owned(), copy, next: Instant::now() + STORED_EVERY })
     }
 
     /// Whether it is in an object store.
@@ -94,11 +97,12 @@ impl Place {
     /// If another process writes the same.
     pub(crate) fn store_so_far(&mut self, path: &Path) -> Result<(), Failure> {
         let (Some(copy), Some(name)) = (&mut self.copy, name_in(path)) else { return Ok(()) };
-        if self.stored.elapsed() < STORED_EVERY || !path.exists() {
+        let start = Instant::now();
+        if start < self.next || !path.exists() {
             return Ok(());
         }
         let stored = copy.store(name);
-        self.stored = Instant::now();
+        self.next = Instant::now() + STORED_EVERY.max(start.elapsed() * WAIT_FACTOR);
         match stored {
             Err(error @ ObjectsError::Changed { .. }) => Err(error.into()),
             _ => Ok(()),
@@ -153,6 +157,10 @@ pub(crate) fn file(path: &Path) -> Result<(Place, PathBuf), Failure> {
     Ok((place, path))
 }
 
+/// What says where a store is.
+const VARIABLES: &str =
+    "variables AWS_ENDPOINT_URL, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION, AWS_ALLOW_HTTP";
+
 /// What is elsewhere cannot be used, or is in the hands of another process.
 impl From<ObjectsError> for Failure {
     fn from(error: ObjectsError) -> Self {
@@ -160,7 +168,7 @@ impl From<ObjectsError> for Failure {
         match error {
             ObjectsError::NoUrl { .. } | ObjectsError::NotBuilt { .. } => Self::Usage(text),
             ObjectsError::Changed { .. } => Self::NotYet(text),
-            ObjectsError::Read { .. } => Self::File(text),
+            ObjectsError::Read { .. } => Self::File(format!("{text} ({VARIABLES})")),
             _ => Self::Other(text),
         }
     }

@@ -1,7 +1,7 @@
 //! `twinlag study run PLAN.toml --out DIR`, `twinlag study merge DIR`, what a study will take, and shards on a cluster.
 //!
-//! A shard leaves its part in the folder, with the plan beside it; `merge` finds both there. A run
-//! without shards merges its only part itself. What was submitted is in the folder `submission` within.
+//! A shard leaves its part in the folder, or the object store, with the plan beside it; `merge` finds both there. A run without shards
+//! merges its only part itself. What was submitted is in the folder `submission` within.
 
 mod plan;
 
@@ -62,7 +62,7 @@ pub(crate) enum Study {
 pub(crate) struct Submit {
     /// The plan, a TOML file; the book's chapter Experiments describes it.
     plan: PathBuf,
-    /// The folder for the results, created if necessary; all machines have to see it.
+    /// The folder for the results, created if necessary; all machines have to see it, as they see `s3://BUCKET/PREFIX`.
     #[arg(long)]
     out: PathBuf,
     #[command(flatten)]
@@ -73,7 +73,7 @@ pub(crate) struct Submit {
 pub(crate) struct Run {
     /// The plan, a TOML file; the book's chapter Experiments describes it.
     plan: PathBuf,
-    /// The folder for the results, created if necessary.
+    /// The folder for the results, created if necessary; or `s3://BUCKET/PREFIX`, in an object store.
     #[arg(long)]
     out: PathBuf,
     /// Run only part K of N, with K counted from 0.
@@ -164,7 +164,7 @@ fn submit(command: &Submit, place: &mut Place, console: Console) -> Result<u8, F
             .map(str::to_owned)
             .to_vec();
     let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
-    let work = command.cluster.work(&plan.name, shard, merge)?;
+    let work = command.cluster.work(&plan.name, place.is_stored(), shard, merge)?;
     command.cluster.submit(&scripts(place), work, console)
 }
 

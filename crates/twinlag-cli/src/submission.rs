@@ -181,12 +181,20 @@ impl Cluster {
 
     /// What is submitted.
     ///
+    /// - `is_stored`: whether all that a shard reads and writes is in an object store
     /// - `shard`, `merge`: arguments of the program
-    pub(crate) fn work(&self, name: &str, shard: Vec<String>, merge: Vec<String>) -> Result<Work, Failure> {
+    pub(crate) fn work(
+        &self,
+        name: &str,
+        is_stored: bool,
+        shard: Vec<String>,
+        merge: Vec<String>,
+    ) -> Result<Work, Failure> {
         let unknown = |what: &str, error: std::io::Error| Failure::Other(format!("{what} is not known: {error}"));
         Ok(Work {
             name: name.to_owned(),
             folder: std::env::current_dir().map_err(|error| unknown("the folder in which the program runs", error))?,
+            is_stored,
             program: std::env::current_exe().map_err(|error| unknown("where the program is", error))?,
             shard,
             merge,

@@ -1,4 +1,4 @@
-//! Kubernetes: an indexed job, whose image and volume are to be filled in.
+//! Kubernetes: an indexed job, whose image, and volume or secret, are to be filled in.
 
 use sha2::{Digest as _, Sha256};
 
@@ -57,7 +57,8 @@ pub(crate) fn job(work: &Work, resources: &Resources, shard: &str) -> Result<Str
     let (shards, seconds) = (work.shards, seconds(resources));
     let memory = resources.memory.as_ref().map_or(String::new(), |memory| format!(", memory: {}", in_quotes(memory)));
     let each = format!("{{cpu: \"{}\"{memory}}}", resources.cpus);
-    let [name, shard, folder] = [&name(work, shard), shard, script::text(&work.folder)?].map(in_quotes);
+    let name = in_quotes(&name(work, shard));
+    let (container, pod) = if work.is_stored { stored(work)? } else { shared(work, shard)? };
     Ok(format!(
         "apiVersion: batch/v1
 kind: Job
@@ -76,16 +77,38 @@ spec:
       {LIMIT}{seconds}
       containers:
         - name: shard
-          {IMAGE}# to be filled in: one that has the program, at the place that TWINLAG names
+          resources: {{requests: {each}, limits: {each}}}
+{container}{pod}"
+    ))
+}
+
+/// What runs the script of a shard in a folder that all pods see, within the container and beside it.
+fn shared(work: &Work, shard: &str) -> Result<(String, String), ClusterError> {
+    let [shard, folder] = [shard, script::text(&work.folder)?].map(in_quotes);
+    let container = format!(
+        "          {IMAGE}# to be filled in: one that has the program, at the place that TWINLAG names
           env: [{{name: TWINLAG, value: twinlag}}]
           command: [sh, {shard}]
-          resources: {{requests: {each}, limits: {each}}}
           volumeMounts: [{{name: shared, mountPath: {folder}}}]
-      volumes:
-        - name: shared
-          persistentVolumeClaim: {{claimName: CLAIM}} # to be filled in: one that has the folder, and that many pods may write to
 "
-    ))
+    );
+    let pod = "      volumes:
+        - name: shared
+          persistentVolumeClaim: {claimName: CLAIM} # to be filled in: one that has the folder, and that many pods may write to
+";
+    Ok((container, pod.to_owned()))
+}
+
+/// What runs a shard that reads and writes objects.
+fn stored(work: &Work) -> Result<(String, String), ClusterError> {
+    let line = in_quotes(&script::line_of_shard(work, "$JOB_COMPLETION_INDEX")?);
+    let container = format!(
+        "          {IMAGE}# to be filled in: one that has the program, built for object stores
+          envFrom: [{{secretRef: {{name: SECRET}}}}] # to be filled in: one with the variables of the object store
+          command: [sh, -c, {line}]
+"
+    );
+    Ok((container, String::new()))
 }
 
 /// The line that starts it, in place of an earlier one, and the merge behind it.
@@ -112,9 +135,9 @@ mod tests {
     use super::*;
 
     fn work(name: &str) -> Work {
-        let (shard, merge) = (vec![Work::SHARD.to_owned()], Vec::new());
-        let folder = "/a \"b\"".into();
-        Work { name: name.to_owned(), folder, program: "/bin/true".into(), shard, merge, shards: NonZeroU64::MIN }
+        let (shard, merge) = (vec!["a b".to_owned(), Work::SHARD.to_owned()], Vec::new());
+        let (program, folder) = ("/bin/true".into(), "/a \"b\"".into());
+        Work { name: name.to_owned(), folder, is_stored: false, program, shard, merge, shards: NonZeroU64::MIN }
     }
 
     #[test]
@@ -129,6 +152,14 @@ mod tests {
             );
         }
         assert_ne!(name(&work("bias"), "/a/shard.sh"), name(&work("bias"), "/b/shard.sh"));
+    }
+
+    #[test]
+    fn shards_of_objects_need_no_volume() {
+        let work = Work { is_stored: true, ..work("bias") };
+        let job = job(&work, &Resources::of_minutes(5), "/a/shard.sh").expect("text");
+        assert!(!job.contains("volume") && job.contains("secretRef"), "{job}");
+        assert!(job.contains(r#"[sh, -c, "exec twinlag 'a b' \"$JOB_COMPLETION_INDEX/1\""]"#), "{job}");
     }
 
     #[test]

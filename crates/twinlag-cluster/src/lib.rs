@@ -18,6 +18,7 @@
 //! let work = Work {
 //!     name: "bias".into(),
 //!     folder: folder.path().into(),
+//!     is_stored: false,
 //!     program: "/opt/bin/twinlag".into(),
 //!     shard: words("study run plan.toml --out bias --resume --shard {shard}"),
 //!     merge: words("study merge bias"),

@@ -66,11 +66,22 @@ pub(crate) fn shard(work: &Work, directives: &[String], logs: &str) -> Result<St
     let about = format!("One shard of {shards}, counted from 0: the first argument, or the task of an array.");
     let first = "shard=\"${1:-${SLURM_ARRAY_TASK_ID:-${JOB_COMPLETION_INDEX:?expected the number of a shard}}}\"\n";
     let head = head(work, &about, directives, first, [logs, &log_of("$shard")])?;
+    Ok(format!("{head}exec {}\n", program(&arguments_of(work, "$shard")?)))
+}
+
+/// The arguments of a shard, as a shell takes them.
+///
+/// - `shard`: what a shell takes for its index
+fn arguments_of(work: &Work, shard: &str) -> Result<String, ClusterError> {
     let place = work.shard.iter().position(|word| word == Work::SHARD).ok_or(ClusterError::NoShard)?;
     let (before, behind) = (&work.shard[..place], &work.shard[place + 1..]);
-    let words = [command(before)?, format!("\"$shard/{shards}\""), command(behind)?];
-    let arguments = words.into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" ");
-    Ok(format!("{head}exec {}\n", program(&arguments)))
+    let words = [command(before)?, format!("\"{shard}/{}\"", work.shards), command(behind)?];
+    Ok(words.into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" "))
+}
+
+/// The line of a shard that needs no folder: its index is in a variable.
+pub(crate) fn line_of_shard(work: &Work, index: &str) -> Result<String, ClusterError> {
+    Ok(format!("exec twinlag {}", arguments_of(work, index)?))
 }
 
 /// The script that joins the parts. Where one is missing it ends with 1, not with [`AGAIN`]: waiting does not bring the part.

@@ -13,8 +13,11 @@ use crate::error::ClusterError;
 pub struct Work {
     /// What engines show it as.
     pub name: String,
-    /// The folder in which all commands run; every machine has to see it.
+    /// The folder in which all commands run; every machine has to see it, but for pods of Kubernetes where [`Self::is_stored`].
     pub folder: PathBuf,
+    /// Whether all that a shard reads and writes is in an object store.
+    #[serde(default)]
+    pub is_stored: bool,
     /// The program; on a machine that has it elsewhere, the variable `TWINLAG` says where.
     pub program: PathBuf,
     /// Its arguments for a shard, with [`Self::SHARD`] in the place of which shard it is.
