@@ -50,13 +50,20 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
     Ok(())
 }
 
-/// Each optional feature left out, one by one: there are so few that they are listed here.
+/// Each optional feature, and what is built apart, one by one: there are so few that they are listed here.
 fn features() -> Result<()> {
     step(
         "without the standard library",
         "cargo",
         &["check", "--package", "twinlag-compensate", "--package", "twinlag-sensor", "--no-default-features"],
     )?;
+    step(
+        "with object stores",
+        "cargo",
+        &["clippy", "--package", "twinlag-objects", "--features", "s3", "--", "--deny", "warnings"],
+    )?;
+    let server = ["--manifest-path", "xtask/objects/Cargo.toml"];
+    step("format of the S3 server", "cargo", &[&["fmt", "--check"], &server[..]].concat())?;
     step("without readers of binary files", "cargo", &["check", "--package", "twinlag-files", "--tests"])?;
     step(
         "without the random solvers",

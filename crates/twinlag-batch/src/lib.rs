@@ -10,6 +10,7 @@
 //! for a few records; studies of simulated records are those of `twinlag-study`.
 //!
 //! ```
+//! use std::ops::ControlFlow;
 //! use twinlag::record::{Record, Selection};
 //! use twinlag_batch::{Answer, Begin, Journal, Outcome, Row, Unit, Verb, each, find, run, write_csv};
 //!
@@ -30,7 +31,7 @@
 //! };
 //! let asked = serde_json::json!({"verb": "characterise"});
 //! let mut journal = Journal::open(&folder.path().join("table.journal"), &asked, Begin::Create)?;
-//! run(&units, &mut journal, None, characterise, |_| {})?;
+//! run(&units, &mut journal, None, characterise, |_| ControlFlow::Continue(()))?;
 //!
 //! let mut table = Vec::new();
 //! write_csv(&units, &mut journal, Verb::Characterise, &mut table)?;
@@ -64,7 +65,7 @@ pub use manifest::Manifest;
 pub use outcome::Outcome;
 pub use own::is_of_batch;
 pub use parquet::write_parquet;
-pub use parts::{Parts, done_in_part, part_path, parts_beside};
+pub use parts::{Parts, done_in_part, part_path, parts_beside, shard_of_part};
 pub use row::{Answer, Row, Verb};
 pub use run::{Progress, map, run};
 pub use table::write_csv;

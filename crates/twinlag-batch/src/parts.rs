@@ -19,6 +19,13 @@ pub fn part_path(table: &Path, shard: Shard) -> PathBuf {
     path.into()
 }
 
+/// The shard whose part has this name beside a table; `None` if it is no part of that.
+pub fn shard_of_part(table: &Path, name: &str) -> Option<Shard> {
+    let (index, of) = name.strip_prefix(table.file_name()?.to_str()?)?.strip_prefix(".part-")?.split_once("-of-")?;
+    let shard = Shard::new(index.parse().ok()?, of.parse().ok()?).ok()?;
+    part_path(table, shard).file_name().filter(|is| *is == name).map(|_| shard)
+}
+
 /// The parts that lie beside a table, in the order of their shards.
 ///
 /// # Errors
@@ -26,17 +33,11 @@ pub fn part_path(table: &Path, shard: Shard) -> PathBuf {
 pub fn parts_beside(table: &Path) -> Result<Vec<(Shard, PathBuf)>, BatchError> {
     let folder = table.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let unreadable = |error: std::io::Error| BatchError::Read { path: folder.to_owned(), reason: error.to_string() };
-    let start = format!("{}.part-", table.file_name().unwrap_or_default().to_string_lossy());
     let mut parts = Vec::new();
     for entry in folder.read_dir().map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        let shard = path.file_name().and_then(|name| {
-            let (index, of) = name.to_str()?.strip_prefix(&start)?.split_once("-of-")?;
-            Shard::new(index.parse().ok()?, of.parse().ok()?).ok()
-        });
-        if let Some(shard) = shard.filter(|shard| part_path(table, *shard).file_name() == path.file_name()) {
-            parts.push((shard, path));
-        }
+        let shard = path.file_name().and_then(|name| shard_of_part(table, name.to_str()?));
+        parts.extend(shard.map(|shard| (shard, path)));
     }
     parts.sort_by_key(|(shard, _)| (shard.of(), shard.index()));
     Ok(parts)

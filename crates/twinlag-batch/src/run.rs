@@ -5,6 +5,7 @@
 
 use std::any::Any;
 use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -34,6 +35,7 @@ pub struct Progress {
 ///
 /// - `threads`: how many units are worked on at once, `None` for one for each processor; no cell depends on it. With fewer units than
 ///   threads, the others help within the units
+/// - `progress`: called before the first unit and after each that is in the journal; if it breaks, no further unit is begun
 ///
 /// # Errors
 /// [`BatchError::Write`]; what was done before is in the journal.
@@ -42,11 +44,13 @@ pub fn run(
     journal: &mut Journal,
     threads: Option<NonZeroUsize>,
     work: impl Fn(&Unit) -> Vec<Row> + Sync,
-    mut progress: impl FnMut(Progress),
+    mut progress: impl FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(), BatchError> {
     let open: Vec<&Unit> = units.iter().filter(|unit| !journal.is_done(unit)).collect();
     let mut state = Progress { done: units.len() - open.len(), total: units.len() };
-    progress(state);
+    if progress(state).is_break() {
+        return Ok(());
+    }
     let mut result = Ok(());
     let answer = |unit: &&Unit| {
         let seen = Seen::now(unit);
@@ -57,10 +61,9 @@ pub fn run(
         (seen, rows)
     };
     in_order_of_arrival(&open, threads, answer, |unit, (seen, rows)| {
-        state.done += 1;
-        progress(state);
         result = journal.append(unit, seen, &rows);
-        result.is_ok()
+        state.done += 1;
+        result.is_ok() && progress(state).is_continue()
     });
     result
 }

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::BufReader;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -56,7 +57,7 @@ fn run_shard_asked(manifest: &Manifest, table: &Path, of: &str, asked: &Value) -
     let path = part_path(table, shard(of));
     let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard: shard(of) };
     let mut journal = Journal::open_part(&path, asked, part_of, Begin::Replace).expect("a new one");
-    run(&manifest.units_of(shard(of)), &mut journal, None, row, |_| {}).expect("can be written");
+    run(&manifest.units_of(shard(of)), &mut journal, None, row, |_| ControlFlow::Continue(())).expect("can be written");
     path
 }
 
@@ -135,7 +136,7 @@ fn parts_give_the_table_of_a_whole_run() {
     let (folder, manifest) = batch(&[30, 10, 20, 40, 50]);
     let table = folder.path().join("t.csv");
     let mut journal = Journal::open(&folder.path().join("journal"), &asked(), Begin::Create).expect("a new one");
-    run(&manifest.units(), &mut journal, None, row, |_| {}).expect("can be written");
+    run(&manifest.units(), &mut journal, None, row, |_| ControlFlow::Continue(())).expect("can be written");
     let mut whole = Vec::new();
     write_csv(&manifest.units(), &mut journal, Verb::Characterise, &mut whole).expect("memory");
     for of in ["2/3", "0/3", "1/3"] {

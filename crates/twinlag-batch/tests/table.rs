@@ -1,6 +1,7 @@
 //! The table as text and as Parquet has the same cells; what a run leaves behind is refused where it is not of this batch.
 
 use std::fs::File;
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -64,7 +65,7 @@ fn units() -> Vec<Unit> {
 fn text_and_parquet_have_the_same_cells() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut journal = Journal::open(&folder.path().join("journal"), &json!({}), Begin::Create).expect("a new one");
-    run(&units(), &mut journal, None, rows_of, |_| {}).expect("can be written");
+    run(&units(), &mut journal, None, rows_of, |_| ControlFlow::Continue(())).expect("can be written");
     let mut text = Vec::new();
     write_csv(&units(), &mut journal, Verb::Characterise, &mut text).expect("memory");
     let path = folder.path().join("table.parquet");
@@ -111,7 +112,7 @@ fn a_table_is_known_whatever_its_length() {
         let units = each((0..count).map(|number| format!("{number}").into()).collect());
         let mut journal = Journal::open(&folder.path().join(name), &json!({}), Begin::Create).expect("a new one");
         let empty = |unit: &Unit| vec![Row::without_answer(unit, &unit.files()[0], Outcome::Unusable, "is empty")];
-        run(&units, &mut journal, None, empty, |_| {}).expect("can be written");
+        run(&units, &mut journal, None, empty, |_| ControlFlow::Continue(())).expect("can be written");
         let create = |path: &Path| File::create(path).expect("a file");
         write_csv(&units, &mut journal, Verb::Diagnose, create(&csv)).expect("can be written");
         write_parquet(&units, &mut journal, Verb::Diagnose, create(&parquet)).expect("can be written");

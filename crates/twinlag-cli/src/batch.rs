@@ -4,10 +4,10 @@ mod question;
 mod said;
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
 use std::fs;
 use std::io::Read as _;
 use std::num::{NonZeroU32, NonZeroUsize};
+use std::ops::ControlFlow;
 use std::panic;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +20,7 @@ use twinlag_batch::{
     Answers, BatchError, Begin, Fleet, Found, GroupBy, Journal, Manifest, Outcome, PartOf, Row, Unit, Verb as RowVerb,
     find, is_of_batch, name_of, part_path, parts_beside, run as run_units, write_csv, write_parquet,
 };
-use twinlag_cluster::Work;
+use twinlag_cluster::{Storage, Work};
 use twinlag_pages::{fleet_report, is_fleet_report};
 use twinlag_study::Shard;
 
@@ -29,7 +29,7 @@ use crate::batch::question::{Question, failed};
 use crate::batch::said::say;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::{Output, folder_of, with_ending};
+use crate::output::{Output, with_ending};
 use crate::place::{self, Place};
 use crate::shards::JOURNAL_ENDING;
 use crate::submission::{self, Cluster};
@@ -87,7 +87,7 @@ pub(crate) struct Batch {
     /// What is asked of each.
     #[arg(long, value_name = "VERB", default_value = "characterise")]
     verb: Verb,
-    /// Write the table to this file, as text or as Parquet by its ending, .csv or .parquet; may be given twice.
+    /// Write the table to this file or `s3://BUCKET/PREFIX/TABLE`, as text or as Parquet by its ending, .csv or .parquet; may be given twice.
     #[arg(long, value_name = "TABLE", required = true)]
     out: Vec<PathBuf>,
     /// Write a summary with pictures, as one self-contained HTML file.
@@ -192,13 +192,16 @@ const GAS_ENDING: &str = ".gas.csv";
 /// Within a batch, a record says nothing on its own.
 const SILENT: Console = Console { json: true, quiet: true };
 
-pub(crate) fn run(command: &mut Batch, console: Console) -> Result<u8, Failure> {
+pub(crate) fn run(mut command: Batch, console: Console) -> Result<u8, Failure> {
     if command.cluster.time_limit.is_some() && command.cluster.engine.is_none() && !command.division.resubmit {
         return Err(Failure::Usage("--time-limit needs --engine or --resubmit".to_owned()));
     }
-    let given = folder_of(&command.out[0]).to_owned();
+    let (given, _) = place::split(&command.out[0]);
+    command.expect_one_place(&given)?;
     place::at(&given, |place| {
-        command.work_in(place)?;
+        command.work_in(place);
+        command.fetch(place)?;
+        let command = &command;
         let Division { merge, status, resubmit, .. } = command.division;
         match (merge, status || resubmit) {
             (true, _) => merge_parts(command, place, console),
@@ -212,6 +215,9 @@ pub(crate) fn run(command: &mut Batch, console: Console) -> Result<u8, Failure> 
 fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     let question = Question::of(command)?;
+    if let Some(shard) = command.division.shard {
+        shards::expect_one_division(table, place, shard.of())?;
+    }
     let journal_path =
         command.division.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
     command.check_outputs(&journal_path)?;
@@ -269,8 +275,9 @@ fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Fai
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
         if stored.is_ok() {
-            stored = place.store_so_far(&journal_path);
+            stored = place.store_so_far(&journal_path, console);
         }
+        if stored.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     bar.finish_and_clear();
     let _ = panic::take_hook();
@@ -336,9 +343,7 @@ fn submit(
         )));
     }
     let shards = command.cluster.shards();
-    if let Some((_, part)) = parts.iter().find(|(shard, _)| shard.of() != shards) {
-        return Err(Failure::Usage(format!("{}: is of another number of shards; remove it", part.display())));
-    }
+    shards::expect_one_division(table, place, shards)?;
     let manifest = command.manifest(question, asked, journal, place, console)?;
     command.note_unlisted(&manifest, journal, place, console)?;
     let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();
@@ -359,24 +364,21 @@ fn submit(
     merge.push("--force".to_owned());
     let name = table.file_stem().unwrap_or_default().to_string_lossy();
     // The records are in files.
-    let work = command.cluster.work(&name, false, shard, merge)?;
+    let storage = if place.is_stored() { Storage::FoldersAndObjects } else { Storage::Folders };
+    let work = command.cluster.work(&name, storage, shard, merge)?;
     command.cluster.submit(&scripts(table, place), work, console)
 }
 
-/// The folder of what was submitted; of a table that is stored elsewhere, it is in the folder in which the program runs.
+/// The folder of what was submitted.
 fn scripts(table: &Path, place: &Place) -> PathBuf {
-    let beside = shards::submission_path(table);
-    match beside.file_name() {
-        Some(name) if place.is_stored() => name.into(),
-        _ => beside,
-    }
+    place.scripts(table, shards::submission_path(table))
 }
 
 /// Says how far the shards of a table are, or submits again what is missing of them.
 fn follow(command: &Batch, place: &Place, console: Console) -> Result<u8, Failure> {
     let table = &command.out[0];
     let scripts = scripts(table, place);
-    let progress = |of| shards::progress_of(table, of);
+    let progress = |of| shards::progress_of(table, place, of);
     let result = is_written(table).then_some(table.as_path());
     if command.division.resubmit {
         return submission::resubmit(&scripts, progress, result, command.cluster.time_limit, console);
@@ -446,31 +448,39 @@ fn finish(
 }
 
 impl Batch {
-    /// Takes what is in a place into its folder, and has the outputs written there.
-    fn work_in(&mut self, place: &mut Place) -> Result<(), Failure> {
-        if let Some(gas) = self.gas.as_ref().filter(|gas| place::is_url(gas)) {
-            return Err(Failure::Usage(format!("--gas {}: expected a folder that this machine sees", gas.display())));
+    /// Refuses paths that the place of the first table does not allow.
+    fn expect_one_place(&self, given: &Path) -> Result<(), Failure> {
+        if let Some(path) = self.what.iter().chain(&self.gas).find(|path| place::is_url(path)) {
+            return place::expect_file(path);
         }
-        let table = self.out[0].file_name().unwrap_or_default().to_owned();
-        let given = folder_of(&self.out[0]).to_owned();
-        let mut names = Vec::new();
+        let is_elsewhere = |path: &&PathBuf| place::is_url(path) && place::split(path).0 != given;
+        match self.out.iter().chain(&self.report).find(is_elsewhere) {
+            None => Ok(()),
+            Some(path) => {
+                let (path, given) = (path.display(), given.display());
+                Err(Failure::Usage(format!(
+                    "{path}: expected a path of this machine, or one in {given}, as the first table has"
+                )))
+            }
+        }
+    }
+
+    /// Has outputs that go into a store written into the folder of the place.
+    fn work_in(&mut self, place: &Place) {
         for path in self.out.iter_mut().chain(&mut self.report).filter(|path| place::is_url(path)) {
-            let Some(name) = path.file_name().filter(|_| folder_of(path) == given).map(OsStr::to_owned) else {
-                return Err(Failure::Usage(format!(
-                    "{}: expected a name in {}, as the first table has",
-                    path.display(),
-                    given.display()
-                )));
-            };
-            *path = place.folder().join(&name);
-            names.push(name);
+            *path = place.folder().join(place::split(path).1);
         }
-        let table = Path::new(&table);
-        if let Some(shard) = self.division.shard {
-            let needed = [shards::manifest_path(table), part_path(table, shard)];
-            return place.fetch(|name| needed.iter().any(|needed| needed.as_os_str() == name));
-        }
-        place.fetch(|name| names.iter().any(|is| is == name) || shards::is_named_beside(table, name))
+    }
+
+    /// Brings what this run needs of what is in the place.
+    fn fetch(&self, place: &mut Place) -> Result<(), Failure> {
+        let table = &self.out[0];
+        let is = |path: &Path, name: &str| path.file_name().is_some_and(|file| file == name);
+        let needed = |name: &str| match self.division.shard {
+            Some(shard) => is(&shards::manifest_path(table), name) || is(&part_path(table, shard), name),
+            None => self.outputs().iter().any(|(_, path)| is(path, name)) || shards::is_named_beside(table, name),
+        };
+        place.fetch(needed)
     }
 
     /// Refuses outputs that could not be written or would overwrite something.

@@ -43,7 +43,7 @@ impl Failure {
         if let Self::Line { excerpt, .. } = self { Some(excerpt) } else { None }
     }
 
-    /// The same with another message.
+    /// A failure with the same exit code and another message.
     pub(crate) fn reworded(self, text: impl FnOnce(String) -> String) -> Self {
         match self {
             Self::Usage(is) => Self::Usage(text(is)),

@@ -83,7 +83,7 @@ fn run() -> Result<u8, Failure> {
         Command::Compensate(command) => compensate::run(&command, console),
         Command::Simulate(command) => simulate::run(&command, console),
         Command::Inspect(command) => inspect::run(&command, console),
-        Command::Batch(mut command) => batch::run(&mut command, console),
+        Command::Batch(command) => batch::run(*command, console),
         Command::Plan(command) => plan::run(&command, console),
         Command::Track(command) => track::run(&command, console),
         Command::Study(command) => study::run(&command, console),

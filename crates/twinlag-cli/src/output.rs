@@ -10,6 +10,7 @@ use twinlag::record::{Decimals, RecordError, write_csv};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::place;
 
 /// A file to be written, and the option that names it.
 pub(crate) type Output<'a> = (&'static str, &'a Path);
@@ -19,6 +20,7 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
     let usage = |text: String| Err(Failure::Usage(text));
     let mut seen: Vec<(&str, PathBuf)> = Vec::new();
     for (option, path) in outputs {
+        place::expect_file(path)?;
         let folder = folder_of(path);
         if !folder.exists() {
             let (path, folder) = (path.display(), folder.display());

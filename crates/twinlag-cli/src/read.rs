@@ -9,6 +9,7 @@ use twinlag_files::Choice;
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::place;
 use crate::profile::Profile;
 use crate::progress::Progress;
 
@@ -22,6 +23,7 @@ pub(crate) fn table_watched(file: &Path, choice: &Choice, console: Console) -> R
     if file == Path::new("-") {
         return Ok(Table::from_reader(stdin(), "standard input")?);
     }
+    place::expect_file(file)?;
     let opened = std::fs::metadata(file).ok().filter(Metadata::is_file).zip(File::open(file).ok());
     let Some((about, opened)) = opened else { return Ok(Table::from_path(file)?) };
     let progress = Progress::start(console, "reading".into());

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
-use twinlag_batch::{Found, Manifest, Parts, Unit, done_in_part, part_path, parts_beside};
+use twinlag_batch::{Found, Manifest, Parts, Unit, done_in_part, part_path, parts_beside, shard_of_part};
 use twinlag_study::Shard;
 
 use crate::console::Console;
@@ -107,15 +107,32 @@ pub(crate) fn manifest(
     Ok(manifest)
 }
 
+/// Refuses parts of another number of shards.
+pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Result<(), Failure> {
+    let folder = folder_of(table).display();
+    let names = place.names().map_err(|error| Failure::File(format!("{folder}: cannot be read: {error}")))?;
+    match names.iter().filter_map(|name| shard_of_part(table, name)).find(|shard| shard.of() != of) {
+        None => Ok(()),
+        Some(shard) => {
+            let part = place.named(&part_path(table, shard));
+            Err(Failure::Usage(format!("{}: is of another number of shards than {of}; remove it", part.display())))
+        }
+    }
+}
+
 /// What each of so many shards has left.
-pub(crate) fn progress_of(table: &Path, of: u64) -> Result<Vec<ShardProgress>, Failure> {
+pub(crate) fn progress_of(table: &Path, place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let manifest = read(&manifest_path(table))?;
     if let Some((_, part)) = parts_beside(table)?.into_iter().find(|(part, _)| part.of() != of) {
         return Err(Failure::File(format!("{}: is of another number of shards than {of}; remove it", part.display())));
     }
     let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
-        ShardProgress { total, done: done.map_err(|error| error.to_string()), part: part_path(table, shard) }
+        ShardProgress {
+            total,
+            done: done.map_err(|error| place.said(error.into()).to_string()),
+            part: part_path(table, shard),
+        }
     };
     Ok(Shard::all(of).zip(manifest.units_of_shards(of)).map(progress).collect())
 }

@@ -13,13 +13,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use schemars::JsonSchema;
 use serde::Serialize;
-use twinlag_cluster::Work;
+use twinlag_cluster::{Storage, Work};
 use twinlag_experiment::{Experiment, ExperimentError, Plan, Row, Table, write};
 use twinlag_study::{Options, Part, Shard, Study as _, StudyError};
 
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output::with_ending;
 use crate::place::{self, Place};
 use crate::study::plan::Planning;
 use crate::submission::{self, Cluster, ShardProgress};
@@ -35,7 +34,7 @@ pub(crate) enum Study {
     Run(Run),
     /// Join the parts of all shards in a folder into the table and the pictures.
     Merge {
-        /// The folder that holds the parts.
+        /// The folder that holds the parts, or `s3://BUCKET/PREFIX`.
         dir: PathBuf,
     },
     /// Run a few trials, and say what the whole study will take, and in how many shards.
@@ -45,12 +44,12 @@ pub(crate) enum Study {
     Submit(Submit),
     /// Say how far the shards are that were submitted. Exit code 75: there is no result yet.
     Status {
-        /// The folder that holds the parts.
+        /// The folder that holds the parts, or `s3://BUCKET/PREFIX`.
         dir: PathBuf,
     },
     /// Submit again the shards that are missing, which are neither done nor waiting nor running, and the merge.
     Resubmit {
-        /// The folder that holds the parts.
+        /// The folder that holds the parts, or `s3://BUCKET/PREFIX`.
         dir: PathBuf,
         /// Another limit than before, in minutes.
         #[arg(long, value_name = "MINUTES")]
@@ -118,14 +117,12 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
         Study::Plan(planning) => plan::run(planning, console),
         Study::Submit(command) => place::at(&command.out, |place| submit(command, place, console)),
         Study::Status { dir } => place::at(dir, |place| {
-            place.fetch(|_| true)?;
-            let (scripts, result) = (scripts(place), results_in(place.folder()));
-            submission::status(&scripts, |of| progress_of(place, of), "trials", result.as_deref(), console)
+            follow(place, |scripts, progress, result| submission::status(scripts, progress, "trials", result, console))?
         }),
         Study::Resubmit { dir, time_limit } => place::at(dir, |place| {
-            place.fetch(|_| true)?;
-            let (scripts, result) = (scripts(place), results_in(place.folder()));
-            submission::resubmit(&scripts, |of| progress_of(place, of), result.as_deref(), *time_limit, console)
+            follow(place, |scripts, progress, result| {
+                submission::resubmit(scripts, progress, result, *time_limit, console)
+            })?
         }),
     }
 }
@@ -140,15 +137,22 @@ const RESULTS_TABLE: &str = "results.csv";
 const PROGRAM: &str = env!("TWINLAG_VERSION");
 /// The folder of what was submitted.
 const SUBMISSION: &str = "submission";
-/// How that folder ends on this machine, of results that are stored elsewhere.
-const SUBMISSION_ENDING: &str = ".submission";
 
-/// The folder of what was submitted; of results that are stored elsewhere, it is in the folder in which the program runs.
+/// Says how far the shards are, or submits again what is missing of them.
+///
+/// - `follow`: gets the scripts, what each shard has left, and where the result is
+fn follow<Out>(
+    place: &mut Place,
+    follow: impl FnOnce(&Path, &dyn Fn(u64) -> Result<Vec<ShardProgress>, Failure>, Option<&Path>) -> Out,
+) -> Result<Out, Failure> {
+    place.fetch(|name| [PLAN, RESULTS, RESULTS_TABLE].contains(&name) || Shard::of_file_name(name).is_some())?;
+    let result = results_in(place.folder());
+    Ok(follow(&scripts(place), &|of| progress_of(place, of), result.as_deref()))
+}
+
+/// The folder of what was submitted.
 fn scripts(place: &Place) -> PathBuf {
-    match place.named(place.folder()).file_name() {
-        Some(name) if place.is_stored() => with_ending(Path::new(name), SUBMISSION_ENDING),
-        _ => place.folder().join(SUBMISSION),
-    }
+    place.scripts(place.folder(), place.folder().join(SUBMISSION))
 }
 
 /// Submits all shards.
@@ -157,14 +161,15 @@ fn submit(command: &Submit, place: &mut Place, console: Console) -> Result<u8, F
     expect_no_results(&read(&command.plan)?.0, place)?;
     expect_one_division(place, command.cluster.shards()).map_err(Failure::Usage)?;
     let plan = prepare(&command.plan, place)?;
-    let (out, copy) = (submission::text(&command.out)?, submission::text(command.out.join(PLAN))?);
+    let (out, copy) = (submission::text(&command.out)?, submission::text(place.named(&place.folder().join(PLAN)))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
     let shard =
         ["study", "run", &copy, "--out", &out, "--shard", Work::SHARD, "--resume", "--quiet", "--threads", &threads]
             .map(str::to_owned)
             .to_vec();
     let merge = ["study", "merge", &out].map(str::to_owned).to_vec();
-    let work = command.cluster.work(&plan.name, place.is_stored(), shard, merge)?;
+    let storage = if place.is_stored() { Storage::Objects } else { Storage::Folders };
+    let work = command.cluster.work(&plan.name, storage, shard, merge)?;
     command.cluster.submit(&scripts(place), work, console)
 }
 
@@ -177,7 +182,7 @@ fn progress_of(place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let progress = |shard: Shard| {
         let part = dir.join(shard.file_name());
         let read = || Part::read_of(&experiment, shard, PROGRAM, &part).map(|part| part.done());
-        let done = if part.exists() { read().map_err(|error| Failure::from(error).to_string()) } else { Ok(0) };
+        let done = if part.exists() { read().map_err(|error| place.said(error.into()).to_string()) } else { Ok(0) };
         Ok(ShardProgress { total: shard.trials(&experiment)?, done, part })
     };
     Shard::all(of).map(progress).collect()
@@ -231,23 +236,19 @@ fn prepare(plan_file: &Path, place: &mut Place) -> Result<Plan, Failure> {
     Experiment::new(&plan).map_err(|e| Failure::File(format!("{}: {e}", plan_file.display())))?;
     fs::create_dir_all(out).map_err(|e| Failure::Other(format!("{}: cannot be created: {e}", out.display())))?;
     let copy = out.join(PLAN);
-    match fs::read_to_string(&copy) {
-        Ok(other) if other != text => {
-            Err(Failure::Usage(format!("{}: holds another plan; name another folder", copy.display())))
-        }
-        Ok(_) => Ok(plan),
-        Err(_) => {
-            output::write(&copy, &text)?;
-            place.store_first(&copy)?;
-            Ok(plan)
-        }
+    if !copy.exists() {
+        output::write(&copy, &text)?;
+        place.store_first(&copy)?;
     }
+    if place::text(&copy)? == text {
+        return Ok(plan);
+    }
+    Err(Failure::Usage(format!("{}: holds another plan; name another folder", copy.display())))
 }
 
 fn read(path: &Path) -> Result<(Plan, String), Failure> {
     let name = path.display();
-    let (_place, path) = place::file(path)?;
-    let text = fs::read_to_string(path).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
+    let text = place::text(path)?;
     let plan = Plan::from_toml(&text).map_err(|e| Failure::File(format!("{name}: {e}")))?;
     Ok((plan, text))
 }
@@ -283,7 +284,7 @@ fn start(run: &Run, place: &mut Place, console: Console) -> Result<u8, Failure> 
         bar.set_length(p.total);
         bar.set_position(p.done);
         if stored.is_ok() {
-            stored = place.store_so_far(&part);
+            stored = place.store_so_far(&part, console);
         }
         if stored.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, Args, Command, CommandFactory};
 use schemars::JsonSchema;
 use serde::Serialize;
-use twinlag_cluster::{ClusterError, Engine, Queue, Resources, State, Submission, Submitted, Work};
+use twinlag_cluster::{ClusterError, Engine, Queue, Resources, State, Storage, Submission, Submitted, Work};
 use twinlag_study::ranges;
 
 use crate::arguments::Arguments;
@@ -181,12 +181,11 @@ impl Cluster {
 
     /// What is submitted.
     ///
-    /// - `is_stored`: whether all that a shard reads and writes is in an object store
     /// - `shard`, `merge`: arguments of the program
     pub(crate) fn work(
         &self,
         name: &str,
-        is_stored: bool,
+        storage: Storage,
         shard: Vec<String>,
         merge: Vec<String>,
     ) -> Result<Work, Failure> {
@@ -194,7 +193,7 @@ impl Cluster {
         Ok(Work {
             name: name.to_owned(),
             folder: std::env::current_dir().map_err(|error| unknown("the folder in which the program runs", error))?,
-            is_stored,
+            storage,
             program: std::env::current_exe().map_err(|error| unknown("where the program is", error))?,
             shard,
             merge,

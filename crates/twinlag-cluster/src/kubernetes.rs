@@ -4,7 +4,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::error::ClusterError;
 use crate::script;
-use crate::work::{Resources, Work};
+use crate::work::{Resources, Storage, Work};
 
 /// The name of the file.
 pub(crate) const FILE: &str = "job.yaml";
@@ -15,6 +15,11 @@ const MAX_NAME: usize = 48;
 const HASH_DIGITS: usize = 8;
 /// What is to be filled in.
 const IMAGE: &str = "image: IMAGE ";
+/// The volume that all pods share.
+const VOLUMES: &str = "      volumes:
+        - name: shared
+          persistentVolumeClaim: {claimName: CLAIM} # to be filled in: one that has the folder and all records, and that many pods may write to
+";
 /// What stands before the limit of time.
 const LIMIT: &str = "activeDeadlineSeconds: ";
 
@@ -58,7 +63,20 @@ pub(crate) fn job(work: &Work, resources: &Resources, shard: &str) -> Result<Str
     let memory = resources.memory.as_ref().map_or(String::new(), |memory| format!(", memory: {}", in_quotes(memory)));
     let each = format!("{{cpu: \"{}\"{memory}}}", resources.cpus);
     let name = in_quotes(&name(work, shard));
-    let (container, pod) = if work.is_stored { stored(work)? } else { shared(work, shard)? };
+    let secret = match work.storage {
+        Storage::Folders => "",
+        _ => {
+            "          envFrom: [{secretRef: {name: SECRET}}] # to be filled in: one with the variables of the object store\n"
+        }
+    };
+    let (command, volumes) = match work.storage {
+        Storage::Objects => (format!("[sh, -c, {}]", in_quotes(&script::line_of_shard(work)?)), None),
+        _ => (format!("[sh, {}]", in_quotes(shard)), Some(in_quotes(script::text(&work.folder)?))),
+    };
+    let mounts =
+        volumes.as_ref().map(|folder| format!("          volumeMounts: [{{name: shared, mountPath: {folder}}}]\n"));
+    let mounts = mounts.unwrap_or_default();
+    let volumes = volumes.map_or("", |_| VOLUMES);
     Ok(format!(
         "apiVersion: batch/v1
 kind: Job
@@ -77,38 +95,12 @@ spec:
       {LIMIT}{seconds}
       containers:
         - name: shard
-          resources: {{requests: {each}, limits: {each}}}
-{container}{pod}"
-    ))
-}
-
-/// What runs the script of a shard in a folder that all pods see, within the container and beside it.
-fn shared(work: &Work, shard: &str) -> Result<(String, String), ClusterError> {
-    let [shard, folder] = [shard, script::text(&work.folder)?].map(in_quotes);
-    let container = format!(
-        "          {IMAGE}# to be filled in: one that has the program, at the place that TWINLAG names
+          {IMAGE}# to be filled in: one that has the program, at the place that TWINLAG names
           env: [{{name: TWINLAG, value: twinlag}}]
-          command: [sh, {shard}]
-          volumeMounts: [{{name: shared, mountPath: {folder}}}]
-"
-    );
-    let pod = "      volumes:
-        - name: shared
-          persistentVolumeClaim: {claimName: CLAIM} # to be filled in: one that has the folder, and that many pods may write to
-";
-    Ok((container, pod.to_owned()))
-}
-
-/// What runs a shard that reads and writes objects.
-fn stored(work: &Work) -> Result<(String, String), ClusterError> {
-    let line = in_quotes(&script::line_of_shard(work, "$JOB_COMPLETION_INDEX")?);
-    let container = format!(
-        "          {IMAGE}# to be filled in: one that has the program, built for object stores
-          envFrom: [{{secretRef: {{name: SECRET}}}}] # to be filled in: one with the variables of the object store
-          command: [sh, -c, {line}]
-"
-    );
-    Ok((container, String::new()))
+{secret}          command: {command}
+          resources: {{requests: {each}, limits: {each}}}
+{mounts}{volumes}"
+    ))
 }
 
 /// The line that starts it, in place of an earlier one, and the merge behind it.
@@ -137,7 +129,15 @@ mod tests {
     fn work(name: &str) -> Work {
         let (shard, merge) = (vec!["a b".to_owned(), Work::SHARD.to_owned()], Vec::new());
         let (program, folder) = ("/bin/true".into(), "/a \"b\"".into());
-        Work { name: name.to_owned(), folder, is_stored: false, program, shard, merge, shards: NonZeroU64::MIN }
+        Work {
+            name: name.to_owned(),
+            folder,
+            storage: Storage::Folders,
+            program,
+            shard,
+            merge,
+            shards: NonZeroU64::MIN,
+        }
     }
 
     #[test]
@@ -155,11 +155,18 @@ mod tests {
     }
 
     #[test]
-    fn shards_of_objects_need_no_volume() {
-        let work = Work { is_stored: true, ..work("bias") };
-        let job = job(&work, &Resources::of_minutes(5), "/a/shard.sh").expect("text");
-        assert!(!job.contains("volume") && job.contains("secretRef"), "{job}");
-        assert!(job.contains(r#"[sh, -c, "exec twinlag 'a b' \"$JOB_COMPLETION_INDEX/1\""]"#), "{job}");
+    fn a_job_has_what_its_shards_read_and_write() {
+        let job = |storage| {
+            let work = Work { storage, ..work("bias") };
+            job(&work, &Resources::of_minutes(5), "/a/shard.sh").expect("text")
+        };
+        let has = |job: &str| ["volume", "secretRef"].map(|text| job.contains(text));
+        assert_eq!(has(&job(Storage::Folders)), [true, false]);
+        assert_eq!(has(&job(Storage::FoldersAndObjects)), [true, true]);
+        let objects = job(Storage::Objects);
+        assert_eq!(has(&objects), [false, true]);
+        let command = r#"[sh, -c, "exec \"${TWINLAG:-twinlag}\" 'a b' \"$JOB_COMPLETION_INDEX/1\""]"#;
+        assert!(objects.contains(command), "{objects}");
     }
 
     #[test]

@@ -11,14 +11,14 @@
 //!
 //! ```
 //! use std::num::NonZeroU64;
-//! use twinlag_cluster::{Engine, Resources, Submission, Work};
+//! use twinlag_cluster::{Engine, Resources, Storage, Submission, Work};
 //!
 //! let folder = tempfile::tempdir()?;
 //! let words = |text: &str| text.split(' ').map(str::to_owned).collect();
 //! let work = Work {
 //!     name: "bias".into(),
 //!     folder: folder.path().into(),
-//!     is_stored: false,
+//!     storage: Storage::Folders,
 //!     program: "/opt/bin/twinlag".into(),
 //!     shard: words("study run plan.toml --out bias --resume --shard {shard}"),
 //!     merge: words("study merge bias"),
@@ -45,4 +45,4 @@ mod work;
 pub use engine::{Engine, Queue, State};
 pub use error::ClusterError;
 pub use submission::{Job, Submission, Submitted};
-pub use work::{Resources, Work};
+pub use work::{Resources, Storage, Work};

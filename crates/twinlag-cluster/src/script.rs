@@ -79,9 +79,9 @@ fn arguments_of(work: &Work, shard: &str) -> Result<String, ClusterError> {
     Ok(words.into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" "))
 }
 
-/// The line of a shard that needs no folder: its index is in a variable.
-pub(crate) fn line_of_shard(work: &Work, index: &str) -> Result<String, ClusterError> {
-    Ok(format!("exec twinlag {}", arguments_of(work, index)?))
+/// The line that runs a shard whose index is in the variable of an indexed job.
+pub(crate) fn line_of_shard(work: &Work) -> Result<String, ClusterError> {
+    Ok(format!("exec \"${{TWINLAG:-twinlag}}\" {}", arguments_of(work, "$JOB_COMPLETION_INDEX")?))
 }
 
 /// The script that joins the parts. Where one is missing it ends with 1, not with [`AGAIN`]: waiting does not bring the part.

@@ -13,11 +13,11 @@ use crate::error::ClusterError;
 pub struct Work {
     /// What engines show it as.
     pub name: String,
-    /// The folder in which all commands run; every machine has to see it, but for pods of Kubernetes where [`Self::is_stored`].
+    /// The folder in which all commands run. Every machine has to see it, except pods of work that is all in [`Storage::Objects`].
     pub folder: PathBuf,
-    /// Whether all that a shard reads and writes is in an object store.
+    /// Where the files are that a shard reads and writes.
     #[serde(default)]
-    pub is_stored: bool,
+    pub storage: Storage,
     /// The program; on a machine that has it elsewhere, the variable `TWINLAG` says where.
     pub program: PathBuf,
     /// Its arguments for a shard, with [`Self::SHARD`] in the place of which shard it is.
@@ -33,6 +33,20 @@ impl Work {
     pub const SHARD: &'static str = "{shard}";
     /// Most shards; chosen: engines take some thousand, and each has a file.
     pub const MAX_SHARDS: u64 = 1_000_000;
+}
+
+/// Where the files are that a shard reads and writes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum Storage {
+    /// In folders that every machine sees.
+    #[default]
+    Folders,
+    /// Some in folders, the others in an object store.
+    FoldersAndObjects,
+    /// All in an object store.
+    Objects,
 }
 
 /// What a shard needs.

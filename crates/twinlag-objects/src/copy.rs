@@ -4,47 +4,64 @@ use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _, stream};
-use object_store::{Error, ObjectMeta, ObjectStore as _, ObjectStoreExt as _, PutMode, UpdateVersion};
+use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutMode, UpdateVersion};
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
 use tokio::runtime::{Builder, Runtime};
+use tokio::time::{sleep, timeout};
 
 use crate::error::ObjectsError;
-use crate::store::Store;
+use crate::fault;
+use crate::prefix::Prefix;
 
 /// How many objects are fetched at once; chosen: a store answers in some ten milliseconds, whatever it is asked.
 const FETCHED_AT_ONCE: usize = 32;
-/// How often a request is made in all that fails for another reason than what it asks; chosen, each with what the client repeats itself.
-const MAX_TRIES: u32 = 4;
 /// The wait before the second try, which doubles from one to the next; chosen.
 const FIRST_WAIT: Duration = Duration::from_millis(200);
+/// The longest wait between two tries; chosen: a store that comes back is seen soon.
+const LONGEST_WAIT: Duration = Duration::from_secs(3);
+
+type Hash = [u8; 32];
 
 /// A folder on this machine with some of the files that are stored under a prefix.
 ///
-/// It is removed with this value, and so is what has not been stored: see [`Self::keep`].
+/// The folder is removed when this value is dropped, with what has not been stored: see [`Self::keep`].
 #[derive(Debug)]
 pub struct WorkingCopy {
-    store: Store,
+    prefix: Prefix,
     folder: TempDir,
     runtime: Runtime,
-    /// What is stored, as this copy has last seen it.
-    seen: BTreeMap<String, Seen>,
+    client: Arc<dyn ObjectStore>,
+    /// What is known of each object.
+    objects: BTreeMap<String, Known>,
 }
 
-#[derive(Clone, Debug)]
-struct Seen {
-    version: UpdateVersion,
-    /// Of its content, if this copy has had it.
-    sha256: Option<[u8; 32]>,
+/// What is known of an object.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    /// As it was last seen; `None` if there was none.
+    version: Option<UpdateVersion>,
+    /// Of its content, if that has been here.
+    sha256: Option<Hash>,
+    /// What has been sent since: the store may have it.
+    sent: Vec<Hash>,
 }
 
-impl Seen {
+impl Known {
     fn of(content: &[u8], version: UpdateVersion) -> Self {
-        Self { version, sha256: Some(sha256(content)) }
+        Self { version: Some(version), sha256: Some(sha256(content)), sent: Vec::new() }
+    }
+
+    /// Whether an object is as it was last seen. Some stores quote the tag in one answer and not in another.
+    fn is(&self, object: &ObjectMeta) -> bool {
+        let bare =
+            |tag: &Option<String>| tag.as_ref().map(|tag| tag.trim_start_matches("W/").trim_matches('"').to_owned());
+        self.version.as_ref().is_some_and(|version| bare(&version.e_tag) == bare(&object.e_tag))
     }
 }
 
@@ -52,19 +69,25 @@ impl WorkingCopy {
     /// Lists what is stored, and makes an empty folder for it. What is deeper than the prefix is no part of it.
     ///
     /// # Errors
-    /// [`ObjectsError::Read`]; [`ObjectsError::File`] if there is no place for the folder.
-    pub fn open(store: &Store) -> Result<Self, ObjectsError> {
+    /// [`ObjectsError::Read`], [`ObjectsError::Away`], [`ObjectsError::Unusable`]; [`ObjectsError::File`] if there is no place for the
+    /// folder.
+    pub fn open(prefix: &Prefix) -> Result<Self, ObjectsError> {
         let no_place = |error| of_file(&std::env::temp_dir(), &error);
         let folder = tempfile::Builder::new().prefix("twinlag-").tempdir().map_err(no_place)?;
-        let runtime = Builder::new_current_thread().enable_all().build().map_err(no_place)?;
-        let unreadable = |error: Error| ObjectsError::Read { url: store.url.clone(), reason: error.to_string() };
-        let listed = runtime.block_on(repeated(async || store.objects.list_with_delimiter(Some(&store.prefix)).await));
-        let objects = listed.map_err(unreadable)?.objects;
-        let seen = objects.into_iter().filter_map(|object| {
-            let name = object.location.filename()?.to_owned();
-            Some((name, Seen { version: version_of(&object), sha256: None }))
+        let (runtime, client) = (runtime()?, prefix.client()?);
+        let request = async || client.list_with_delimiter(Some(prefix.path())).await;
+        let listed = runtime.block_on(repeated(prefix.patience, request));
+        let listed = listed.map_err(|error| unreadable(prefix.url.clone(), &error))?;
+        let objects = listed.objects.into_iter().filter_map(|object| {
+            // A marker of the folder itself has no name in it.
+            let names: Vec<_> = object.location.prefix_match(prefix.path())?.collect();
+            let [name] = &names[..] else { return None };
+            // Nor has what is no name of a file on this system.
+            Path::new(name.as_ref()).file_name().filter(|file| *file == name.as_ref())?;
+            Some((name.as_ref().to_owned(), Known { version: Some(version_of(&object)), ..Known::default() }))
         });
-        Ok(Self { store: store.clone(), folder, seen: seen.collect(), runtime })
+        let objects = objects.collect();
+        Ok(Self { prefix: prefix.clone(), folder, runtime, client, objects })
     }
 
     /// The folder.
@@ -73,60 +96,90 @@ impl WorkingCopy {
     }
 
     /// Where the objects are.
-    pub fn place(&self) -> &Store {
-        &self.store
+    pub fn prefix(&self) -> &Prefix {
+        &self.prefix
     }
 
     /// The names of what is stored, in their order, whether it has been fetched or not.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.seen.keys().map(String::as_str)
+        self.objects.iter().filter(|(_, known)| known.version.is_some()).map(|(name, _)| name.as_str())
     }
 
-    /// Brings the objects of some names, each with the time at which it was stored. One that is there already is brought again.
+    /// Brings the objects of some names, each with the time at which it was stored; those that are here are left as they are.
     ///
     /// # Errors
-    /// [`ObjectsError::Read`], [`ObjectsError::File`]. An object that has been removed since the listing is left out.
+    /// [`ObjectsError::Read`], [`ObjectsError::Away`], [`ObjectsError::File`]. An object that has been removed since the listing is left out.
     pub fn fetch(&mut self, is_wanted: impl Fn(&str) -> bool) -> Result<(), ObjectsError> {
-        let wanted: Vec<String> = self.names().filter(|name| is_wanted(name)).map(str::to_owned).collect();
-        let (store, folder) = (&self.store, self.folder.path());
+        let is_here = |name: &str| self.objects.get(name).is_some_and(|known| known.sha256.is_some());
+        let wanted = self.names().filter(|name| is_wanted(name) && !is_here(name)).map(str::to_owned).collect();
+        self.fetch_all(wanted)
+    }
+
+    fn fetch_all(&mut self, names: Vec<String>) -> Result<(), ObjectsError> {
+        let (prefix, folder, client) = (&self.prefix, self.folder.path(), &self.client);
         let one = async |name: String| {
-            let Some((content, meta)) = repeated(async || whole(store, &name).await)
-                .await
-                .map_err(|error| ObjectsError::Read { url: store.url_of(&name), reason: error.to_string() })?
-            else {
-                return Ok((name, None));
+            let found = repeated(prefix.patience, async || whole(prefix, client, &name).await).await;
+            let Some((content, meta)) = found.map_err(|error| unreadable(prefix.url_of(&name), &error))? else {
+                return Ok((name, Known::default()));
             };
             let path = folder.join(&name);
             written(&path, &content, meta.last_modified.into()).map_err(|error| of_file(&path, &error))?;
-            Ok((name, Some(Seen::of(&content, version_of(&meta)))))
+            Ok((name, Known::of(&content, version_of(&meta))))
         };
-        let all = stream::iter(wanted.into_iter().map(one)).buffer_unordered(FETCHED_AT_ONCE);
-        let fetched: Vec<(String, Option<Seen>)> = self.runtime.block_on(all.try_collect())?;
-        for (name, seen) in fetched {
-            match seen {
-                Some(seen) => self.seen.insert(name, seen),
-                None => self.seen.remove(&name),
-            };
-        }
+        let all = stream::iter(names.into_iter().map(one)).buffer_unordered(FETCHED_AT_ONCE);
+        let fetched: Vec<(String, Known)> = self.runtime.block_on(all.try_collect())?;
+        self.objects.extend(fetched);
         Ok(())
     }
 
-    /// Stores a file of the folder, unless it is stored as it is. An object that this copy has listed, fetched or stored is replaced; one
-    /// that it knows nothing of, or that another process has written since, is not.
+    /// Stores a file of the folder; does nothing if the object already has its content. Replaces an object that this copy has listed,
+    /// fetched or stored, unless another process has written it since.
     ///
     /// # Errors
-    /// [`ObjectsError::Changed`]; [`ObjectsError::Write`]; [`ObjectsError::File`] if there is no such file.
+    /// [`ObjectsError::Changed`], [`ObjectsError::Removed`]; [`ObjectsError::Write`], [`ObjectsError::Away`]; [`ObjectsError::File`] if there
+    /// is no such file.
     pub fn store(&mut self, name: &str) -> Result<(), ObjectsError> {
+        self.store_within(name, None)
+    }
+
+    /// Stores a file of the folder as [`Self::store`] does, but gives up after some time.
+    ///
+    /// # Errors
+    /// Those of [`Self::store`].
+    pub fn store_at_once(&mut self, name: &str, limit: Duration) -> Result<(), ObjectsError> {
+        self.store_within(name, Some(limit))
+    }
+
+    fn store_within(&mut self, name: &str, limit: Option<Duration>) -> Result<(), ObjectsError> {
         let path = self.folder.path().join(name);
         let content = Bytes::from(fs::read(&path).map_err(|error| of_file(&path, &error))?);
-        let before = self.seen.get(name);
-        if before.is_some_and(|seen| seen.sha256 == Some(sha256(&content))) {
+        let known = self.objects.entry(name.to_owned()).or_default();
+        if known.sha256 == Some(sha256(&content)) {
             return Ok(());
         }
-        let version = before.map(|seen| seen.version.clone());
-        let stored = self.runtime.block_on(put(&self.store, name, &content, version))?;
-        self.seen.insert(name.to_owned(), Seen::of(&content, stored));
-        Ok(())
+        let (prefix, client) = (&self.prefix, &self.client);
+        self.runtime.block_on(async {
+            let stored = put(prefix, client, name, &content, known);
+            match limit {
+                None => stored.await,
+                Some(limit) => timeout(limit, stored).await.unwrap_or_else(|_| {
+                    let reason = format!("no answer in {} s", limit.as_secs_f64());
+                    Err(ObjectsError::Away { url: prefix.url_of(name), reason })
+                }),
+            }
+        })
+    }
+
+    /// Stores a file of the folder that whoever comes first makes: if another process was first, what that has made is fetched in its
+    /// place.
+    ///
+    /// # Errors
+    /// Those of [`Self::store`] and [`Self::fetch`], but for [`ObjectsError::Changed`].
+    pub fn store_first(&mut self, name: &str) -> Result<(), ObjectsError> {
+        match self.store(name) {
+            Err(ObjectsError::Changed { .. }) => self.fetch_all(vec![name.to_owned()]),
+            stored => stored,
+        }
     }
 
     /// Leaves the folder where it is, for whoever could not store it, and returns its path.
@@ -135,46 +188,74 @@ impl WorkingCopy {
     }
 }
 
-/// Stores an object, in place of the version that was seen of it, and returns its version.
+impl Prefix {
+    /// The content of an object; `None` if there is no such object.
+    ///
+    /// # Errors
+    /// [`ObjectsError::Read`], [`ObjectsError::Away`], [`ObjectsError::Unusable`]; [`ObjectsError::BadUrl`] of what is no name.
+    pub fn read(&self, name: &str) -> Result<Option<Vec<u8>>, ObjectsError> {
+        self.location(name)?;
+        let (runtime, client) = (runtime()?, self.client()?);
+        let found = runtime.block_on(repeated(self.patience, async || whole(self, &client, name).await));
+        let found = found.map_err(|error| unreadable(self.url_of(name), &error))?;
+        Ok(found.map(|(content, _)| content.into()))
+    }
+}
+
+fn runtime() -> Result<Runtime, ObjectsError> {
+    Builder::new_current_thread().enable_all().build().map_err(|error| of_file(&std::env::temp_dir(), &error))
+}
+
+/// Stores an object in place of the version that is known of it.
 async fn put(
-    store: &Store,
+    prefix: &Prefix,
+    client: &Arc<dyn ObjectStore>,
     name: &str,
     content: &Bytes,
-    before: Option<UpdateVersion>,
-) -> Result<UpdateVersion, ObjectsError> {
-    let location = store.prefix.clone().join(name);
-    let mode = before.clone().map_or(PutMode::Create, PutMode::Update);
-    let mut wait = FIRST_WAIT;
-    for tries in 1.. {
-        let error = match store.objects.put_opts(&location, content.clone().into(), mode.clone().into()).await {
-            Ok(stored) => return Ok(stored.into()),
+    known: &mut Known,
+) -> Result<(), ObjectsError> {
+    let (location, url) = (prefix.location(name)?, || prefix.url_of(name));
+    let (start, mut wait) = (Instant::now(), FIRST_WAIT);
+    known.sent.push(sha256(content));
+    loop {
+        let mode = known.version.clone().map_or(PutMode::Create, PutMode::Update);
+        let error = match client.put_opts(&location, content.clone().into(), mode.into()).await {
+            Ok(stored) => {
+                *known = Known::of(content, stored.into());
+                return Ok(());
+            }
             Err(error) => error,
         };
-        // The store may have done it, and the answer was lost: then it holds what was sent.
-        if let Ok(there) = whole(store, name).await {
-            match there {
-                Some((there, meta)) if there == *content => return Ok(version_of(&meta)),
-                there => {
-                    let is_before = there.map(|(_, meta)| meta.e_tag) == before.as_ref().map(|seen| seen.e_tag.clone());
-                    if !is_before {
-                        return Err(ObjectsError::Changed { url: store.url_of(name) });
-                    }
-                }
+        // The store may have done it, this time or an earlier one, and the answer was lost: then it holds what was sent.
+        match whole(prefix, client, name).await {
+            Ok(Some((there, meta))) if there == *content => {
+                *known = Known::of(content, version_of(&meta));
+                return Ok(());
             }
+            Ok(Some((_, meta))) if known.is(&meta) => {}
+            Ok(Some((there, meta))) if known.sent.contains(&sha256(&there)) => known.version = Some(version_of(&meta)),
+            Ok(Some(_)) => return Err(ObjectsError::Changed { url: url() }),
+            Ok(None) if known.version.is_some() => return Err(ObjectsError::Removed { url: url() }),
+            Ok(None) | Err(_) => {}
         }
-        if tries == MAX_TRIES || is_final(&error) {
-            return Err(ObjectsError::Write { url: store.url_of(name), reason: error.to_string() });
+        if fault::is_final(&error) {
+            return Err(ObjectsError::Write { url: url(), reason: fault::reason(&error) });
         }
-        tokio::time::sleep(wait).await;
-        wait *= 2;
+        if is_over(start, prefix.patience, wait) {
+            return Err(ObjectsError::Away { url: url(), reason: fault::reason(&error) });
+        }
+        wait = waited(wait).await;
     }
-    unreachable!("the last try returns")
 }
 
 /// The content of an object; `None` if there is none.
-async fn whole(store: &Store, name: &str) -> Result<Option<(Bytes, ObjectMeta)>, Error> {
-    let location = store.prefix.clone().join(name);
-    match store.objects.get(&location).await {
+async fn whole(
+    prefix: &Prefix,
+    client: &Arc<dyn ObjectStore>,
+    name: &str,
+) -> Result<Option<(Bytes, ObjectMeta)>, Error> {
+    let location = prefix.location(name).map_err(|error| Error::NotSupported { source: error.into() })?;
+    match client.get(&location).await {
         Err(Error::NotFound { .. }) => Ok(None),
         Err(error) => Err(error),
         Ok(found) => {
@@ -184,30 +265,39 @@ async fn whole(store: &Store, name: &str) -> Result<Option<(Bytes, ObjectMeta)>,
     }
 }
 
-/// Makes a request that changes nothing until it is answered.
-async fn repeated<T>(request: impl AsyncFn() -> Result<T, Error>) -> Result<T, Error> {
-    let mut wait = FIRST_WAIT;
-    for _ in 1..MAX_TRIES {
+/// Makes a request that only reads, again if it fails.
+async fn repeated<T>(patience: Duration, request: impl AsyncFn() -> Result<T, Error>) -> Result<T, Error> {
+    let (start, mut wait) = (Instant::now(), FIRST_WAIT);
+    loop {
         match request().await {
-            Err(error) if !is_final(&error) => {}
+            Err(error) if !fault::is_final(&error) && !is_over(start, patience, wait) => {}
             answered => return answered,
         }
-        tokio::time::sleep(wait).await;
-        wait *= 2;
+        wait = waited(wait).await;
     }
-    request().await
 }
 
-/// Whether an error would be the same at the next try.
-fn is_final(error: &Error) -> bool {
-    !matches!(error, Error::Generic { .. } | Error::Precondition { .. } | Error::AlreadyExists { .. })
+/// Whether a request has been made often enough: for so long, or twice where there is no time to wait.
+fn is_over(start: Instant, patience: Duration, wait: Duration) -> bool {
+    start.elapsed() >= patience && (wait > FIRST_WAIT || patience > Duration::ZERO)
+}
+
+/// Waits, and returns how long to wait the next time.
+async fn waited(wait: Duration) -> Duration {
+    sleep(wait).await;
+    (2 * wait).min(LONGEST_WAIT)
+}
+
+fn unreadable(url: String, error: &Error) -> ObjectsError {
+    let reason = fault::reason(error);
+    if fault::is_final(error) { ObjectsError::Read { url, reason } } else { ObjectsError::Away { url, reason } }
 }
 
 fn version_of(object: &ObjectMeta) -> UpdateVersion {
     UpdateVersion { e_tag: object.e_tag.clone(), version: object.version.clone() }
 }
 
-fn sha256(content: &[u8]) -> [u8; 32] {
+fn sha256(content: &[u8]) -> Hash {
     Sha256::digest(content).into()
 }
 
@@ -223,12 +313,12 @@ fn written(path: &Path, content: &[u8], modified: SystemTime) -> io::Result<()> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::faults::{Fault, Faulty};
+    use crate::faulty::{Fault, Faulty};
 
     const URL: &str = "s3://bucket/study";
     const NAME: &str = "part-0-of-1.json";
 
-    fn open(store: &Store) -> WorkingCopy {
+    fn open(store: &Prefix) -> WorkingCopy {
         WorkingCopy::open(store).expect("can be listed")
     }
 
@@ -236,7 +326,7 @@ mod tests {
         fs::write(copy.folder().join(NAME), content).expect("can be written");
     }
 
-    fn stored(store: &Store) -> String {
+    fn stored(store: &Prefix) -> String {
         let mut copy = open(store);
         copy.fetch(|_| true).expect("can be read");
         fs::read_to_string(copy.folder().join(NAME)).expect("is there")
@@ -244,7 +334,7 @@ mod tests {
 
     #[test]
     fn what_is_stored_comes_back_with_its_time() {
-        let store = Store::in_memory(URL);
+        let store = Prefix::in_memory(URL);
         let mut copy = open(&store);
         write(&copy, "a part");
         let before = SystemTime::now();
@@ -264,19 +354,19 @@ mod tests {
 
     #[test]
     fn prefixes_beside_and_below_are_no_part_of_it() {
-        let store = Store::in_memory(URL);
+        let store = Prefix::in_memory(URL);
         for url in ["s3://bucket/study2", "s3://bucket/study/below", "s3://bucket"] {
-            let mut copy = open(&Store::on(store.objects.clone(), url));
+            let mut copy = open(&Prefix::on(store.client().expect("in memory"), url));
             write(&copy, url);
             copy.store(NAME).expect("new");
         }
         assert_eq!(open(&store).names().count(), 0);
-        assert_eq!(stored(&Store::on(store.objects, "s3://bucket/")), "s3://bucket");
+        assert_eq!(stored(&Prefix::on(store.client().expect("in memory"), "s3://bucket/")), "s3://bucket");
     }
 
     #[test]
     fn of_two_processes_one_goes_on() {
-        let store = Store::in_memory(URL);
+        let store = Prefix::in_memory(URL);
         let (mut one, mut other) = (open(&store), open(&store));
         write(&one, "one");
         write(&other, "other");
@@ -299,7 +389,7 @@ mod tests {
 
     #[test]
     fn the_same_from_two_processes_is_no_conflict() {
-        let store = Store::in_memory(URL);
+        let store = Prefix::in_memory(URL);
         let (mut one, mut other) = (open(&store), open(&store));
         for copy in [&mut one, &mut other] {
             write(copy, "the result");
@@ -312,7 +402,7 @@ mod tests {
     fn faults_of_the_store_leave_no_trace() {
         for fault in [Fault::Refused, Fault::AnswerLost] {
             for place in 0..6 {
-                let store = Store::on(Faulty::new(place, fault), URL);
+                let store = Prefix::on(Faulty::new(place, fault), URL);
                 let mut copy = open(&store);
                 for content in ["first", "second"] {
                     write(&copy, content);
@@ -325,19 +415,73 @@ mod tests {
 
     #[test]
     fn a_store_that_stays_away_is_an_error_and_the_folder_can_be_kept() {
-        let store = Store::on(Faulty::new(1, Fault::Gone), URL);
+        let store = Prefix::on(Faulty::new(1, Fault::Gone), URL);
         let mut copy = open(&store);
         write(&copy, "the result");
-        assert!(matches!(copy.store(NAME), Err(ObjectsError::Write { url, .. }) if url == store.url_of(NAME)));
+        assert!(matches!(copy.store(NAME), Err(ObjectsError::Away { url, .. }) if url == store.url_of(NAME)));
         let kept = copy.keep();
         assert_eq!(fs::read_to_string(kept.join(NAME)).expect("kept"), "the result");
         fs::remove_dir_all(kept).expect("there");
-        assert!(matches!(WorkingCopy::open(&store), Err(ObjectsError::Read { .. })));
+        assert!(matches!(WorkingCopy::open(&store), Err(ObjectsError::Away { .. })));
+    }
+
+    #[test]
+    fn an_object_that_was_removed_is_not_stored_again() {
+        let store = Prefix::in_memory(URL);
+        let mut copy = open(&store);
+        write(&copy, "first");
+        copy.store(NAME).expect("new");
+        let location = store.location(NAME).expect("a name");
+        copy.runtime.block_on(copy.client.delete(&location)).expect("there");
+        write(&copy, "second");
+        assert!(matches!(copy.store(NAME), Err(ObjectsError::Removed { url }) if url == store.url_of(NAME)));
+    }
+
+    /// What was sent and not confirmed is known when it is seen later.
+    #[test]
+    fn an_answer_that_is_lost_at_last_is_no_other_process() {
+        // The listing, then each request to store and to look: the store takes the first and confirms nothing, and then comes back.
+        let store = Prefix::on(Faulty::new(1, Fault::Silent), URL);
+        let mut copy = open(&store);
+        write(&copy, "first");
+        assert!(matches!(copy.store(NAME), Err(ObjectsError::Away { .. })));
+        write(&copy, "second");
+        copy.store(NAME).expect("its own");
+        assert_eq!(stored(&store), "second");
+    }
+
+    #[test]
+    fn names_may_have_any_signs() {
+        let store = Prefix::in_memory(URL);
+        for name in ["Übung #1 100%.csv", "~a[b]{c}*?^|<>\"\\", " "] {
+            let mut copy = open(&store);
+            fs::write(copy.folder().join(name), name).expect("can be written");
+            copy.store(name).expect("new");
+            let mut other = open(&store);
+            assert!(other.names().any(|is| is == name), "{name:?}");
+            other.fetch(|_| true).expect("there");
+            assert_eq!(fs::read_to_string(other.folder().join(name)).expect("there"), name);
+            assert_eq!(store.read(name).expect("can be read").as_deref(), Some(name.as_bytes()));
+        }
+        assert_eq!(store.read("nothing").expect("can be read"), None);
+    }
+
+    #[test]
+    fn whoever_comes_first_makes_it() {
+        let store = Prefix::in_memory(URL);
+        let (mut one, mut other) = (open(&store), open(&store));
+        write(&one, "one");
+        write(&other, "other");
+        one.store_first(NAME).expect("new");
+        other.store_first(NAME).expect("theirs");
+        assert_eq!(fs::read_to_string(other.folder().join(NAME)).expect("there"), "one");
+        write(&other, "goes on");
+        other.store(NAME).expect("as it was seen");
     }
 
     #[test]
     fn a_file_that_is_missing_is_named() {
-        let mut copy = open(&Store::in_memory(URL));
+        let mut copy = open(&Prefix::in_memory(URL));
         assert!(matches!(copy.store(NAME), Err(ObjectsError::File { path, .. }) if path.ends_with(NAME)));
     }
 }

@@ -10,7 +10,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ObjectsError {
     #[error("{url}: expected s3://BUCKET/PREFIX")]
-    NoUrl { url: String },
+    BadUrl { url: String },
     #[error("{url}: this program was built without object stores (feature s3)")]
     NotBuilt { url: String },
     #[error("{url}: the store cannot be used: {reason}")]
@@ -19,8 +19,12 @@ pub enum ObjectsError {
     Read { url: String, reason: String },
     #[error("{url}: cannot be written: {reason}")]
     Write { url: String, reason: String },
+    #[error("{url}: the store cannot be reached: {reason}; try again when it can")]
+    Away { url: String, reason: String },
     #[error("{url}: another process has written it since this one has read it: wait until that one ends")]
     Changed { url: String },
+    #[error("{url}: has been removed since this process has read it")]
+    Removed { url: String },
     #[error("{}: cannot be read or written: {reason}", path.display())]
     File { path: PathBuf, reason: String },
 }

@@ -6,18 +6,18 @@
 //! other gets [`ObjectsError::Changed`], so that no lock is needed. What the files hold is the caller's business. A program that has
 //! folders that all its machines see needs none of this.
 //!
-//! Requests that fail for a while are repeated. A store may have done what it answers with an error, or not at all: after
-//! each error the object is read and compared.
+//! Requests that fail are repeated for half a minute. A store may have done what it answers with an error: after each error the object is
+//! read and compared. All of it holds for stores that heed `If-Match` and `If-None-Match` of what they are to store, as Amazon S3 does.
 //!
 //! ```
-//! use twinlag_objects::{Store, WorkingCopy};
+//! use twinlag_objects::{Prefix, WorkingCopy};
 //!
-//! let store = Store::in_memory("s3://bucket/study");
-//! let mut copy = WorkingCopy::open(&store)?;
+//! let prefix = Prefix::in_memory("s3://bucket/study");
+//! let mut copy = WorkingCopy::open(&prefix)?;
 //! std::fs::write(copy.folder().join("part-0-of-2.json"), "half of it")?;
 //! copy.store("part-0-of-2.json")?;
 //!
-//! let mut elsewhere = WorkingCopy::open(&store)?;
+//! let mut elsewhere = WorkingCopy::open(&prefix)?;
 //! elsewhere.fetch(|name| name.starts_with("part-"))?;
 //! assert_eq!(std::fs::read_to_string(elsewhere.folder().join("part-0-of-2.json"))?, "half of it");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -25,10 +25,11 @@
 
 mod copy;
 mod error;
+mod fault;
 #[cfg(test)]
-mod faults;
-mod store;
+mod faulty;
+mod prefix;
 
 pub use copy::WorkingCopy;
 pub use error::ObjectsError;
-pub use store::Store;
+pub use prefix::Prefix;

@@ -16,8 +16,12 @@ use crate::{fleet, root};
 const FAULTY_EVERY: &str = "7";
 /// The bucket, a folder of the server's.
 const BUCKET: &str = "bucket";
-/// Where the study is.
-const STUDY: &str = "s3://bucket/of-objects/study";
+/// Where the study is, and where its bucket has that.
+const STUDY: &str = "s3://bucket/all objects/übung";
+const STUDY_IN_BUCKET: &str = "all objects/übung";
+/// Where the table is, beside the study.
+const TABLE: &str = "s3://bucket/all objects/übung#1.csv";
+const TABLE_IN_BUCKET: &str = "all objects/übung#1.csv";
 /// Its shards, of which each takes longer than the time after which what is done is stored.
 const SHARDS: [&str; 2] = ["0/2", "1/2"];
 
@@ -34,8 +38,8 @@ impl Site {
             ("AWS_ALLOW_HTTP", "true"),
         ];
         self.variables = variables.map(|(name, value)| (name, PathBuf::from(value))).to_vec();
-        self.study_on(&store.join(BUCKET).join("of-objects/study"))?;
-        self.fleet_on(&store.join(BUCKET).join("of-objects"), files)?;
+        self.study_on(&store.join(BUCKET).join(STUDY_IN_BUCKET))?;
+        self.fleet_on(&store.join(BUCKET).join(TABLE_IN_BUCKET), files)?;
         self.variables.clear();
         Ok(())
     }
@@ -49,6 +53,8 @@ impl Site {
     /// - `stored`: where the server has it
     fn study_on(&self, stored: &Path) -> Result<()> {
         let part = stored.join("part-0-of-2.json");
+        let submit = ["study", "submit", "plan.toml", "--out", STUDY, "--engine", "parallel", "--shards", "2"];
+        self.expect(&[&submit[..], &["--time-limit", "60"]].concat(), 0, "")?;
         let mut killed = Running(self.shard(SHARDS[0])?);
         let start = Instant::now();
         while !part.exists() {
@@ -76,9 +82,13 @@ impl Site {
 
         let whole = fs::read(&part)?;
         fs::write(&part, [&whole[..], b"more"].concat())?;
-        self.expect(&["study", "merge", STUDY], 3, &format!("{STUDY}/part-0-of-2.json"))?;
+        let is_named = format!("{STUDY}/part-0-of-2.json is not part of a study, or is damaged");
+        self.expect(&["study", "merge", STUDY], 3, &is_named)?;
+        self.expect(&["study", "resubmit", STUDY], 3, &is_named)?;
+        self.expect(&["study", "status", STUDY], 75, &is_named)?;
         fs::write(&part, whole)?;
         self.expect(&["study", "merge", STUDY], 0, "")?;
+        self.expect(&["study", "status", STUDY], 0, "the result is there")?;
         for name in ["results.json", "results.csv"] {
             let is_same = fs::read(stored.join(name))? == fs::read(self.folder.join("whole").join(name))?;
             ensure!(is_same, "{name}: other bytes than those of one process");
@@ -87,14 +97,13 @@ impl Site {
         Ok(())
     }
 
-    /// - `stored`: where the server has its tables
+    /// - `stored`: where the server has its table
     fn fleet_on(&self, stored: &Path, files: usize) -> Result<()> {
         fleet::make(&self.folder.join("records"), files, 2000)?;
         self.expect(&["batch", "records", "--out", "records.csv", "--quiet"], 0, "")?;
-        let table = "s3://bucket/of-objects/records.csv";
         // All at once: one of them makes the manifest.
         let shards: Vec<Child> = ["0/3", "1/3", "2/3"]
-            .map(|shard| ["batch", "records", "--out", table, "--threads", "1", "--quiet", "--shard", shard])
+            .map(|shard| ["batch", "records", "--out", TABLE, "--threads", "1", "--quiet", "--shard", shard])
             .iter()
             .map(|arguments| Ok(self.command(arguments).spawn()?))
             .collect::<Result<_>>()?;
@@ -102,8 +111,10 @@ impl Site {
             let status = shard.wait()?;
             ensure!(status.success(), "a shard of the batch ended with {status}");
         }
-        self.expect(&["batch", "--merge", "--out", table], 0, "")?;
-        let is_same = fs::read(stored.join("records.csv"))? == fs::read(self.folder.join("records.csv"))?;
+        // The summary goes to this machine.
+        self.expect(&["batch", "--merge", "--out", TABLE, "--report", "records.html"], 0, "")?;
+        ensure!(self.folder.join("records.html").exists(), "there is no summary");
+        let is_same = fs::read(stored)? == fs::read(self.folder.join("records.csv"))?;
         ensure!(is_same, "the records have another table on the server");
         println!("objects: the bytes of one process, of {files} files");
         Ok(())
@@ -112,9 +123,9 @@ impl Site {
     /// Runs the program, which has to end so, and to say so.
     fn expect(&self, arguments: &[&str], code: i32, said: &str) -> Result<()> {
         let output = self.command(arguments).output()?;
-        let error = String::from_utf8_lossy(&output.stderr);
-        let fits = output.status.code() == Some(code) && error.contains(said);
-        ensure!(fits, "{}: expected {code} and {said:?}, got {}: {error}", arguments.join(" "), output.status);
+        let text = [output.stdout, output.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
+        let fits = output.status.code() == Some(code) && text.contains(said);
+        ensure!(fits, "{}: expected {code} and {said:?}, got {}: {text}", arguments.join(" "), output.status);
         Ok(())
     }
 }

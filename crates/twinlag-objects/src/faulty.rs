@@ -24,26 +24,36 @@ pub(crate) enum Fault {
     AnswerLost,
     /// Nothing is done, from then on.
     Gone,
+    /// All is done, and the answers of [`SILENT`] requests are errors.
+    Silent,
 }
 
-/// A store of which one request fails, by its place from 0.
+/// How many requests a store that is silent leaves without an answer: two tries to store, each with a look.
+const SILENT: u32 = 4;
+
+/// A store of which a request fails, by its number from 0.
 #[derive(Debug)]
 pub(crate) struct Faulty {
     store: InMemory,
-    place: u32,
+    fails_at: u32,
     fault: Fault,
     asked: AtomicU32,
 }
 
 impl Faulty {
-    pub(crate) fn new(place: u32, fault: Fault) -> Arc<Self> {
-        Arc::new(Self { store: InMemory::new(), place, fault, asked: AtomicU32::new(0) })
+    pub(crate) fn new(fails_at: u32, fault: Fault) -> Arc<Self> {
+        Arc::new(Self { store: InMemory::new(), fails_at, fault, asked: AtomicU32::new(0) })
     }
 
     /// The fault of the next request.
     fn next(&self) -> Option<Fault> {
-        let place = self.asked.fetch_add(1, Ordering::SeqCst);
-        (place == self.place || (place > self.place && self.fault == Fault::Gone)).then_some(self.fault)
+        let number = self.asked.fetch_add(1, Ordering::SeqCst);
+        let last = match self.fault {
+            Fault::Refused | Fault::AnswerLost => self.fails_at,
+            Fault::Silent => self.fails_at + SILENT - 1,
+            Fault::Gone => u32::MAX,
+        };
+        (self.fails_at..=last).contains(&number).then_some(self.fault)
     }
 
     /// The answer of a request, unless it fails.
@@ -51,7 +61,7 @@ impl Faulty {
         let failed = || Error::Generic { store: "faulty", source: "a fault that was injected".into() };
         match self.next() {
             None => request.await,
-            Some(Fault::AnswerLost) => request.await.and(Err(failed())),
+            Some(Fault::AnswerLost | Fault::Silent) => request.await.and(Err(failed())),
             Some(_) => Err(failed()),
         }
     }
