@@ -213,7 +213,7 @@ fn result_names(plan: &Plan) -> Vec<String> {
 fn expect_no_results(plan: &Plan, place: &Place) -> Result<(), Failure> {
     let folder = place.folder().display();
     let there = place.names().map_err(|error| Failure::File(format!("{folder}: cannot be read: {error}")))?;
-    match result_names(plan).into_iter().find(|name| there.contains(name)) {
+    match result_names(plan).into_iter().rev().find(|name| there.contains(name)) {
         None => Ok(()),
         Some(name) => {
             let path = place.folder().join(name);

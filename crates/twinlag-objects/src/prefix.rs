@@ -143,11 +143,16 @@ fn client(url: &str, bucket: &str) -> Result<Arc<dyn ObjectStore>, ObjectsError>
         .with_retry(retry)
         .with_config(AmazonS3ConfigKey::Client(ClientConfigKey::Timeout), NO_TIMEOUT)
         .with_config(AmazonS3ConfigKey::Client(ClientConfigKey::ReadTimeout), READ_TIMEOUT);
-    // Whatever is no URL of HTTP, the client panics on.
     if let Some(endpoint) = builder.get_config_value(&AmazonS3ConfigKey::Endpoint) {
-        let is_http = url::Url::parse(&endpoint).is_ok_and(|url| ["http", "https"].contains(&url.scheme()));
-        if !is_http {
-            return Err(unusable(format!("its endpoint is {endpoint:?}: expected http:// or https:// and a name")));
+        let scheme = url::Url::parse(&endpoint).map(|url| url.scheme().to_owned()).unwrap_or_default();
+        let may_be_http = builder.get_config_value(&AmazonS3ConfigKey::Client(ClientConfigKey::AllowHttp));
+        match (&*scheme, may_be_http.as_deref()) {
+            ("https", _) | ("http", Some("true")) => {}
+            ("http", _) => return Err(unusable(format!("its endpoint is {endpoint}: set AWS_ALLOW_HTTP=true"))),
+            // The client panics on whatever else there is.
+            _ => {
+                return Err(unusable(format!("its endpoint is {endpoint:?}: expected http:// or https:// and a name")));
+            }
         }
     }
     Ok(Arc::new(builder.build().map_err(|error| unusable(error.to_string()))?))

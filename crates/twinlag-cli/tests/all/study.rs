@@ -39,6 +39,17 @@ fn what_cannot_run_is_refused_with_the_reason() {
         (vec!["study", "run", "none.toml", "--out", "out"], 3, "none.toml"),
         (vec!["study", "merge", "nowhere"], 3, "plan.toml"),
         (vec!["study", "run", "plan.toml", "--out", "out", "--shard", "3/3"], 2, "3/3"),
+        (vec!["study", "run", "plan.toml", "--out", "s3:/lab/out"], 2, "s3:/lab/out: expected s3://BUCKET/PREFIX"),
+        (vec!["study", "run", "plan.toml", "--out", "s3://lab/out"], 2, "built without object stores (feature s3)"),
+        (vec!["study", "merge", "gs://lab/out"], 2, "expected s3://BUCKET/PREFIX"),
+        (vec!["batch", ".", "--out", "s3://lab/table.csv"], 2, "built without object stores (feature s3)"),
+        (
+            vec!["batch", ".", "--out", "table.csv", "--report", "s3://lab/page.html"],
+            2,
+            "expected a path of this machine",
+        ),
+        (vec!["simulate", "rig.toml", "--out", "s3://lab/run.csv"], 2, "expected a path of this machine"),
+        (vec!["characterise", "s3://lab/run.csv"], 2, "expected a path of this machine"),
     ] {
         let got = bench.run(&arguments);
         assert_eq!(got.code, code, "{arguments:?}: {}", got.stderr);
