@@ -224,6 +224,7 @@ impl From<ObjectsError> for Failure {
             ObjectsError::Changed { .. } => Self::NotYet(text),
             ObjectsError::Away { .. } => Self::NotYet(text + &variables()),
             ObjectsError::Read { .. } | ObjectsError::Unusable { .. } => Self::File(text + &variables()),
+            ObjectsError::Unconditional { .. } => Self::File(text),
             ObjectsError::Write { .. } => Self::Other(text + &variables()),
             _ => Self::Other(text),
         }

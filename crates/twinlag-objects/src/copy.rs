@@ -171,14 +171,28 @@ impl WorkingCopy {
     }
 
     /// Stores a file of the folder that whoever comes first makes: if another process was first, what that has made is fetched in its
-    /// place.
+    /// place. Whoever is first also tries to make it once more, which the store has to refuse.
     ///
     /// # Errors
-    /// Those of [`Self::store`] and [`Self::fetch`], but for [`ObjectsError::Changed`].
+    /// Those of [`Self::store`] and [`Self::fetch`], but for [`ObjectsError::Changed`]; [`ObjectsError::Unconditional`].
     pub fn store_first(&mut self, name: &str) -> Result<(), ObjectsError> {
         match self.store(name) {
             Err(ObjectsError::Changed { .. }) => self.fetch_all(vec![name.to_owned()]),
+            Ok(()) => self.expect_refusal(name),
             stored => stored,
+        }
+    }
+
+    /// Refuses a store that replaces an object though it is asked not to.
+    fn expect_refusal(&self, name: &str) -> Result<(), ObjectsError> {
+        let path = self.folder.path().join(name);
+        let content = Bytes::from(fs::read(&path).map_err(|error| of_file(&path, &error))?);
+        let location = self.prefix.location(name)?;
+        // An error of any other kind says nothing.
+        let put = self.client.put_opts(&location, content.into(), PutMode::Create.into());
+        match self.runtime.block_on(put) {
+            Ok(_) => Err(ObjectsError::Unconditional { url: self.prefix.url_of(name) }),
+            Err(_) => Ok(()),
         }
     }
 
@@ -477,6 +491,16 @@ mod tests {
         assert_eq!(fs::read_to_string(other.folder().join(NAME)).expect("there"), "one");
         write(&other, "goes on");
         other.store(NAME).expect("as it was seen");
+    }
+
+    #[test]
+    fn a_store_that_heeds_no_conditions_is_refused() {
+        let store = Prefix::on(Faulty::new(0, Fault::Unconditional), URL);
+        let mut copy = open(&store);
+        write(&copy, "a plan");
+        assert!(
+            matches!(copy.store_first(NAME), Err(ObjectsError::Unconditional { url }) if url == store.url_of(NAME))
+        );
     }
 
     #[test]

@@ -25,6 +25,10 @@ pub enum ObjectsError {
     Changed { url: String },
     #[error("{url}: has been removed since this process has read it")]
     Removed { url: String },
+    #[error(
+        "{url}: the store has replaced it though it was asked not to (If-None-Match): two processes could write the same; use another store"
+    )]
+    Unconditional { url: String },
     #[error("{}: cannot be read or written: {reason}", path.display())]
     File { path: PathBuf, reason: String },
 }

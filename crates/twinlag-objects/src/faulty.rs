@@ -11,7 +11,7 @@ use futures_util::stream::BoxStream;
 use object_store::memory::InMemory;
 use object_store::path::Path;
 use object_store::{
-    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore,
+    CopyOptions, Error, GetOptions, GetResult, ListResult, MultipartUpload, ObjectMeta, ObjectStore, PutMode,
     PutMultipartOptions, PutOptions, PutPayload, PutResult, Result,
 };
 
@@ -24,6 +24,8 @@ pub(crate) enum Fault {
     AnswerLost,
     /// Nothing is done, from then on.
     Gone,
+    /// Nothing fails, and whatever is to be stored replaces what is there.
+    Unconditional,
     /// All is done, and the answers of [`SILENT`] requests are errors.
     Silent,
 }
@@ -50,6 +52,7 @@ impl Faulty {
         let number = self.asked.fetch_add(1, Ordering::SeqCst);
         let last = match self.fault {
             Fault::Refused | Fault::AnswerLost => self.fails_at,
+            Fault::Unconditional => return None,
             Fault::Silent => self.fails_at + SILENT - 1,
             Fault::Gone => u32::MAX,
         };
@@ -76,7 +79,8 @@ impl fmt::Display for Faulty {
 #[async_trait]
 impl ObjectStore for Faulty {
     async fn put_opts(&self, location: &Path, payload: PutPayload, options: PutOptions) -> Result<PutResult> {
-        self.answer(self.store.put_opts(location, payload, options)).await
+        let mode = if self.fault == Fault::Unconditional { PutMode::Overwrite } else { options.mode.clone() };
+        self.answer(self.store.put_opts(location, payload, PutOptions { mode, ..options })).await
     }
 
     async fn put_multipart_opts(
