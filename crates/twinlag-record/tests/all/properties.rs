@@ -1,8 +1,6 @@
 //! What holds for every record and every file.
 
-mod common;
-
-use common::record_with;
+use crate::common::record_with;
 use proptest::prelude::*;
 use twinlag_record::{Channels, Decimals, Record, SamplingChoice, Selection, Table, write_csv};
 

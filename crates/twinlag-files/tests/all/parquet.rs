@@ -1,10 +1,6 @@
 //! Parquet files of pyarrow and pandas.
 
-#![cfg(feature = "parquet")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
 use twinlag_files::Choice;
 use twinlag_record::{Record, Selection};
 

@@ -1,10 +1,6 @@
 //! HDF5 files of h5py, MATLAB 7.3 among them.
 
-#![cfg(feature = "hdf5")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
 use twinlag_files::{Choice, contents};
 
 #[test]

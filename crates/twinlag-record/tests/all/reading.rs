@@ -1,8 +1,6 @@
 //! What loggers write is read, and what was made of it is said. The oracle is the numbers that the text was made from.
 
-mod common;
-
-use common::{assert_is_the_rig, notes, plain, record, record_with, rows};
+use crate::common::{assert_is_the_rig, notes, plain, record, record_with, rows};
 use twinlag_record::{Channels, ColumnRef, Kind, Note, Record, SamplingChoice, SamplingKind, Selection, Table};
 
 fn comma(value: f64) -> String {

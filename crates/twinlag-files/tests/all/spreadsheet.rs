@@ -1,10 +1,6 @@
 //! Workbooks of openpyxl, pandas with odfpy, and xlwt.
 
-#![cfg(feature = "spreadsheet")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
 use twinlag_files::Choice;
 use twinlag_record::{Record, Selection};
 

@@ -1,10 +1,6 @@
 //! TDMS files of npTDMS.
 
-#![cfg(feature = "tdms")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
 use twinlag_files::{Choice, contents, read};
 use twinlag_record::{Record, Selection};
 

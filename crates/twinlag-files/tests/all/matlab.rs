@@ -1,10 +1,6 @@
 //! MATLAB 5 files of SciPy.
 
-#![cfg(feature = "matlab")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes};
 use twinlag_files::Choice;
 
 #[test]

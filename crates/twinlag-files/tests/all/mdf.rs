@@ -1,10 +1,6 @@
 //! MDF files of asammdf.
 
-#![cfg(feature = "mdf")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
 use twinlag_files::{Choice, FileError, contents, read};
 
 #[test]

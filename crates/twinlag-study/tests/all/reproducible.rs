@@ -181,7 +181,7 @@ fn every_trial_runs_once_and_absences_are_counted() {
 /// seeds itself from that.
 #[test]
 fn no_generator_is_a_dependency_of_the_engine() {
-    let manifest = include_str!("../Cargo.toml");
+    let manifest = include_str!("../../Cargo.toml");
     let dependencies = manifest.split("[dependencies]").nth(1).unwrap().split("\n[").next().unwrap();
     assert!(!dependencies.contains("rand"), "{dependencies}");
 }

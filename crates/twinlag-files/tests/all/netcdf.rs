@@ -1,10 +1,6 @@
 //! netCDF files of netCDF4, classic ones among them.
 
-#![cfg(feature = "netcdf")]
-
-mod common;
-
-use common::{assert_cuts_are_refused, assert_flips_are_survived, check, path};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, path};
 use twinlag_files::{Choice, contents};
 use twinlag_record::Column;
 

@@ -1,11 +1,9 @@
 //! Files of programs that are known by their headers. The forms are those of the programs' own manuals and of files in public
 //! collections; the oracle is the numbers that the text was made from.
 
-mod common;
-
 use std::io::Write as _;
 
-use common::{assert_is_the_rig, assert_says, notes, record, record_with, refusal, rows};
+use crate::common::{assert_is_the_rig, assert_says, notes, record, record_with, refusal, rows};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use twinlag_record::{ColumnRef, Note, Program, Record, RecordError, RowReader, Selection, Table, Unit};
@@ -266,7 +264,7 @@ fn compressed(text: &str) -> Vec<u8> {
 /// Whatever it is called; also of several parts, as loggers append them, and long ones.
 #[test]
 fn compressed_files_are_read_and_damaged_ones_refused() {
-    let read = |bytes: &[u8]| Record::from_reader(bytes, common::FILE, &Selection::default());
+    let read = |bytes: &[u8]| Record::from_reader(bytes, crate::common::FILE, &Selection::default());
     let text = SEA_BIRD.to_owned() + &sea_bird_rows();
     let bytes = compressed(&text);
     let got = read(&bytes).expect("gzip");

@@ -1,5 +1,4 @@
 //! What the tests share.
-#![allow(dead_code, reason = "each test binary uses a part")]
 
 use twinlag_record::{Record, RecordError, Selection, Table};
 

@@ -1,8 +1,6 @@
 //! What cannot be read in one way only is refused, with place and remedy.
 
-mod common;
-
-use common::{FILE, assert_says, plain, record, record_with, refusal, refusal_with, rows};
+use crate::common::{FILE, assert_says, plain, record, record_with, refusal, refusal_with, rows};
 use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table};
 
 #[expect(clippy::unnecessary_wraps, reason = "as the fields of a selection are")]

@@ -1,5 +1,4 @@
 //! Fixtures that other libraries wrote, and what is in them by their own word.
-#![allow(dead_code, reason = "each test binary uses a part")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,0 +1,5 @@
+//! All tests of `twinlag-model` in one program: linked once, and run side by side.
+
+mod mismatch;
+mod saturation;
+mod twins;

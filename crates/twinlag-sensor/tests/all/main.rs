@@ -1,0 +1,4 @@
+//! All tests of `twinlag-sensor` in one program: linked once, and run side by side.
+
+mod send_sync;
+mod stream;
