@@ -237,7 +237,7 @@ fn a_killed_process_leaves_a_part_to_go_on_from() {
     let (mut kills, mut attempt) = (0, 0_u64);
     loop {
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "child_process", "--test-threads=1"])
+            .args(["--exact", "reproducible::child_process", "--test-threads=1"])
             .env(CHILD, &path)
             .stdout(std::process::Stdio::null())
             .spawn()
