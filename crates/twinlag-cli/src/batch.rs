@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read as _;
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::ops::ControlFlow;
 use std::panic;
 use std::path::{Path, PathBuf};
 
@@ -216,7 +215,7 @@ fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Fai
     let table = &command.out[0];
     let question = Question::of(command)?;
     if let Some(shard) = command.division.shard {
-        shards::expect_one_division(table, place, shard.of())?;
+        shards::expect_one_division(table, place, shard.of()).map_err(Failure::Usage)?;
     }
     let journal_path =
         command.division.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
@@ -270,18 +269,13 @@ fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Fai
         Some(change) => failed(unit, &change),
         None => question.rows(unit, &gas_files),
     };
-    let mut stored = Ok(());
     let done = run_units(&units, &mut journal, command.course.threads, work, |progress| {
         bar.set_length(progress.total as u64);
         bar.set_position(progress.done as u64);
-        if stored.is_ok() {
-            stored = place.store_so_far(&journal_path, console);
-        }
-        if stored.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        place.store_so_far(&journal_path, console)
     });
     bar.finish_and_clear();
     let _ = panic::take_hook();
-    stored?;
     place.store(&journal_path)?;
     done?;
     match command.division.shard {
@@ -343,7 +337,7 @@ fn submit(
         )));
     }
     let shards = command.cluster.shards();
-    shards::expect_one_division(table, place, shards)?;
+    shards::expect_one_division(table, place, shards).map_err(Failure::Usage)?;
     let manifest = command.manifest(question, asked, journal, place, console)?;
     command.note_unlisted(&manifest, journal, place, console)?;
     let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();

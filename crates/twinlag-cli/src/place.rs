@@ -4,6 +4,7 @@
 //! sees paths of that folder; messages and answers name what the user has named.
 
 use std::io::ErrorKind;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -21,8 +22,8 @@ const WAIT_FACTOR: u32 = 20;
 const UPLOAD_LIMIT: Duration = Duration::from_secs(5);
 /// How the folder of what was submitted to a cluster ends on this machine, of results that are in a store.
 const SUBMISSION_ENDING: &str = ".submission";
-/// How a URL begins, and what nearly is one.
-const SCHEMES: [&str; 2] = ["s3://", "s3:"];
+/// How what is nearly a URL begins.
+const NEARLY: &str = "s3:";
 /// What says where a store is and who asks.
 const VARIABLES: [&str; 5] =
     ["AWS_ENDPOINT_URL", "AWS_REGION", "AWS_ALLOW_HTTP", "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"];
@@ -38,12 +39,13 @@ pub(crate) struct Place {
     next: Instant,
     /// Whether the user knows that it could not be stored.
     is_noted: bool,
+    /// Why nothing more can be stored.
+    lost: Option<Failure>,
 }
 
 /// Whether a path is meant as a URL.
 pub(crate) fn is_url(path: &Path) -> bool {
-    let is_nearly =
-        |text: &str| text.get(..SCHEMES[1].len()).is_some_and(|start| start.eq_ignore_ascii_case(SCHEMES[1]));
+    let is_nearly = |text: &str| text.get(..NEARLY.len()).is_some_and(|start| start.eq_ignore_ascii_case(NEARLY));
     path.to_str().is_some_and(|text| Prefix::is_url(text) || is_nearly(text))
 }
 
@@ -90,7 +92,7 @@ impl Place {
     fn open(given: &Path) -> Result<Self, Failure> {
         let url = given.to_str().filter(|_| is_url(given));
         let copy = url.map(|url| WorkingCopy::open(&Prefix::of_url(url)?)).transpose()?;
-        Ok(Self { given: given.to_owned(), copy, next: Instant::now() + STORED_EVERY, is_noted: false })
+        Ok(Self { given: given.to_owned(), copy, next: Instant::now() + STORED_EVERY, is_noted: false, lost: None })
     }
 
     /// Whether it is in an object store.
@@ -131,32 +133,40 @@ impl Place {
     }
 
     /// Stores a file of the folder; one elsewhere on this machine stays where it is.
+    ///
+    /// # Errors
+    /// Also those for which [`Self::store_so_far`] broke.
     pub(crate) fn store(&mut self, path: &Path) -> Result<(), Failure> {
+        if let Some(failure) = self.lost.take() {
+            return Err(failure);
+        }
         let Some((copy, name)) = self.stored(path) else { return Ok(()) };
         let stored = copy.store(name);
         stored.map_err(|error| self.kept(error))
     }
 
-    /// Stores a file of which there is more to come, if it is time. A store that cannot be reached gets it another time.
-    pub(crate) fn store_so_far(&mut self, path: &Path, console: Console) -> Result<(), Failure> {
+    /// Stores a file of which there is more to come, if it is time. A store that cannot be reached gets it another time; breaks if none will
+    /// take it.
+    pub(crate) fn store_so_far(&mut self, path: &Path, console: Console) -> ControlFlow<()> {
         let start = Instant::now();
-        if start < self.next || !path.exists() {
-            return Ok(());
-        }
-        let Some((copy, name)) = self.stored(path) else { return Ok(()) };
-        let stored = copy.store_at_once(name, UPLOAD_LIMIT);
-        let end = Instant::now();
-        self.next = end + STORED_EVERY;
-        match stored {
-            Ok(()) => self.next = end + STORED_EVERY.max((end - start) * WAIT_FACTOR),
-            Err(error @ ObjectsError::Away { .. }) => {
-                if !std::mem::replace(&mut self.is_noted, true) {
-                    console.note(|| format!("not stored yet: {error}"));
+        if start >= self.next
+            && path.exists()
+            && let Some((copy, name)) = self.stored(path)
+        {
+            let stored = copy.store_at_once(name, UPLOAD_LIMIT);
+            let end = Instant::now();
+            self.next = end + STORED_EVERY;
+            match stored {
+                Ok(()) => self.next = end + STORED_EVERY.max((end - start) * WAIT_FACTOR),
+                Err(error @ ObjectsError::Away { .. }) => {
+                    if !std::mem::replace(&mut self.is_noted, true) {
+                        console.note(|| format!("not stored yet: {error}"));
+                    }
                 }
+                Err(error) => self.lost = Some(self.kept(error)),
             }
-            Err(error) => return Err(self.kept(error)),
         }
-        Ok(())
+        if self.lost.is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 
     /// The failure of what could not be stored; what only this machine has is kept.
@@ -205,13 +215,12 @@ impl Place {
     /// - `results`: the folder of the results, or their table
     /// - `beside`: where it is otherwise
     pub(crate) fn scripts(&self, results: &Path, beside: PathBuf) -> PathBuf {
-        let named = self.named(results);
-        match named.to_str().and_then(|url| url.strip_prefix(SCHEMES[0])) {
-            Some(name) if self.is_stored() => {
-                with_ending(Path::new(&name.trim_end_matches('/').replace('/', "+")), SUBMISSION_ENDING)
-            }
-            _ => beside,
+        if !self.is_stored() {
+            return beside;
         }
+        let named = self.named(results).to_string_lossy().into_owned();
+        let (_, name) = named.split_once("://").unwrap_or(("", &named));
+        with_ending(Path::new(&name.trim_end_matches('/').replace('/', "+")), SUBMISSION_ENDING)
     }
 }
 
@@ -245,7 +254,7 @@ mod tests {
     /// A place in memory, as if the user had named the URL.
     fn place(prefix: &Prefix) -> Place {
         let copy = Some(WorkingCopy::open(prefix).expect("can be listed"));
-        Place { given: "s3://lab/bias".into(), copy, next: Instant::now(), is_noted: false }
+        Place { given: "s3://lab/bias".into(), copy, next: Instant::now(), is_noted: false, lost: None }
     }
 
     const QUIET: Console = Console { json: false, quiet: true };
@@ -291,9 +300,10 @@ mod tests {
         for (place, content) in [(&mut one, "one"), (&mut other, "other")] {
             std::fs::write(place.folder().join("part"), content).expect("can be written");
         }
-        one.store_so_far(&one.folder().join("part"), QUIET).expect("new");
+        assert!(one.store_so_far(&one.folder().join("part"), QUIET).is_continue());
         assert!(one.next > Instant::now());
-        let lost = other.store_so_far(&other.folder().join("part"), QUIET);
+        assert!(other.store_so_far(&other.folder().join("part"), QUIET).is_break());
+        let lost = other.store(&other.folder().join("part"));
         assert_eq!(lost.map_err(|failure| failure.exit_code()), Err(75));
         assert_eq!(prefix.read("part").expect("there").as_deref(), Some(&b"one"[..]));
         other.store_first(&other.folder().join("part")).expect("theirs");

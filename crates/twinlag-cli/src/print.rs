@@ -8,10 +8,10 @@ use anstream::{AutoStream, ColorChoice};
 use serde::Serialize;
 use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Value, Verdict};
 use twinlag::estimate::IntervalBasis;
-use twinlag::record::{Note, Record};
+use twinlag::record::{Note, Record, SamplingKind};
 use twinlag::{
     Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedCause, NamedEffect, NamedTwin, NoiseSource,
-    SecondLag, SensorEstimate, Status, Track,
+    RecordSummary, SecondLag, SensorEstimate, Status, Track,
 };
 use twinlag_pages::{parameter_in_words, plausibility_in_words, unit_suffix};
 
@@ -77,10 +77,16 @@ pub(crate) fn characterisation(answer: &Characterisation, console: Console) -> R
     on_stdout(&text)
 }
 
+/// The file, how many samples it has and how far they are apart.
+fn about_record(record: &RecordSummary) -> String {
+    let spacing = if record.sampling.kind == SamplingKind::Irregular { "apart on average" } else { "apart" };
+    format!("{}: {} samples, {} s {spacing}", record.source, record.samples, digits(record.sample_period_s, 4))
+}
+
 fn text(answer: &Characterisation) -> String {
     let mut lines: Vec<String> = caution(answer).into_iter().collect();
     let record = &answer.record;
-    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
+    lines.push(about_record(record));
     lines.push(format!("{} estimate, {}, {}", answer.estimator, answer.optimiser, answer.hold));
     lines.push(String::new());
     let width = answer.sensors.iter().map(|s| s.channel.chars().count()).max().unwrap_or(0);
@@ -140,6 +146,9 @@ fn text(answer: &Characterisation) -> String {
     if !answer.advice.is_empty() {
         let options: Vec<&str> = answer.advice.iter().filter_map(|setting| usage(*setting)).collect();
         lines.push(format!("options to try: {}", options.join(", ")));
+    }
+    if answer.status == Status::ModelRejected {
+        lines.push("to find what two lags lack: twinlag diagnose, with the same files".to_owned());
     }
     lines.push(String::new());
     lines.join("\n")
@@ -219,7 +228,7 @@ pub(crate) fn compensation(
 fn compensation_text(answer: &Compensation, out: &Path) -> String {
     let record = &answer.last.record;
     let mut lines: Vec<String> = caution(&answer.last).into_iter().collect();
-    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
+    lines.push(about_record(record));
     lines.extend(answer.verdict.map(|v| format!("model: {}", verdict(v))));
     for effect in &answer.effects {
         let place = effect.channel.as_ref().map_or(String::new(), |c| format!(" in {c}"));
@@ -271,7 +280,7 @@ pub(crate) fn track(answer: &Track, out: &Path, to_stdout: bool, console: Consol
 fn track_text(answer: &Track, out: &Path) -> String {
     let record = &answer.last.record;
     let mut lines: Vec<String> = caution(&answer.last).into_iter().collect();
-    lines.push(format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)));
+    lines.push(about_record(record));
     let is_given = !answer.time_s.is_empty();
     let change = match (answer.change.as_str(), answer.coefficients, &answer.step) {
         ("smooth", Some(size), _) => format!("both time constants change smoothly: {size} coefficients"),
@@ -336,11 +345,7 @@ fn about(text: &str, to_stdout: bool, console: Console) -> Result<(), Failure> {
 
 fn diagnosis_text(answer: &Diagnosis) -> String {
     let record = &answer.base.record;
-    let mut lines = vec![
-        format!("verdict: {}", verdict_of(answer)),
-        format!("{}: {} samples, {} s apart", record.source, record.samples, digits(record.sample_period_s, 4)),
-        String::new(),
-    ];
+    let mut lines = vec![format!("verdict: {}", verdict_of(answer)), about_record(record), String::new()];
     for sensor in &answer.last.sensors {
         lines.push(format!("  {}: time constant {}", sensor.channel, time_constant(sensor)));
     }

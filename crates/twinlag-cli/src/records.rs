@@ -66,24 +66,22 @@ fn indented(rows: &[Vec<String>], is_text: impl Fn(usize) -> bool) -> impl Itera
 
 /// What each record says by itself, and where it contradicts the others.
 fn each(records: &[RecordAnswer], sensors: &[SensorEstimate; 2]) -> Vec<String> {
-    let mut lines = vec![
-        String::new(),
-        "what each record says by itself, with standard errors, the rest of the model at its best:".to_owned(),
-    ];
     let [one, two] = sensors.each_ref().map(|sensor| sensor.channel.as_str());
-    let header = vec![
-        "record".to_owned(),
-        format!("time constant of {one}"),
-        format!("of {two}"),
-        format!("noise of {one}"),
-        format!("of {two}"),
-    ];
+    let are_given = records.iter().any(|record| record.time_constants.iter().any(Option::is_some));
+    let (title, mut header) = if are_given {
+        let title = "what each record says by itself, with standard errors, the rest of the model at its best:";
+        (title, vec!["record".to_owned(), format!("time constant of {one}"), format!("of {two}")])
+    } else {
+        ("the noise of each record:", vec!["record".to_owned()])
+    };
+    header.extend([format!("noise of {one}"), format!("of {two}")]);
     let of_record = |record: &RecordAnswer| {
-        let [tau_1, tau_2] = record.time_constants.map(own_time_constant);
-        let [noise_1, noise_2] = record.noise_std_k.map(|std_k| format!("{} K", digits(std_k, 3)));
-        vec![record.source.clone(), tau_1, tau_2, noise_1, noise_2]
+        let time_constants = record.time_constants.map(own_time_constant).into_iter().filter(|_| are_given);
+        let noise = record.noise_std_k.map(|std_k| format!("{} K", digits(std_k, 3)));
+        [record.source.clone()].into_iter().chain(time_constants).chain(noise).collect()
     };
     let rows: Vec<Vec<String>> = [header].into_iter().chain(records.iter().map(of_record)).collect();
+    let mut lines = vec![String::new(), title.to_owned()];
     lines.extend(indented(&rows, |_| true));
     lines.extend(records.iter().flat_map(own));
     lines.extend(contradictions_in_words(records).into_iter().map(|line| format!("  {line}")));

@@ -107,15 +107,14 @@ pub(crate) fn manifest(
     Ok(manifest)
 }
 
-/// Refuses parts of another number of shards.
-pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Result<(), Failure> {
-    let folder = folder_of(table).display();
-    let names = place.names().map_err(|error| Failure::File(format!("{folder}: cannot be read: {error}")))?;
+/// Refuses parts of another number of shards, saying which.
+pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Result<(), String> {
+    let names = place.names().unwrap_or_default();
     match names.iter().filter_map(|name| shard_of_part(table, name)).find(|shard| shard.of() != of) {
         None => Ok(()),
         Some(shard) => {
-            let part = place.named(&part_path(table, shard));
-            Err(Failure::Usage(format!("{}: is of another number of shards than {of}; remove it", part.display())))
+            let part = part_path(table, shard);
+            Err(format!("{}: is of another number of shards than {of}; remove it", part.display()))
         }
     }
 }
@@ -123,9 +122,7 @@ pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Resul
 /// What each of so many shards has left.
 pub(crate) fn progress_of(table: &Path, place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let manifest = read(&manifest_path(table))?;
-    if let Some((_, part)) = parts_beside(table)?.into_iter().find(|(part, _)| part.of() != of) {
-        return Err(Failure::File(format!("{}: is of another number of shards than {of}; remove it", part.display())));
-    }
+    expect_one_division(table, place, of).map_err(Failure::File)?;
     let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
         ShardProgress {

@@ -7,7 +7,6 @@ mod plan;
 
 use std::fs;
 use std::num::NonZeroU32;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -116,14 +115,8 @@ pub(crate) fn run(command: &Study, console: Console) -> Result<u8, Failure> {
         Study::Merge { dir } => place::at(dir, |place| merge(place, console)),
         Study::Plan(planning) => plan::run(planning, console),
         Study::Submit(command) => place::at(&command.out, |place| submit(command, place, console)),
-        Study::Status { dir } => place::at(dir, |place| {
-            follow(place, |scripts, progress, result| submission::status(scripts, progress, "trials", result, console))?
-        }),
-        Study::Resubmit { dir, time_limit } => place::at(dir, |place| {
-            follow(place, |scripts, progress, result| {
-                submission::resubmit(scripts, progress, result, *time_limit, console)
-            })?
-        }),
+        Study::Status { dir } => place::at(dir, |place| status(place, console)),
+        Study::Resubmit { dir, time_limit } => place::at(dir, |place| resubmit(place, *time_limit, console)),
     }
 }
 
@@ -138,16 +131,22 @@ const PROGRAM: &str = env!("TWINLAG_VERSION");
 /// The folder of what was submitted.
 const SUBMISSION: &str = "submission";
 
-/// Says how far the shards are, or submits again what is missing of them.
-///
-/// - `follow`: gets the scripts, what each shard has left, and where the result is
-fn follow<Out>(
-    place: &mut Place,
-    follow: impl FnOnce(&Path, &dyn Fn(u64) -> Result<Vec<ShardProgress>, Failure>, Option<&Path>) -> Out,
-) -> Result<Out, Failure> {
+/// Says how far the shards are.
+fn status(place: &mut Place, console: Console) -> Result<u8, Failure> {
+    let result = fetched_results(place)?;
+    submission::status(&scripts(place), |of| progress_of(place, of), "trials", result.as_deref(), console)
+}
+
+/// Submits again what is missing of the shards.
+fn resubmit(place: &mut Place, time_limit: Option<NonZeroU32>, console: Console) -> Result<u8, Failure> {
+    let result = fetched_results(place)?;
+    submission::resubmit(&scripts(place), |of| progress_of(place, of), result.as_deref(), time_limit, console)
+}
+
+/// Brings the plan, the parts and the results, and returns where the results are; `None` if they are not all there.
+fn fetched_results(place: &mut Place) -> Result<Option<PathBuf>, Failure> {
     place.fetch(|name| [PLAN, RESULTS, RESULTS_TABLE].contains(&name) || Shard::of_file_name(name).is_some())?;
-    let result = results_in(place.folder());
-    Ok(follow(&scripts(place), &|of| progress_of(place, of), result.as_deref()))
+    Ok(results_in(place.folder()))
 }
 
 /// The folder of what was submitted.
@@ -279,17 +278,12 @@ fn start(run: &Run, place: &mut Place, console: Console) -> Result<u8, Failure> 
         ..Options::default()
     };
     let bar = progress::bar(console).with_message("trials");
-    let mut stored = Ok(());
     let done = twinlag_study::run(&experiment, &options, |p| {
         bar.set_length(p.total);
         bar.set_position(p.done);
-        if stored.is_ok() {
-            stored = place.store_so_far(&part, console);
-        }
-        if stored.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        place.store_so_far(&part, console)
     });
     bar.finish_and_clear();
-    stored?;
     // A trial that fails leaves what was done before it.
     if part.exists() {
         place.store(&part)?;

@@ -4,7 +4,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::error::ClusterError;
 use crate::script;
-use crate::work::{Resources, Storage, Work};
+use crate::work::{Resources, Work};
 
 /// The name of the file.
 pub(crate) const FILE: &str = "job.yaml";
@@ -15,6 +15,9 @@ const MAX_NAME: usize = 48;
 const HASH_DIGITS: usize = 8;
 /// What is to be filled in.
 const IMAGE: &str = "image: IMAGE ";
+/// The variables of a container.
+const SECRET: &str =
+    "          envFrom: [{secretRef: {name: SECRET}}] # to be filled in: one with the variables of the object store\n";
 /// The volume that all pods share.
 const VOLUMES: &str = "      volumes:
         - name: shared
@@ -63,20 +66,14 @@ pub(crate) fn job(work: &Work, resources: &Resources, shard: &str) -> Result<Str
     let memory = resources.memory.as_ref().map_or(String::new(), |memory| format!(", memory: {}", in_quotes(memory)));
     let each = format!("{{cpu: \"{}\"{memory}}}", resources.cpus);
     let name = in_quotes(&name(work, shard));
-    let secret = match work.storage {
-        Storage::Folders => "",
-        _ => {
-            "          envFrom: [{secretRef: {name: SECRET}}] # to be filled in: one with the variables of the object store\n"
-        }
+    let secret = if work.storage.has_objects() { SECRET } else { "" };
+    let (command, mounts, volumes) = if work.storage.has_folders() {
+        let folder = in_quotes(script::text(&work.folder)?);
+        let mounts = format!("          volumeMounts: [{{name: shared, mountPath: {folder}}}]\n");
+        (format!("[sh, {}]", in_quotes(shard)), mounts, VOLUMES)
+    } else {
+        (format!("[sh, -c, {}]", in_quotes(&script::line_of_shard(work)?)), String::new(), "")
     };
-    let (command, volumes) = match work.storage {
-        Storage::Objects => (format!("[sh, -c, {}]", in_quotes(&script::line_of_shard(work)?)), None),
-        _ => (format!("[sh, {}]", in_quotes(shard)), Some(in_quotes(script::text(&work.folder)?))),
-    };
-    let mounts =
-        volumes.as_ref().map(|folder| format!("          volumeMounts: [{{name: shared, mountPath: {folder}}}]\n"));
-    let mounts = mounts.unwrap_or_default();
-    let volumes = volumes.map_or("", |_| VOLUMES);
     Ok(format!(
         "apiVersion: batch/v1
 kind: Job
@@ -125,6 +122,7 @@ mod tests {
     use std::num::NonZeroU64;
 
     use super::*;
+    use crate::work::Storage;
 
     fn work(name: &str) -> Work {
         let (shard, merge) = (vec!["a b".to_owned(), Work::SHARD.to_owned()], Vec::new());

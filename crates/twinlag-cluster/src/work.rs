@@ -49,6 +49,16 @@ pub enum Storage {
     Objects,
 }
 
+impl Storage {
+    pub(crate) fn has_folders(self) -> bool {
+        self != Self::Objects
+    }
+
+    pub(crate) fn has_objects(self) -> bool {
+        self != Self::Folders
+    }
+}
+
 /// What a shard needs.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Resources {

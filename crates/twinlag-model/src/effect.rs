@@ -81,6 +81,12 @@ pub trait Effect: Send + Sync {
     /// their bounds. With a single set even an obvious effect can be missed.
     fn starts(&self) -> Vec<Vec<f64>>;
 
+    /// How much later slow changes come in its channel with these values, s: the time constant that it looks like. A fit then starts with
+    /// a time constant that makes up for it as well. By default none.
+    fn lag_s(&self, _values: &[f64]) -> f64 {
+        0.0
+    }
+
     /// Puts the effect into the model. Derivatives of the cost come from the arithmetic with `values`.
     fn install(&self, values: &[Number], plant: &mut Plant);
 

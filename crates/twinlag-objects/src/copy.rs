@@ -9,6 +9,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _, stream};
+use object_store::path::Path as Location;
 use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, PutMode, UpdateVersion};
 use sha2::{Digest as _, Sha256};
 use tempfile::TempDir;
@@ -53,8 +54,9 @@ struct Known {
 }
 
 impl Known {
-    fn of(content: &[u8], version: UpdateVersion) -> Self {
-        Self { version: Some(version), sha256: Some(sha256(content)), sent: Vec::new() }
+    /// - `sha256`: of the content that this version has
+    fn of(sha256: Hash, version: UpdateVersion) -> Self {
+        Self { version: Some(version), sha256: Some(sha256), sent: Vec::new() }
     }
 
     /// Whether an object is as it was last seen. Some stores quote the tag in one answer and not in another.
@@ -118,13 +120,12 @@ impl WorkingCopy {
     fn fetch_all(&mut self, names: Vec<String>) -> Result<(), ObjectsError> {
         let (prefix, folder, client) = (&self.prefix, self.folder.path(), &self.client);
         let one = async |name: String| {
-            let found = repeated(prefix.patience, async || whole(prefix, client, &name).await).await;
-            let Some((content, meta)) = found.map_err(|error| unreadable(prefix.url_of(&name), &error))? else {
+            let Some((content, meta)) = read(prefix, client, &name).await? else {
                 return Ok((name, Known::default()));
             };
             let path = folder.join(&name);
             written(&path, &content, meta.last_modified.into()).map_err(|error| of_file(&path, &error))?;
-            Ok((name, Known::of(&content, version_of(&meta))))
+            Ok((name, Known::of(sha256(&content), version_of(&meta))))
         };
         let all = stream::iter(names.into_iter().map(one)).buffer_unordered(FETCHED_AT_ONCE);
         let fetched: Vec<(String, Known)> = self.runtime.block_on(all.try_collect())?;
@@ -154,12 +155,13 @@ impl WorkingCopy {
         let path = self.folder.path().join(name);
         let content = Bytes::from(fs::read(&path).map_err(|error| of_file(&path, &error))?);
         let known = self.objects.entry(name.to_owned()).or_default();
-        if known.sha256 == Some(sha256(&content)) {
+        let sha256 = sha256(&content);
+        if known.sha256 == Some(sha256) {
             return Ok(());
         }
         let (prefix, client) = (&self.prefix, &self.client);
         self.runtime.block_on(async {
-            let stored = put(prefix, client, name, &content, known);
+            let stored = put(prefix, client, name, (&content, sha256), known);
             match limit {
                 None => stored.await,
                 Some(limit) => timeout(limit, stored).await.unwrap_or_else(|_| {
@@ -208,11 +210,8 @@ impl Prefix {
     /// # Errors
     /// [`ObjectsError::Read`], [`ObjectsError::Away`], [`ObjectsError::Unusable`]; [`ObjectsError::BadUrl`] of what is no name.
     pub fn read(&self, name: &str) -> Result<Option<Vec<u8>>, ObjectsError> {
-        self.location(name)?;
-        let (runtime, client) = (runtime()?, self.client()?);
-        let found = runtime.block_on(repeated(self.patience, async || whole(self, &client, name).await));
-        let found = found.map_err(|error| unreadable(self.url_of(name), &error))?;
-        Ok(found.map(|(content, _)| content.into()))
+        let client = self.client()?;
+        Ok(runtime()?.block_on(read(self, &client, name))?.map(|(content, _)| content.into()))
     }
 }
 
@@ -221,29 +220,31 @@ fn runtime() -> Result<Runtime, ObjectsError> {
 }
 
 /// Stores an object in place of the version that is known of it.
+///
+/// - `content`: with its hash
 async fn put(
     prefix: &Prefix,
     client: &Arc<dyn ObjectStore>,
     name: &str,
-    content: &Bytes,
+    (content, hash): (&Bytes, Hash),
     known: &mut Known,
 ) -> Result<(), ObjectsError> {
     let (location, url) = (prefix.location(name)?, || prefix.url_of(name));
     let (start, mut wait) = (Instant::now(), FIRST_WAIT);
-    known.sent.push(sha256(content));
+    known.sent.push(hash);
     loop {
         let mode = known.version.clone().map_or(PutMode::Create, PutMode::Update);
         let error = match client.put_opts(&location, content.clone().into(), mode.into()).await {
             Ok(stored) => {
-                *known = Known::of(content, stored.into());
+                *known = Known::of(hash, stored.into());
                 return Ok(());
             }
             Err(error) => error,
         };
         // The store may have done it, this time or an earlier one, and the answer was lost: then it holds what was sent.
-        match whole(prefix, client, name).await {
+        match whole(client, &location).await {
             Ok(Some((there, meta))) if there == *content => {
-                *known = Known::of(content, version_of(&meta));
+                *known = Known::of(hash, version_of(&meta));
                 return Ok(());
             }
             Ok(Some((_, meta))) if known.is(&meta) => {}
@@ -263,13 +264,19 @@ async fn put(
 }
 
 /// The content of an object; `None` if there is none.
-async fn whole(
+async fn read(
     prefix: &Prefix,
     client: &Arc<dyn ObjectStore>,
     name: &str,
-) -> Result<Option<(Bytes, ObjectMeta)>, Error> {
-    let location = prefix.location(name).map_err(|error| Error::NotSupported { source: error.into() })?;
-    match client.get(&location).await {
+) -> Result<Option<(Bytes, ObjectMeta)>, ObjectsError> {
+    let location = prefix.location(name)?;
+    let found = repeated(prefix.patience, async || whole(client, &location).await).await;
+    found.map_err(|error| unreadable(prefix.url_of(name), &error))
+}
+
+/// The content of an object, asked for once; `None` if there is none.
+async fn whole(client: &Arc<dyn ObjectStore>, location: &Location) -> Result<Option<(Bytes, ObjectMeta)>, Error> {
+    match client.get(location).await {
         Err(Error::NotFound { .. }) => Ok(None),
         Err(error) => Err(error),
         Ok(found) => {

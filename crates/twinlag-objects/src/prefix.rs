@@ -25,14 +25,14 @@ pub struct Prefix {
     pub(crate) url: String,
     /// Within the bucket.
     path: Path,
-    pub(crate) objects: Objects,
+    objects: Objects,
     /// How long requests are repeated.
     pub(crate) patience: Duration,
 }
 
 /// What has the objects.
 #[derive(Clone)]
-pub(crate) enum Objects {
+enum Objects {
     /// A bucket of a server.
     Bucket(String),
     /// What clones of a prefix share.

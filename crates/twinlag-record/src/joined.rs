@@ -23,7 +23,7 @@ impl Record {
     /// let (one, two) = (record("monday.csv")?, record("tuesday.csv")?);
     /// let both = Record::joined(&[(&one, 0.0), (&two, 10.0)]).expect("two records");
     /// assert_eq!((both.len(), both.source.as_str()), (40, "monday.csv, tuesday.csv"));
-    /// assert_eq!((both.time_s[20], both.segments.len()), (10.0, 2));
+    /// assert_eq!((both.time_s[20], both.segments.len(), both.observed_s()), (10.0, 2, 9.5));
     /// assert!(Record::joined(&[]).is_none());
     /// # Ok::<(), twinlag_record::RecordError>(())
     /// ```

@@ -410,6 +410,14 @@ impl Record {
         self.time_s.len()
     }
 
+    /// Time that the unbroken stretches span together, s: without gaps, and without what lies between records that are joined.
+    pub fn observed_s(&self) -> f64 {
+        let span_s = |rows: &Range<usize>| {
+            self.time_s[rows.start..rows.end].last().map_or(0.0, |last| last - self.time_s[rows.start])
+        };
+        self.segments.iter().map(span_s).sum()
+    }
+
     /// Whether there are no rows; a checked record has some.
     pub fn is_empty(&self) -> bool {
         self.time_s.is_empty()

@@ -14,22 +14,20 @@ use crate::{fleet, root};
 
 /// Of so many requests to the server one fails; chosen: a shard makes about so many.
 const FAULTY_EVERY: &str = "7";
-/// The bucket, a folder of the server's.
-const BUCKET: &str = "bucket";
-/// Where the study is, and where its bucket has that.
+/// How URLs begin: the server has what follows in its folder.
+const SCHEME: &str = "s3://";
+/// Where the study is.
 const STUDY: &str = "s3://bucket/all objects/übung";
-const STUDY_IN_BUCKET: &str = "all objects/übung";
 /// Where the table is, beside the study.
 const TABLE: &str = "s3://bucket/all objects/übung#1.csv";
-const TABLE_IN_BUCKET: &str = "all objects/übung#1.csv";
-/// Its shards, of which each takes longer than the time after which what is done is stored.
+/// The shards of the study, of which each takes longer than the time after which what is done is stored.
 const SHARDS: [&str; 2] = ["0/2", "1/2"];
 
 impl Site {
     /// A study and a batch, with a shard that is killed, one that runs twice at once, and a part that is damaged.
     pub(super) fn objects(&mut self, files: usize) -> Result<()> {
         let store = self.folder.join("store");
-        fs::create_dir_all(store.join(BUCKET))?;
+        fs::create_dir_all(store.join("bucket"))?;
         let (_server, url) = start_server(&store)?;
         let variables = [
             ("AWS_ENDPOINT_URL", url.as_str()),
@@ -38,8 +36,9 @@ impl Site {
             ("AWS_ALLOW_HTTP", "true"),
         ];
         self.variables = variables.map(|(name, value)| (name, PathBuf::from(value))).to_vec();
-        self.study_on(&store.join(BUCKET).join(STUDY_IN_BUCKET))?;
-        self.fleet_on(&store.join(BUCKET).join(TABLE_IN_BUCKET), files)?;
+        let [study, table] = [STUDY, TABLE].map(|url| store.join(url.trim_start_matches(SCHEME)));
+        self.study_on(&study)?;
+        self.fleet_on(&table, files)?;
         self.variables.clear();
         Ok(())
     }

@@ -67,6 +67,10 @@ impl Effect for Delay {
         starts.map(|periods| inside(&self.seat.parameters, &[periods * self.step_s])).collect()
     }
 
+    fn lag_s(&self, values: &[f64]) -> f64 {
+        values[0]
+    }
+
     /// A gas that comes to one sensor later than to the other does so by a part of what the sensors resolve, and a scan by a
     /// part of a sample period.
     fn usual_size(&self) -> Option<f64> {

@@ -47,6 +47,10 @@ impl Effect for SecondOrder {
         [0.05, 0.3].into_iter().map(|share| vec![(share * self.tau_s).max(0.3 * self.step_s)]).collect()
     }
 
+    fn lag_s(&self, values: &[f64]) -> f64 {
+        values[0]
+    }
+
     fn install(&self, values: &[Number], plant: &mut Plant) {
         plant.sensors[self.sensor].second_tau_s = Some(values[0]);
     }

@@ -18,9 +18,8 @@ impl Page<'_> {
     pub(super) fn first_screen(&self, document: Document, making: &Making) -> Result<Document, ReportError> {
         let (answer, record) = (self.answer, self.record);
         let samples = record.time_s.len();
-        let span_s = record.time_s.last().zip(record.time_s.first()).map_or(f64::NAN, |(b, a)| b - a);
         let facts = [
-            format!("{samples} samples over {}", with_unit(&rounded(span_s, 4), "s")),
+            format!("{samples} samples over {}", with_unit(&rounded(record.observed_s(), 4), "s")),
             format!("channels {}", listed(self.channels())),
         ];
         let (tone, worth) = self.worth();

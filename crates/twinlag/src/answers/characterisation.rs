@@ -67,11 +67,10 @@ pub struct RecordSummary {
 
 impl RecordSummary {
     pub(crate) fn of(record: &Record) -> Self {
-        let steps = || record.segments.iter().filter(|rows| rows.len() > 1);
         let sample_period_s = match record.sampling.kind {
             SamplingKind::Irregular => {
-                let span_s: f64 = steps().map(|rows| record.time_s[rows.end - 1] - record.time_s[rows.start]).sum();
-                span_s / steps().map(|rows| rows.len() - 1).sum::<usize>() as f64
+                let steps = record.segments.iter().map(|rows| rows.len().saturating_sub(1)).sum::<usize>();
+                record.observed_s() / steps as f64
             }
             _ => record.sampling.period_s,
         };

@@ -33,7 +33,7 @@ pub struct FoundIn {
     pub samples: usize,
     /// Time from sample to sample, s.
     pub sample_period_s: f64,
-    /// Time from the first row to the last, s.
+    /// Time that the unbroken stretches span together, s.
     pub length_s: f64,
     /// Smallest and largest temperature of each channel, °C.
     #[serde(rename = "temperatures_C")]
@@ -47,7 +47,7 @@ impl FoundIn {
             sha256: sha256(record),
             samples: record.len(),
             sample_period_s: RecordSummary::of(record).sample_period_s,
-            length_s: record.time_s.first().zip(record.time_s.last()).map_or(0.0, |(first, last)| last - first),
+            length_s: record.observed_s(),
             temperatures_c: [range(&record.t1_c), range(&record.t2_c)],
         }
     }

@@ -42,9 +42,9 @@ pub struct GasBand {
 }
 
 impl GasSpectrum {
-    /// The spectrum of the longest evenly spaced part of a line, which never reaches from one record into the next: its tapered
-    /// periodogram (Hann), bin by bin `2 |X|² / (n Σ w²)`, scaled so that all bands together have the variance of the values. `None`
-    /// where values are missing or do not change in it, or are fewer than 64.
+    /// The spectrum of the evenly spaced parts of a line, none of which reaches from one record into the next: the mean of their tapered
+    /// periodograms (Hann), each weighted by the number of its values. That of a part is, bin by bin, `2 |X|² / (n Σ w²)`, scaled so that
+    /// all bands together have the variance of its values. `None` where no part has 64 values that are all there and change.
     ///
     /// ```
     /// use twinlag::GasSpectrum;
@@ -65,65 +65,129 @@ impl GasSpectrum {
         if line.time_s.len() != line.value.len() {
             return None;
         }
-        let part = longest_even_part(&line.time_s);
-        let (time_s, values) = (&line.time_s[part.clone()], &line.value[part]);
+        let parts = even_parts(&line.time_s).into_iter();
+        let parts: Vec<Part> =
+            parts.filter_map(|part| Part::of(&line.time_s[part.clone()], &line.value[part])).collect();
+        let longest = parts.iter().max_by_key(|part| part.count)?;
+        let count: usize = parts.iter().map(|part| part.count).sum();
+        let weighted_sum = |of: fn(&Part) -> f64| parts.iter().map(|part| part.count as f64 * of(part)).sum::<f64>();
+        let variance_k2 = weighted_sum(|part| part.power_k2.iter().sum()) / count as f64;
+        let edges = band_edges(longest.power_k2.len());
+        // Power and its first moment over frequency.
+        let mut sums = vec![(0.0, 0.0); edges.len()];
+        for part in &parts {
+            let weight = part.count as f64 / count as f64;
+            for (bin, power_k2) in part.power_k2.iter().enumerate().skip(1) {
+                let frequency_hz = bin as f64 / part.length_s;
+                // Bins of a shorter part are further apart. Rounded, since that of the longest is whole.
+                let bin_of_longest = (frequency_hz * longest.length_s).round() as usize;
+                let (power, moment) = &mut sums[edges.partition_point(|edge| *edge <= bin_of_longest) - 1];
+                *power += weight * power_k2;
+                *moment += weight * power_k2 * frequency_hz;
+            }
+        }
+        let is_shown = |(power_k2, _): &(f64, f64)| *power_k2 > MIN_SHARE * variance_k2;
+        let band = |(power_k2, moment): (f64, f64)| GasBand { frequency_hz: moment / power_k2, power_k2 };
+        let bands = sums.into_iter().filter(is_shown).map(band).collect();
+        Some(Self { mean_c: weighted_sum(|part| part.mean_c) / count as f64, bands })
+    }
+}
+
+/// An evenly spaced part of a line.
+struct Part {
+    count: usize,
+    /// As many sample periods as it has values, s.
+    length_s: f64,
+    mean_c: f64,
+    /// Power in each bin of the transform, K²; the first is that of the mean, and none.
+    power_k2: Vec<f64>,
+}
+
+impl Part {
+    /// `None` where values are too few, are missing, or do not change.
+    fn of(time_s: &[f64], values: &[f64]) -> Option<Self> {
         let n = values.len();
         if n < MIN_SAMPLES || !values.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let period_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
         let mean_c = values.iter().sum::<f64>() / n as f64;
         let variance_k2 = values.iter().map(|v| (v - mean_c).powi(2)).sum::<f64>() / n as f64;
         let transform = Tapered::new(hann(n)).transform(values.iter().map(|v| v - mean_c));
-        let power: Vec<f64> = transform.iter().map(Complex64::norm_sqr).collect();
-        let total: f64 = power[1..].iter().sum();
+        let mut power_k2: Vec<f64> = transform.iter().map(Complex64::norm_sqr).collect();
+        power_k2[0] = 0.0;
+        let total: f64 = power_k2.iter().sum();
         if !(variance_k2 > 0.0 && total > 0.0) {
             return None;
         }
-        let to_hz = 1.0 / (n as f64 * period_s);
-        let mut bands = Vec::new();
-        let mut from = 1;
-        while from < power.len() {
-            let to = ((from as f64 * BAND_RATIO).ceil() as usize).clamp(from + 1, power.len());
-            let sum: f64 = power[from..to].iter().sum();
-            if sum > MIN_SHARE * total {
-                let moment: f64 = (from..to).map(|bin| bin as f64 * power[bin]).sum();
-                bands.push(GasBand { frequency_hz: to_hz * moment / sum, power_k2: variance_k2 * sum / total });
-            }
-            from = to;
-        }
-        Some(Self { mean_c, bands })
+        power_k2.iter_mut().for_each(|power| *power *= variance_k2 / total);
+        let length_s = n as f64 * (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
+        Some(Self { count: n, length_s, mean_c, power_k2 })
     }
 }
 
-/// The longest run of times whose steps are the median one.
-fn longest_even_part(time_s: &[f64]) -> Range<usize> {
+/// The first bins of bands of a sixth of an octave, or of one bin where that is wider.
+fn band_edges(bins: usize) -> Vec<usize> {
+    let next = |from: &usize| Some(((*from as f64 * BAND_RATIO).ceil() as usize).max(from + 1));
+    std::iter::successors(Some(1), next).take_while(|from| *from < bins).collect()
+}
+
+/// The runs of times whose steps are the median one.
+fn even_parts(time_s: &[f64]) -> Vec<Range<usize>> {
     let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let period_s = median(steps_s.clone());
     let is_uneven = |step_s: &f64| (step_s - period_s).abs() > MAX_UNEVEN_SHARE * period_s;
-    let (mut longest, mut from) = (0..0, 0);
-    for part in steps_s.split(is_uneven) {
-        let to = (from + part.len() + 1).min(time_s.len());
-        if to - from > longest.len() {
-            longest = from..to;
-        }
-        from = to;
-    }
-    longest
+    let mut from = 0;
+    let part = |steps: &[f64]| {
+        let to = (from + steps.len() + 1).min(time_s.len());
+        std::mem::replace(&mut from, to)..to
+    };
+    steps_s.split(is_uneven).map(part).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Two records, one after the other: the longer one counts, at the end as at the beginning.
+    /// A line of sines of 2 Hz, one record after the other with a pause.
+    ///
+    /// - `records`: of each its samples, every 0.01 s, and its amplitude, K
+    fn line(records: &[(u32, f64)]) -> Line {
+        let mut line = Line::default();
+        let mut from_s = 0.0;
+        for &(samples, amplitude_k) in records {
+            let time_s: Vec<f64> = (0..samples).map(|k| from_s + 0.01 * f64::from(k)).collect();
+            line.value.extend(
+                time_s.iter().map(|t| 300.0 + amplitude_k * (std::f64::consts::TAU * 2.0 * (t - from_s)).sin()),
+            );
+            line.time_s.extend(time_s);
+            from_s += 0.01 * f64::from(samples) + 5.0;
+        }
+        line
+    }
+
+    /// Each record counts by its length, in whatever order: of 20 and 40 periods, `(20 · 2²/2 + 40 · 6²/2) / 60`.
     #[test]
-    fn the_longest_unbroken_part_counts() {
+    fn all_records_count() {
+        for records in [[(1000, 2.0), (2000, 6.0)], [(2000, 6.0), (1000, 2.0)]] {
+            let spectrum = GasSpectrum::of(&line(&records)).expect("even, and it changes");
+            let power_k2: f64 = spectrum.bands.iter().map(|band| band.power_k2).sum();
+            assert!((power_k2 - 38.0 / 3.0).abs() < 1e-9, "{power_k2}");
+            // Hann's taper spreads a line over three bins, of 0.1 Hz in the shorter record.
+            assert!(
+                spectrum
+                    .bands
+                    .iter()
+                    .filter(|band| band.power_k2 > 1e-6)
+                    .all(|band| (band.frequency_hz - 2.0).abs() < 0.11)
+            );
+        }
+    }
+
+    #[test]
+    fn steps_that_differ_end_a_part() {
         let times = |from_s: f64, count: usize| (0..count).map(move |k| from_s + 0.01 * k as f64);
-        let shorter_first: Vec<f64> = times(0.0, 80).chain(times(5.0, 120)).collect();
-        assert_eq!(longest_even_part(&shorter_first), 80..200);
-        let longer_first: Vec<f64> = times(0.0, 120).chain(times(0.5, 80)).collect();
-        assert_eq!(longest_even_part(&longer_first), 0..120);
-        assert_eq!(longest_even_part(&[]), 0..0);
+        let time_s: Vec<f64> = times(0.0, 80).chain(times(5.0, 120)).collect();
+        assert_eq!(even_parts(&time_s), [0..80, 80..200]);
+        assert!(even_parts(&[]).iter().all(Range::is_empty));
     }
 }
