@@ -36,6 +36,8 @@ const MOST_GRID_PARAMETERS: usize = 3;
 pub(crate) struct Candidate {
     pub(crate) effect: Shared,
     pub(crate) fitted: Fitted,
+    /// The best fit from starts of the other kind, if there are two kinds: five iterations do not say which of them ends lower.
+    pub(crate) other: Option<Fitted>,
     /// Parameters it added.
     pub(crate) added: usize,
     /// `−2 ln L` saved, noise white with the levels that there are.
@@ -364,7 +366,8 @@ impl<'a> Search<'a> {
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
         let fit = |from: &Fitted| from.model.fit(&from.theta, self.observations, self.selection, Effort::Compare);
-        let mut fitted = fit(&looked.fitted);
+        let ends = [Some(&looked.fitted), looked.other.as_ref()].into_iter().flatten().map(fit);
+        let mut fitted = ends.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("it was looked at");
         if looked.effect.about().follows_gas {
             // The estimate that it was made with is that of a model without it.
             fitted = fitted.in_own_gas(self.observations, fit);
@@ -372,7 +375,7 @@ impl<'a> Search<'a> {
         let effect = fitted.model.effects[current.model.effects.len()].clone();
         let robust = robust_before - self.robust(&fitted);
         let [white_gain, robust_gain] = self.gains(current, &fitted, &effect, robust);
-        Candidate { effect, fitted, white_gain, robust_gain, ..looked.clone() }
+        Candidate { effect, fitted, other: None, white_gain, robust_gain, ..looked.clone() }
     }
 
     fn is_far_off(&self, current: &Fitted) -> bool {
@@ -419,7 +422,7 @@ impl<'a> Search<'a> {
     /// - `now`: the current model, linearised
     fn score_gain(&self, current: &Fitted, effect: &Shared, start: &[f64], now: Option<&Linearised>) -> f64 {
         let model = current.model.with(effect.clone());
-        let theta = started(&model, current, start, (self.observations, self.selection));
+        let theta = [&current.theta[..], start].concat();
         let beside = now.map(|without| Beside { without, max_difference: f64::INFINITY });
         let normal = model.normal_equations(&theta, self.observations, self.selection, beside);
         let slope = &normal.slope;
@@ -476,12 +479,18 @@ impl<'a> Search<'a> {
         starts: &[Vec<f64>],
     ) -> Candidate {
         let model = current.model.with(effect.clone());
-        let from = |start: &Vec<f64>| started(&model, current, start, (observations, selection));
-        let all = starts.iter().flat_map(|start| fits(&model, &from(start)));
-        let fitted = all.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("every effect has a start");
+        let best = |all: &mut dyn Iterator<Item = Fitted>| all.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        let plain = best(&mut starts.iter().flat_map(|start| fits(&model, &[&current.theta[..], start].concat())));
+        let balanced = starts.iter().filter_map(|start| balanced(&model, current, start));
+        let balanced = best(&mut balanced.map(|theta| model.fit(&theta, observations, selection, Effort::Look)));
+        let plain = plain.expect("every effect has a start");
+        let (fitted, other) = match balanced {
+            Some(balanced) if balanced.chi2 < plain.chi2 => (balanced, Some(plain)),
+            balanced => (plain, balanced),
+        };
         let before = current.model.energy(&current.theta, observations, selection);
         let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
-        self.candidate(effect, fitted, gain, gain)
+        Candidate { other, ..self.candidate(effect, fitted, gain, gain) }
     }
 
     pub(crate) fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
@@ -489,6 +498,7 @@ impl<'a> Search<'a> {
         Candidate {
             effect: effect.clone(),
             fitted,
+            other: None,
             added,
             white_gain,
             robust_gain,
@@ -513,28 +523,15 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The parameters that the fit of a model with one effect more starts from: those of `current` and, if it fits better, with a change of the
-/// shorter time constant that makes up for what the effect does to slow changes.
-///
-/// - `start`: of the effect
-fn started(
-    model: &Model,
-    current: &Fitted,
-    start: &[f64],
-    (observations, selection): (&Observations, &Selection),
-) -> Vec<f64> {
-    let plain = [&current.theta[..], start].concat();
+/// The parameters of `current` beside a start of one effect more, with a change of the shorter time constant that makes up for what the effect
+/// does to slow changes. `None` where it does nothing to them, or no time constant makes up for it.
+fn balanced(model: &Model, current: &Fitted, start: &[f64]) -> Option<Vec<f64>> {
     let effect = model.effects.last().expect("it has one more");
-    let faster = usize::from(plain[1] < plain[0]);
     let lag_s = effect.lag_s(start);
-    let changed_s = if effect.channel() == Some(faster) { plain[faster] - lag_s } else { plain[faster] + lag_s };
-    if lag_s == 0.0 || changed_s <= 0.0 || model.knows(faster) {
-        return plain;
-    }
-    let mut changed = plain.clone();
-    changed[faster] = changed_s;
-    let energy = |theta: &[f64]| model.energy(theta, observations, selection);
-    if energy(&changed) < energy(&plain) { changed } else { plain }
+    let mut theta = [&current.theta[..], start].concat();
+    let faster = usize::from(theta[1] < theta[0]);
+    theta[faster] += if effect.channel() == Some(faster) { -lag_s } else { lag_s };
+    (lag_s != 0.0 && theta[faster] > 0.0 && !model.knows(faster)).then_some(theta)
 }
 
 #[cfg(test)]
@@ -569,7 +566,7 @@ mod tests {
         let model = base.model.with(effect.clone());
         for start in effect.starts() {
             let part = (&prepared.observations, &prepared.everything);
-            let from = started(&model, &base, &start, part);
+            let from = balanced(&model, &base, &start).expect("a lag");
             assert_eq!(from, [base.theta[0] + start[0], base.theta[1], start[0]]);
             let gain = |effort| (base.chi2 / model.fit(&from, part.0, part.1, effort).chi2).ln();
             // Candidates with a smaller share of the gain of another are not fitted to the end.
