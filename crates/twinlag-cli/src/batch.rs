@@ -215,7 +215,7 @@ fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Fai
     let table = &command.out[0];
     let question = Question::of(command)?;
     if let Some(shard) = command.division.shard {
-        shards::expect_one_division(table, place, shard.of()).map_err(Failure::Usage)?;
+        shards::expect_one_division(table, place, shard.of(), Failure::Usage)?;
     }
     let journal_path =
         command.division.shard.map_or_else(|| with_ending(table, JOURNAL_ENDING), |shard| part_path(table, shard));
@@ -337,7 +337,7 @@ fn submit(
         )));
     }
     let shards = command.cluster.shards();
-    shards::expect_one_division(table, place, shards).map_err(Failure::Usage)?;
+    shards::expect_one_division(table, place, shards, Failure::Usage)?;
     let manifest = command.manifest(question, asked, journal, place, console)?;
     command.note_unlisted(&manifest, journal, place, console)?;
     let dropped = ["report", "static", "force", "resume", "threads", "json", "quiet"].map(str::to_owned).to_vec();

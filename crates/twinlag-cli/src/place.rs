@@ -22,8 +22,8 @@ const WAIT_FACTOR: u32 = 20;
 const UPLOAD_LIMIT: Duration = Duration::from_secs(5);
 /// How the folder of what was submitted to a cluster ends on this machine, of results that are in a store.
 const SUBMISSION_ENDING: &str = ".submission";
-/// How what is nearly a URL begins.
-const NEARLY: &str = "s3:";
+/// How a text begins that is meant as a URL of S3, even with slashes missing or in capitals.
+const S3_START: &str = "s3:";
 /// What says where a store is and who asks.
 const VARIABLES: [&str; 5] =
     ["AWS_ENDPOINT_URL", "AWS_REGION", "AWS_ALLOW_HTTP", "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"];
@@ -40,12 +40,12 @@ pub(crate) struct Place {
     /// Whether the user knows that it could not be stored.
     is_noted: bool,
     /// Why nothing more can be stored.
-    lost: Option<Failure>,
+    failed: Option<Failure>,
 }
 
 /// Whether a path is meant as a URL.
 pub(crate) fn is_url(path: &Path) -> bool {
-    let is_nearly = |text: &str| text.get(..NEARLY.len()).is_some_and(|start| start.eq_ignore_ascii_case(NEARLY));
+    let is_nearly = |text: &str| text.get(..S3_START.len()).is_some_and(|start| start.eq_ignore_ascii_case(S3_START));
     path.to_str().is_some_and(|text| Prefix::is_url(text) || is_nearly(text))
 }
 
@@ -92,7 +92,7 @@ impl Place {
     fn open(given: &Path) -> Result<Self, Failure> {
         let url = given.to_str().filter(|_| is_url(given));
         let copy = url.map(|url| WorkingCopy::open(&Prefix::of_url(url)?)).transpose()?;
-        Ok(Self { given: given.to_owned(), copy, next: Instant::now() + STORED_EVERY, is_noted: false, lost: None })
+        Ok(Self { given: given.to_owned(), copy, next: Instant::now() + STORED_EVERY, is_noted: false, failed: None })
     }
 
     /// Whether it is in an object store.
@@ -106,17 +106,20 @@ impl Place {
     }
 
     /// The names of all that is there, fetched or not; of no folder there are none.
-    pub(crate) fn names(&self) -> std::io::Result<Vec<String>> {
+    pub(crate) fn names(&self) -> Result<Vec<String>, Failure> {
         if let Some(copy) = &self.copy {
             return Ok(copy.names().map(str::to_owned).collect());
         }
+        let unreadable =
+            |error: std::io::Error| Failure::File(format!("{}: cannot be read: {error}", self.given.display()));
         let entries = match self.given.read_dir() {
             Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
                 return Ok(Vec::new());
             }
-            entries => entries?,
+            entries => entries.map_err(unreadable)?,
         };
-        let name = |entry: std::io::Result<std::fs::DirEntry>| Ok(entry?.file_name().into_string().ok());
+        let name =
+            |entry: std::io::Result<std::fs::DirEntry>| Ok(entry.map_err(unreadable)?.file_name().into_string().ok());
         entries.filter_map(|entry| name(entry).transpose()).collect()
     }
 
@@ -135,9 +138,9 @@ impl Place {
     /// Stores a file of the folder; one elsewhere on this machine stays where it is.
     ///
     /// # Errors
-    /// Also those for which [`Self::store_so_far`] broke.
+    /// Why the file could not be stored, now or at the last [`Self::store_so_far`].
     pub(crate) fn store(&mut self, path: &Path) -> Result<(), Failure> {
-        if let Some(failure) = self.lost.take() {
+        if let Some(failure) = self.failed.take() {
             return Err(failure);
         }
         let Some((copy, name)) = self.stored(path) else { return Ok(()) };
@@ -145,8 +148,8 @@ impl Place {
         stored.map_err(|error| self.kept(error))
     }
 
-    /// Stores a file of which there is more to come, if it is time. A store that cannot be reached gets it another time; breaks if none will
-    /// take it.
+    /// Stores a growing file, if it is time. If the store cannot be reached, a later call tries again; any other failure breaks, and
+    /// [`Self::store`] returns it.
     pub(crate) fn store_so_far(&mut self, path: &Path, console: Console) -> ControlFlow<()> {
         let start = Instant::now();
         if start >= self.next
@@ -163,10 +166,10 @@ impl Place {
                         console.note(|| format!("not stored yet: {error}"));
                     }
                 }
-                Err(error) => self.lost = Some(self.kept(error)),
+                Err(error) => self.failed = Some(self.kept(error)),
             }
         }
-        if self.lost.is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if self.failed.is_none() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     }
 
     /// The failure of what could not be stored; what only this machine has is kept.
@@ -254,7 +257,7 @@ mod tests {
     /// A place in memory, as if the user had named the URL.
     fn place(prefix: &Prefix) -> Place {
         let copy = Some(WorkingCopy::open(prefix).expect("can be listed"));
-        Place { given: "s3://lab/bias".into(), copy, next: Instant::now(), is_noted: false, lost: None }
+        Place { given: "s3://lab/bias".into(), copy, next: Instant::now(), is_noted: false, failed: None }
     }
 
     const QUIET: Console = Console { json: false, quiet: true };
@@ -302,9 +305,12 @@ mod tests {
         }
         assert!(one.store_so_far(&one.folder().join("part"), QUIET).is_continue());
         assert!(one.next > Instant::now());
-        assert!(other.store_so_far(&other.folder().join("part"), QUIET).is_break());
-        let lost = other.store(&other.folder().join("part"));
-        assert_eq!(lost.map_err(|failure| failure.exit_code()), Err(75));
+        let part = other.folder().join("part");
+        assert!(other.store_so_far(&part, QUIET).is_break());
+        // The failure of that upload, and not that of a second one, which would find no file.
+        std::fs::remove_file(&part).expect("there");
+        assert_eq!(other.store(&part).map_err(|failure| failure.exit_code()), Err(75));
+        std::fs::write(&part, "other").expect("can be written");
         assert_eq!(prefix.read("part").expect("there").as_deref(), Some(&b"one"[..]));
         other.store_first(&other.folder().join("part")).expect("theirs");
         assert_eq!(std::fs::read(other.folder().join("part")).expect("there"), b"one");

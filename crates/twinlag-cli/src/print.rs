@@ -8,12 +8,12 @@ use anstream::{AutoStream, ColorChoice};
 use serde::Serialize;
 use twinlag::diagnosis::{Grade, Judgement, Masked, NEVER_TESTABLE, Value, Verdict};
 use twinlag::estimate::IntervalBasis;
-use twinlag::record::{Note, Record, SamplingKind};
+use twinlag::record::{Note, Record};
 use twinlag::{
     Along, Characterisation, Compensation, Diagnosis, IntervalMethod, NamedCause, NamedEffect, NamedTwin, NoiseSource,
     RecordSummary, SecondLag, SensorEstimate, Status, Track,
 };
-use twinlag_pages::{parameter_in_words, plausibility_in_words, unit_suffix};
+use twinlag_pages::{parameter_in_words, plausibility_in_words, spacing_in_words, unit_suffix};
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -77,10 +77,10 @@ pub(crate) fn characterisation(answer: &Characterisation, console: Console) -> R
     on_stdout(&text)
 }
 
-/// The file, how many samples it has and how far they are apart.
+/// The source of a record, its number of samples, and the time from one sample to the next.
 fn about_record(record: &RecordSummary) -> String {
-    let spacing = if record.sampling.kind == SamplingKind::Irregular { "apart on average" } else { "apart" };
-    format!("{}: {} samples, {} s {spacing}", record.source, record.samples, digits(record.sample_period_s, 4))
+    let period_s = digits(record.sample_period_s, 4);
+    format!("{}: {} samples, {period_s} s {}", record.source, record.samples, spacing_in_words(record))
 }
 
 fn text(answer: &Characterisation) -> String {
@@ -148,7 +148,7 @@ fn text(answer: &Characterisation) -> String {
         lines.push(format!("options to try: {}", options.join(", ")));
     }
     if answer.status == Status::ModelRejected {
-        lines.push("to find what two lags lack: twinlag diagnose, with the same files".to_owned());
+        lines.push("to find what the model lacks: twinlag diagnose, with the same files".to_owned());
     }
     lines.push(String::new());
     lines.join("\n")

@@ -108,13 +108,17 @@ pub(crate) fn manifest(
 }
 
 /// Refuses parts of another number of shards, saying which.
-pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Result<(), String> {
-    let names = place.names().unwrap_or_default();
-    match names.iter().filter_map(|name| shard_of_part(table, name)).find(|shard| shard.of() != of) {
+pub(crate) fn expect_one_division(
+    table: &Path,
+    place: &Place,
+    of: u64,
+    refused: fn(String) -> Failure,
+) -> Result<(), Failure> {
+    match place.names()?.iter().filter_map(|name| shard_of_part(table, name)).find(|shard| shard.of() != of) {
         None => Ok(()),
         Some(shard) => {
             let part = part_path(table, shard);
-            Err(format!("{}: is of another number of shards than {of}; remove it", part.display()))
+            Err(refused(format!("{}: is of another number of shards than {of}; remove it", part.display())))
         }
     }
 }
@@ -122,7 +126,7 @@ pub(crate) fn expect_one_division(table: &Path, place: &Place, of: u64) -> Resul
 /// What each of so many shards has left.
 pub(crate) fn progress_of(table: &Path, place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let manifest = read(&manifest_path(table))?;
-    expect_one_division(table, place, of).map_err(Failure::File)?;
+    expect_one_division(table, place, of, Failure::File)?;
     let progress = |(shard, total)| {
         let done = done_in_part(table, shard, &manifest).map(|done| done as u64);
         ShardProgress {

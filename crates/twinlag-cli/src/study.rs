@@ -158,7 +158,7 @@ fn scripts(place: &Place) -> PathBuf {
 fn submit(command: &Submit, place: &mut Place, console: Console) -> Result<u8, Failure> {
     place.fetch(|name| name == PLAN)?;
     expect_no_results(&read(&command.plan)?.0, place)?;
-    expect_one_division(place, command.cluster.shards()).map_err(Failure::Usage)?;
+    expect_one_division(place, command.cluster.shards(), Failure::Usage)?;
     let plan = prepare(&command.plan, place)?;
     let (out, copy) = (submission::text(&command.out)?, submission::text(place.named(&place.folder().join(PLAN)))?);
     let threads = command.cluster.cpus.unwrap_or(NonZeroU32::MIN).to_string();
@@ -177,7 +177,7 @@ fn progress_of(place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
     let dir = place.folder();
     let (plan, _) = read(&dir.join(PLAN))?;
     let experiment = Experiment::new(&plan)?;
-    expect_one_division(place, of).map_err(Failure::File)?;
+    expect_one_division(place, of, Failure::File)?;
     let progress = |shard: Shard| {
         let part = dir.join(shard.file_name());
         let read = || Part::read_of(&experiment, shard, PROGRAM, &part).map(|part| part.done());
@@ -188,15 +188,15 @@ fn progress_of(place: &Place, of: u64) -> Result<Vec<ShardProgress>, Failure> {
 }
 
 /// Refuses parts of another number of shards, saying which.
-fn expect_one_division(place: &Place, of: u64) -> Result<(), String> {
-    match parts_in(place).unwrap_or_default().into_iter().find(|part| part.of() != of) {
+fn expect_one_division(place: &Place, of: u64, refused: fn(String) -> Failure) -> Result<(), Failure> {
+    match parts_in(place)?.into_iter().find(|part| part.of() != of) {
         None => Ok(()),
         Some(part) => {
             let part = place.folder().join(part.file_name());
-            Err(format!(
+            Err(refused(format!(
                 "{}: is of another number of shards than {of}; remove it, or name another folder",
                 part.display()
-            ))
+            )))
         }
     }
 }
@@ -210,8 +210,7 @@ fn result_names(plan: &Plan) -> Vec<String> {
 
 /// Refuses to replace what the results of a plan would replace.
 fn expect_no_results(plan: &Plan, place: &Place) -> Result<(), Failure> {
-    let folder = place.folder().display();
-    let there = place.names().map_err(|error| Failure::File(format!("{folder}: cannot be read: {error}")))?;
+    let there = place.names()?;
     match result_names(plan).into_iter().rev().find(|name| there.contains(name)) {
         None => Ok(()),
         Some(name) => {
@@ -261,7 +260,7 @@ fn start(run: &Run, place: &mut Place, console: Console) -> Result<u8, Failure> 
     let plan = prepare(&run.plan, place)?;
     let experiment = Experiment::new(&plan)?;
     let is_other = |part: &Shard| *part != shard && part.overlaps(shard);
-    if let Some(part) = parts_in(place).unwrap_or_default().into_iter().find(is_other) {
+    if let Some(part) = parts_in(place)?.into_iter().find(is_other) {
         let part = place.folder().join(part.file_name());
         return Err(Failure::Usage(format!(
             "{}: has trials that shard {shard} has as well; remove it, or name another folder",
@@ -303,7 +302,7 @@ fn merge(place: &mut Place, console: Console) -> Result<u8, Failure> {
     let dir = place.folder();
     let (plan, _) = read(&dir.join(PLAN))?;
     let name = dir.display();
-    let parts = parts_in(place).map_err(|e| Failure::File(format!("{name}: cannot be read: {e}")))?;
+    let parts = parts_in(place)?;
     if parts.is_empty() {
         return Err(Failure::NotYet(format!("{name}: holds no part of a study; run `twinlag study run` first")));
     }
@@ -327,7 +326,7 @@ fn merge(place: &mut Place, console: Console) -> Result<u8, Failure> {
 }
 
 /// The shards whose parts are there, neighbours side by side: these merge at once.
-fn parts_in(place: &Place) -> std::io::Result<Vec<Shard>> {
+fn parts_in(place: &Place) -> Result<Vec<Shard>, Failure> {
     let mut parts: Vec<Shard> = place.names()?.iter().filter_map(|name| Shard::of_file_name(name)).collect();
     parts.sort_by_key(|shard| (shard.of(), shard.index()));
     Ok(parts)

@@ -15,7 +15,7 @@ const MAX_NAME: usize = 48;
 const HASH_DIGITS: usize = 8;
 /// What is to be filled in.
 const IMAGE: &str = "image: IMAGE ";
-/// The variables of a container.
+/// The line that gives a container the variables of the object store.
 const SECRET: &str =
     "          envFrom: [{secretRef: {name: SECRET}}] # to be filled in: one with the variables of the object store\n";
 /// The volume that all pods share.

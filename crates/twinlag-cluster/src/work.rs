@@ -50,10 +50,12 @@ pub enum Storage {
 }
 
 impl Storage {
+    /// Whether shards use folders that every machine sees.
     pub(crate) fn has_folders(self) -> bool {
         self != Self::Objects
     }
 
+    /// Whether shards use an object store.
     pub(crate) fn has_objects(self) -> bool {
         self != Self::Folders
     }

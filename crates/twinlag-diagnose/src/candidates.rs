@@ -36,8 +36,9 @@ const MOST_GRID_PARAMETERS: usize = 3;
 pub(crate) struct Candidate {
     pub(crate) effect: Shared,
     pub(crate) fitted: Fitted,
-    /// The best fit from starts of the other kind, if there are two kinds: five iterations do not say which of them ends lower.
-    pub(crate) other: Option<Fitted>,
+    /// The better first look among the starts of which `fitted` is not: plain ones, or those of [`balanced_start`]. `None` if there are no such starts,
+    /// and once fitted to the end. A first look is too short to say which of the two ends lower, so both are fitted to the end.
+    pub(crate) runner_up: Option<Fitted>,
     /// Parameters it added.
     pub(crate) added: usize,
     /// `−2 ln L` saved, noise white with the levels that there are.
@@ -366,8 +367,8 @@ impl<'a> Search<'a> {
     /// A candidate that was looked at, fitted to the end.
     pub(crate) fn finished(&self, current: &Fitted, looked: &Candidate, robust_before: f64) -> Candidate {
         let fit = |from: &Fitted| from.model.fit(&from.theta, self.observations, self.selection, Effort::Compare);
-        let ends = [Some(&looked.fitted), looked.other.as_ref()].into_iter().flatten().map(fit);
-        let mut fitted = ends.min_by(|a, b| a.chi2.total_cmp(&b.chi2)).expect("it was looked at");
+        let mut fitted =
+            best(std::iter::once(&looked.fitted).chain(&looked.runner_up).map(fit)).expect("it was looked at");
         if looked.effect.about().follows_gas {
             // The estimate that it was made with is that of a model without it.
             fitted = fitted.in_own_gas(self.observations, fit);
@@ -375,7 +376,7 @@ impl<'a> Search<'a> {
         let effect = fitted.model.effects[current.model.effects.len()].clone();
         let robust = robust_before - self.robust(&fitted);
         let [white_gain, robust_gain] = self.gains(current, &fitted, &effect, robust);
-        Candidate { effect, fitted, other: None, white_gain, robust_gain, ..looked.clone() }
+        Candidate { effect, fitted, runner_up: None, white_gain, robust_gain, ..looked.clone() }
     }
 
     fn is_far_off(&self, current: &Fitted) -> bool {
@@ -479,18 +480,17 @@ impl<'a> Search<'a> {
         starts: &[Vec<f64>],
     ) -> Candidate {
         let model = current.model.with(effect.clone());
-        let best = |all: &mut dyn Iterator<Item = Fitted>| all.min_by(|a, b| a.chi2.total_cmp(&b.chi2));
-        let plain = best(&mut starts.iter().flat_map(|start| fits(&model, &[&current.theta[..], start].concat())));
-        let balanced = starts.iter().filter_map(|start| balanced(&model, current, start));
-        let balanced = best(&mut balanced.map(|theta| model.fit(&theta, observations, selection, Effort::Look)));
+        let plain = best(starts.iter().flat_map(|start| fits(&model, &[&current.theta[..], start].concat())));
         let plain = plain.expect("every effect has a start");
-        let (fitted, other) = match balanced {
-            Some(balanced) if balanced.chi2 < plain.chi2 => (balanced, Some(plain)),
+        let balanced = starts.iter().filter_map(|start| balanced_start(&model, current, start));
+        let balanced = best(balanced.map(|theta| model.fit(&theta, observations, selection, Effort::Look)));
+        let (fitted, runner_up) = match balanced {
+            Some(balanced) if balanced.chi2.total_cmp(&plain.chi2).is_lt() => (balanced, Some(plain)),
             balanced => (plain, balanced),
         };
         let before = current.model.energy(&current.theta, observations, selection);
         let gain = current.count * (before / fitted.chi2.max(1e-300)).ln();
-        Candidate { other, ..self.candidate(effect, fitted, gain, gain) }
+        Candidate { runner_up, ..self.candidate(effect, fitted, gain, gain) }
     }
 
     pub(crate) fn candidate(&self, effect: &Shared, fitted: Fitted, white_gain: f64, robust_gain: f64) -> Candidate {
@@ -498,7 +498,7 @@ impl<'a> Search<'a> {
         Candidate {
             effect: effect.clone(),
             fitted,
-            other: None,
+            runner_up: None,
             added,
             white_gain,
             robust_gain,
@@ -523,15 +523,21 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The parameters of `current` beside a start of one effect more, with a change of the shorter time constant that makes up for what the effect
-/// does to slow changes. `None` where it does nothing to them, or no time constant makes up for it.
-fn balanced(model: &Model, current: &Fitted, start: &[f64]) -> Option<Vec<f64>> {
+/// The fit that leaves the least.
+fn best(fits: impl Iterator<Item = Fitted>) -> Option<Fitted> {
+    fits.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// Start values of `model`, which is that of `current` with one effect more: that effect at `start`, and the shorter time constant changed by as much
+/// as the effect delays slow changes, so that the difference of both channels stays. `None` if the effect delays nothing or is of both channels, and if
+/// the shorter time constant is known or would not stay positive.
+fn balanced_start(model: &Model, current: &Fitted, start: &[f64]) -> Option<Vec<f64>> {
     let effect = model.effects.last().expect("it has one more");
-    let lag_s = effect.lag_s(start);
+    let (channel, lag_s) = (effect.channel()?, effect.lag_s(start));
     let mut theta = [&current.theta[..], start].concat();
-    let faster = usize::from(theta[1] < theta[0]);
-    theta[faster] += if effect.channel() == Some(faster) { -lag_s } else { lag_s };
-    (lag_s != 0.0 && theta[faster] > 0.0 && !model.knows(faster)).then_some(theta)
+    let shorter = usize::from(theta[1] < theta[0]);
+    theta[shorter] += if channel == shorter { -lag_s } else { lag_s };
+    (lag_s != 0.0 && theta[shorter] > 0.0 && !model.knows(shorter)).then_some(theta)
 }
 
 #[cfg(test)]
@@ -539,52 +545,124 @@ mod tests {
     use std::ops::ControlFlow;
 
     use twinlag_model::{Prepared, Settings, Stretch, candidates};
+    use twinlag_signal::undeclared::{GasKind, Kind, undeclared};
     use twinlag_signal::{Gas, Noise, Record, Rig, Sensor, Signal, Turbulence};
 
     use super::*;
     use crate::diagnose::searched;
     use crate::grade::Grade;
 
-    /// A second lag nearly as long as the faster time constant, of which two lags find a quarter: five iterations from there found less of it
-    /// than of a delay, and the slow mode of the other sensor that is its twin was named (a user's two records).
-    #[test]
-    fn a_fit_starts_where_the_faster_time_constant_makes_up_for_the_effect() {
-        let mut sensors = [0.12, 0.7].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
-        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.2)));
-        sensors[1].second_time_constant_s = Some(0.08);
-        let gas = Signal::Turbulence(Turbulence { std_k: 15.0, corner_hz: 0.2, cutoff_hz: 5.0 });
-        let rig = Rig::new(1, Record::new(2000, 0.01), Gas::new(320.0, gas), sensors).expect("a rig");
+    /// Readings of two sensors in turbulence, the second of which has a second lag.
+    ///
+    /// - `times_s`: both time constants, and the second lag
+    fn with_second_lag(seed: u64, step_s: f64, times_s: [f64; 3], noise_k: f64, gas: Turbulence) -> Observations {
+        let mut sensors = [times_s[0], times_s[1]].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(noise_k)));
+        sensors[1].second_time_constant_s = Some(times_s[2]);
+        let gas = Gas::new(300.0, Signal::Turbulence(gas));
+        observed(&Rig::new(seed, Record::new(2000, step_s), gas, sensors).expect("a rig"))
+    }
+
+    fn observed(rig: &Rig) -> Observations {
         let record = rig.simulate().expect("a record");
         let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
-        let settings = Settings { effects: vec![Identifier::SECOND_ORDER], ..Settings::default() };
-        let observations = Observations::new(vec![stretch], Some(0.01)).expect("a record");
-        let mut prepared = Prepared::new(&observations, &settings).expect("it changes");
-        let base = prepared.base(&settings);
+        Observations::new(vec![stretch], Some(rig.record().sample_period_s)).expect("a record")
+    }
+
+    /// A second lag nearly as long as the faster time constant. Two records of a user with such a lag were diagnosed wrongly.
+    fn with_long_second_lag() -> Observations {
+        let gas = Turbulence { std_k: 15.0, corner_hz: 0.2, cutoff_hz: 5.0 };
+        with_second_lag(1, 0.01, [0.12, 0.7, 0.08], 0.2, gas)
+    }
+
+    /// The model of two lags, and candidates made for it.
+    fn two_lags(observations: &Observations, settings: &Settings) -> (Prepared, Fitted, Vec<Shared>) {
+        let mut prepared = Prepared::new(observations, settings).expect("it changes");
+        let base = prepared.base(settings);
         let mut context = prepared.context.clone();
         context.tau_s = [base.theta[0], base.theta[1]];
-        let effect = candidates(&settings.effects, &context).into_iter().find(|e| e.channel() == Some(1)).expect("one");
-        let model = base.model.with(effect.clone());
-        for start in effect.starts() {
-            let part = (&prepared.observations, &prepared.everything);
-            let from = balanced(&model, &base, &start).expect("a lag");
-            assert_eq!(from, [base.theta[0] + start[0], base.theta[1], start[0]]);
-            let gain = |effort| (base.chi2 / model.fit(&from, part.0, part.1, effort).chi2).ln();
-            // Candidates with a smaller share of the gain of another are not fitted to the end.
-            assert!(gain(Effort::Look) > settings.policy.rival_share * gain(Effort::Finish), "{}", gain(Effort::Look));
+        let all = candidates(&settings.effects, &context);
+        (prepared, base, all)
+    }
+
+    /// What a search finds first, with all effects to choose from.
+    fn found_first(observations: &Observations) -> (Identifier, Option<usize>) {
+        let watch = |_: &str, _, _| ControlFlow::Continue(());
+        let (state, _) = searched(observations, &Settings::default(), &watch).expect("a search");
+        let first = state.current.model.effects.first().expect("something is found");
+        (first.identifier(), first.channel())
+    }
+
+    /// What it keeps is `τ2 + lag2 − τ1 − lag1`, by which the channels are apart in slow changes: exact but for the rounding of three sums.
+    #[test]
+    fn a_balanced_start_keeps_how_far_slow_changes_are_apart() {
+        let settings = Settings { effects: vec![Identifier::SECOND_ORDER, Identifier::DELAY], ..Settings::default() };
+        let observations = with_long_second_lag();
+        let (_, mut base, all) = two_lags(&observations, &settings);
+        assert_eq!(all.len(), 4, "two effects, each in both channels");
+        let mut kept = 0;
+        for _ in 0..2 {
+            base.theta.swap(0, 1);
+            let [one_s, two_s] = [base.theta[0], base.theta[1]];
+            for effect in &all {
+                let model = base.model.with(effect.clone());
+                for start in effect.starts() {
+                    let lag_s = effect.lag_s(&start);
+                    let Some(theta) = balanced_start(&model, &base, &start) else {
+                        assert!(lag_s.abs() >= one_s.min(two_s), "{lag_s} of {one_s} and {two_s}");
+                        continue;
+                    };
+                    let delay_s = |i: usize| theta[i] + if effect.channel() == Some(i) { lag_s } else { 0.0 };
+                    let apart_s = [delay_s(1) - delay_s(0), two_s - one_s];
+                    assert!((apart_s[0] - apart_s[1]).abs() < 4.0 * f64::EPSILON, "{apart_s:?}");
+                    assert_eq!(theta[usize::from(one_s < two_s)], one_s.max(two_s), "the longer one stays");
+                    kept += 1;
+                }
+            }
         }
+        assert!(kept >= 8, "{kept} starts");
+    }
+
+    /// Two lags take most of this second lag for a part of the faster time constant: first looks from there found less of it than of a delay.
+    #[test]
+    fn a_fit_starts_where_the_faster_time_constant_makes_up_for_the_effect() {
+        let observations = with_long_second_lag();
+        let settings = Settings { effects: vec![Identifier::SECOND_ORDER], ..Settings::default() };
+        let (prepared, base, all) = two_lags(&observations, &settings);
+        let effect = all.into_iter().find(|e| e.channel() == Some(1)).expect("one");
+        let model = base.model.with(effect.clone());
+        let gain = |from: &[f64], effort| {
+            (base.chi2 / model.fit(from, &prepared.observations, &prepared.everything, effort).chi2).ln()
+        };
+        let most = |gains: &mut dyn Iterator<Item = f64>| gains.fold(0.0, f64::max);
+        let balanced: Vec<_> = effect.starts().iter().filter_map(|s| balanced_start(&model, &base, s)).collect();
+        let at_end = most(&mut balanced.iter().map(|from| gain(from, Effort::Finish)));
+        let look = most(&mut balanced.iter().map(|from| gain(from, Effort::Look)));
+        let plain =
+            most(&mut effect.starts().iter().map(|start| gain(&[&base.theta[..], start].concat(), Effort::Look)));
+        // Candidates with a smaller share of the gain of another are not fitted to the end.
+        let share = settings.policy.rival_share;
+        assert!(look > share * at_end && plain < share * at_end, "{look} and {plain} of {at_end}");
+    }
+
+    /// Without those starts its twin was found, the slow mode of the other sensor.
+    #[test]
+    fn the_search_finds_a_second_lag_that_the_faster_time_constant_makes_up_for() {
+        assert_eq!(found_first(&with_long_second_lag()), (Identifier::SECOND_ORDER, Some(1)));
+    }
+
+    /// One kind of start has the better first look here, and the other the better fit: with the better look alone fitted to the end, noise was found.
+    #[test]
+    fn fits_from_both_kinds_of_starts_go_to_their_ends() {
+        let rig = undeclared(&[Kind::SecondOrder], 1.0, Some(GasKind::Plunge), 307_013).expect("a rig");
+        assert_eq!(found_first(&observed(&rig.rig)), (Identifier::SECOND_ORDER, rig.channel));
     }
 
     /// A second lag that is found, and the same fit with it on its upper bound: nothing of that is an estimate.
     #[test]
     fn an_effect_on_its_bound_leaves_no_estimate() {
-        let mut sensors = [0.012, 0.060].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
-        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.1)));
-        sensors[1].second_time_constant_s = Some(0.018);
-        let gas = Signal::Turbulence(Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 });
-        let rig = Rig::new(20, Record::new(2000, 0.001), Gas::new(300.0, gas), sensors).expect("a rig");
-        let record = rig.simulate().expect("a record");
-        let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
-        let observations = Observations::new(vec![stretch], Some(0.001)).expect("a record");
+        let gas = Turbulence { std_k: 20.0, corner_hz: 2.4, cutoff_hz: 200.0 };
+        let observations = with_second_lag(20, 0.001, [0.012, 0.060, 0.018], 0.1, gas);
         let settings = Settings::default();
         let (state, _) = searched(&observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("a search");
         let mut fitted = state.current;

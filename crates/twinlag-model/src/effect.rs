@@ -81,8 +81,8 @@ pub trait Effect: Send + Sync {
     /// their bounds. With a single set even an obvious effect can be missed.
     fn starts(&self) -> Vec<Vec<f64>>;
 
-    /// How much later slow changes come in its channel with these values, s: the time constant that it looks like. A fit then starts with
-    /// a time constant that makes up for it as well. By default none.
+    /// By how much the effect delays changes in its channel that are slow beside all its lags, s. A search then also starts a fit at which the shorter
+    /// time constant makes up for this delay. 0 if not implemented, as for a slow mode, beside whose lag few changes are slow: no such start.
     fn lag_s(&self, _values: &[f64]) -> f64 {
         0.0
     }

@@ -54,9 +54,9 @@ struct Known {
 }
 
 impl Known {
-    /// - `sha256`: of the content that this version has
-    fn of(sha256: Hash, version: UpdateVersion) -> Self {
-        Self { version: Some(version), sha256: Some(sha256), sent: Vec::new() }
+    /// An object of this version, whose content has this hash.
+    fn of(hash: Hash, version: UpdateVersion) -> Self {
+        Self { version: Some(version), sha256: Some(hash), sent: Vec::new() }
     }
 
     /// Whether an object is as it was last seen. Some stores quote the tag in one answer and not in another.
@@ -155,13 +155,13 @@ impl WorkingCopy {
         let path = self.folder.path().join(name);
         let content = Bytes::from(fs::read(&path).map_err(|error| of_file(&path, &error))?);
         let known = self.objects.entry(name.to_owned()).or_default();
-        let sha256 = sha256(&content);
-        if known.sha256 == Some(sha256) {
+        let hash = sha256(&content);
+        if known.sha256 == Some(hash) {
             return Ok(());
         }
         let (prefix, client) = (&self.prefix, &self.client);
         self.runtime.block_on(async {
-            let stored = put(prefix, client, name, (&content, sha256), known);
+            let stored = put(prefix, client, name, (&content, hash), known);
             match limit {
                 None => stored.await,
                 Some(limit) => timeout(limit, stored).await.unwrap_or_else(|_| {
@@ -263,7 +263,7 @@ async fn put(
     }
 }
 
-/// The content of an object; `None` if there is none.
+/// The content of an object, asked for again if the request fails; `None` if there is none.
 async fn read(
     prefix: &Prefix,
     client: &Arc<dyn ObjectStore>,

@@ -8,8 +8,10 @@ use crate::Making;
 use crate::figures::WIDTH_PX;
 use crate::making::{file_name, notes};
 use crate::pictures::{spectra, temperature_figure, track_figure};
-use crate::words::{capital, grade, interval_of, listed, plausibility_in_words, seconds, sentence, with_unit, words};
-use twinlag::{Characterisation, Compensation, Quality, Track};
+use crate::words::{
+    capital, grade, interval_of, listed, plausibility_in_words, seconds, sentence, spacing_in_words, with_unit, words,
+};
+use twinlag::{Characterisation, Compensation, Quality, RecordSummary, Track};
 
 /// The report on a gas temperature: an HTML page that needs no other file. Equal answers give equal
 /// bytes.
@@ -165,7 +167,7 @@ fn numbers(document: Document, last: &Characterisation) -> Document {
     let record = &last.record;
     document.heading("The record and its model").table(table).facts([
         ("Source", file_name(&record.source).to_owned()),
-        ("Samples", format!("{}, {} apart", record.samples, with_unit(&rounded(record.sample_period_s, 4), "s"))),
+        ("Samples", format!("{}, {}", record.samples, spacing(record))),
     ])
 }
 
@@ -177,7 +179,11 @@ fn end(document: Document, last: &Characterisation, making: &Making) -> String {
 /// How long the record is.
 fn samples(last: &Characterisation) -> String {
     let record = &last.record;
-    format!("{} samples, {} apart", record.samples, with_unit(&rounded(record.sample_period_s, 4), "s"))
+    format!("{} samples, {}", record.samples, spacing(record))
+}
+
+fn spacing(record: &RecordSummary) -> String {
+    format!("{} {}", with_unit(&rounded(record.sample_period_s, 4), "s"), spacing_in_words(record))
 }
 
 fn tone(grade: Grade) -> Tone {

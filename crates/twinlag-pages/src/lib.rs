@@ -21,4 +21,4 @@ pub use gas::{gas_report, track_report};
 pub use making::Making;
 pub use pictures::{gas_picture, readings_picture, track_picture};
 pub use twinlag_report::ReportError;
-pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words, unit_suffix};
+pub use words::{contradictions_in_words, parameter_in_words, plausibility_in_words, spacing_in_words, unit_suffix};

@@ -2,8 +2,10 @@
 
 use twinlag::cross_relation::TestName;
 use twinlag::diagnosis::{Grade, Identifier, Judgement};
+use twinlag::record::SamplingKind;
 use twinlag::{
-    Difference, DisagreementAnswer, EffectInPlace, EffectNumber, PlausibleTimeConstant, RecordAnswer, SensorEstimate,
+    Difference, DisagreementAnswer, EffectInPlace, EffectNumber, PlausibleTimeConstant, RecordAnswer, RecordSummary,
+    SensorEstimate,
 };
 use twinlag_report::{between, plus_minus, rounded};
 
@@ -151,6 +153,11 @@ pub(crate) fn short(name: &str) -> String {
 /// A unit as it is printed: numbers without one have `1`.
 pub(crate) fn unit(unit: &str) -> &str {
     if unit == "1" { "" } else { unit }
+}
+
+/// What is said behind the time from one sample to the next: `apart`, and of a record whose steps differ `apart on average`.
+pub fn spacing_in_words(record: &RecordSummary) -> &'static str {
+    if record.sampling.kind == SamplingKind::Irregular { "apart on average" } else { "apart" }
 }
 
 /// A unit behind a number, with the blank between them; nothing of a number without one.

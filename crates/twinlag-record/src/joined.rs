@@ -15,15 +15,17 @@ impl Record {
     ///
     /// let record = |source: &str| {
     ///     let time_s: Vec<f64> = (0..20).map(|k| 0.25 * f64::from(k)).collect();
-    ///     let reading = |late_s: f64| time_s.iter().map(|t| 20.0 + (t - late_s).sin()).collect();
-    ///     let (t1_c, t2_c) = (reading(0.0), reading(0.4));
+    ///     let reading = |late_s: f64| time_s.iter().map(|t| 20.0 + (t - late_s).sin()).collect::<Vec<f64>>();
+    ///     let (mut t1_c, t2_c) = (reading(0.0), reading(0.4));
+    ///     t1_c[8] = f64::NAN; // a reading that is missing
     ///     let (source, names) = (source.into(), ["bare".into(), "sheathed".into()]);
     ///     Record::from_channels(Channels { source, names, time_s, t1_c, t2_c, reference_c: None }, SamplingChoice::Auto)
     /// };
     /// let (one, two) = (record("monday.csv")?, record("tuesday.csv")?);
     /// let both = Record::joined(&[(&one, 0.0), (&two, 10.0)]).expect("two records");
     /// assert_eq!((both.len(), both.source.as_str()), (40, "monday.csv, tuesday.csv"));
-    /// assert_eq!((both.time_s[20], both.segments.len(), both.observed_s()), (10.0, 2, 9.5));
+    /// assert_eq!((both.time_s[20], both.segments.len()), (10.0, 4));
+    /// assert_eq!((both.length_s(), both.observed_s()), (9.5, 8.5));
     /// assert!(Record::joined(&[]).is_none());
     /// # Ok::<(), twinlag_record::RecordError>(())
     /// ```
@@ -42,6 +44,7 @@ impl Record {
             out.flow = both(out.flow, record.flow.as_deref());
             out.speed_m_s = both(out.speed_m_s, record.speed_m_s.as_deref());
             out.missing += record.missing;
+            out.starts.extend(record.starts.iter().map(|start| start + rows));
             out.segments.extend(record.segments.iter().map(|rows_of| rows_of.start + rows..rows_of.end + rows));
         }
         Some(out)

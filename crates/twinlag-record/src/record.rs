@@ -88,6 +88,8 @@ pub struct Record {
     pub notes: Vec<Note>,
     /// Line of each row, where the record was read from a file.
     lines: Option<RowLines>,
+    /// First row of each record that was joined into this one; `[0]` if none was.
+    pub(crate) starts: Vec<usize>,
 }
 
 /// What is known of the rows besides their numbers, for messages.
@@ -395,6 +397,7 @@ impl Record {
             segments,
             notes,
             lines: origin.table.and_then(|(table, _)| table.lines()).cloned(),
+            starts: vec![0],
         })
     }
 
@@ -410,12 +413,20 @@ impl Record {
         self.time_s.len()
     }
 
-    /// Time that the unbroken stretches span together, s: without gaps, and without what lies between records that are joined.
+    /// Time from the first row to the last, s; of records that were joined, the sum over these.
+    pub fn length_s(&self) -> f64 {
+        let ends = self.starts.iter().skip(1).copied().chain([self.len()]);
+        self.starts.iter().zip(ends).map(|(&start, end)| self.span_s(&(start..end))).sum()
+    }
+
+    /// Time that the unbroken stretches span together, s: without gaps, and without what lies between records that were joined.
     pub fn observed_s(&self) -> f64 {
-        let span_s = |rows: &Range<usize>| {
-            self.time_s[rows.start..rows.end].last().map_or(0.0, |last| last - self.time_s[rows.start])
-        };
-        self.segments.iter().map(span_s).sum()
+        self.segments.iter().map(|rows| self.span_s(rows)).sum()
+    }
+
+    fn span_s(&self, rows: &Range<usize>) -> f64 {
+        let time_s = &self.time_s[rows.clone()];
+        time_s.first().zip(time_s.last()).map_or(0.0, |(first, last)| last - first)
     }
 
     /// Whether there are no rows; a checked record has some.

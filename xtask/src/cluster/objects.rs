@@ -36,7 +36,7 @@ impl Site {
             ("AWS_ALLOW_HTTP", "true"),
         ];
         self.variables = variables.map(|(name, value)| (name, PathBuf::from(value))).to_vec();
-        let [study, table] = [STUDY, TABLE].map(|url| store.join(url.trim_start_matches(SCHEME)));
+        let [study, table] = [STUDY, TABLE].map(|url| store.join(url.strip_prefix(SCHEME).expect("a URL")));
         self.study_on(&study)?;
         self.fleet_on(&table, files)?;
         self.variables.clear();

@@ -299,11 +299,14 @@ fn a_gap_is_noted_and_not_filled() {
 #[test]
 fn irregular_steps_are_noted_and_used_as_stamped() {
     let text = Trace { jitter: 0.5, ..Trace::GOOD }.csv();
-    let answer = Bench::with("irregular", "run.csv", text).characterise("run.csv", &[]);
+    let bench = Bench::with("irregular", "run.csv", text);
+    let answer = bench.characterise("run.csv", &[]);
     answer.says(&["irregular", "as stamped", "nothing was resampled"]);
     let value = answer.status(&["ok"]);
     assert_eq!(value["record"]["sampling"]["kind"], "irregular");
     recovers(&value, GOOD_S);
+    let text = bench.run(&["characterise", "run.csv", "--quiet"]).stdout;
+    assert!(text.contains("run.csv: 2000 samples, ") && text.contains(" s apart on average\n"), "{text}");
 }
 
 #[test]
@@ -770,6 +773,24 @@ fn intervals_with_a_sensor_far_faster_than_the_sampling_hold() {
 fn both_sensors_far_faster_than_the_sampling_are_not_determined() {
     let trace = Trace { samples: 600, period_s: 0.1, tau_s: [0.005, 0.004], ..Trace::GOOD };
     Bench::with("coarse_both", "run.csv", trace.csv()).characterise("run.csv", &[]).status(&UNKNOWN);
+}
+
+/// Failed: the columns of time constants held nothing but dashes.
+#[test]
+fn the_table_of_records_has_noise_alone_where_no_time_constant_is_given() {
+    let trace = Trace { samples: 600, period_s: 0.1, tau_s: [0.005, 0.004], ..Trace::GOOD };
+    let bench = Bench::with("coarse_records", "one.csv", trace.csv());
+    bench.write("two.csv", Trace { seed: trace.seed + 1, ..trace }.csv());
+    let text = bench.run(&["characterise", "one.csv", "two.csv", "--quiet"]).stdout;
+    let table =
+        text.split_once("the noise of each record:\n").unwrap_or_else(|| panic!("no table of noise:\n{text}")).1;
+    let mut rows = table.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    assert_eq!(rows.next().expect("a header"), ["record", "noise", "of", "T1", "noise", "of", "T2"], "{text}");
+    for file in ["one.csv", "two.csv"] {
+        let row = rows.next().expect("a row for each record");
+        // Its name, and two numbers with their unit.
+        assert!(row[0] == file && row.len() == 5 && row[2] == "K" && row[4] == "K", "{text}");
+    }
 }
 
 /// 3 K between the thermometers at rest, which two lags cannot explain: rejected, with the remedy that works.

@@ -19,7 +19,7 @@ impl Page<'_> {
         let (answer, record) = (self.answer, self.record);
         let samples = record.time_s.len();
         let facts = [
-            format!("{samples} samples over {}", with_unit(&rounded(record.observed_s(), 4), "s")),
+            format!("{samples} samples over {}", with_unit(&rounded(record.length_s(), 4), "s")),
             format!("channels {}", listed(self.channels())),
         ];
         let (tone, worth) = self.worth();

@@ -69,7 +69,7 @@ impl RecordSummary {
     pub(crate) fn of(record: &Record) -> Self {
         let sample_period_s = match record.sampling.kind {
             SamplingKind::Irregular => {
-                let steps = record.segments.iter().map(|rows| rows.len().saturating_sub(1)).sum::<usize>();
+                let steps = record.segments.iter().map(|rows| rows.len() - 1).sum::<usize>();
                 record.observed_s() / steps as f64
             }
             _ => record.sampling.period_s,

@@ -217,8 +217,8 @@ pub struct Diagnosis {
     /// The data that it is of; `None` in answers of earlier versions.
     #[serde(default)]
     pub found_in: Option<FoundIn>,
-    /// The spectrum of the gas as the record shows it; `None` of unevenly sampled records, of those with gaps, and of those with more
-    /// than 65 536 samples.
+    /// The spectrum of the gas as the record shows it; `None` if no evenly spaced part of it has 64 samples that change, and of records
+    /// with more than 65 536 samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gas_spectrum: Option<GasSpectrum>,
     /// Whether a measured flow was there, with which time constants may go.

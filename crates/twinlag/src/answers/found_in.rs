@@ -33,7 +33,7 @@ pub struct FoundIn {
     pub samples: usize,
     /// Time from sample to sample, s.
     pub sample_period_s: f64,
-    /// Time that the unbroken stretches span together, s.
+    /// Time from the first row to the last, s; of several records, the sum over these.
     pub length_s: f64,
     /// Smallest and largest temperature of each channel, °C.
     #[serde(rename = "temperatures_C")]
@@ -47,7 +47,7 @@ impl FoundIn {
             sha256: sha256(record),
             samples: record.len(),
             sample_period_s: RecordSummary::of(record).sample_period_s,
-            length_s: record.observed_s(),
+            length_s: record.length_s(),
             temperatures_c: [range(&record.t1_c), range(&record.t2_c)],
         }
     }
@@ -141,8 +141,7 @@ mod tests {
         let data = FoundIn::of(&record);
         assert_eq!(data.sha256, "134c95e971dbc9ea79be6d3ac63a0c26ec6665107c02f0931cdebf82fc027734");
         assert_eq!(data.temperatures_c, [[19.0, 22.5], [20.0, 21.5]]);
-        // A reading is missing: three samples before it and twelve after it span 1 and 5.5 s.
-        assert_eq!((data.samples, data.sample_period_s, data.length_s), (16, 0.5, 6.5));
+        assert_eq!((data.samples, data.sample_period_s, data.length_s), (16, 0.5, 7.5));
         assert!(data.is(&record));
     }
 

@@ -25,7 +25,7 @@ pub struct GasSpectrum {
     /// Mean temperature, °C.
     #[serde(rename = "mean_C")]
     pub mean_c: f64,
-    /// Bands in order of frequency. Their powers add up to the variance.
+    /// Bands in order of frequency. Their powers add up to the variance within the parts of the record, each weighted by its samples.
     pub bands: Vec<GasBand>,
 }
 
@@ -44,7 +44,7 @@ pub struct GasBand {
 impl GasSpectrum {
     /// The spectrum of the evenly spaced parts of a line, none of which reaches from one record into the next: the mean of their tapered
     /// periodograms (Hann), each weighted by the number of its values. That of a part is, bin by bin, `2 |X|² / (n Σ w²)`, scaled so that
-    /// all bands together have the variance of its values. `None` where no part has 64 values that are all there and change.
+    /// all bands together have the variance of its values. `None` if no part has at least 64 values, all of them there, that change.
     ///
     /// ```
     /// use twinlag::GasSpectrum;
@@ -65,9 +65,8 @@ impl GasSpectrum {
         if line.time_s.len() != line.value.len() {
             return None;
         }
-        let parts = even_parts(&line.time_s).into_iter();
-        let parts: Vec<Part> =
-            parts.filter_map(|part| Part::of(&line.time_s[part.clone()], &line.value[part])).collect();
+        let all = even_parts(&line.time_s).into_iter();
+        let parts: Vec<Part> = all.filter_map(|rows| Part::of(&line.time_s[rows.clone()], &line.value[rows])).collect();
         let longest = parts.iter().max_by_key(|part| part.count)?;
         let count: usize = parts.iter().map(|part| part.count).sum();
         let weighted_sum = |of: fn(&Part) -> f64| parts.iter().map(|part| part.count as f64 * of(part)).sum::<f64>();
@@ -99,7 +98,7 @@ struct Part {
     /// As many sample periods as it has values, s.
     length_s: f64,
     mean_c: f64,
-    /// Power in each bin of the transform, K²; the first is that of the mean, and none.
+    /// Power of each bin of the transform, K², from frequency 0, whose power is set to 0: the mean was removed.
     power_k2: Vec<f64>,
 }
 
@@ -165,21 +164,38 @@ mod tests {
         line
     }
 
-    /// Each record counts by its length, in whatever order: of 20 and 40 periods, `(20 · 2²/2 + 40 · 6²/2) / 60`.
+    /// Each record counts by its length, in whatever order: of 20 and 40 periods, `(20 · 2²/2 + 40 · 6²/2) / 60`. One of fewer than 64 samples,
+    /// and one with a value that is missing, count nothing.
     #[test]
     fn all_records_count() {
         for records in [[(1000, 2.0), (2000, 6.0)], [(2000, 6.0), (1000, 2.0)]] {
-            let spectrum = GasSpectrum::of(&line(&records)).expect("even, and it changes");
+            let mut line = line(&[&records[..], &[(50, 9.0), (100, 9.0)]].concat());
+            *line.value.last_mut().expect("there are some") = f64::NAN;
+            let spectrum = GasSpectrum::of(&line).expect("even, and it changes");
             let power_k2: f64 = spectrum.bands.iter().map(|band| band.power_k2).sum();
-            assert!((power_k2 - 38.0 / 3.0).abs() < 1e-9, "{power_k2}");
+            // Rounding of squares of 300 K, of which so many add up: `3000 · 300² ε`.
+            assert!((power_k2 - 38.0 / 3.0).abs() < 3000.0 * 300.0_f64.powi(2) * f64::EPSILON, "{power_k2}");
             // Hann's taper spreads a line over three bins, of 0.1 Hz in the shorter record.
-            assert!(
-                spectrum
-                    .bands
-                    .iter()
-                    .filter(|band| band.power_k2 > 1e-6)
-                    .all(|band| (band.frequency_hz - 2.0).abs() < 0.11)
-            );
+            let shown = spectrum.bands.iter().filter(|band| band.power_k2 > 1e-6);
+            assert!(shown.clone().all(|band| (band.frequency_hz - 2.0).abs() < 0.11));
+        }
+    }
+
+    /// Bins of the longer record are half as wide, and so may be the bands, in whatever order.
+    #[test]
+    fn bands_are_those_of_the_longest_part() {
+        let bands = |records: &[(u32, f64)]| {
+            let mut line = line(records);
+            // Single readings, whose power is spread over all bins.
+            [700, 1700, 2400].into_iter().for_each(|row| line.value[row] += 1.0);
+            let bands = GasSpectrum::of(&line).expect("even, and it changes").bands;
+            bands.iter().map(|band| band.frequency_hz).collect::<Vec<f64>>()
+        };
+        let [forth, back] = [bands(&[(1000, 2.0), (2000, 6.0)]), bands(&[(2000, 6.0), (1000, 2.0)])];
+        assert_eq!(forth.len(), back.len());
+        // The first two bins of 20 s, of which a band holds one each.
+        for of in [&forth, &back] {
+            assert!((of[0] - 0.05).abs() < 0.01 && (of[1] - 0.1).abs() < 0.01, "{of:?}");
         }
     }
 
