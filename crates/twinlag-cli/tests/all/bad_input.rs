@@ -785,7 +785,7 @@ fn the_table_of_records_has_noise_alone_where_no_time_constant_is_given() {
     let table =
         text.split_once("the noise of each record:\n").unwrap_or_else(|| panic!("no table of noise:\n{text}")).1;
     let mut rows = table.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
-    assert_eq!(rows.next().expect("a header"), ["record", "noise", "of", "T1", "noise", "of", "T2"], "{text}");
+    assert_eq!(rows.next().expect("a header"), ["record", "noise", "of", "T1", "of", "T2"], "{text}");
     for file in ["one.csv", "two.csv"] {
         let row = rows.next().expect("a row for each record");
         // Its name, and two numbers with their unit.
