@@ -56,13 +56,16 @@ fn a_model_of_several_records_is_planned_in_the_gas_of_all_in_whatever_order() {
     // Hotter by ten degrees in both sensors.
     short.iter_mut().for_each(|row| row[1..].iter_mut().for_each(|reading_c| *reading_c += 10.0));
     bench.write("short.csv", csv(&short));
-    let mean_c = |files: &[&str], model: &str| {
-        let arguments = [&["diagnose"], files, &["--json", "--save", model]].concat();
-        number(&bench.run(&arguments).json()["gas_spectrum"]["mean_C"])
+    let mean_and_bands = |files: &[&str], model: &str| {
+        let spectrum =
+            &bench.run(&[&["diagnose"], files, &["--json", "--save", model]].concat()).json()["gas_spectrum"];
+        (number(&spectrum["mean_C"]), spectrum["bands"].as_array().map(Vec::len))
     };
-    let (joint_c, turned_c) =
-        (mean_c(&["short.csv", "long.csv"], "joint.json"), mean_c(&["long.csv", "short.csv"], "turned.json"));
-    let (short_c, long_c) = (mean_c(&["short.csv"], "short.json"), mean_c(&["long.csv"], "long.json"));
+    let (joint_c, bands) = mean_and_bands(&["short.csv", "long.csv"], "joint.json");
+    let (turned_c, _) = mean_and_bands(&["long.csv", "short.csv"], "turned.json");
+    let (short_c, _) = mean_and_bands(&["short.csv"], "short.json");
+    let (long_c, of_longest) = mean_and_bands(&["long.csv"], "long.json");
+    assert_eq!(bands, of_longest);
     // 1000 and 2000 samples. Time constants that differ by less than a percent move the mean of a gas that scatters by 30 K by less than this.
     let [expected_c, tolerance_k] = [(short_c + 2.0 * long_c) / 3.0, 0.3];
     assert!((short_c - long_c).abs() > 10.0 * tolerance_k, "{short_c} {long_c}");
