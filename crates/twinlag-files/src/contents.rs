@@ -88,7 +88,11 @@ impl fmt::Display for Group {
             write!(f, ", from {start}")?;
         }
         write!(f, ": ")?;
-        let named = self.channels.iter().take(LISTED_CHANNELS).map(ToString::to_string).collect::<Vec<_>>();
+        let named = self.channels.iter().take(LISTED_CHANNELS).map(|channel| match &channel.obstacle {
+            Some(obstacle) => format!("{channel} ({obstacle})"),
+            None => channel.to_string(),
+        });
+        let named = named.collect::<Vec<_>>();
         write!(f, "{}", named.join(", "))?;
         match self.channels.len().saturating_sub(LISTED_CHANNELS) {
             0 => Ok(()),

@@ -128,6 +128,15 @@ impl Reading {
     }
 
     fn load(&self, opened: &mut dyn Opened, group: usize) -> Result<Loaded, FileError> {
+        let described = &opened.groups()[group];
+        if !described.channels.is_empty() && described.channels.iter().all(|channel| channel.obstacle.is_some()) {
+            let found = format!("no channel of this group can be read as numbers:\n  {described}\n");
+            return Err(Fault::unsupported(found, "choose another group, or export it as CSV").of(
+                &self.file,
+                self.format,
+                self.bytes,
+            ));
+        }
         let mut loaded = self.guarded(|| opened.load(group))?;
         let name = &opened.groups()[group].name;
         if let Some((first, odd)) = unequal(&loaded.series) {

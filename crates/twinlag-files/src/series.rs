@@ -62,6 +62,17 @@ pub(crate) enum Values {
     Texts(Vec<String>),
 }
 
+impl Values {
+    /// The numbers; of what is none, as many missing ones.
+    pub(crate) fn into_numbers(self) -> Vec<f64> {
+        match self {
+            Self::Numbers(values) => values,
+            Self::Instants(values) => vec![f64::NAN; values.len()],
+            Self::Texts(values) => vec![f64::NAN; values.len()],
+        }
+    }
+}
+
 impl Series {
     pub(crate) fn numbers(name: impl Into<String>, unit: impl Into<String>, values: Vec<f64>) -> Self {
         Self { name: name.into(), unit: unit.into(), values: Values::Numbers(values) }

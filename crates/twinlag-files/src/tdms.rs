@@ -4,11 +4,14 @@
 //!
 //! Channels of a group with one number of samples and one time base are a group here. The time is
 //! `wf_start_offset + k wf_increment`, from `wf_start_time`; without an increment it is a channel of
-//! its own, if there is one. Counts that are still to be scaled are refused: for a thermocouple the
-//! scale needs its reference junction. Layout: NI, "TDMS File Format Internal Structure".
+//! its own, if there is one. Counts are scaled as the file says. Layout: NI, "TDMS File Format Internal
+//! Structure".
 
+mod daqmx;
 mod parse;
+mod scale;
 mod segment;
+mod thermocouple;
 mod value;
 
 use std::collections::BTreeMap;
@@ -18,10 +21,11 @@ use crate::contents::{Channel, Group, name_apart};
 use crate::fault::Fault;
 use crate::format::Format;
 use crate::input::{Input, Stream};
-use crate::records::{self, Field, Meaning};
+use crate::records::{self, Field};
 use crate::series::{Loaded, Opened, Series, Values};
-use segment::{Object, Objects, Piece};
-use value::{Kind, Property};
+use scale::Scales;
+use segment::{Object, Objects, Piece, Source};
+use value::Property;
 
 struct Tdms {
     stream: Stream,
@@ -80,13 +84,21 @@ pub(crate) fn open(input: Input, _: Format) -> Result<Box<dyn Opened>, Fault> {
 fn describe(object: &Object) -> Channel {
     let text = |name: &str| object.properties.get(name).and_then(Property::text).unwrap_or_default().trim();
     let unit = Some(text("unit_string")).filter(|unit| !unit.is_empty()).unwrap_or_else(|| text("NI_UnitDescription"));
-    let obstacle = match object.kind {
-        _ if object.is_unscaled() => Some("its samples are counts that are still to be scaled".to_owned()),
-        Some(kind) if kind.meaning().is_some() => None,
-        Some(kind) => Some(format!("its samples are {}", kind.name())),
-        None => Some("it has no samples".to_owned()),
+    let obstacle = match &object.sources[..] {
+        [] => Some("it has no samples".to_owned()),
+        sources => match (sources.iter().find(|source| source.kind.meaning().is_none()), scales_of(object)) {
+            (Some(source), _) => Some(format!("its samples are {}", source.kind.name())),
+            (None, Err(reason)) => Some(format!("its samples are counts that cannot be scaled: {reason}")),
+            (None, Ok(_)) => None,
+        },
     };
     Channel { name: object.name.clone(), unit: unit.to_owned(), obstacle }
+}
+
+/// The scales for a channel's counts, if it has any, or why they cannot be applied.
+fn scales_of(object: &Object) -> Result<Option<Scales>, String> {
+    let counts: Vec<u32> = object.sources.iter().map(|source| source.scale).collect();
+    Scales::of(&object.properties, &counts)
 }
 
 impl Opened for Tdms {
@@ -105,23 +117,28 @@ impl Opened for Tdms {
 
     fn load(&mut self, group: usize) -> Result<Loaded, Fault> {
         let (clock, members) = &self.members[group];
-        if let Some(object) = members.iter().find(|object| object.is_unscaled()) {
-            let scales = object.scales();
-            return Err(Fault::unsupported(
-                format!(
-                    "channel '{}' of group '{}' has counts that are still to be scaled{scales}",
-                    object.name, object.group
-                ),
-                "let DAQmx or LabVIEW write scaled values, or export it as CSV",
-            ));
-        }
         let mut loaded = Loaded::default();
+        let mut scaled: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (object, channel) in members.iter().zip(&self.groups[group].channels) {
-            let meaning = object.kind.and_then(Kind::meaning).filter(|_| channel.obstacle.is_none());
-            let Some(meaning) = meaning else { continue };
-            let values = samples(&mut self.stream, meaning, object)?;
+            if channel.obstacle.is_some() {
+                continue;
+            }
+            let mut values = object.sources.iter().map(|source| samples(&mut self.stream, source));
+            let values = match scales_of(object) {
+                Ok(Some(scales)) => {
+                    let counts = values.map(|values| Ok(values?.into_numbers())).collect::<Result<Vec<_>, Fault>>()?;
+                    scaled.entry(scales.names()).or_default().push(format!("'{}'", channel.name));
+                    Values::Numbers(scales.apply(&counts))
+                }
+                _ => values.next().unwrap_or(Ok(Values::Numbers(Vec::new())))?,
+            };
             loaded.series.push(Series { name: channel.name.clone(), unit: channel.unit.clone(), values });
         }
+        loaded.notes.extend(
+            scaled
+                .iter()
+                .map(|(laws, names)| format!("counts of {} scaled as the file says: {laws}", names.join(", "))),
+        );
         loaded.add_clock(f64::from_bits(clock.offset), clock.period_s());
         if self.is_open {
             loaded
@@ -132,16 +149,17 @@ impl Opened for Tdms {
     }
 }
 
-/// All samples of a channel. The pieces were checked to lie within the file.
-fn samples(stream: &mut Stream, meaning: Meaning, object: &Object) -> Result<Values, Fault> {
+/// All samples of a source. The pieces were checked to lie within the file.
+fn samples(stream: &mut Stream, source: &Source) -> Result<Values, Fault> {
+    let Some(meaning) = source.kind.meaning() else { return Ok(Values::Numbers(Vec::new())) };
     let field = |piece: &Piece| Field {
         offset: piece.at,
-        bytes: object.kind.map_or(0, Kind::bytes) as usize,
+        bytes: source.kind.bytes() as usize,
         meaning,
         is_big_endian: piece.is_big_endian,
     };
     let mut columns = [Values::Numbers(Vec::new())];
-    for (index, piece) in object.pieces.iter().enumerate() {
+    for (index, piece) in source.pieces.iter().enumerate() {
         let field = field(piece);
         if index == 0 {
             columns = [field.empty()];
@@ -149,7 +167,10 @@ fn samples(stream: &mut Stream, meaning: Meaning, object: &Object) -> Result<Val
         stream.seek(SeekFrom::Start(piece.offset))?;
         records::read(stream, piece.count, piece.stride as usize, &[field], &mut columns)?;
     }
-    let [values] = columns;
+    let [mut values] = columns;
+    if let (Some(bit), Values::Numbers(values)) = (source.bit, &mut values) {
+        values.iter_mut().for_each(|value| *value = f64::from((*value as u64 >> bit & 1) as u8));
+    }
     Ok(values)
 }
 

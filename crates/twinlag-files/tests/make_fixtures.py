@@ -1,6 +1,6 @@
 """Writes the fixtures of the tests with the libraries that people use, and beside each what is in it.
 
-    python -m venv venv && venv/bin/pip install asammdf npTDMS openpyxl odfpy pandas pyarrow h5py netCDF4 scipy xlwt
+    python -m venv venv && venv/bin/pip install asammdf npTDMS openpyxl odfpy pandas pyarrow h5py netCDF4 scipy xlwt hypothesis pytest
     venv/bin/python make_fixtures.py [NAME...]
 
 A fixture `x.mf4` comes with `x.mf4.csv`: names, units and kinds of the columns in the first three lines, then one
@@ -10,6 +10,7 @@ what is missing is empty. Numbers are those that the library itself reads back, 
 
 import datetime
 import math
+import struct
 import sys
 from pathlib import Path
 
@@ -279,16 +280,128 @@ def tdms():
         ])
     expect("stamps.tdms", [("Time", "", stamps), *read(path, "log", [("T1", "°C"), ("T2", "°C")])])
 
-    # Counts with a thermocouple's scale that is still to be applied.
-    scale = {
-        "NI_Scaling_Status": "unscaled",
-        "NI_Number_Of_Scales": 1,
-        "NI_Scale[0]_Scale_Type": "Thermocouple",
-        "NI_Scale[0]_Thermocouple_Thermocouple_Type": 10073,
+    # Counts with scales that are still to be applied; npTDMS applies them as it reads.
+    def scaled(*scales):
+        given = {"NI_Scaling_Status": "unscaled", "NI_Number_Of_Scales": len(scales)}
+        for k, (kind, values) in enumerate(scales):
+            given[f"NI_Scale[{k}]_Scale_Type"] = kind
+            given.update({f"NI_Scale[{k}]_{kind}_{name}": value for name, value in values.items()})
+        return given
+
+    raw = 2**32 - 1
+    volts = ("Linear", {"Slope": 2.0e-5, "Y_Intercept": 0.375, "Input_Source": raw})
+    points = {f"Pre_Scaled_Values[{k}]": v for k, v in enumerate([0.5, 0.25, 0.0])}
+    points |= {f"Scaled_Values[{k}]": v for k, v in enumerate([60.0, 21.0, -5.0])}
+    resistance = {"Current_Excitation": 1e-3, "R0_Nominal_Resistance": 100.0, "A": 3.9083e-3, "B": -5.775e-7, "C": -4.183e-12}
+    steinhart = {"A": 1.2873851e-3, "B": 2.3575235e-4, "C": 9.497806e-8, "Temperature_Offset": 273.15}
+    laws = {
+        "polynomial": [volts, ("Polynomial", {"Coefficients_Size": 3, "Coefficients[0]": -4.0, "Coefficients[1]": 70.0,
+                                              "Coefficients[2]": 0.3, "Input_Source": 0})],
+        "table": [volts, ("Table", {"Pre_Scaled_Values_Size": 3, "Scaled_Values_Size": 3, **points, "Input_Source": 0})],
+        "resistance": [("Linear", {"Slope": 4.0e-6, "Y_Intercept": 0.1, "Input_Source": raw}),
+                       ("RTD", {**resistance, "Lead_Wire_Resistance": 0.5, "Resistance_Configuration": 3, "Input_Source": 0})],
+        "divider": [volts, ("Thermistor", {**steinhart, "Excitation_Type": 10322, "Excitation_Value": 2.5, "Lead_Wire_Resistance": 0.5,
+                                           "Resistance_Configuration": 3, "R1_Reference_Resistance": 1e4, "Input_Source": 0})],
+        "current": [volts, ("Thermistor", {**steinhart, "Excitation_Type": 10134, "Excitation_Value": 5e-5, "Lead_Wire_Resistance": 1.0,
+                                           "Resistance_Configuration": 2, "R1_Reference_Resistance": 0.0, "Input_Source": 0})],
+        "difference": [volts, ("Linear", {"Slope": 90.0, "Y_Intercept": 1.0, "Input_Source": 0}),
+                       ("Subtract", {"Left_Operand_Input_Source": 0, "Right_Operand_Input_Source": 1})],
     }
-    with TdmsWriter(HERE / "unscaled.tdms") as writer:
-        counts = np.arange(ROWS, dtype=np.int16)
-        writer.write_segment([ChannelObject("daq", name, counts, {**waveform, **scale}) for name in ["T1", "T2"]])
+    counts = np.round(9000 * np.sin(np.arange(ROWS) / 3)).astype(np.int16)
+    path = HERE / "scales.tdms"
+    with TdmsWriter(path) as writer:
+        channels = [ChannelObject("daq", name, counts, {**waveform, **scaled(*law), "unit_string": "Deg C"}) for name, law in laws.items()]
+        writer.write_segment(channels)
+    expect("scales.tdms", [("time", "s", clock), *read(path, "daq", [(name, "Deg C") for name in laws])])
+
+    # A scale that makes no temperature.
+    with TdmsWriter(HERE / "strain.tdms") as writer:
+        bridge = scaled(("Strain", {"Configuration": 10183, "Input_Source": raw}))
+        writer.write_segment([ChannelObject("daq", name, counts, {**waveform, **bridge}) for name in ["T1", "T2"]])
+
+    daqmx(scaled, resistance)
+    big_endian(clock)
+
+
+def daqmx(scaled, resistance):
+    """What DAQmx logs of two thermocouples of type K whose cold junction is at a resistance thermometer.
+
+    The file is put together with what npTDMS tests itself with. npTDMS takes the published inverse polynomials; what
+    is expected here are the temperatures at which its reference function has the voltage.
+    """
+    from nptdms import TdmsFile
+    from nptdms.test import test_daqmx, util
+    from nptdms.thermocouples import type_k
+    from scipy.optimize import brentq
+
+    rng = np.random.default_rng(26)
+    chunk = 16  # the last one is of eight rows
+    counts = [np.round(4000 + amplitude * np.sin(np.arange(ROWS) / slow) + rng.normal(0, 2, ROWS)) for amplitude, slow in [(9000, 3), (6000, 5)]]
+    cold = np.round(30 * np.sin(np.arange(ROWS) / 9))
+    rows = b"".join(np.array([a, b], "<i4").tobytes() + np.array([c], "<i2").tobytes() for a, b, c in zip(*counts, cold))
+    voltage = [
+        ("Polynomial", {"Coefficients_Size": 2, "Coefficients[0]": 3.5, "Coefficients[1]": 0.25, "Input_Source": 0}),
+        ("Linear", {"Slope": 2e-5, "Y_Intercept": 0.109, "Input_Source": 1}),
+        ("RTD", {**resistance, "Lead_Wire_Resistance": 0.0, "Resistance_Configuration": 4, "Input_Source": 3}),
+        ("Thermocouple", {"Thermocouple_Type": 10073, "Scaling_Direction": 1, "Input_Source": 4}),
+        ("Add", {"Left_Operand_Input_Source": 2, "Right_Operand_Input_Source": 5}),
+    ]
+    temperature = ("Thermocouple", {"Thermocouple_Type": 10073, "Scaling_Direction": 0, "Input_Source": 6})
+
+    def typed(properties):
+        kinds = {str: (0x20, lambda v: util.hexlify_value("<I", len(v)) + util.string_hexlify(v))}
+        kinds |= {int: (7, lambda v: util.hexlify_value("<I", v)), float: (10, lambda v: util.hexlify_value("<d", v))}
+        return {name: (kinds[type(v)][0], kinds[type(v)][1](v)) for name, v in properties.items()}
+
+    def write(path, scales):
+        # Scales 0 and 1 are the counts: of the channel, and of the cold junction.
+        properties = scaled(("", {}), ("", {}), *scales)
+        properties = {name: v for name, v in properties.items() if not name.startswith(("NI_Scale[0]", "NI_Scale[1]"))}
+        properties |= {"unit_string": "Deg C", "wf_increment": 0.002, "wf_start_offset": 0.0}
+        channels = [
+            test_daqmx.daqmx_channel_metadata(
+                name, chunk, [10],
+                [test_daqmx.daqmx_scaler_metadata(0, 5, at), test_daqmx.daqmx_scaler_metadata(1, 3, 8)], typed(properties))
+            for name, at in [("T1", 0), ("T2", 4)]
+        ]
+        file = util.GeneratedFile()
+        metadata = util.segment_objects_metadata(util.root_metadata(), util.group_metadata(), *channels)
+        file.add_segment(("kTocMetaData", "kTocRawData", "kTocNewObjList", "kTocDAQmxRawData"), metadata, rows, binary_data=True)
+        with file.get_tempfile() as written:
+            path.write_bytes(written.file.read())
+        with TdmsFile.open(path) as read:
+            return [read["Group"][name][:] for name in ["T1", "T2"]]
+
+    path = HERE / "daqmx.tdms"
+    excess_mv = lambda celsius, uv: float(type_k.celsius_to_mv(np.array([celsius]))[0]) - uv / 1000
+    exact = [[brentq(excess_mv, -200, 1372, args=(uv,), xtol=1e-11) for uv in channel] for channel in write(path, voltage)]
+    for found, by_polynomials in zip(exact, write(path, [*voltage, temperature])):
+        assert np.max(np.abs(np.array(found) - by_polynomials)) < 0.06, "NIST: within 0.06 K"
+    expect("daqmx.tdms", [("time", "s", [0.002 * k for k in range(ROWS)]), ("T1", "Deg C", exact[0]), ("T2", "Deg C", exact[1])])
+
+
+def big_endian(clock):
+    """Numbers with the high byte first, as LabVIEW writes them where it is told to: npTDMS reads them and writes none."""
+    from nptdms import TdmsFile
+
+    def text(s):
+        return struct.pack(">I", len(s.encode())) + s.encode()
+
+    waveform = [("wf_increment", 0.002), ("wf_start_offset", 0.5)]
+    properties = b"".join(text(name) + struct.pack(">Id", 10, value) for name, value in waveform)
+
+    def channel(name):
+        index = struct.pack(">IIIQ", 20, 10, 1, ROWS)
+        return text(f"/'gas'/'{name}'") + index + struct.pack(">I", len(waveform)) + properties
+
+    metadata = struct.pack(">I", 2) + channel("T1") + channel("T2")
+    samples = np.concatenate([warm(27), warm(28)]).astype(">f8").tobytes()
+    flags = 1 << 1 | 1 << 2 | 1 << 3 | 1 << 6
+    lead_in = b"TDSm" + struct.pack("<I", flags) + struct.pack(">IQQ", 4713, len(metadata) + len(samples), len(metadata))
+    path = HERE / "big_endian.tdms"
+    path.write_bytes(lead_in + metadata + samples)
+    with TdmsFile.open(path) as file:
+        expect("big_endian.tdms", [("time", "s", clock), *((name, "", file["gas"][name][:]) for name in ["T1", "T2"])])
 
 
 def parquet():

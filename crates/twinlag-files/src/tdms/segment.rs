@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::io::{Read, Seek, SeekFrom};
 
 use super::Properties;
+use super::daqmx::{self, Layout};
 use super::parse::Cursor;
+use super::scale;
 use super::value::{Kind, Property};
 use crate::fault::Fault;
 use crate::input::Stream;
@@ -15,16 +17,10 @@ const HAS_NEW_LIST: u32 = 1 << 2;
 const HAS_SAMPLES: u32 = 1 << 3;
 const IS_INTERLEAVED: u32 = 1 << 5;
 const IS_BIG_ENDIAN: u32 = 1 << 6;
-const HAS_DAQMX: u32 = 1 << 7;
 /// Of a segment that was never closed.
 const TO_THE_END: u64 = u64::MAX;
 const NO_SAMPLES: u32 = u32::MAX;
 const AS_BEFORE: u32 = 0;
-/// The property that counts scales.
-const SCALES: &str = "NI_Number_Of_Scales";
-/// Kinds of raw data of DAQmx, in which samples are counts that are to be scaled.
-const DAQMX_SCALER: u32 = 0x1269;
-const DAQMX_LINE_SCALERS: [u32; 2] = [0x126a, 0x1369];
 
 /// All channels of a file.
 #[derive(Debug)]
@@ -41,13 +37,35 @@ pub(super) struct Object {
     pub(super) group: String,
     pub(super) name: String,
     pub(super) properties: Properties,
-    /// `None` if it never had samples.
-    pub(super) kind: Option<Kind>,
+    /// What its values are made of: one kind of samples, or all the counts that a scale takes; nothing if
+    /// it never had samples.
+    pub(super) sources: Vec<Source>,
     pub(super) rows: u64,
-    pub(super) pieces: Vec<Piece>,
-    is_daqmx: bool,
     /// What it has in each chunk of the segment at hand.
-    chunk: Option<Chunk>,
+    pub(super) chunk: Option<Chunk>,
+    /// Where its counts stand in raw data of DAQmx.
+    pub(super) layout: Option<Layout>,
+}
+
+/// Samples of one type.
+#[derive(Clone, Debug)]
+pub(super) struct Source {
+    /// The scale for which they stand.
+    pub(super) scale: u32,
+    pub(super) kind: Kind,
+    /// Which bit of them counts; all do of what is no digital line.
+    pub(super) bit: Option<u8>,
+    pub(super) pieces: Vec<Piece>,
+}
+
+impl Source {
+    /// Adds samples, to the last run of them if they follow it.
+    pub(super) fn add(&mut self, piece: Piece) {
+        match self.pieces.last_mut() {
+            Some(last) if last.continues(&piece) => last.count += piece.count,
+            _ => self.pieces.push(piece),
+        }
+    }
 }
 
 /// Samples in one run through the file.
@@ -71,32 +89,36 @@ impl Piece {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Chunk {
-    count: u64,
-    bytes: u64,
+pub(super) struct Chunk {
+    pub(super) count: u64,
+    pub(super) bytes: u64,
 }
 
 impl Object {
-    /// Adds samples, to the last run of them if they follow it.
-    fn add(&mut self, piece: Piece) {
-        match self.pieces.last_mut() {
-            Some(last) if last.continues(&piece) => last.count += piece.count,
-            _ => self.pieces.push(piece),
+    /// The type of its samples, if it has one type.
+    fn kind(&self) -> Option<Kind> {
+        self.sources.first().map(|source| source.kind)
+    }
+
+    /// Takes what its samples are from a segment on. Where samples stand may change, their types may not.
+    ///
+    /// - `at`: byte of the file, in messages
+    pub(super) fn become_of(&mut self, sources: Vec<Source>, at: u64) -> Result<(), Fault> {
+        let alike = |(had, has): (&Source, &Source)| (had.scale, had.kind, had.bit) == (has.scale, has.kind, has.bit);
+        if self.sources.len() == sources.len() && self.sources.iter().zip(&sources).all(alike) {
+            return Ok(());
         }
-    }
-
-    /// Whether its samples are counts that a chain of scales in the properties is to be applied to.
-    pub(super) fn is_unscaled(&self) -> bool {
-        let status = self.properties.get("NI_Scaling_Status").and_then(Property::text);
-        let scales = self.properties.get(SCALES).and_then(Property::number).unwrap_or(0.0);
-        self.is_daqmx || status == Some("unscaled") || (status != Some("scaled") && scales > 0.0)
-    }
-
-    /// The types of its scales, in messages.
-    pub(super) fn scales(&self) -> String {
-        let of_type = self.properties.iter().filter(|(name, _)| name.ends_with("_Scale_Type"));
-        let types: Vec<&str> = of_type.filter_map(|(_, property)| property.text()).collect();
-        if types.is_empty() { String::new() } else { format!(" ({})", types.join(", ")) }
+        if self.rows > 0 {
+            return Err(Fault::unsupported(
+                format!(
+                    "changes the type of the samples of channel '{}' of group '{}' at byte {at}",
+                    self.name, self.group
+                ),
+                "export it as MDF 4 or CSV",
+            ));
+        }
+        self.sources = sources;
+        Ok(())
     }
 }
 
@@ -175,7 +197,7 @@ pub(super) fn read(stream: &mut Stream, bytes: u64) -> Result<Objects, Fault> {
     for object in &mut all.objects {
         let group = format!("/'{}'", object.group.replace('\'', "''"));
         let shared = [group.as_str(), "/"].into_iter().filter_map(|path| listed.shared.get(path));
-        for (name, property) in shared.flatten().filter(|(name, _)| name.starts_with("NI_Scal") || *name == SCALES) {
+        for (name, property) in shared.flatten().filter(|(name, _)| scale::is_of_scale(name)) {
             object.properties.entry(name.clone()).or_insert_with(|| property.clone());
         }
     }
@@ -197,7 +219,6 @@ fn read_objects(cursor: &mut Cursor<'_>, objects: &mut Vec<Object>, listed: &mut
     let count = cursor.u32()?;
     for _ in 0..count {
         let path = cursor.text()?;
-        let at = cursor.position();
         let Some((group, name)) = channel_of(&path) else {
             // The file or a group.
             read_index(cursor, &mut Object::default())?;
@@ -209,14 +230,7 @@ fn read_objects(cursor: &mut Cursor<'_>, objects: &mut Vec<Object>, listed: &mut
             objects.len() - 1
         });
         let object = &mut objects[index];
-        let (before, had_daqmx) = (object.kind, object.is_daqmx);
         let has_samples = read_index(cursor, object)?;
-        if before.is_some_and(|kind| object.kind != Some(kind)) && object.rows > 0 && !had_daqmx {
-            return Err(Fault::unsupported(
-                format!("changes the type of the samples of channel '{path}' at byte {at}"),
-                "export it as MDF 4 or CSV",
-            ));
-        }
         listed.active.retain(|other| *other != index || has_samples);
         if has_samples && !listed.active.contains(&index) {
             listed.active.push(index);
@@ -243,8 +257,8 @@ fn read_index(cursor: &mut Cursor<'_>, object: &mut Object) -> Result<bool, Faul
             Some(_) => Ok(true),
             None => Err(Fault::damaged_at(at, "how many samples a channel has", "a reference to none before")),
         },
-        _ if length == DAQMX_SCALER || DAQMX_LINE_SCALERS.contains(&length) => {
-            read_daqmx(cursor, object, length)?;
+        _ if daqmx::is_mark(length) => {
+            daqmx::read_index(cursor, object, length)?;
             Ok(true)
         }
         _ => {
@@ -255,25 +269,11 @@ fn read_index(cursor: &mut Cursor<'_>, object: &mut Object) -> Result<bool, Faul
             let _dimension = cursor.u32()?;
             let count = cursor.u64()?;
             let bytes = if kind == Kind::Text { cursor.u64()? } else { count.saturating_mul(kind.bytes()) };
-            object.kind = Some(kind);
-            object.chunk = Some(Chunk { count, bytes });
+            object.become_of(vec![Source { scale: scale::COUNTS, kind, bit: None, pieces: Vec::new() }], at)?;
+            (object.chunk, object.layout) = (Some(Chunk { count, bytes }), None);
             Ok(true)
         }
     }
-}
-
-/// Raw data of DAQmx: read over, since they are not used.
-fn read_daqmx(cursor: &mut Cursor<'_>, object: &mut Object, kind: u32) -> Result<(), Fault> {
-    let scaler_bytes = if kind == DAQMX_SCALER { 20 } else { 17 };
-    cursor.take(8)?;
-    let count = cursor.u64()?;
-    let scalers = cursor.u32()?;
-    cursor.take(u64::from(scalers) * scaler_bytes)?;
-    let widths = cursor.u32()?;
-    cursor.take(u64::from(widths) * 4)?;
-    object.is_daqmx = true;
-    object.chunk = Some(Chunk { count, bytes: 0 });
-    Ok(())
 }
 
 fn read_properties(cursor: &mut Cursor<'_>, properties: &mut Properties) -> Result<(), Fault> {
@@ -288,14 +288,12 @@ fn read_properties(cursor: &mut Cursor<'_>, properties: &mut Properties) -> Resu
 /// by sample.
 fn place_samples(lead_in: &LeadIn, objects: &mut [Object], active: &[usize]) -> Result<(), Fault> {
     let available = lead_in.end - lead_in.metadata_end;
-    let chunks: Vec<(usize, Chunk)> = active.iter().filter_map(|&index| Some((index, objects[index].chunk?))).collect();
-    if lead_in.has(HAS_DAQMX) || chunks.iter().any(|(index, _)| objects[*index].is_daqmx) {
-        for (index, chunk) in chunks {
-            objects[index].is_daqmx = true;
-            objects[index].rows = objects[index].rows.saturating_add(chunk.count);
-        }
-        return Ok(());
+    let is_big_endian = lead_in.has(IS_BIG_ENDIAN);
+    // Some files lack the flag for DAQmx: what the channels say counts.
+    if active.iter().any(|&index| objects[index].layout.is_some()) {
+        return daqmx::place(objects, active, (lead_in.metadata_end, available), is_big_endian, lead_in.is_open);
     }
+    let chunks: Vec<(usize, Chunk)> = active.iter().filter_map(|&index| Some((index, objects[index].chunk?))).collect();
     let chunk_bytes = chunks.iter().fold(0_u64, |sum, (_, chunk)| sum.saturating_add(chunk.bytes));
     if chunk_bytes == 0 {
         return Ok(());
@@ -304,7 +302,7 @@ fn place_samples(lead_in: &LeadIn, objects: &mut [Object], active: &[usize]) -> 
         let expected = format!("whole chunks of {chunk_bytes} bytes");
         return Err(Fault::damaged_at(lead_in.metadata_end, expected, format!("{available} bytes")));
     }
-    let stride = chunks.iter().filter_map(|(index, _)| objects[*index].kind).map(Kind::bytes).sum::<u64>();
+    let stride = chunks.iter().filter_map(|(index, _)| objects[*index].kind()).map(Kind::bytes).sum::<u64>();
     let is_interleaved = lead_in.has(IS_INTERLEAVED);
     if is_interleaved && chunks.iter().any(|(_, chunk)| chunk.count != chunks[0].1.count) {
         return Err(Fault::damaged_at(lead_in.metadata_end, "as many interleaved samples of each channel", "others"));
@@ -314,8 +312,7 @@ fn place_samples(lead_in: &LeadIn, objects: &mut [Object], active: &[usize]) -> 
         let mut at = 0;
         for &(index, Chunk { count, bytes }) in &chunks {
             let object = &mut objects[index];
-            let size = object.kind.map_or(0, Kind::bytes);
-            let is_big_endian = lead_in.has(IS_BIG_ENDIAN);
+            let size = object.kind().map_or(0, Kind::bytes);
             let piece = if is_interleaved {
                 Piece { offset, at, count, stride, is_big_endian }
             } else {
@@ -323,7 +320,7 @@ fn place_samples(lead_in: &LeadIn, objects: &mut [Object], active: &[usize]) -> 
             };
             object.rows += count;
             if size > 0 && count > 0 {
-                object.add(piece);
+                object.sources.iter_mut().for_each(|source| source.add(piece));
             }
             at += size as usize;
             offset += if is_interleaved { 0 } else { bytes };

@@ -52,6 +52,18 @@ pub(crate) fn assert_same(got: &Table, want: &Table, what: &str) {
     }
 }
 
+/// Names, units and kinds are the same, and numbers within a tolerance.
+pub(crate) fn assert_near(got: &Table, want: &Table, tolerance: f64) {
+    assert_eq!((got.columns().len(), got.rows()), (want.columns().len(), want.rows()));
+    for (index, (column, wanted)) in got.columns().iter().zip(want.columns()).enumerate() {
+        assert_eq!((column.name(), column.unit()), (wanted.name(), wanted.unit()));
+        let (numbers, want) = (got.numbers(index).expect("numbers"), want.numbers(index).expect("numbers"));
+        for (row, (number, want)) in numbers.iter().zip(want).enumerate() {
+            assert!((number - want).abs() <= tolerance, "{}, row {row}: {number} and {want}", column.name());
+        }
+    }
+}
+
 /// Reads a fixture and compares it with what is in it.
 pub(crate) fn check(name: &str, choice: &Choice) -> Table {
     let of_file = twinlag_files::read(path(name), choice).unwrap_or_else(|error| panic!("{error}"));

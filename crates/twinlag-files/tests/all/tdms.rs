@@ -1,6 +1,6 @@
 //! TDMS files of npTDMS.
 
-use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, check, notes, path};
+use crate::common::{assert_cuts_are_refused, assert_flips_are_survived, assert_near, check, expected, notes, path};
 use twinlag_files::{Choice, contents, read};
 use twinlag_record::{Record, Selection};
 
@@ -31,26 +31,71 @@ fn a_channel_of_stamps_is_the_time() {
 }
 
 #[test]
-fn counts_that_are_still_to_be_scaled_are_refused() {
-    let error = read(path("unscaled.tdms"), &Choice { group: Some("daq".to_owned()), ..Choice::default() });
-    let text = error.expect_err("counts are no temperatures").to_string();
-    assert!(
-        text.contains("channel 'T1' of group 'daq' has counts that are still to be scaled (Thermocouple)"),
-        "{text}"
-    );
-    assert!(text.contains("write scaled values"), "{text}");
+fn the_high_byte_may_stand_first() {
+    check("big_endian.tdms", &Choice::default());
+}
+
+/// Newton's steps and the library's root finder end within rounding of some tens of °C.
+const ROUNDING_K: f64 = 1e-10;
+
+/// Of six laws, npTDMS applies each.
+#[test]
+fn counts_are_scaled_by_the_laws_in_the_file() {
+    let table = read(path("scales.tdms"), &Choice::default()).expect("scales that are known");
+    assert_near(&table, &expected("scales.tdms"), ROUNDING_K);
+    for scaled in
+        ["'resistance' scaled as the file says: linear, resistance", "'divider', 'current' scaled as the file says"]
+    {
+        assert!(notes(&table).contains(scaled), "{}", notes(&table));
+    }
+}
+
+/// Rows of the counts of two thermocouples and their cold junction, in chunks of which the last is short.
+#[test]
+fn a_log_of_daqmx_gives_temperatures_of_thermocouples() {
+    let table = read(path("daqmx.tdms"), &Choice::default()).expect("counts with their scales");
+    assert_near(&table, &expected("daqmx.tdms"), ROUNDING_K);
+    let laws = "counts of 'T1', 'T2' scaled as the file says: linear, resistance thermometer, \
+                voltage of the cold junction, thermocouple type K";
+    assert!(notes(&table).contains(laws), "{}", notes(&table));
+}
+
+#[test]
+fn counts_that_make_no_temperature_are_refused() {
+    let reason = "T1 (its samples are counts that cannot be scaled: its scale is of kind 'Strain'";
+    for (group, said) in [(None, "has no group with rows of numbers"), (Some("daq"), "no channel of this group")] {
+        let choice = Choice { group: group.map(str::to_owned), ..Choice::default() };
+        let text = read(path("strain.tdms"), &choice).expect_err("a bridge is no thermometer").to_string();
+        assert!(text.contains(said) && text.contains(reason), "{text}");
+    }
 }
 
 #[test]
 fn cut_off_files_are_refused() {
-    for name in ["segments.tdms", "chunks.tdms", "interleaved.tdms", "stamps.tdms"] {
+    for name in [
+        "segments.tdms",
+        "chunks.tdms",
+        "interleaved.tdms",
+        "stamps.tdms",
+        "big_endian.tdms",
+        "scales.tdms",
+        "daqmx.tdms",
+    ] {
         assert_cuts_are_refused(name, &Choice::default());
     }
 }
 
 #[test]
 fn damaged_files_are_survived() {
-    for name in ["segments.tdms", "chunks.tdms", "interleaved.tdms", "stamps.tdms", "unscaled.tdms"] {
+    for name in [
+        "segments.tdms",
+        "chunks.tdms",
+        "interleaved.tdms",
+        "stamps.tdms",
+        "big_endian.tdms",
+        "scales.tdms",
+        "daqmx.tdms",
+    ] {
         assert_flips_are_survived(name, &Choice::default());
     }
 }
