@@ -278,7 +278,15 @@ fn found(
 fn other_causes(found: &Found, ties: &[Tie], policy: &Policy) -> Vec<OtherCause> {
     let is_twin = |tie: &&Tie| found.exact_twins.iter().any(|twin| (twin.effect, Some(twin.channel)) == tie.other);
     let of_this = ties.iter().filter(|tie| tie.named == (found.effect, found.fitted_in) && !is_twin(tie));
-    of_this.filter_map(|tie| tie.other_cause(policy)).collect()
+    let mut out: Vec<OtherCause> = Vec::new();
+    for cause in of_this.filter_map(|tie| tie.other_cause(policy)) {
+        // Forms of one effect are one cause.
+        match out.iter_mut().find(|other| (other.effect, other.channel) == (cause.effect, cause.channel)) {
+            Some(other) => other.cover(&cause),
+            None => out.push(cause),
+        }
+    }
+    out
 }
 
 /// Takes a noise out of what is named where much of the residual goes with the gas, which no noise does; its spectrum is what

@@ -83,6 +83,7 @@ pub(crate) fn searched<'a>(
 /// Moves on as long as there is a move; then takes the shortest of all delays that fit as well as the best.
 pub(crate) fn search(state: &mut State<'_>, settings: &Settings, can_learn: bool) -> Result<(), ModelError> {
     while can_learn && state.taken.len() < settings.policy.most_effects && advance(state, settings)? {}
+    state.compare_again()?;
     if let Some(proposal) = state.choose_delay() {
         state.apply(proposal);
     }
@@ -199,6 +200,27 @@ mod tests {
             }
         }
         taken
+    }
+
+    /// A gain and an offset that make up for each other at the mean, and a delay. Failed: crosstalk was found beside a noise that was taken
+    /// out later, and no interval covered what the time constants are if the gain is the cause.
+    #[test]
+    fn ties_are_compared_again_beside_the_effects_that_remain() {
+        let mut sensors = [0.1, 0.4].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+        sensors.iter_mut().for_each(|s| s.noise = Some(Noise::white(0.1)));
+        (sensors[1].gain, sensors[1].offset_k, sensors[1].delay_s) = (1.01, -3.0, 0.02);
+        let gas = Gas::new(300.0, Signal::Turbulence(Turbulence { std_k: 15.0, corner_hz: 0.5, cutoff_hz: 20.0 }));
+        let rig = Rig::new(3, Record::new(3000, 0.01), gas, sensors).expect("a valid rig");
+        let record = rig.simulate().expect("finite numbers");
+        let stretch = Stretch::new(record.time_s, [record.t1_c, record.t2_c]);
+        let observations = Observations::new(vec![stretch], Some(0.01)).expect("a record");
+        let (settings, watch) = (Settings::default(), |_: &str, _, _| ControlFlow::Continue(()));
+        let (state, _) = searched(&observations, &settings, &watch).expect("not cancelled");
+        assert!(state.moves.iter().any(|m| matches!(m, Move::Remove { .. })), "{:?}", state.moves);
+        let effects = state.current.model.effects.len();
+        let ties: Vec<_> = state.taken.iter().flat_map(|taken| &taken.ties).collect();
+        assert!(ties.iter().any(|tie| tie.effect.identifier() == Identifier::CALIBRATION), "{:?}", state.moves);
+        assert!(ties.iter().all(|tie| tie.fitted.model.effects.len() == effects), "{:?}", state.moves);
     }
 
     /// Failed: ties were replaced by those of a later comparison, of which no move said anything.

@@ -654,8 +654,8 @@ pub struct Number {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct RecordScatter {
-    /// The 95 % interval of the mean over such records.
-    pub interval_95: [f64; 2],
+    /// The 95 % interval of the mean over such records; `None` where chance may make them differ as much.
+    pub interval_95: Option<[f64; 2]>,
     /// Root mean square of what the records' values differ, over their standard errors.
     pub ratio: f64,
     /// Probability of at least as large a scatter if the model is right.
@@ -665,8 +665,9 @@ pub struct RecordScatter {
 impl RecordScatter {
     /// That of what records say of a number; `None` where noise explains what they differ.
     pub fn of(between: Option<&BetweenRecords>) -> Option<Self> {
-        let BetweenRecords { interval_95, ratio, p_value, .. } = *between.filter(|between| between.scatters())?;
-        Some(Self { interval_95, ratio, p_value })
+        let between = between.filter(|between| between.scatters())?;
+        let BetweenRecords { interval_95, ratio, p_value, .. } = *between;
+        Some(Self { interval_95: between.differs().then_some(interval_95), ratio, p_value })
     }
 }
 
@@ -699,7 +700,9 @@ impl Number {
             reasons.push(Reason::LeftOver);
         }
         if let Some(RecordScatter { interval_95: between, ratio, p_value }) = self.between {
-            let with_between = hull(interval, between);
+            // What records differ by chance widens the interval of all; that of their own values may be far longer, since it knows
+            // nothing of what lies between records.
+            let with_between = between.map_or_else(|| self.widened(interval, ratio), |between| hull(interval, between));
             if is_longer(with_between, interval) {
                 covers.push(Covered::Records);
             }
@@ -882,7 +885,7 @@ mod tests {
     fn intervals_cover_what_records_differ() {
         let (policy, basis) = (Policy::default(), Basis::default());
         let judged = |interval_95, p_value| {
-            let between = Some(RecordScatter { interval_95, ratio: 2.5, p_value });
+            let between = Some(RecordScatter { interval_95: Some(interval_95), ratio: 2.5, p_value });
             let (judgement, interval) =
                 Number { between, ..number(2.0, [1.8, 2.2], false) }.judged(Vec::new(), &basis, &policy);
             let said = judgement.because.matches("covers").count();
@@ -893,6 +896,10 @@ mod tests {
         assert_eq!(judged([1.0, 2.1], 0.2), (Grade::Go, [1.0, 2.2], records(), 1));
         assert_eq!(judged([1.0, 2.1], 1e-6), (Grade::Conditional, [1.0, 2.2], records(), 1));
         assert_eq!(judged([-1.0, 3.0], 0.2), (Grade::NoGo, [-1.0, 3.0], records(), 0));
+        let between = Some(RecordScatter { interval_95: None, ratio: 1.5, p_value: 0.1 });
+        let by_chance = Number { between, ..number(2.0, [1.8, 2.2], false) };
+        let interval = by_chance.judged(Vec::new(), &basis, &policy).1.expect("it had one");
+        assert!(interval.iter().zip([1.7, 2.3]).all(|(end, expected)| (end - expected).abs() < 1e-12), "{interval:?}");
     }
 
     /// An interval that is longer than noise makes it says so, on its own scale.

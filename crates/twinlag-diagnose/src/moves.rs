@@ -439,6 +439,20 @@ impl<'a> State<'a> {
         Ok(Some(Proposal { entry, change: Change::Put(index, Box::new(taken)) }))
     }
 
+    /// Compares again what was compared beside an effect that has been taken out since: ties hold beside the effects that there are.
+    pub(crate) fn compare_again(&mut self) -> Result<(), ModelError> {
+        for index in 0..self.taken.len() {
+            let effects = self.current.model.effects.len();
+            let is_of_others = |tie: &Candidate| tie.fitted.model.effects.len() != effects;
+            if self.taken[index].ties.iter().any(is_of_others)
+                && let Some(proposal) = self.compare(index)?
+            {
+                self.apply(proposal);
+            }
+        }
+        Ok(())
+    }
+
     /// Lowers noise levels to what is left over, where that is clearly less.
     pub(crate) fn lower_noise(&self) -> Option<Proposal> {
         let is_due = self.prepared.has_high_levels(&self.current, self.settings);

@@ -190,8 +190,8 @@ impl fmt::Display for Remark {
             }
             Self::NoiseLowered => f.write_str(
                 "the noise levels come from the residual, because the fastest changes of the readings \
-                 are larger and belong to the gas. Compare them with what is known of the instruments: if they are too low, so \
-                 are the intervals",
+                 are larger and belong to the gas. Give the noise of the instruments if it is known: where the levels are too low, \
+                 so are the intervals",
             ),
             Self::Replaced { before, after } => {
                 write!(f, "{after} took the place of {before}, because it explains more: look for {after} at the rig")

@@ -39,6 +39,14 @@ pub struct OtherCause {
 }
 
 impl OtherCause {
+    /// Makes its intervals cover those of another form of the same effect.
+    pub(crate) fn cover(&mut self, form: &Self) {
+        for (number, other) in self.time_constants.iter_mut().zip(&form.time_constants) {
+            let both = |own| other.interval_95.map_or(own, |form| hull(own, form));
+            number.interval_95 = number.interval_95.map(both);
+        }
+    }
+
     /// Makes each of its intervals wider by as much as that of the same time constant of the model `last` is.
     pub(crate) fn widen(&mut self, last: &Fitted, fit: &ModelFit, circumstances: &Circumstances<'_>) {
         for (sensor, number) in self.time_constants.iter_mut().enumerate() {

@@ -214,7 +214,7 @@ pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watc
         let withdrawal = state.withdrawal(index, gain);
         state.apply(withdrawal);
     }
-    Ok(())
+    state.compare_again()
 }
 
 /// The effect, noise aside, that saves the least deviance on records which had no part in fitting it, and this deviance.

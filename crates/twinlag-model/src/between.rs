@@ -1,13 +1,15 @@
 //! What several records of one rig say of the numbers that they share.
 //!
 //! Each record has an estimate of its own beside the joint one: a Newton step of its own energy from the joint fit. If the model
-//! were the whole truth, these would scatter by their standard errors. Where they scatter by more, something that changes from
-//! record to record is missing in the model, and a shared number is a mean over records that were drawn from many: its
+//! were the whole truth, these would scatter by their standard errors. Where they scatter by clearly more, something that changes
+//! from record to record is missing in the model, and a shared number is a mean over records that were drawn from many: its
 //! uncertainty is that of a random effect, whose variance between records is that of Paule and Mandel (1982), with the standard
 //! error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a number has a large standard
-//! error, and so little weight.
+//! error, and so little weight: where nothing but such a record is off, it says nothing of a variance between the others, and the
+//! standard error of the mean grows by the ratio of Birge (1932) alone, the scatter over what the standard errors explain.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
+use twinlag_cross_relation::Z_975;
 
 use crate::dense;
 use crate::fit::Fitted;
@@ -18,6 +20,8 @@ use crate::summary::covariance;
 
 /// Halvings of the interval in which the variance between records lies: to a relative 1e-15.
 const HALVINGS: usize = 60;
+/// Probability of the scatter by chance below which it counts as one between records: the usual one.
+const SCATTER_PROBABILITY: f64 = 0.05;
 /// Fewest records of which one can be said to contradict the others.
 const FEWEST_TO_CONTRADICT: usize = 3;
 
@@ -41,7 +45,7 @@ pub struct BetweenRecords {
     pub own: Vec<OwnValue>,
     /// Their weighted mean.
     pub mean: f64,
-    /// Standard deviation of the number between records, beside their standard errors.
+    /// Standard deviation of the number between records, beside their standard errors; 0 where these explain what they differ.
     pub standard_deviation: f64,
     /// Standard error of the mean.
     pub standard_error: f64,
@@ -116,24 +120,31 @@ impl BetweenRecords {
         }
         let dof = (own.len() - 1) as f64;
         let (_, at_rest) = scatter(&own, 0.0);
-        let variance = variance_between(&own, dof);
+        let p_value = ChiSquared::new(dof).map_or(1.0, |chi2| chi2.sf(at_rest));
+        let does_vary = p_value < SCATTER_PROBABILITY;
+        let variance = if does_vary { variance_between(&own, dof) } else { 0.0 };
         let (mean, statistic) = scatter(&own, variance);
         let weight: f64 = own.iter().map(|own| (own.standard_error.powi(2) + variance).recip()).sum();
         let standard_error = ((statistic / dof).max(1.0) / weight).sqrt();
-        let half = quantile_975(dof) * standard_error;
+        let half = if does_vary { quantile_975(dof) } else { Z_975 } * standard_error;
         Some(Self {
             mean,
             standard_deviation: variance.sqrt(),
             standard_error,
             interval_95: [mean - half, mean + half],
             ratio: (at_rest / dof).sqrt(),
-            p_value: ChiSquared::new(dof).map_or(1.0, |chi2| chi2.sf(at_rest)),
+            p_value,
             own,
         })
     }
 
-    /// Whether the records scatter by more than their standard errors.
+    /// Whether the records scatter by more than their standard errors, if only by chance.
     pub fn scatters(&self) -> bool {
+        self.ratio > 1.0
+    }
+
+    /// Whether they scatter by more than chance.
+    pub fn differs(&self) -> bool {
         self.standard_deviation > 0.0
     }
 
@@ -276,14 +287,26 @@ impl Between {
 mod tests {
     use super::*;
 
-    /// Values that scatter less than their errors have the interval of their weighted mean, with Student's quantile.
+    /// Values that scatter less than their errors have the interval of their weighted mean.
     #[test]
     fn records_that_agree_have_no_variance_between_them() {
         let between = BetweenRecords::of(&[(0, 1.00, 0.1), (1, 1.05, 0.1), (2, 0.95, 0.1)]).expect("three records");
         assert_eq!(between.standard_deviation, 0.0);
         assert!((between.mean - 1.0).abs() < 1e-12 && between.p_value > 0.5);
-        // 0.1/√3, and 4.302653 for two degrees of freedom, to the digits given.
-        assert!((between.interval_95[1] - 1.0 - 4.302_653 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-6);
+        assert!((between.interval_95[1] - 1.0 - Z_975 * 0.1 / 3.0_f64.sqrt()).abs() < 1e-9);
+    }
+
+    /// A good record keeps what it says beside one that hardly says anything and is 1.8 of its own standard errors off; one that is
+    /// six off shows that records differ, of which two say little.
+    #[test]
+    fn a_weak_record_does_not_make_a_good_one_worthless() {
+        let of = |value| BetweenRecords::of(&[(0, 1.0, 0.001), (1, value, 0.1)]).expect("two records");
+        let (near, far) = (of(1.18), of(1.6));
+        // Birge's ratio is 1.8, the standard error that of the good record.
+        let half = 0.5 * (near.interval_95[1] - near.interval_95[0]);
+        assert!((half / (Z_975 * 1.8 * 0.001) - 1.0).abs() < 1e-3, "{half}");
+        assert!(near.scatters() && !near.differs());
+        assert!(far.standard_deviation > 0.1 && far.interval_95[1] - far.interval_95[0] > 1.0);
     }
 
     /// A record that determines nothing changes nothing: its weight is one in 10⁸.

@@ -44,10 +44,10 @@ impl ChannelNoise {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
     }
 
-    /// Both times `factor`; none becomes less than its converter's own noise.
-    pub fn scale(&mut self, factor: f64) {
-        for (std_k, step_k) in self.std_k.iter_mut().zip(self.step_k) {
-            *std_k = (*std_k * factor).max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*std_k));
+    /// Takes other levels, K; none becomes less than its converter's own noise.
+    pub(crate) fn lower_to(&mut self, std_k: [f64; 2]) {
+        for ((level_k, lower_k), step_k) in self.std_k.iter_mut().zip(std_k).zip(self.step_k) {
+            *level_k = lower_k.max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*level_k));
         }
     }
 }

@@ -11,8 +11,10 @@ use crate::model::Model;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::range_end::{Judge, RangeEnd, range_ends};
+use crate::records::Member;
 use crate::selection::Selection;
 use crate::settings::Settings;
+use crate::spectrum::{Bands, levels_below};
 use crate::weighting::Weighting;
 
 /// Samples of a record that is looked at through excerpts first, and of each of these.
@@ -195,15 +197,37 @@ impl Prepared {
         settings.noise_std_k.is_none() && fitted.model.noise().is_none() && !is_coarse && is_clearly_less
     }
 
-    /// Lowers the levels to what `fitted` leaves over, which may show that a converter is coarse.
+    /// Lowers the levels to what `fitted` leaves over, of several records in each of those whose noise is its own; which may show
+    /// that a converter is coarse.
     pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
-        self.levels.scale(fitted.mean_energy().sqrt());
+        let own: Vec<[f64; 2]> = if self.observations.has_own_noise() {
+            let left = |member: Member| {
+                let (of_member, samples) = (self.observations.of_member(member.number), member.samples);
+                self.levels_left(fitted, &of_member, &self.searched.of_samples(samples))
+            };
+            self.observations.members().into_iter().map(left).collect()
+        } else {
+            Vec::new()
+        };
+        let of_all = self.levels_left(fitted, &self.observations, &self.searched);
+        self.levels.lower_to(of_all);
+        let over_all = |own: &[f64; 2]| [0, 1].map(|i| own[i] / self.levels.std_k[i]);
+        self.observations = self.observations.clone().with_noise_factors(&own.iter().map(over_all).collect::<Vec<_>>());
         self.levels.is_of_residual = true;
         self.context.noise_std_k = self.levels.std_k;
         self.context.is_coarse = self.levels.coarse_step_k().map(|step_k| step_k.is_some());
         if settings.effects.contains(&Identifier::QUANTISATION) {
             self.found.extend(coarse_steps(&self.levels));
         }
+    }
+
+    /// Noise levels, K, of what `fitted` leaves over in `observations`, these or one of these records.
+    fn levels_left(&self, fitted: &Fitted, observations: &Observations, selection: &Selection) -> [f64; 2] {
+        let left = fitted.model.residual_runs(&fitted.theta, observations, |sample| selection.holds(sample));
+        let mut plant = fitted.model.plant(&fitted.theta, observations);
+        let factor = observations.noise_factor();
+        (0..2).for_each(|i| plant.noise_std_k[i] *= factor[i]);
+        levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse)
     }
 
     /// All of the record and its noise levels as they were before either was weighed by what a fit leaves over.

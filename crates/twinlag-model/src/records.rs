@@ -120,6 +120,11 @@ impl Observations {
         if self.is_joined() { [1.0; 2] } else { self.stretches[0].noise_factor }
     }
 
+    /// Whether records differ in their noise.
+    pub(crate) fn has_own_noise(&self) -> bool {
+        self.is_joined() && self.stretches.iter().any(|stretch| stretch.noise_factor != [1.0; 2])
+    }
+
     /// These with the noise of each record's channels over that of all, in the order of [`Self::members`].
     #[must_use]
     pub(crate) fn with_noise_factors(mut self, factors: &[[f64; 2]]) -> Self {

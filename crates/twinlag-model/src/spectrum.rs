@@ -197,6 +197,8 @@ const MAX_LEVEL_FACTOR: f64 = 5.0;
 /// of the gas as well; above, where nothing but scatter is.
 const LEVELS_LOOSE: f64 = 0.3;
 const LEVELS_TIGHT: f64 = 0.03;
+/// The same below, where what is left over shows that third differences are mostly those of the gas: a factor of e.
+const LEVELS_OF_GAS: f64 = 1.0;
 /// Step of derivatives in the logarithm of a parameter: about the cube root of rounding.
 const LOG_STEP: f64 = 1e-5;
 
@@ -209,6 +211,8 @@ struct NoiseCost<'a> {
     half: Half,
     /// Channels whose converter is coarse: third differences may say anything.
     is_coarse: [bool; 2],
+    /// Standard deviation of the logarithm of a level below that of third differences.
+    below: f64,
 }
 
 impl NoiseCost<'_> {
@@ -231,7 +235,7 @@ impl Cost for NoiseCost<'_> {
     fn value(&self, x: &[f64]) -> f64 {
         let prior = |(factor, is_coarse): (&f64, &bool)| {
             let above = if *is_coarse { LEVELS_LOOSE } else { LEVELS_TIGHT };
-            let scatter = if *factor > 1.0 { above } else { LEVELS_LOOSE };
+            let scatter = if *factor > 1.0 { above } else { self.below };
             (factor.ln() / scatter).powi(2)
         };
         self.likelihood(x, self.half) + x[..2].iter().zip(&self.is_coarse).map(prior).sum::<f64>()
@@ -249,6 +253,7 @@ struct NoiseSearch<'a> {
     /// Factors of both levels, and the extra noise, that solvers start from.
     starts: Vec<Vec<f64>>,
     is_coarse: [bool; 2],
+    below: f64,
 }
 
 impl<'a> NoiseSearch<'a> {
@@ -256,7 +261,8 @@ impl<'a> NoiseSearch<'a> {
         let paths = Paths::of(plant, observations);
         let power = |b: &Band| paths.total(paths.base, &paths.extra, b.omega).max(f64::MIN_POSITIVE);
         let base = bands.0.iter().map(power).collect();
-        Self { observations, bands, paths, base, place: None, starts: vec![vec![1.0; 2]], is_coarse }
+        let starts = vec![vec![1.0; 2]];
+        Self { observations, bands, paths, base, place: None, starts, is_coarse, below: LEVELS_LOOSE }
     }
 
     /// A search for the extra noise of `plant` at `place`, and this noise as it is; `None` of a plant without it.
@@ -274,8 +280,8 @@ impl<'a> NoiseSearch<'a> {
     }
 
     fn cost(&self, half: Half) -> NoiseCost<'_> {
-        let Self { bands, paths, base, place, is_coarse, .. } = self;
-        NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse }
+        let Self { bands, paths, base, place, is_coarse, below, .. } = self;
+        NoiseCost { bands, paths, base, place: *place, half, is_coarse: *is_coarse, below: *below }
     }
 
     /// Levels of the channels, K.
@@ -310,6 +316,21 @@ impl<'a> NoiseSearch<'a> {
         });
         fits.min_by(|a, b| a.value.total_cmp(&b.value)).expect("at least one start").x
     }
+}
+
+/// Levels of white noise, K, where what is left over is clearly less than third differences say: most of these is the gas.
+///
+/// Each channel's noise has a spectrum of its own in the disagreement: that of T1 is filtered by the model of T2, and that of T2 by
+/// the model of T1. So the spectrum of the residual determines both levels, while third differences hold more of the gas in the
+/// reading of the faster sensor than in the other.
+pub(crate) fn levels_below(
+    plant: &Plant,
+    observations: &Observations,
+    bands: &Bands,
+    is_coarse: [bool; 2],
+) -> [f64; 2] {
+    let search = NoiseSearch { below: LEVELS_OF_GAS, ..NoiseSearch::of(plant, observations, bands, is_coarse) };
+    search.noise_std_k(&search.solve(Half::Both))
 }
 
 /// `−2 ln L` of white noise with the best levels for the residual of `plant`.

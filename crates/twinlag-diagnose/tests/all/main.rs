@@ -7,5 +7,6 @@ mod covered;
 mod first_state;
 mod flow;
 mod motion;
+mod noise;
 mod records;
 mod reduced;

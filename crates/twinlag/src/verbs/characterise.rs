@@ -192,15 +192,6 @@ const STEPS: &str = "steps of the characterisation";
 /// the interval covers both.
 const CLEAR_PROBABILITY: f64 = 0.9933;
 
-/// What the gas may do between samples instead of what it is taken to do.
-#[derive(Clone, Copy, Debug)]
-struct OtherHold {
-    /// How much each time constant would move, relative.
-    moved: [f64; 2],
-    /// How probable it is.
-    probability: f64,
-}
-
 /// Puts the question to the estimators, in steps of which each needs the one before.
 fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Characterisation, Error> {
     let mut warnings = asked.needless();
@@ -212,7 +203,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     warnings.extend(outweighed(&fit));
     // What the gas does between samples must be settled before the residual is judged: a wrong hold
     // leaves more than noise.
-    let other_hold = asked.settle_hold(&mut fit)?;
+    let moved_by_hold = asked.settle_hold(&mut fit)?;
     // Levels that took the signal for noise are no measure for the residual, and must go before it
     // is held against them.
     if fit.lower_levels_to_residual() {
@@ -236,7 +227,7 @@ fn answer<'a, const P: usize>(asked: &Asked<'_>, task: &Task<'a>) -> Result<Char
     if asked.options.estimator == Estimator::Whitened {
         let solved = fit.solved(covariance);
         let judged = Judged { tests, is_rejected, is_determined: true, whitened_is_accepted: false };
-        return conclude::conclude(asked, &fit, solved, judged, other_hold, warnings);
+        return conclude::conclude(asked, &fit, solved, judged, moved_by_hold, warnings);
     }
     // What the whitened estimate cannot determine, the others only seem to determine.
     let is_determined = fit.fit().end.is_usable() && fit.vague(&theta, covariance.as_ref()).is_empty();
@@ -303,9 +294,9 @@ impl Asked<'_> {
         Ok(fit.residual_tests(theta, is_minimum)?)
     }
 
-    /// Compares with the other hold; where the hold is to be found, and the other one is clearly the more probable, `fit`
-    /// is the estimate with that.
-    fn settle_hold<const P: usize>(&self, fit: &mut WhitenedFit<'_, P>) -> Result<Option<OtherHold>, Error> {
+    /// How much each time constant would move with the other hold, relative; where the hold is to be found, and the other one is
+    /// clearly the more probable, `fit` is the estimate with that.
+    fn settle_hold<const P: usize>(&self, fit: &mut WhitenedFit<'_, P>) -> Result<Option<[f64; 2]>, Error> {
         if self.options.estimator != Estimator::Whitened || fit.readings().even_period_s().is_none() {
             return Ok(None);
         }
@@ -313,18 +304,18 @@ impl Asked<'_> {
         let other = fit.with_hold(hold)?;
         let is_usable = other.fit().end.is_usable();
         let both_usable = is_usable && fit.fit().end.is_usable();
-        let moved = [0, 1].map(|i| other.theta()[i] / fit.theta()[i] - 1.0);
-        let mut probability = other.probability_beside(fit);
+        let mut moved = [0, 1].map(|i| other.theta()[i] / fit.theta()[i] - 1.0);
+        let is_more_probable = other.probability_beside(fit) > CLEAR_PROBABILITY;
         let alone_is_accepted = || -> Result<bool, Error> {
             let rejected =
                 |fit: &WhitenedFit<'_, P>| Ok::<_, Error>(fit.is_rejected_by(&self.tests(fit, &fit.theta())?));
             Ok(rejected(fit)? && !rejected(&other)?)
         };
-        if self.options.hold == Hold::Auto && is_usable && (probability > CLEAR_PROBABILITY || alone_is_accepted()?) {
+        if self.options.hold == Hold::Auto && is_usable && (is_more_probable || alone_is_accepted()?) {
             *fit = WhitenedFit::find(&Task { hold, ..fit.task().clone() })?;
-            probability = 1.0 - probability;
+            moved = moved.map(|moved| (1.0 + moved).recip() - 1.0);
         }
-        Ok(both_usable.then_some(OtherHold { moved, probability }))
+        Ok(both_usable.then_some(moved))
     }
 
     /// Where the estimator that was asked for ends, beside the whitened `fit`.

@@ -6,7 +6,7 @@ use twinlag_diagnose::Reason;
 use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
 use twinlag_optimise::{End, Fit};
 
-use super::{Asked, OtherHold, bootstrap};
+use super::{Asked, bootstrap};
 use crate::answers::{Characterisation, IntervalMethod, Status};
 use crate::error::Error;
 
@@ -33,7 +33,7 @@ pub(super) struct Conclusion<'q, 'a, const P: usize> {
     pub(super) best: Fit,
     pub(super) levels: NoiseLevels,
     pub(super) judged: Judged,
-    pub(super) other_hold: Option<OtherHold>,
+    pub(super) moved_by_hold: Option<[f64; 2]>,
     pub(super) warnings: Vec<String>,
     /// What speaks against what was given.
     pub(super) contradictions: Vec<Reason>,
@@ -45,7 +45,7 @@ pub(super) fn conclude<const P: usize>(
     fit: &WhitenedFit<'_, P>,
     solved: Solved<P>,
     judged: Judged,
-    other_hold: Option<OtherHold>,
+    moved_by_hold: Option<[f64; 2]>,
     warnings: Vec<String>,
 ) -> Result<Characterisation, Error> {
     let best = solved.fit.clone().unwrap_or_else(|| Fit {
@@ -62,7 +62,8 @@ pub(super) fn conclude<const P: usize>(
         (Some(_), Some(std_k)) => fit.levels().profiled(std_k),
         _ => *fit.levels(),
     };
-    Conclusion { asked, fit, solved, best, levels, judged, other_hold, warnings, contradictions: Vec::new() }.answer()
+    Conclusion { asked, fit, solved, best, levels, judged, moved_by_hold, warnings, contradictions: Vec::new() }
+        .answer()
 }
 
 impl<const P: usize> Conclusion<'_, '_, P> {

@@ -5,7 +5,6 @@ use twinlag_diagnose::Judgement;
 use twinlag_estimate::{Estimator, IntervalBasis, Intervals, Known, NoiseColour, REJECTION_P_VALUE, TauIntervals};
 use twinlag_sensor::Discretisation;
 
-use super::OtherHold;
 use super::conclude::Conclusion;
 use crate::answers::{
     Characterisation, Difference, Estimated, FreeParameters, IntervalMethod, MadeBy, RecordSummary, Residual,
@@ -16,9 +15,9 @@ use crate::setting::Setting;
 /// Share of a standard error that the choice of hold may cost without a word: half of one widens
 /// the interval by an eighth.
 const NOTICEABLE_STANDARD_ERRORS: f64 = 0.5;
-/// Share of the difference between both holds that counts as a standard error at least: they bracket what a gas does between
-/// samples.
-const LEAST_HOLD_SHARE: f64 = 0.5;
+/// Standard error of an estimate with one hold, over how far the other one moves it. A gas does something between the two: evenly
+/// spread from one to the other, the mean square of the distance from one is a third of the square of its longest.
+const HOLD_STANDARD_ERRORS: f64 = 0.577_350_269_189_625_8;
 /// Standard deviations from a known value beyond which the record contradicts it: by chance once in
 /// 370.
 pub(super) const CONTRADICTING_STANDARD_DEVIATIONS: f64 = 3.0;
@@ -35,7 +34,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
             estimator: self.asked.options.estimator.name().into(),
             optimiser: self.best.optimiser.clone(),
             hold: hold_name(self.fit.whitened().hold()).into(),
-            hold_sensitivity: self.other_hold.map(|other| other.moved),
+            hold_sensitivity: self.moved_by_hold,
             sensors: [self.unknown_sensor(0), self.unknown_sensor(1)],
             time_constant_difference_s: Difference::default(),
             free: FreeParameters::default(),
@@ -90,11 +89,7 @@ impl<const P: usize> Conclusion<'_, '_, P> {
     /// Estimates and intervals of both time constants and of their difference.
     pub(super) fn fill(&mut self, out: &mut Characterisation, covariance: &[[f64; P]; P], intervals: &TauIntervals) {
         let theta = self.solved.theta;
-        // The mean square error that the hold makes is that of the other one times its probability. The gas may do
-        // neither, so half the difference counts at least.
-        let from_hold: [f64; 2] = self.other_hold.map_or([0.0; 2], |OtherHold { moved, probability }| {
-            [0, 1].map(|i| probability.sqrt().max(LEAST_HOLD_SHARE) * moved[i] * theta[i])
-        });
+        let moved: [f64; 2] = self.moved_by_hold.map_or([0.0; 2], |moved| [0, 1].map(|i| moved[i] * theta[i]));
         for i in 0..2 {
             let sensor = &mut out.sensors[i];
             sensor.time_constant_s = Some(theta[i]);
@@ -102,29 +97,30 @@ impl<const P: usize> Conclusion<'_, '_, P> {
                 continue;
             }
             let noise = covariance[i][i].sqrt();
-            sensor.standard_error_s = Some(noise.hypot(from_hold[i]));
-            // Both ends, in logarithms, as so many standard errors of noise: the hold's joins each.
-            let widened = intervals.interval_95_s[i].map(|end| {
-                let log = (end / theta[i]).ln();
-                theta[i] * log.hypot(Z_975 * from_hold[i] / theta[i]).copysign(log).exp()
-            });
-            sensor.interval_95_s = Some(widened);
+            sensor.standard_error_s = Some(noise.hypot(HOLD_STANDARD_ERRORS * moved[i]));
+            // Its interval with the other hold is as long, and lies around the other value.
+            let relative = 1.0 + moved[i] / theta[i];
+            let [low, high] = intervals.interval_95_s[i];
+            sensor.interval_95_s = Some([low * relative.min(1.0), high * relative.max(1.0)]);
             sensor.interval_basis = Some(intervals.basis[i]);
-            if from_hold[i].abs() > NOTICEABLE_STANDARD_ERRORS * noise {
+            if moved[i].abs() > NOTICEABLE_STANDARD_ERRORS * noise {
                 self.warnings.push(format!(
                     "{}: the assumption about the gas between samples changes the time constant by \
                      {:.2} %, which is part of the interval; sample faster",
                     sensor.channel,
-                    100.0 * self.other_hold.map_or(0.0, |other| other.moved[i]).abs()
+                    100.0 * self.moved_by_hold.map_or(0.0, |moved| moved[i]).abs()
                 ));
             }
         }
         let difference = theta[1] - theta[0];
         let variance = covariance[0][0] + covariance[1][1] - 2.0 * covariance[0][1];
-        let width = Z_975 * (variance + (from_hold[1] - from_hold[0]).powi(2)).sqrt();
+        let (width, difference_moved) = (Z_975 * variance.sqrt(), moved[1] - moved[0]);
         out.time_constant_difference_s = Difference {
             value: Some(difference),
-            interval_95_s: Some([difference - width, difference + width]),
+            interval_95_s: Some([
+                difference - width + difference_moved.min(0.0),
+                difference + width + difference_moved.max(0.0),
+            ]),
             includes_delay: false,
             judgement: Judgement::default(),
         };
