@@ -1,0 +1,43 @@
+//! Levels of noise where the gas reaches so far up the band that third differences are mostly those of the gas.
+
+use twinlag_diagnose::{Observations, Verdict};
+use twinlag_signal::{Noise, Signal};
+
+use crate::common::{even, found, joint, ramps, readings, told, turbulence};
+
+/// White noise of each channel, K.
+const QUIET_K: f64 = 0.02;
+/// Three standard errors of the logarithms of the levels. The noise of T1 is as large as that of T2 in the disagreement below 13 Hz of the
+/// 500 that are sampled, where some 80 degrees of freedom determine it to `√(2/80)`; above, that of T2 is the larger one by far, and 2000
+/// degrees determine it to `½ √(2/2000)`. Third differences see the gas in the reading of T1: 2.4 times its noise.
+const LOG_TOLERANCES: [f64; 2] = [0.47, 0.05];
+
+fn quiet(signal: Signal) -> Observations {
+    let simulated = readings(31, signal, |sensors| {
+        sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(QUIET_K)));
+    });
+    even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+}
+
+fn assert_right(noise_std_k: [f64; 2]) {
+    for (level_k, tolerance) in noise_std_k.iter().zip(LOG_TOLERANCES) {
+        assert!((level_k / QUIET_K).ln().abs() < tolerance, "{noise_std_k:?}");
+    }
+}
+
+/// Failed: levels kept the ratio of third differences, 2.4 to 1, so that T2 had 0.7 of its noise.
+#[test]
+fn both_levels_are_those_of_the_residual() {
+    let d = found(&quiet(turbulence()));
+    assert_eq!(d.verdict, Verdict::Adequate, "{}", told(&d));
+    assert!(d.last.is_noise_of_residual);
+    assert_right(d.last.noise_std_k);
+}
+
+/// Of a record in slow gas third differences say the same as the residual. Failed: the two records differed 2.4 times in the noise of T1.
+#[test]
+fn each_record_has_the_levels_of_its_own_residual() {
+    let d = joint(&[quiet(turbulence()), quiet(ramps(3))]);
+    assert_eq!(d.diagnosis.verdict, Verdict::Adequate, "{}", told(&d.diagnosis));
+    d.records.iter().for_each(|record| assert_right(record.noise_std_k));
+}
