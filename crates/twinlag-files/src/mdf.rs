@@ -3,6 +3,7 @@
 //! Values are physical: the file's own conversion is applied. A sample whose invalidation bit is
 //! set is missing. Times count from the start of the measurement in the header, in all groups.
 
+use falcon_mdf::blocks::DataType;
 use falcon_mdf::model::{Channel as MdfChannel, ChannelGroup, SignalValues};
 use falcon_mdf::{Mf4Error, Mf4File};
 
@@ -141,6 +142,9 @@ fn obstacle(channel: &MdfChannel, is_bus_event: bool) -> Option<String> {
     }
     if let Some(reason) = channel.unreadable() {
         return Some(reason.to_string());
+    }
+    if matches!(channel.data_type, DataType::FloatLe | DataType::FloatBe) && !matches!(channel.bit_count, 32 | 64) {
+        return Some(format!("its samples are floating-point numbers of {} bits", channel.bit_count));
     }
     if channel.array_shape.is_some() {
         return Some("each of its samples is an array".to_owned());

@@ -63,7 +63,7 @@ pub(crate) enum Values {
 }
 
 impl Values {
-    /// The numbers; of what is none, as many missing ones.
+    /// The numbers; as many missing ones for instants and texts.
     pub(crate) fn into_numbers(self) -> Vec<f64> {
         match self {
             Self::Numbers(values) => values,

@@ -198,6 +198,12 @@ def mdf():
     file.save(HERE / "groups.mf4", overwrite=True, compression=2)
     expect("groups.mf4", read(HERE / "groups.mf4", [("T1", "K"), ("T2", "K")]))
 
+    # Numbers of two bytes, which the reader's library takes for zero.
+    file = MDF(version="4.10")
+    start(file)
+    file.append([signal("T1", "°C", warm(11).astype(np.float16), time), signal("T2", "°C", warm(12), time)], acq_name="gas")
+    file.save(HERE / "half.mf4", overwrite=True)
+
     # Each temperature in a group of its own: only joined are they a record. All times are sums of powers of two, so
     # that the interpolation is exact.
     time, its_time = np.arange(ROWS) / 128, 1 / 256 + np.arange(18) / 64

@@ -197,7 +197,8 @@ const MAX_LEVEL_FACTOR: f64 = 5.0;
 /// of the gas as well; above, where nothing but scatter is.
 const LEVELS_LOOSE: f64 = 0.3;
 const LEVELS_TIGHT: f64 = 0.03;
-/// The same below, where what is left over shows that third differences are mostly those of the gas: a factor of e.
+/// Standard deviation of the logarithm of levels below those from third differences, where what is left over shows that these are mostly
+/// of the gas: a factor of e.
 const LEVELS_OF_GAS: f64 = 1.0;
 /// Step of derivatives in the logarithm of a parameter: about the cube root of rounding.
 const LOG_STEP: f64 = 1e-5;

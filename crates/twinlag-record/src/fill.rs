@@ -29,6 +29,8 @@ pub(crate) struct Filling<'a> {
     repeated: LeftOut,
     /// Lines of a serial log that are no rows.
     messages: LeftOut,
+    /// Lines of a serial log that lack a part.
+    cut: LeftOut,
     /// The numbers of a row.
     row: Vec<f64>,
 }
@@ -66,6 +68,7 @@ impl<'a> Filling<'a> {
             held: None,
             repeated: LeftOut::default(),
             messages: LeftOut::default(),
+            cut: LeftOut::default(),
             row: vec![0.0; layout.width],
         }
     }
@@ -122,6 +125,10 @@ impl<'a> Filling<'a> {
         if lines > 0 {
             self.notes.push(Note::Messages { lines, first_line });
         }
+        let LeftOut { lines, first_line } = self.cut;
+        if lines > 0 {
+            self.notes.push(Note::CutRows { lines, first_line });
+        }
         Ok(())
     }
 
@@ -158,7 +165,11 @@ impl<'a> Filling<'a> {
         if form.program == Some(Program::LabView) && lab_view::begins_another(content) {
             return Err(RecordError::SecondMeasurement { file: file(), line });
         }
-        if found != width && !trailing {
+        if found < width && form.program == Some(Program::Serial) && form.is_stamped() {
+            // What is left of a number may be taken for one: nothing but the time of arrival is.
+            cells = std::iter::repeat_n(Cow::Borrowed(""), width - 1).chain(cells.pop()).collect();
+            self.cut.add(line);
+        } else if found != width && !trailing {
             let whole = |cell: &Cow<'_, str>| cell.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
             let commas = self.layout.delimiter == Delimiter::Comma && found > width && cells.iter().all(whole);
             return Err(if commas {

@@ -71,6 +71,11 @@ impl FixedWidth {
 }
 
 impl Form {
+    /// Whether each line has a time of arrival, which stands behind its cells.
+    pub(crate) fn is_stamped(&self) -> bool {
+        self.wrapping.as_ref().is_some_and(Wrapping::is_stamped)
+    }
+
     /// A line of cells that are parted, without what stands around them.
     pub(crate) fn unwrap<'a>(&self, line: &'a str) -> Cow<'a, str> {
         match (&self.wrapping, &self.fixed) {

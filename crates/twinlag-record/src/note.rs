@@ -152,6 +152,13 @@ pub enum Note {
         /// The first of them.
         first_line: usize,
     },
+    /// Lines of a serial log with fewer cells than a row: nothing of them is taken but the time of arrival.
+    CutRows {
+        /// How many lines lack a part.
+        lines: usize,
+        /// The first of them.
+        first_line: usize,
+    },
     /// Rows with a missing temperature: NaN in the record, in no segment.
     Masked {
         /// Rows with either missing.
@@ -277,6 +284,15 @@ impl fmt::Display for Note {
             }
             Self::Messages { lines, first_line } => {
                 write!(f, "{lines} lines without a row of numbers left out, the first is line {first_line}")
+            }
+            Self::CutRows { lines: 1, first_line } => {
+                write!(f, "1 line lacks a part, line {first_line}: its readings were taken as missing")
+            }
+            Self::CutRows { lines, first_line } => {
+                write!(
+                    f,
+                    "{lines} lines lack a part, the first is line {first_line}: their readings were taken as missing"
+                )
             }
             Self::Masked { rows, t1, t2 } => {
                 let rows = Counted(*rows, "row");

@@ -60,6 +60,10 @@ impl Wrapping {
         Some(Self { is_stamped, labels, units, delimiter: Delimiter::Semicolon, cells: 0 })
     }
 
+    pub(crate) fn is_stamped(&self) -> bool {
+        self.is_stamped
+    }
+
     /// The names and units of the columns, where each line has them.
     pub(crate) fn columns(&self) -> Option<(Vec<String>, Vec<Unit>)> {
         let stamp = self.is_stamped.then(|| (STAMP_NAME.to_owned(), Unit::Unstated));

@@ -50,6 +50,23 @@ fn succeeds(answer: &Answer) {
     assert_eq!(answer.code, 0, "{answer:#?}");
 }
 
+/// Failed: whether a batch had written it was asked before whether it is a file, and whoever opens a pipe waits for its writer.
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_a_folder_is_a_row() {
+    let bench = Bench::new("pipe");
+    std::fs::create_dir_all(bench.path("runs")).expect("the target directory can be written");
+    bench.write("runs/a.csv", Trace::GOOD.csv());
+    let pipe = bench.path("runs/pipe");
+    let _ = std::fs::remove_file(&pipe);
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status().expect("a program of every Unix");
+    assert!(made.success());
+    succeeds(&bench.run(&["batch", "runs", "--out", "table.csv", "--quiet", "--force"]));
+    let rows = rows(&bench, "table.csv");
+    assert_eq!(rows["runs/a.csv"]["exit_code"], "0");
+    assert!(rows["runs/pipe"]["reason"].contains("expected a file, found a pipe"), "{rows:#?}");
+}
+
 #[test]
 fn each_record_is_a_row_with_the_numbers_of_the_verb() {
     let bench = fleet("each");

@@ -82,3 +82,12 @@ fn damaged_files_are_survived() {
         assert_flips_are_survived(name, &Choice::default());
     }
 }
+
+/// Failed: all of its readings were 0 °C.
+#[test]
+fn numbers_of_two_bytes_are_left_out_by_name() {
+    let table = read(path("half.mf4"), &Choice::default()).expect("the other channel can be read");
+    assert!(table.columns().iter().all(|column| column.name() != "T1"), "{:?}", table.columns().len());
+    let said = "channel 'T1' was left out: its samples are floating-point numbers of 16 bits";
+    assert!(notes(&table).contains(said), "{}", notes(&table));
+}

@@ -219,6 +219,26 @@ fn messages_of_a_serial_log_are_no_rows() {
     assert!(is_said(&noisy) && !is_said(&plain), "{:?}", noisy.notes);
 }
 
+/// Bytes were lost on the line, and the log begins in the middle of one. Failed: the file was refused, as one with a decimal comma.
+#[test]
+fn what_is_left_of_a_line_of_a_serial_log_is_no_reading() {
+    let rows = body(|t, a, b| format!("12:00:{t:06.3} -> {a:.2},{b:.2}"));
+    let whole = record(&rows);
+    let lines: Vec<&str> = rows.lines().collect();
+    let cut = |index: usize| {
+        let kept = &lines[index][..lines[index].find("-> ").expect("an arrow") + 5];
+        let changed = lines.iter().enumerate().map(|(at, line)| if at == index { kept } else { line });
+        changed.collect::<Vec<_>>().join("\n") + "\n"
+    };
+    for index in [0, 7] {
+        let got = record(&cut(index));
+        assert_eq!(got.time_s.len(), whole.time_s.len());
+        assert!(got.t1_c[index].is_nan() && got.t2_c[index].is_nan(), "row {index}");
+        assert_eq!(got.t1_c[index + 1], whole.t1_c[index + 1]);
+        assert!(got.notes.contains(&Note::CutRows { lines: 1, first_line: index + 1 }), "{:?}", got.notes);
+    }
+}
+
 #[test]
 fn a_plotter_log_has_its_names_in_each_line() {
     let half = Selection { period_s: Some(0.5), ..Selection::default() };
