@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::common::record;
 use twinlag::estimate::{Bootstrap, IntervalBasis};
 use twinlag::record::Record;
-use twinlag::{IntervalMethod, Intervals, Options, Status, characterise, characterise_watched};
+use twinlag::{Hold, IntervalMethod, Intervals, Options, Status, characterise, characterise_watched};
 
 const TRUTH_S: [f64; 2] = [0.0238, 0.1168];
 
@@ -44,6 +44,36 @@ fn profile_and_bootstrap_agree_with_standard_errors_where_these_hold() {
             }
         }
     }
+}
+
+/// Whatever the gas does between samples, and whichever hold is asked for or found: one of these gases is taken to go in straight lines.
+/// Failed: of 40 records in a gas as fast as the first the interval around one hold missed the truth, near the other, in 12.
+#[test]
+fn an_interval_reaches_from_one_hold_to_the_other() {
+    let mut found = Vec::new();
+    for gas in [
+        "kind = \"broadband\"\nstd_k = 15.0\ncorner_hz = 15.0",
+        "kind = \"turbulence\"\nstd_k = 15.0\ncorner_hz = 3.0\ncutoff_hz = 60.0",
+    ] {
+        let sensors = [0.007, 0.018].map(|t| format!("time_constant_s = {t}\nnoise = {{ std_k = 0.1 }}"));
+        let record = record(5, 3000, 0.002, gas, [&sensors[0], &sensors[1]]);
+        let ask = |hold| {
+            characterise(&record, &Options { hold, best_effort: true, ..Options::default() }).expect("a sound question")
+        };
+        let answers = [Hold::Auto, Hold::ZeroOrderHold, Hold::FirstOrderHold].map(ask);
+        found.push(answers[0].hold.clone());
+        for (one, other) in answers.iter().flat_map(|one| answers[1..].iter().map(move |other| (one, other))) {
+            for (one, other) in one.sensors.iter().zip(&other.sensors) {
+                let [low, high] = one.interval_95_s.expect("an answer");
+                let value = other.time_constant_s.expect("an answer");
+                assert!(low <= value && value <= high, "{gas}: {value} s and [{low}, {high}]");
+            }
+            let [low, high] = one.time_constant_difference_s.interval_95_s.expect("an answer");
+            let value = other.time_constant_difference_s.value.expect("an answer");
+            assert!(low <= value && value <= high, "{gas}: difference {value} s and [{low}, {high}]");
+        }
+    }
+    assert!(found.contains(&"first-order-hold".to_owned()), "{found:?}");
 }
 
 #[test]
