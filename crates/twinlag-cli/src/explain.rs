@@ -1,4 +1,6 @@
-//! `twinlag explain NAME`: an effect, a status, a verdict, a grade or a test in plain words.
+//! `twinlag explain NAME`: an effect, one of its numbers, a status, a verdict, a grade or a test in plain words.
+
+mod numbers;
 
 use serde::Serialize;
 use twinlag::cross_relation::TestName;
@@ -151,7 +153,10 @@ const FIELDS: [(&str, &str); 5] = [
 ];
 
 /// Kinds of names, in the order in which they are listed.
-const KINDS: [&str; 7] = ["effect", "verdict", "status", "grade", "test", "answer", "limit"];
+const KINDS: [&str; 8] = ["effect", "number", "verdict", "status", "grade", "test", "answer", "limit"];
+/// Edits, at most, that make another name of one that is misspelt: letters that are missing, needless, another, or in each other's
+/// place. Chosen.
+const MAX_EDITS: usize = 2;
 
 /// A name with what it means.
 #[derive(Serialize)]
@@ -176,7 +181,8 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     let found: Vec<&Explanation> = all.iter().filter(|e| name.as_ref().is_none_or(|name| e.name == *name)).collect();
     match &command.name {
         Some(name) if found.is_empty() => {
-            return Err(Failure::Usage(format!("nothing is called '{name}'; there are{list}")));
+            let nearest = nearest(name, &all).map(|other| format!(": is it '{other}'?")).unwrap_or_default();
+            return Err(Failure::Usage(format!("nothing is called '{name}'{nearest}; there are{list}")));
         }
         None if !console.json => {
             print::on_stdout(&format!("twinlag explain NAME, with one of{list}\n"))?;
@@ -194,6 +200,12 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
+/// The name that is a few edits from what was asked for, and closest to it.
+fn nearest(asked: &str, all: &[Explanation]) -> Option<&'static str> {
+    let edits = all.iter().map(|e| (strsim::osa_distance(&asked.to_lowercase().replace('_', "-"), e.name), e.name));
+    edits.filter(|(edits, name)| *edits <= MAX_EDITS && *edits < name.len() / 2).min().map(|(_, name)| name)
+}
+
 fn explanations() -> Vec<Explanation> {
     let effects = Identifier::ALL.into_iter().map(of_effect);
     let worded = |kind: &'static str| {
@@ -206,6 +218,7 @@ fn explanations() -> Vec<Explanation> {
     let two_sensors =
         Explanation { name: TWO_SENSORS, kind: "limit", text: [first.to_owned()].into_iter().chain(never).collect() };
     effects
+        .chain(numbers::explanations())
         .chain(VERDICTS.map(worded("verdict")))
         .chain(STATUSES.map(worded("status")))
         .chain(GRADES.map(worded("grade")))

@@ -11,6 +11,10 @@ use crate::print;
 use crate::profile::Profile;
 use crate::read::read_watched;
 
+/// Rows that differ from the one before, at least, where records that share so many in a row share them not by chance: each of two
+/// readings in coarse steps, up, down or none, agrees with a chance of a third, and 16 of them with one of 2e-8. Chosen.
+const MIN_SHARED_CHANGES: usize = 16;
+
 /// The files of a command, the first of which is in its input; refused where one is named twice.
 pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a Path>, Failure> {
     let files: Vec<&Path> = std::iter::once(&input.file).chain(more).map(PathBuf::as_path).collect();
@@ -29,7 +33,7 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
     }
 }
 
-/// Reads all of them, and says how each was read; refused where one is a copy of another.
+/// Reads all of them, and says how each was read; refused where one has readings of another.
 pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<Vec<Record>, Failure> {
     let profile = input.columns.profile()?;
     let mut records = Vec::new();
@@ -42,8 +46,8 @@ pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<V
     of_one_rig(records, &profile, console)
 }
 
-/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one is a copy of
-/// another.
+/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one has
+/// readings of another.
 pub(crate) fn of_one_rig(
     mut records: Vec<Record>,
     profile: &Profile,
@@ -68,22 +72,43 @@ fn named_as(record: &mut Record, first: &Record, console: Console) {
     record.channels.clone_from(&first.channels);
 }
 
-/// Refuses a record that is a copy of another: left out, it would be there all the same.
+/// Refuses a record that has readings of another: left out, they would be there all the same.
 fn no_copies(records: &[Record]) -> Result<(), Failure> {
-    // Missing readings are NaN, which equal nothing.
-    let are_same = |one: &[f64], other: &[f64]| {
-        one.len() == other.len() && one.iter().zip(other).all(|(a, b)| a.to_bits() == b.to_bits())
-    };
     for (place, record) in records.iter().enumerate() {
-        let is_copy = |other: &&Record| are_same(&other.t1_c, &record.t1_c) && are_same(&other.t2_c, &record.t2_c);
-        if let Some(other) = records[..place].iter().find(is_copy) {
-            return Err(Failure::Usage(format!(
-                "{} has the readings of {}: a record that is counted twice is not left out when it is left out once",
-                record.source, other.source
-            )));
+        for other in &records[..place] {
+            let rows = shared_rows(record, other).max(shared_rows(other, record));
+            if rows > 0 {
+                let part = if rows == record.len() {
+                    String::new()
+                } else {
+                    format!(" in {rows} of its {} rows", record.len())
+                };
+                return Err(Failure::Usage(format!(
+                    "{} has the readings of {}{part}: what is counted twice is not left out when it is left out once",
+                    record.source, other.source
+                )));
+            }
         }
     }
     Ok(())
+}
+
+/// Rows with which `later` begins and which `earlier` has as well, up to the end of either; none where they are so few, or change so
+/// seldom, that two records may have them by chance.
+fn shared_rows(earlier: &Record, later: &Record) -> usize {
+    // Missing readings are NaN, which equal nothing.
+    let row = |record: &Record, k: usize| [record.t1_c[k].to_bits(), record.t2_c[k].to_bits()];
+    let changes = |rows: std::ops::Range<usize>| rows.skip(1).filter(|k| row(later, *k) != row(later, k - 1)).count();
+    // Where readings rest at first, every row of rest would be a place to begin.
+    let Some(changed) = (1..later.len()).find(|k| row(later, *k) != row(later, k - 1)) else { return 0 };
+    let is_from = |first: usize| {
+        let rows = later.len().min(earlier.len() - first);
+        rows > changed
+            && [changed, changed - 1].iter().all(|k| row(earlier, first + k) == row(later, *k))
+            && (0..rows).all(|k| row(earlier, first + k) == row(later, k))
+            && (rows == later.len() && rows == earlier.len() || changes(0..rows) >= MIN_SHARED_CHANGES)
+    };
+    (0..earlier.len()).find(|first| is_from(*first)).map_or(0, |first| later.len().min(earlier.len() - first))
 }
 
 /// Their names, for a message about all of them.

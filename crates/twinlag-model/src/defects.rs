@@ -45,9 +45,9 @@ impl ChannelNoise {
     }
 
     /// Takes other levels, K; none becomes less than its converter's own noise.
-    pub(crate) fn lower_to(&mut self, std_k: [f64; 2]) {
-        for ((level_k, lower_k), step_k) in self.std_k.iter_mut().zip(std_k).zip(self.step_k) {
-            *level_k = lower_k.max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*level_k));
+    pub(crate) fn take(&mut self, std_k: [f64; 2]) {
+        for ((level_k, other_k), step_k) in self.std_k.iter_mut().zip(std_k).zip(self.step_k) {
+            *level_k = other_k.max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*level_k));
         }
     }
 }

@@ -314,7 +314,34 @@ fn an_output_that_exists_is_overwritten_by_force() {
 fn a_copy_of_a_record_is_refused() {
     let bench = offset("diagnose-copy");
     bench.write("copy.csv", with_offset(Trace::GOOD));
-    bench.refuses(2, &["diagnose", "run.csv", "copy.csv"], &["copy.csv has the readings of run.csv"]);
+    bench.refuses(2, &["diagnose", "run.csv", "copy.csv"], &["copy.csv has the readings of run.csv:"]);
+}
+
+/// Nor is a part of a record, or what a logger wrote to the end of one file and to the beginning of the next.
+#[test]
+fn records_with_readings_of_each_other_are_refused() {
+    let bench = offset("diagnose-shared");
+    let rows = |seed: u64| {
+        let mut rows = Trace { seed, ..Trace::GOOD }.rows();
+        rows.iter_mut().for_each(|row| row[2] += OFFSET_K);
+        rows
+    };
+    let (run, later) = (rows(Trace::GOOD.seed), rows(2));
+    bench.write("cut.csv", csv(&run[700..1900]));
+    let mut goes_on = [&run[1500..], &later[..800]].concat();
+    goes_on.iter_mut().enumerate().for_each(|(k, row)| row[0] = Trace::GOOD.period_s * k as f64);
+    bench.write("next.csv", csv(&goes_on));
+    bench.refuses(2, &["diagnose", "run.csv", "cut.csv"], &["cut.csv has the readings of run.csv:"]);
+    bench.refuses(
+        2,
+        &["characterise", "cut.csv", "run.csv"],
+        &["run.csv has the readings of cut.csv in 1200 of its 2000 rows"],
+    );
+    bench.refuses(
+        2,
+        &["diagnose", "run.csv", "next.csv"],
+        &["next.csv has the readings of run.csv in 500 of its 1300 rows"],
+    );
 }
 
 /// Both time constants of several records: what is read of each is said with its name, and a model is of one.
