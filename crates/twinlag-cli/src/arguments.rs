@@ -90,7 +90,7 @@ pub(crate) enum Command {
     /// results.
     #[command(subcommand)]
     Study(Study),
-    /// Explain an effect, a verdict, a status, a grade or a test in plain words, or what two sensors can never reveal.
+    /// Explain an effect, one of its numbers, a verdict, a status, a grade or a test in plain words, or what two sensors can never reveal.
     Explain(Explain),
     /// Simulate a built-in rig with an effect unknown to the estimator, and diagnose it; needs no
     /// file.
@@ -691,8 +691,8 @@ pub(crate) struct Plan {
 /// Explain a name in plain words.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-NAME is an effect (delay), a verdict (partly-explained), a status (model-rejected), a grade (conditional), a test of the residual
-(coherence), a part of an answer (transfer), or two-sensors, which is what two sensors alone can never reveal.")]
+NAME is an effect (delay), a number of one (gas_share), a verdict (partly-explained), a status (model-rejected), a grade (conditional),
+a test of the residual (coherence), a part of an answer (transfer), or two-sensors, which is what two sensors alone can never reveal.")]
 pub(crate) struct Explain {
     /// What to explain; without it, all that can be explained is listed.
     pub(crate) name: Option<String>,

@@ -154,8 +154,8 @@ const FIELDS: [(&str, &str); 5] = [
 
 /// Kinds of names, in the order in which they are listed.
 const KINDS: [&str; 8] = ["effect", "number", "verdict", "status", "grade", "test", "answer", "limit"];
-/// Edits, at most, that make another name of one that is misspelt: letters that are missing, needless, another, or in each other's
-/// place. Chosen.
+
+/// Most letters that are missing, needless, wrong or swapped in a name that is taken for a misspelt one. Chosen.
 const MAX_EDITS: usize = 2;
 
 /// A name with what it means.
@@ -176,12 +176,14 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     let all = explanations();
     let of = |kind: &str| all.iter().filter(|e| e.kind == kind).map(|e| e.name).collect::<Vec<_>>().join(", ");
     let list = KINDS.map(|kind| format!("\n  {kind}: {}", of(kind))).concat();
-    let name = command.name.as_ref().map(|name| name.replace('_', "-"));
+    let asked = command.name.as_ref().map(|name| name.to_lowercase().replace('_', "-"));
+    let asked = asked.as_deref().map(numbers::explained);
     // `calibration` is an effect and a test.
-    let found: Vec<&Explanation> = all.iter().filter(|e| name.as_ref().is_none_or(|name| e.name == *name)).collect();
+    let found: Vec<&Explanation> = all.iter().filter(|e| asked.is_none_or(|asked| e.name == asked)).collect();
     match &command.name {
         Some(name) if found.is_empty() => {
-            let nearest = nearest(name, &all).map(|other| format!(": is it '{other}'?")).unwrap_or_default();
+            let nearest = asked.and_then(|asked| nearest(asked, &all));
+            let nearest = nearest.map(|other| format!(" (is it '{other}'?)")).unwrap_or_default();
             return Err(Failure::Usage(format!("nothing is called '{name}'{nearest}; there are{list}")));
         }
         None if !console.json => {
@@ -200,10 +202,10 @@ pub(crate) fn run(command: &Explain, console: Console) -> Result<u8, Failure> {
     Ok(0)
 }
 
-/// The name that is a few edits from what was asked for, and closest to it.
+/// The name with the fewest edits; of a short one fewer than half its letters, or any word would be near it.
 fn nearest(asked: &str, all: &[Explanation]) -> Option<&'static str> {
-    let edits = all.iter().map(|e| (strsim::osa_distance(&asked.to_lowercase().replace('_', "-"), e.name), e.name));
-    edits.filter(|(edits, name)| *edits <= MAX_EDITS && *edits < name.len() / 2).min().map(|(_, name)| name)
+    let edits = all.iter().map(|e| (strsim::osa_distance(asked, e.name), e.name));
+    edits.filter(|(edits, name)| *edits <= MAX_EDITS && 2 * edits < name.len()).min().map(|(_, name)| name)
 }
 
 fn explanations() -> Vec<Explanation> {

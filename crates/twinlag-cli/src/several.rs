@@ -1,5 +1,6 @@
 //! Several files that are records of one rig.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use twinlag::record::Record;
@@ -11,9 +12,8 @@ use crate::print;
 use crate::profile::Profile;
 use crate::read::read_watched;
 
-/// Rows that differ from the one before, at least, where records that share so many in a row share them not by chance: each of two
-/// readings in coarse steps, up, down or none, agrees with a chance of a third, and 16 of them with one of 2e-8. Chosen.
-const MIN_SHARED_CHANGES: usize = 16;
+/// Different rows, at least, among those that two records share: fewer, as at rest in coarse steps, they may share by chance. Chosen.
+const MIN_SHARED: usize = 16;
 
 /// The files of a command, the first of which is in its input; refused where one is named twice.
 pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a Path>, Failure> {
@@ -33,7 +33,7 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
     }
 }
 
-/// Reads all of them, and says how each was read; refused where one has readings of another.
+/// Reads all of them, and says how each was read; refused where one shares rows with another.
 pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<Vec<Record>, Failure> {
     let profile = input.columns.profile()?;
     let mut records = Vec::new();
@@ -46,8 +46,8 @@ pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<V
     of_one_rig(records, &profile, console)
 }
 
-/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one has
-/// readings of another.
+/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one shares
+/// rows with another.
 pub(crate) fn of_one_rig(
     mut records: Vec<Record>,
     profile: &Profile,
@@ -59,7 +59,7 @@ pub(crate) fn of_one_rig(
     {
         others.iter_mut().for_each(|record| named_as(record, first, console));
     }
-    no_copies(&records)?;
+    no_shared_rows(&records)?;
     Ok(records)
 }
 
@@ -72,20 +72,17 @@ fn named_as(record: &mut Record, first: &Record, console: Console) {
     record.channels.clone_from(&first.channels);
 }
 
-/// Refuses a record that has readings of another: left out, they would be there all the same.
-fn no_copies(records: &[Record]) -> Result<(), Failure> {
+/// Refuses a record that shares rows with another: where one of them is left out, these would be there all the same.
+fn no_shared_rows(records: &[Record]) -> Result<(), Failure> {
     for (place, record) in records.iter().enumerate() {
         for other in &records[..place] {
             let rows = shared_rows(record, other).max(shared_rows(other, record));
             if rows > 0 {
-                let part = if rows == record.len() {
-                    String::new()
-                } else {
-                    format!(" in {rows} of its {} rows", record.len())
-                };
                 return Err(Failure::Usage(format!(
-                    "{} has the readings of {}{part}: what is counted twice is not left out when it is left out once",
-                    record.source, other.source
+                    "{}: {rows} of its {} rows are rows of {} as well. What is counted twice is not left out when it is left out once",
+                    record.source,
+                    record.len(),
+                    other.source
                 )));
             }
         }
@@ -93,22 +90,24 @@ fn no_copies(records: &[Record]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Rows with which `later` begins and which `earlier` has as well, up to the end of either; none where they are so few, or change so
-/// seldom, that two records may have them by chance.
+/// Rows with which `later` begins and which `earlier` has as well, up to the end of either; none where so few of them differ that two
+/// records may share them by chance.
 fn shared_rows(earlier: &Record, later: &Record) -> usize {
-    // Missing readings are NaN, which equal nothing.
+    // Missing readings are NaN, which equal nothing: bits are compared.
     let row = |record: &Record, k: usize| [record.t1_c[k].to_bits(), record.t2_c[k].to_bits()];
-    let changes = |rows: std::ops::Range<usize>| rows.skip(1).filter(|k| row(later, *k) != row(later, k - 1)).count();
-    // Where readings rest at first, every row of rest would be a place to begin.
+    let overlap = |first: usize| later.len().min(earlier.len() - first);
+    let is_same = |first: usize| (0..overlap(first)).all(|k| row(earlier, first + k) == row(later, k));
+    if later.len() == earlier.len() && is_same(0) {
+        return later.len();
+    }
+    // Where readings rest at first every row of rest would be a place to begin: the first change is looked for.
     let Some(changed) = (1..later.len()).find(|k| row(later, *k) != row(later, k - 1)) else { return 0 };
-    let is_from = |first: usize| {
-        let rows = later.len().min(earlier.len() - first);
-        rows > changed
-            && [changed, changed - 1].iter().all(|k| row(earlier, first + k) == row(later, *k))
-            && (0..rows).all(|k| row(earlier, first + k) == row(later, k))
-            && (rows == later.len() && rows == earlier.len() || changes(0..rows) >= MIN_SHARED_CHANGES)
+    let may_begin = |first: usize| {
+        overlap(first) > changed && [changed, changed - 1].iter().all(|k| row(earlier, first + k) == row(later, *k))
     };
-    (0..earlier.len()).find(|first| is_from(*first)).map_or(0, |first| later.len().min(earlier.len() - first))
+    let different = |rows: usize| (0..rows).map(|k| row(later, k)).collect::<HashSet<_>>().len();
+    let is_from = |first: &usize| may_begin(*first) && is_same(*first) && different(overlap(*first)) >= MIN_SHARED;
+    (0..earlier.len()).find(is_from).map_or(0, overlap)
 }
 
 /// Their names, for a message about all of them.

@@ -44,8 +44,8 @@ impl ChannelNoise {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
     }
 
-    /// Takes other levels, K; none becomes less than its converter's own noise.
-    pub(crate) fn take(&mut self, std_k: [f64; 2]) {
+    /// Replaces the levels, K; none falls below the rounding noise of its converter, or below itself where that is less.
+    pub(crate) fn replace(&mut self, std_k: [f64; 2]) {
         for ((level_k, other_k), step_k) in self.std_k.iter_mut().zip(std_k).zip(self.step_k) {
             *level_k = other_k.max(step_k.map_or(0.0, |q| q / 12.0_f64.sqrt()).min(*level_k));
         }

@@ -210,13 +210,13 @@ impl Prepared {
             Vec::new()
         };
         let of_all = self.levels_left(fitted, &self.observations, &self.searched);
-        self.levels.take(of_all);
+        self.levels.replace(of_all);
         let over_all = |own: &[f64; 2]| [0, 1].map(|i| own[i] / self.levels.std_k[i]);
         self.observations = self.observations.clone().with_noise_factors(&own.iter().map(over_all).collect::<Vec<_>>());
         // Their ratio is that of the spectrum, and their size that of all that is left over, which is then clearly less no more.
         let model = fitted.model.clone().with_noise(self.levels.std_k);
         let energy = model.energy(&fitted.theta, &self.observations, &self.searched) / fitted.count;
-        self.levels.take(self.levels.std_k.map(|level_k| level_k * energy.sqrt()));
+        self.levels.replace(self.levels.std_k.map(|level_k| level_k * energy.sqrt()));
         self.levels.is_of_residual = true;
         self.context.noise_std_k = self.levels.std_k;
         self.context.is_coarse = self.levels.coarse_step_k().map(|step_k| step_k.is_some());

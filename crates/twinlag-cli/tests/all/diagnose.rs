@@ -314,10 +314,14 @@ fn an_output_that_exists_is_overwritten_by_force() {
 fn a_copy_of_a_record_is_refused() {
     let bench = offset("diagnose-copy");
     bench.write("copy.csv", with_offset(Trace::GOOD));
-    bench.refuses(2, &["diagnose", "run.csv", "copy.csv"], &["copy.csv has the readings of run.csv:"]);
+    bench.refuses(
+        2,
+        &["diagnose", "run.csv", "copy.csv"],
+        &["copy.csv: 2000 of its 2000 rows are rows of run.csv as well"],
+    );
 }
 
-/// Nor is a part of a record, or what a logger wrote to the end of one file and to the beginning of the next.
+/// So is a part of a record, and what a logger wrote to the end of one file and to the beginning of the next.
 #[test]
 fn records_with_readings_of_each_other_are_refused() {
     let bench = offset("diagnose-shared");
@@ -331,17 +335,36 @@ fn records_with_readings_of_each_other_are_refused() {
     let mut goes_on = [&run[1500..], &later[..800]].concat();
     goes_on.iter_mut().enumerate().for_each(|(k, row)| row[0] = Trace::GOOD.period_s * k as f64);
     bench.write("next.csv", csv(&goes_on));
-    bench.refuses(2, &["diagnose", "run.csv", "cut.csv"], &["cut.csv has the readings of run.csv:"]);
+    bench.refuses(
+        2,
+        &["diagnose", "run.csv", "cut.csv"],
+        &["cut.csv: 1200 of its 1200 rows are rows of run.csv as well"],
+    );
     bench.refuses(
         2,
         &["characterise", "cut.csv", "run.csv"],
-        &["run.csv has the readings of cut.csv in 1200 of its 2000 rows"],
+        &["run.csv: 1200 of its 2000 rows are rows of cut.csv as well"],
     );
     bench.refuses(
         2,
         &["diagnose", "run.csv", "next.csv"],
-        &["next.csv has the readings of run.csv in 500 of its 1300 rows"],
+        &["next.csv: 500 of its 1300 rows are rows of run.csv as well"],
     );
+}
+
+/// Two steps of a coarse converter in turn, at rest before and after a run, are in both records, and are no rows of one in the other.
+#[test]
+fn records_that_rest_alike_are_two_records() {
+    let bench = Bench::new("diagnose-rest");
+    for (seed, name) in [(1, "one.csv"), (2, "two.csv")] {
+        let mut rows = Trace { seed, ..Trace::GOOD }.rows();
+        let count = rows.len();
+        let rests = (0..40).chain(count - 40..count);
+        rests.for_each(|k| rows[k][1..].fill(if k % 2 == 0 { 20.0 } else { 20.5 }));
+        bench.write(name, csv(&rows));
+    }
+    let answer = bench.run(&["characterise", "one.csv", "two.csv"]);
+    assert!(answer.code != 2 && !answer.stderr.contains("as well"), "{answer:#?}");
 }
 
 /// Both time constants of several records: what is read of each is said with its name, and a model is of one.

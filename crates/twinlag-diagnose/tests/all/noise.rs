@@ -34,7 +34,7 @@ fn both_levels_are_those_of_the_residual() {
     assert_right(d.last.noise_std_k);
 }
 
-/// Of a record in slow gas third differences say the same as the residual. Failed: 0.033 K in T1 of the other.
+/// Of a record in slow gas third differences say the same as the residual. Failed: T1 of the other record had 0.033 K.
 #[test]
 fn each_record_has_the_levels_of_its_own_residual() {
     let d = joint(&[quiet(turbulence()), quiet(ramps(3))]);
