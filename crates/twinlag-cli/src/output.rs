@@ -10,6 +10,7 @@ use twinlag::record::{Decimals, RecordError, write_csv};
 
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::invocation::Invocation;
 use crate::place;
 
 /// A file to be written, and the option that names it.
@@ -46,6 +47,8 @@ pub(crate) fn check(record: &Path, outputs: &[Output<'_>], force: bool) -> Resul
         if path.exists() && !force {
             return usage(format!("{} exists: choose another name, or add --force", path.display()));
         }
+        // Begun, and removed again: a folder that takes no files is noticed before the work, not after it.
+        part_of(path).map_err(|e| cannot_be_written(path, &e))?;
     }
     Ok(())
 }
@@ -144,7 +147,8 @@ fn part_of(path: &Path) -> std::io::Result<Option<(NamedTempFile<File>, PathBuf)
         Ok(target) if !target.metadata()?.is_file() => return Ok(None),
         // A file that may not be written is not replaced either.
         Ok(target) => (target.clone(), Some(File::options().write(true).open(target)?.metadata()?)),
-        Err(_) => (path.to_owned(), None),
+        Err(error) if error.kind() == ErrorKind::NotFound => (path.to_owned(), None),
+        Err(error) => return Err(error),
     };
     if is_stream || (is_link && old.is_none()) {
         return Ok(None);
@@ -253,7 +257,8 @@ pub(crate) fn command_line() -> String {
             format!("'{}'", argument.replace('\'', "'\\''"))
         }
     };
-    let mut arguments = std::env::args();
+    let mut arguments =
+        Invocation::of_process().arguments.iter().map(|argument| argument.to_string_lossy().into_owned());
     let program = arguments.next().map(|path| file_name(&path));
     let rest = arguments.map(|argument| match argument.split_once('=') {
         Some((option, value)) if option.starts_with("--") => format!("{option}={}", without_folders(value)),
@@ -294,6 +299,29 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).expect("is there").count(), 1);
         write(&path, "new").expect("can be written");
         assert_eq!(std::fs::read(&path).expect("is there"), b"new");
+    }
+
+    /// Failed: what could not be written was noticed when the work was done.
+    #[cfg(unix)]
+    #[test]
+    fn what_cannot_be_written_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let long = folder.path().join("a".repeat(300));
+        let around = folder.path().join("around");
+        std::os::unix::fs::symlink(&around, &around).expect("a link to itself");
+        let mut cases = vec![long, around];
+        if cfg!(target_os = "linux") {
+            cases.push("/sys/kernel/out.csv".into());
+        }
+        for path in cases {
+            let refused = check(Path::new("record.csv"), &[("--out", &path)], false).expect_err("cannot be written");
+            let expected = format!("{}: cannot be written", path.display());
+            assert!(refused.to_string().starts_with(&expected), "{refused}");
+        }
+        let path = folder.path().join("out.csv");
+        check(Path::new("record.csv"), &[("--out", &path)], false).expect("can be written");
+        assert!(!path.exists());
+        assert_eq!(std::fs::read_dir(folder.path()).expect("is there").count(), 1);
     }
 
     /// What a link leads to is written, whether it is there yet or not, with nothing of a longer old file left.

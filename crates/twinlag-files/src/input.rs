@@ -4,6 +4,8 @@ use std::fs::File;
 use std::io::{self, BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 
+use twinlag_record::gzip;
+
 /// Most bytes from which the format is recognised: the entries of an archive and the attributes of
 /// a root group stand among them.
 const HEAD_BYTES: u64 = 64 * 1024;
@@ -24,14 +26,30 @@ impl Input {
         }
     }
 
-    /// The first bytes, enough to recognise the format.
+    /// Its bytes in order, decompressed where gzip has compressed them, and whether it has.
+    fn plain(&self) -> io::Result<(Box<dyn Read + '_>, bool)> {
+        match self {
+            Self::Path(path) => gzip::decompressed(File::open(path)?),
+            Self::Bytes(bytes) => gzip::decompressed(bytes.as_slice()),
+        }
+    }
+
+    /// The first bytes, enough to recognise the format; of what gzip has compressed those within.
     pub(crate) fn head(&self) -> io::Result<Vec<u8>> {
         let mut head = Vec::new();
-        match self {
-            Self::Path(path) => File::open(path)?.take(HEAD_BYTES).read_to_end(&mut head)?,
-            Self::Bytes(bytes) => bytes.as_slice().take(HEAD_BYTES).read_to_end(&mut head)?,
-        };
+        self.plain()?.0.take(HEAD_BYTES).read_to_end(&mut head)?;
         Ok(head)
+    }
+
+    /// What gzip has compressed, decompressed in memory; `None` of anything else.
+    pub(crate) fn decompressed(&self) -> io::Result<Option<Self>> {
+        let (mut plain, is_compressed) = self.plain()?;
+        if !is_compressed {
+            return Ok(None);
+        }
+        let mut bytes = Vec::new();
+        plain.read_to_end(&mut bytes)?;
+        Ok(Some(Self::Bytes(bytes)))
     }
 
     /// A reader that can seek.

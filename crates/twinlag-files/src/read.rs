@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use twinlag_record::{Note, Table};
+use twinlag_record::{Note, RecordError, Table, gzip};
 
 use crate::choice::{Choice, choose, joined};
 use crate::contents::{Contents, Group};
@@ -52,7 +52,7 @@ pub fn contents_of_bytes(bytes: Vec<u8>, source: &str) -> Result<Contents, FileE
     contents_of_input(Input::Bytes(bytes), source)
 }
 
-/// Whether the first bytes of a file are those of a format that is no text.
+/// Whether the first bytes of a file, or of what gzip has compressed in it, are those of a format that is no text.
 pub fn is_binary(path: impl AsRef<Path>) -> bool {
     let head = Input::Path(path.as_ref().to_owned()).head();
     head.is_ok_and(|head| Format::of(&head).is_some())
@@ -70,18 +70,28 @@ fn of_path(path: &Path) -> Result<(Input, String), FileError> {
 struct Reading {
     file: String,
     format: Format,
+    /// Its length, decompressed.
     bytes: u64,
+    /// Whether gzip has compressed it.
+    is_compressed: bool,
 }
 
 impl Reading {
-    fn of(input: &Input, file: &str) -> Result<Self, FileError> {
-        let cannot = |error: std::io::Error| FileError::CannotRead { file: file.to_owned(), reason: error.to_string() };
-        let head = input.head().map_err(cannot)?;
-        let bytes = input.bytes().map_err(cannot)?;
+    /// The file, and where its bytes are when it is decompressed.
+    fn of(input: Input, file: &str) -> Result<(Self, Input), FileError> {
+        let failed = |error: std::io::Error| match gzip::failure(file, &error) {
+            RecordError::CannotRead { file, reason } => FileError::CannotRead { file, reason },
+            damaged => damaged.into(),
+        };
+        let decompressed = input.decompressed().map_err(failed)?;
+        let is_compressed = decompressed.is_some();
+        let input = decompressed.unwrap_or(input);
+        let head = input.head().map_err(failed)?;
+        let bytes = input.bytes().map_err(failed)?;
         let file = file.to_owned();
         match Format::of(&head) {
             Some(Format::Foreign(foreign)) => Err(FileError::NoReader { file, foreign }),
-            Some(format) => Ok(Self { file, format, bytes }),
+            Some(format) => Ok((Self { file, format, bytes, is_compressed }, input)),
             None => Err(FileError::Unrecognised { file, beginning: beginning(&head) }),
         }
     }
@@ -205,7 +215,7 @@ impl Reading {
 }
 
 fn read_input(input: Input, choice: &Choice, file: &str) -> Result<Table, FileError> {
-    let reading = Reading::of(&input, file)?;
+    let (reading, input) = Reading::of(input, file)?;
     let mut opened = reading.open(input)?;
     let opened = opened.as_mut();
     let (group, why) = reading.choose(opened, choice)?;
@@ -220,11 +230,12 @@ fn read_input(input: Input, choice: &Choice, file: &str) -> Result<Table, FileEr
     how.retain(|part| !part.is_empty());
     let columns = loaded.series.into_iter().map(Series::into_column);
     let table = Table::from_columns(file, columns)?;
+    let table = if reading.is_compressed { table.with_note(Note::Decompressed) } else { table };
     Ok([how.join(", ")].into_iter().chain(loaded.notes).fold(table, |table, how| table.with_note(Note::Read { how })))
 }
 
 fn contents_of_input(input: Input, file: &str) -> Result<Contents, FileError> {
-    let reading = Reading::of(&input, file)?;
+    let (reading, input) = Reading::of(input, file)?;
     let mut opened = reading.open(input)?;
     let groups = reading.groups(opened.as_mut())?;
     Ok(Contents { format: reading.format, version: opened.version(), groups })

@@ -9,7 +9,20 @@ use crate::RecordError;
 const FIRST_BYTES: [u8; 2] = [0x1F, 0x8B];
 
 /// What `reader` gives, decompressed where it is compressed, and whether it was.
-pub(crate) fn decompressed<'a>(mut reader: impl Read + 'a) -> io::Result<(Box<dyn Read + 'a>, bool)> {
+///
+/// ```
+/// use std::io::Read;
+///
+/// let (mut text, is_compressed) = twinlag_record::gzip::decompressed(&b"0,20,21"[..])?;
+/// let mut all = String::new();
+/// text.read_to_string(&mut all)?;
+/// assert_eq!((all.as_str(), is_compressed), ("0,20,21", false));
+/// # Ok::<(), std::io::Error>(())
+/// ```
+///
+/// # Errors
+/// Those of `reader`, of the first bytes; of the others when they are read.
+pub fn decompressed<'a>(mut reader: impl Read + 'a) -> io::Result<(Box<dyn Read + 'a>, bool)> {
     let mut first = Vec::with_capacity(FIRST_BYTES.len());
     reader.by_ref().take(FIRST_BYTES.len() as u64).read_to_end(&mut first)?;
     let is_compressed = first == FIRST_BYTES;
@@ -22,7 +35,9 @@ pub(crate) fn decompressed<'a>(mut reader: impl Read + 'a) -> io::Result<(Box<dy
 }
 
 /// Why nothing more can be read: kinds of errors that decompression alone has are those of a damaged file.
-pub(crate) fn failure(file: &str, error: &io::Error) -> RecordError {
+///
+/// - `file`: its name in the message
+pub fn failure(file: &str, error: &io::Error) -> RecordError {
     let (file, reason) = (file.to_owned(), error.to_string());
     match error.kind() {
         ErrorKind::UnexpectedEof => RecordError::CutGzip { file },

@@ -46,7 +46,7 @@ mod fill;
 mod form;
 mod from_columns;
 mod grid;
-mod gzip;
+pub mod gzip;
 mod joined;
 mod lab_view;
 mod layout;

@@ -76,6 +76,8 @@ const APART: [&str; 20] = [
     "sigma",
     "uncertainty",
 ];
+/// Never T1 or T2: temperatures that are computed, of Sea-Bird's names those of potential temperature, `potemp090C`.
+const COMPUTED: [&str; 8] = ["potemp", "potential", "theta", "dew", "dewpoint", "taupunkt", "windchill", "heatindex"];
 /// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
 const GAS: [&str; 2] = ["gas", "tgas"];
 /// Perhaps a sensor, perhaps its surroundings: only the caller knows.
@@ -166,10 +168,16 @@ pub(crate) fn is_temperature(column: &Column) -> bool {
     column.kind() == Kind::Number && is_called_temperature(column)
 }
 
-/// Whether it is no sensor by its name: a reference, a setpoint, the one column of the gas.
+/// Whether it is no sensor by its name: a reference, a setpoint, a computed temperature, the one column of the gas.
 pub(crate) fn is_apart(column: &Column, columns: &[Column]) -> bool {
     let of_gas = |column: &&Column| is_called_temperature(column) && has(column, &GAS) && !has(column, &APART);
-    has(column, &APART) || (has(column, &GAS) && columns.iter().filter(of_gas).count() < 2)
+    has(column, &APART) || is_computed(column) || (has(column, &GAS) && columns.iter().filter(of_gas).count() < 2)
+}
+
+/// Whether a word of the name begins with letters of the list, and goes on with a number if at all.
+fn is_computed(column: &Column) -> bool {
+    let letters = |word: &str| word.chars().take_while(|c| c.is_alphabetic()).collect::<String>();
+    words(column.label()).any(|word| COMPUTED.contains(&letters(&word).as_str()))
 }
 
 pub(crate) fn first_word(column: &Column) -> String {

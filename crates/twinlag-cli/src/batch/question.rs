@@ -251,13 +251,16 @@ pub(super) fn failed(unit: &Unit, reason: &str) -> Vec<Row> {
     of_rig.into_iter().chain(unit.files().iter().map(of_file)).collect()
 }
 
-/// Refuses what is no file: whoever opens a pipe or a device may wait for ever.
+/// Refuses what is no file: a folder here is one whose files were not found, and whoever opens a pipe or a device may wait for ever.
 fn expect_file(file: &Path) -> Result<(), Failure> {
     let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
     let about = fs::metadata(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
     match (about.is_file(), about.is_dir()) {
         (true, _) => Ok(()),
-        (_, true) => Err(wrong("this folder cannot be listed: check its permissions".to_owned())),
+        (_, true) => Err(wrong(match fs::read_dir(file) {
+            Ok(_) => "a link to a folder that it is in: name the files that are meant".to_owned(),
+            Err(error) => format!("this folder cannot be listed: {error}"),
+        })),
         _ => Err(wrong("expected a file, found a pipe or a device".to_owned())),
     }
 }

@@ -230,7 +230,10 @@ fn what_cannot_be_opened_stops_nothing() {
     succeeds(&bench.run(&["batch", "runs", "./runs/a_1.csv", "--out", "table.csv", "--threads", "99999"]));
     let rows = rows(&bench, "table.csv");
     #[cfg(unix)]
-    assert!(rows["runs/dangling.csv"]["reason"].contains("cannot be read") && rows.len() == 7, "{rows:#?}");
+    {
+        assert!(rows["runs/dangling.csv"]["reason"].contains("cannot be read") && rows.len() == 7, "{rows:#?}");
+        assert!(rows["runs/below/up"]["reason"].contains("a link to a folder that it is in"), "{rows:#?}");
+    }
     std::fs::create_dir_all(bench.path("none")).expect("can be created");
     bench.refuses(3, &["batch", "none", "--out", "t.csv"], &["none", "no file in this folder"]);
 }

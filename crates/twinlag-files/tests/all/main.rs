@@ -3,6 +3,8 @@
 #[allow(dead_code, reason = "each format uses a part")]
 mod common;
 mod format;
+#[cfg(feature = "mdf")]
+mod gzip;
 #[cfg(feature = "hdf5")]
 mod hdf5;
 #[cfg(feature = "matlab")]

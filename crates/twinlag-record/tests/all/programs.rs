@@ -53,6 +53,15 @@ fn a_sea_bird_cast_is_read_by_its_header() {
     assert!(said.contains("Sea-Bird") && said.contains("column names on line 8"), "{said}");
 }
 
+/// Failed: a temperature and the potential one that was computed from it were proposed as the two sensors.
+#[test]
+fn potential_temperatures_are_no_sensors() {
+    let computed = "# name 3 = potemp090C: Potential Temperature [ITS-90, deg C]\r";
+    let cast = SEA_BIRD.replace("# name 3 = c0S/m: Conductivity [S/m]\r", computed);
+    assert_ne!(cast, SEA_BIRD);
+    assert_eq!(record(&(cast + &sea_bird_rows())).channels, ["t090C", "t190C"]);
+}
+
 #[test]
 fn a_cast_that_is_cut_off_is_refused() {
     let whole = SEA_BIRD.to_owned() + &sea_bird_rows();
