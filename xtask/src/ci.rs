@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{book, cluster, report, root};
+use crate::{book, cluster, python, report, root};
 
 /// The oldest compiler that is promised: `rust-version` of the workspace.
 const OLDEST: &str = "1.89";
@@ -45,6 +45,7 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
         // In release, which has the line tables that a profile is made of.
         step("profiles of a short record", "cargo", &["xtask", "profile", "--quick"])?;
         cluster::run(&cluster::Cluster::default())?;
+        python::run(&python::Python::default())?;
         report::run(&report::Report::default())?;
     }
     Ok(())

@@ -1,5 +1,6 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
-//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask cluster`, `cargo xtask profile`, `cargo xtask report`, `cargo xtask dist`.
+//! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask cluster`, `cargo xtask profile`, `cargo xtask report`,
+//! `cargo xtask python`, `cargo xtask dist`.
 
 mod bench;
 mod book;
@@ -10,6 +11,7 @@ mod experiment;
 mod fleet;
 mod measured;
 mod profile;
+mod python;
 mod report;
 
 use std::path::{Path, PathBuf};
@@ -73,6 +75,8 @@ enum Task {
     Profile(profile::Profile),
     /// Makes a release archive for a platform, the same to the byte whenever it is made.
     Dist(dist::Dist),
+    /// Builds the Python package as a wheel, installs it in an empty environment and tests it there; needs Python with `venv`.
+    Python(python::Python),
     /// Opens reports in a browser: console, accessibility, keyboard, print; needs Chromium and Node.js.
     Report(report::Report),
 }
@@ -89,6 +93,7 @@ fn main() -> ExitCode {
         Task::Fleet(arguments) => fleet::run(&arguments),
         Task::Cluster(arguments) => cluster::run(&arguments),
         Task::Profile(arguments) => profile::run(&arguments),
+        Task::Python(arguments) => python::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
         Task::Dist(arguments) => dist::run(&arguments),
         Task::Experiment(task) => experiment::run(task),

@@ -2,8 +2,15 @@
 //! alone.
 //!
 //! The program is a thin layer over the crate `twinlag`: it reads arguments, shows progress and
-//! prints answers. Data go to standard output, messages to standard error. Exit codes: 0 answered;
-//! 2 wrong usage; 3 the file cannot be used; 4 the data were read but cannot answer the question
+//! prints answers. Data go to standard output, messages to standard error. It is a library so that others can bring it along, as
+//! the Python package does; whoever wants answers in a program of their own takes `twinlag` itself.
+//!
+//! ```
+//! let arguments = ["twinlag", "explain", "gain"];
+//! assert_eq!(twinlag_cli::run(None, arguments.map(Into::into)), 0);
+//! ```
+//!
+//! Exit codes: 0 answered; 2 wrong usage; 3 the file cannot be used; 4 the data were read but cannot answer the question
 //! (the answer is still printed, with a `status` that says why); 75 a shard of a study is missing;
 //! 1 any other error.
 
@@ -22,6 +29,7 @@ mod failure;
 mod grades;
 mod if_known;
 mod inspect;
+mod invocation;
 mod keep;
 mod live;
 mod manual;
@@ -44,23 +52,27 @@ mod study;
 mod submission;
 mod track;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
+use std::path::PathBuf;
 
 use clap::{CommandFactory, FromArgMatches};
 
 use crate::arguments::{Arguments, Command};
 use crate::failure::Failure;
+use crate::invocation::Invocation;
 
-fn main() -> ExitCode {
+/// Runs the program and returns its exit code. To be called once in a process, before it has long vectors.
+///
+/// - `program`: what is to be started to call it again, as shards on a cluster do; `None` where nobody knows
+/// - `arguments`: those of a command line, the first of which is the name of the program
+pub fn run(program: Option<PathBuf>, arguments: impl IntoIterator<Item = OsString>) -> u8 {
     twinlag_memory::give_back_large();
-    match run() {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            eprintln!("twinlag: {failure}");
-            failure.excerpt().iter().for_each(|line| eprintln!("{line}"));
-            ExitCode::from(failure.exit_code())
-        }
-    }
+    let invocation = Invocation { program, arguments: arguments.into_iter().collect() }.begin();
+    answer(invocation).unwrap_or_else(|failure| {
+        eprintln!("twinlag: {failure}");
+        failure.excerpt().iter().for_each(|line| eprintln!("{line}"));
+        failure.exit_code()
+    })
 }
 
 /// Lets options take negative numbers, so that what says which numbers an option may have says it of these too.
@@ -72,10 +84,18 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
     command.mut_args(taking).mut_subcommands(taking_negative_numbers)
 }
 
-fn run() -> Result<u8, Failure> {
+fn answer(invocation: &Invocation) -> Result<u8, Failure> {
     let command = taking_negative_numbers(Arguments::command());
-    let matches = command.get_matches_from(config::with_config(std::env::args_os().collect())?);
-    let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
+    let given = config::with_config(invocation.arguments.clone())?;
+    let parsed = command.try_get_matches_from(given).and_then(|matches| Arguments::from_arg_matches(&matches));
+    let arguments = match parsed {
+        Ok(arguments) => arguments,
+        // Help and version are among them, and belong on standard output; a reader that has closed it has read enough.
+        Err(error) => {
+            let _ = error.print();
+            return Ok(error.exit_code() as u8);
+        }
+    };
     let console = arguments.console();
     match arguments.command {
         Command::Characterise(command) => characterise::run(&command, console),

@@ -15,6 +15,7 @@ use crate::columns::columns;
 use crate::config;
 use crate::console::Console;
 use crate::failure::Failure;
+use crate::invocation::Invocation;
 use crate::print;
 
 fn shards(text: &str) -> Result<NonZeroU64, String> {
@@ -189,12 +190,13 @@ impl Cluster {
         shard: Vec<String>,
         merge: Vec<String>,
     ) -> Result<Work, Failure> {
-        let unknown = |what: &str, error: std::io::Error| Failure::Other(format!("{what} is not known: {error}"));
+        let unknown = |what: &str| Failure::Other(format!("{what} is not known"));
+        let folder = std::env::current_dir().ok();
         Ok(Work {
             name: name.to_owned(),
-            folder: std::env::current_dir().map_err(|error| unknown("the folder in which the program runs", error))?,
+            folder: folder.ok_or_else(|| unknown("the folder in which the program runs"))?,
             storage,
-            program: std::env::current_exe().map_err(|error| unknown("where the program is", error))?,
+            program: Invocation::of_process().program.clone().ok_or_else(|| unknown("the file of the program"))?,
             shard,
             merge,
             shards: self.shards.unwrap_or(NonZeroU64::MIN),
@@ -395,7 +397,7 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
         option.is_some_and(|option| option.get_action().takes_values())
     };
     let (mut kept, mut is_value, mut is_over) = (Vec::new(), false, false);
-    for argument in config::with_config(std::env::args_os().collect())?.into_iter().skip(1) {
+    for argument in config::with_config(Invocation::of_process().arguments.clone())?.into_iter().skip(1) {
         let argument = argument.to_str().ok_or_else(|| no_unicode(&argument))?.to_owned();
         if std::mem::take(&mut is_value) {
             continue;

@@ -1,0 +1,309 @@
+"""Answers of the verbs."""
+
+from __future__ import annotations
+
+import copy
+import datetime
+import html
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+from twinlag import _core
+from twinlag._part import Effect, Part, Sensor, Sensors, part_of, quantity
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
+
+    from twinlag._model import Model
+
+
+class Answer:
+    """What a verb says. The fields of the program's JSON are attributes: ``answer.status``, ``answer.warnings``.
+
+    Not made by its constructor, but by the verbs.
+    """
+
+    __slots__ = ("_fields", "_inner", "_series")
+    _inner: _core.Answer | None
+    _fields: dict[str, Any]
+    _series: dict[str, Any]
+
+    def __init__(self, inner: _core.Answer | None, fields: dict[str, Any], series: dict[str, Any]) -> None:
+        self._inner = inner
+        self._fields = fields
+        self._series = series
+
+    @classmethod
+    def _of(cls, inner: _core.Answer) -> Any:
+        return cls(inner, json.loads(inner.json()), inner.series())
+
+    @property
+    def _model_fields(self) -> dict[str, Any]:
+        """The fields of the fit that the answer rests on."""
+        return self._fields.get("final", self._fields)  # type: ignore[no-any-return]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        for fields in (self._fields, self._model_fields):
+            if name in fields:
+                return part_of(fields[name])
+        raise AttributeError(f"no field {name!r}; there are {', '.join(self._fields)}")
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._fields, *self._model_fields]
+
+    def __reduce__(self) -> Any:
+        return type(self), (None, self._fields, self._series)
+
+    @property
+    def status(self) -> str:
+        """``ok``, ``at-bound``, ``not-identifiable`` or ``model-rejected``."""
+        return self._model_fields["status"]  # type: ignore[no-any-return]
+
+    @property
+    def ok(self) -> bool:
+        """Whether both time constants are determined and only noise is left over."""
+        return self.status == "ok"
+
+    @property
+    def sensors(self) -> Sensors:
+        """Both sensors, by the name of the channel, or as 0 and 1."""
+        return Sensors(self._model_fields["sensors"])
+
+    @property
+    def difference(self) -> Part:
+        """By how much the second sensor is slower: ``value``, ``interval_95_s``, ``grade``, ``because``."""
+        return Part(self._model_fields["time_constant_difference_s"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The answer as the program's ``--json`` has it; a copy."""
+        return copy.deepcopy(self._fields)
+
+    def to_frame(self) -> Any:
+        """A pandas data frame with a row for each number: value, ends of the 95 % interval, unit, grade, reason."""
+        import pandas as pd
+
+        return pd.DataFrame(self._rows(), columns=["of", "number", "value", "low", "high", "unit", "grade", "because"])
+
+    def _rows(self) -> list[tuple[Any, ...]]:
+        rows = []
+        for channel, sensor in self.sensors.items():
+            rows.append((channel, "time constant", sensor.time_constant_s, *_ends(sensor.interval), "s", sensor.status, sensor.because))
+        difference = self.difference
+        ends = _ends(difference["interval_95_s"])
+        rows.append(("both", "difference", difference["value"], *ends, "s", difference["grade"], difference["because"]))
+        return rows
+
+    def report(self, path: str | os.PathLike[str], *, static: bool = False) -> None:
+        """Write the answer as a page: one HTML file that needs no other.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. One that exists is overwritten.
+        static : bool
+            Without a script, for print and mail.
+        """
+        now = datetime.datetime.now().astimezone()
+        page = self._asked().page(now.strftime("%Y-%m-%d %H:%M %Z"), static)
+        if page is None:
+            raise ValueError("a characterisation has no page: a diagnosis has")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(page)
+
+    def _asked(self) -> _core.Answer:
+        if self._inner is None:
+            raise ValueError("the answer was pickled, and has its numbers but not the record: ask again for a page or a picture")
+        return self._inner
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self._verdict()}: {self.sensors!r}>"
+
+    def _verdict(self) -> str:
+        return self.status
+
+    def __str__(self) -> str:
+        lines = [f"{type(self).__name__}: {self._verdict()}"]
+        lines.extend(self._lines())
+        lines.extend(f"warning: {warning}" for warning in self._model_fields["warnings"])
+        return "\n".join(lines)
+
+    def _lines(self) -> list[str]:
+        lines = [f"  {channel}: time constant {quantity(sensor)}" for channel, sensor in self.sensors.items()]
+        lines.extend(f"    {sensor.because}" for sensor in self.sensors.values() if sensor.status != "go")
+        return lines
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{name}</th>" for name in ("", "", "value", "95 % interval", "grade"))
+        body = "".join(_html_row(row) for row in self._rows())
+        title = f"<p><b>{html.escape(type(self).__name__)}: {html.escape(self._verdict())}</b></p>"
+        picture = self._inner.picture() if self._inner is not None else None
+        return f"{title}<table><tr>{head}</tr>{body}</table>{picture or ''}"
+
+
+def _ends(interval: Any) -> tuple[float | None, float | None]:
+    return (None, None) if interval is None else (interval[0], interval[1])
+
+
+def _html_row(row: tuple[Any, ...]) -> str:
+    of, number, value, low, high, unit, grade, because = row
+    shown = "–" if value is None else f"{value:.5g} {unit}"
+    within = "" if low is None else f"[{low:.5g}, {high:.5g}]"
+    cells = (of, number, shown, within)
+    cells_html = "".join(f"<td>{html.escape(str(cell))}</td>" for cell in cells)
+    return f'<tr>{cells_html}<td title="{html.escape(because)}">{html.escape(grade)}</td></tr>'
+
+
+class Characterisation(Answer):
+    """Both time constants of a record, of `characterise`."""
+
+    __slots__ = ()
+
+
+class Diagnosis(Answer):
+    """What two lags leave over, and which effects account for it, of `diagnose`."""
+
+    __slots__ = ()
+
+    @property
+    def verdict(self) -> str:
+        """``adequate``, ``explained``, ``partly-explained`` or ``unexplained``."""
+        return self._fields["verdict"]  # type: ignore[no-any-return]
+
+    @property
+    def effects(self) -> list[Effect]:
+        """The effects that were found."""
+        return [Effect(effect) for effect in self._fields["effects"]]
+
+    @property
+    def error(self) -> Part:
+        """The errors ``before`` and ``after`` the effects."""
+        return Part(self._fields["error"])
+
+    @property
+    def model(self) -> Model:
+        """The model, to be used on other records of the rig."""
+        from twinlag._model import Model
+
+        return Model(json.loads(self._asked().model() or "null"))
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw both time constants with their intervals, before and after; returns the axes."""
+        from twinlag import _plot
+
+        return _plot.time_constants(self, ax)
+
+    def _verdict(self) -> str:
+        return self.verdict
+
+    def _lines(self) -> list[str]:
+        lines = super()._lines()
+        for effect in self.effects:
+            lines.append(f"  {effect['effect']} in {effect['channel'] or 'both'}: {effect['explanation']}")
+            for name, number in effect.numbers.items():
+                lines.append(f"    {name} {quantity(number, 'value', 'interval_95')}")
+        return lines
+
+    def _rows(self) -> list[tuple[Any, ...]]:
+        rows = super()._rows()
+        for effect in self.effects:
+            of = effect["effect"] + (f" in {effect['channel']}" if effect["channel"] else "")
+            for name, number in effect.numbers.items():
+                ends = _ends(number["interval_95"])
+                rows.append((of, name, number["value"], *ends, number["unit"], number["grade"], number["because"]))
+        return rows
+
+
+class _WithSeries(Answer):
+    __slots__ = ()
+
+    @property
+    def time_s(self) -> NDArray[float64]:
+        """Instants, s; empty where there is no answer."""
+        return self._series["time_s"]  # type: ignore[no-any-return]
+
+    @property
+    def grade(self) -> str:
+        """Whether it may be used: ``go``, ``conditional`` or ``no-go``."""
+        return self._fields["grade"]  # type: ignore[no-any-return]
+
+    @property
+    def because(self) -> str:
+        """Why it has that grade."""
+        return self._fields["because"]  # type: ignore[no-any-return]
+
+    @property
+    def status(self) -> str:
+        """``ok``, or ``not-identifiable`` where there is no answer."""
+        return self._fields["status"]  # type: ignore[no-any-return]
+
+    def to_frame(self) -> Any:
+        """A pandas data frame of the series, with the instants in s as its index."""
+        import pandas as pd
+
+        return pd.DataFrame(self._series).set_index("time_s")
+
+    def _verdict(self) -> str:
+        return f"{self.status}, {self.grade}"
+
+
+class Compensation(_WithSeries):
+    """The gas temperature of a record, of `compensate`."""
+
+    __slots__ = ()
+
+    @property
+    def gas_c(self) -> NDArray[float64]:
+        """The gas temperature, °C; empty where it may not be used."""
+        return self._series["gas_C"]  # type: ignore[no-any-return]
+
+    @property
+    def gas_std_k(self) -> NDArray[float64]:
+        """Its standard deviation, K."""
+        return self._series["gas_std_K"]  # type: ignore[no-any-return]
+
+    @property
+    def model(self) -> Model | None:
+        """The model that it rests on, with what the gas is like; ``None`` where there is no gas temperature."""
+        from twinlag._model import Model
+
+        text = self._asked().model()
+        return None if text is None else Model(json.loads(text))
+
+    def to_xarray(self) -> Any:
+        """An xarray dataset of the gas temperature and its standard deviation over ``time_s``."""
+        import xarray as xr
+
+        variables = {
+            "gas_temperature": ("time_s", self.gas_c, {"units": "degC"}),
+            "gas_temperature_std": ("time_s", self.gas_std_k, {"units": "K"}),
+        }
+        return xr.Dataset(variables, coords={"time_s": ("time_s", self.time_s, {"units": "s"})})
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the gas temperature with its 95 % band; returns the axes."""
+        from twinlag import _plot
+
+        return _plot.gas(self, ax)
+
+
+class Track(_WithSeries):
+    """Both time constants along a record, of `track`: series ``tau1_s``, ``tau1_low_s``, ``tau1_high_s`` and those of sensor 2."""
+
+    __slots__ = ()
+
+    def series(self, name: str) -> Any:
+        """A series by name, such as ``tau1_s``; NaN where a time constant is not given."""
+        return self._series[name]
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw both time constants with their 95 % bands; returns the axes."""
+        from twinlag import _plot
+
+        return _plot.track(self, ax)
+
+
+__all__ = ["Answer", "Characterisation", "Compensation", "Diagnosis", "Sensor", "Track"]

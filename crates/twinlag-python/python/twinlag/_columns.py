@@ -1,0 +1,92 @@
+"""What people have as columns, as arrays that the compiled part takes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from twinlag._errors import RecordError
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
+
+Column = tuple[str, str, Any]
+"""Name, unit, and an array of doubles, of nanoseconds since 1970-01-01, or a list of texts."""
+
+
+def _one_dimensional(values: Any, name: str) -> Any:
+    """The values as an array, checked for its shape."""
+    import numpy as np
+
+    array = np.ma.filled(values.astype(float), np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    if array.ndim != 1:
+        raise RecordError(f"{name}: expected one value for each row, got an array of shape {array.shape}")
+    return array
+
+
+def numbers(values: Any, name: str) -> NDArray[float64]:
+    """Doubles; a value that is missing is NaN.
+
+    >>> numbers([20, None, 21], "t1")
+    array([20., nan, 21.])
+    """
+    import numpy as np
+
+    array = _one_dimensional(values, name)
+    if array.dtype.kind in "cmMbSUV":
+        raise RecordError(f"{name}: expected numbers, got values of type {array.dtype}")
+    try:
+        return np.ascontiguousarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if array.dtype == object:
+            return _of_objects(array, name, error)
+        raise RecordError(f"{name}: expected numbers, got values of type {array.dtype}") from error
+
+
+def _of_objects(array: Any, name: str, error: Exception) -> NDArray[float64]:
+    """Doubles of objects, of which some may be missing in one way or another."""
+    import numpy as np
+
+    out = np.empty(len(array))
+    for row, value in enumerate(array):
+        if value is None or type(value).__name__ in {"NAType", "NaTType"}:
+            out[row] = np.nan
+            continue
+        try:
+            out[row] = float(value)
+        except (TypeError, ValueError):
+            raise RecordError(f"{name}: expected a number, got {value!r} in row {row + 1}") from error
+    return out
+
+
+def _without_zone(values: Any) -> Any:
+    """Stamps with a zone as stamps of UTC, as arrays keep them."""
+    accessor = getattr(values, "dt", values)
+    convert = getattr(accessor, "tz_convert", None)
+    if convert is None or getattr(accessor, "tz", None) is None:
+        return values
+    utc = convert("UTC")
+    return getattr(utc, "dt", utc).tz_localize(None)
+
+
+def times(values: Any, unit: str) -> Column:
+    """The column of instants: seconds, or whatever `unit` says, `datetime64`, `timedelta64`, or `datetime` objects."""
+    import datetime
+
+    import numpy as np
+
+    array = _one_dimensional(_without_zone(values), "time")
+    if array.dtype == object and len(array) and isinstance(array[0], datetime.datetime):
+        utc = datetime.timezone.utc
+
+        def naive(stamp: Any) -> Any:
+            return stamp.astimezone(utc).replace(tzinfo=None) if getattr(stamp, "tzinfo", None) else stamp
+
+        array = np.array([naive(stamp) for stamp in array], dtype="datetime64[ns]")
+    if array.dtype.kind == "M":
+        return "time", "", np.ascontiguousarray(array.astype("datetime64[ns]").view(np.int64))
+    if array.dtype.kind == "m":
+        return "time", "s", numbers(array / np.timedelta64(1, "s"), "time")
+    if array.dtype.kind in "US":
+        return "time", "", [str(cell) for cell in array]
+    return "time", unit, numbers(array, "time")

@@ -1,0 +1,296 @@
+"""The verbs: what can be asked of a record."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from twinlag import _core
+from twinlag._answers import Characterisation, Compensation, Diagnosis, Track
+from twinlag._model import Model
+from twinlag._progress import shown
+from twinlag._record import Record
+
+Value = float | str | tuple[float, float]
+"""What is known of a number: the number, the number with its standard deviation, or text with units."""
+
+
+def _options(
+    channels: tuple[str, str],
+    *,
+    known: Mapping[str, Value] | None = None,
+    free: Iterable[str] = (),
+    second_order: Iterable[str] = (),
+    noise_std_k: Sequence[float] | None = None,
+    noise_ratio: float | None = None,
+    noise_colour: str | None = None,
+    quiet_s: Iterable[tuple[float, float]] = (),
+    estimator: str | None = None,
+    optimiser: str | None = None,
+    hold: str | None = None,
+    intervals: str | None = None,
+    discard: int | None = None,
+    best_effort: bool = False,
+) -> dict[str, Any]:
+    """The options in the form of the library."""
+    free, second_order = _names(free), _names(second_order)
+    _expect(free, ("gain", "offset"), "free")
+    sensors = dict(zip((*channels, "T1", "T2"), (0, 1, 0, 1)))
+    _expect(second_order, tuple(sensors), "second_order")
+    options: dict[str, Any] = {
+        "free_gain": "gain" in free,
+        "free_offset": "offset" in free,
+        "second_order": [place in {sensors[name] for name in second_order} for place in (0, 1)],
+        "known": [_known(name, value, channels) for name, value in (known or {}).items()],
+        "quiet_segments_s": [[float(start), float(end)] for start, end in quiet_s],
+        "best_effort": bool(best_effort),
+    }
+    if noise_std_k is not None:
+        options["noise_std_k"] = [float(level) for level in noise_std_k]
+    given = {
+        "noise_ratio": noise_ratio,
+        "noise_colour": noise_colour,
+        "estimator": estimator,
+        "optimiser": optimiser,
+        "hold": hold,
+        "intervals": intervals,
+        "discard": discard,
+    }
+    options.update({name: value for name, value in given.items() if value is not None})
+    return options
+
+
+def _names(names: Iterable[str]) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _expect(names: tuple[str, ...], allowed: tuple[str, ...], argument: str) -> None:
+    for name in names:
+        if name not in allowed:
+            raise ValueError(f"{argument}: expected {' or '.join(dict.fromkeys(allowed))}, got {name!r}")
+
+
+def _known(name: str, value: Value, channels: tuple[str, str]) -> str:
+    """A known value as text: `T1.time_constant_s=0.5+-0.05`."""
+    for channel, number in zip(channels, ("T1", "T2")):
+        if name == channel or name.startswith(channel + "."):
+            name = number + name[len(channel) :]
+    if isinstance(value, str):
+        return f"{name}={value}"
+    if isinstance(value, (tuple, list)):
+        mean, deviation = value
+        return f"{name}={float(mean)!r}+-{float(deviation)!r}"
+    return f"{name}={float(value)!r}"
+
+
+def _records(record: Record | Iterable[Record]) -> list[Record]:
+    records = [record] if isinstance(record, Record) else list(record)
+    if not records or not all(isinstance(record, Record) for record in records):
+        raise TypeError("expected a twinlag.Record, or several of one rig; make one by twinlag.read or twinlag.Record")
+    return records
+
+
+def _one(record: Record) -> Record:
+    if not isinstance(record, Record):
+        raise TypeError("expected a twinlag.Record; make one by twinlag.read or twinlag.Record")
+    return record
+
+
+def _asked(options: dict[str, Any], **others: Any) -> str:
+    return json.dumps({"options": options, **{name: value for name, value in others.items() if value is not None}})
+
+
+def _fields(model: Model | None) -> dict[str, Any] | None:
+    return None if model is None else model._fields
+
+
+def characterise(
+    record: Record | Iterable[Record],
+    *,
+    model: Model | None = None,
+    progress: Any = None,
+    **options: Any,
+) -> Characterisation:
+    """Estimate both time constants blind, without knowing the gas temperature.
+
+    Parameters
+    ----------
+    record : Record or iterable of Record
+        A record, or several of one rig.
+    model : Model, optional
+        A model of another record of the rig, whose effects are held fixed.
+    known : mapping, optional
+        What is known beforehand, by sensor or parameter: ``{"T1": 0.5}``, ``{"T2": (2.0, 0.1)}`` with a standard deviation,
+        ``{"T1": "500ms+-20%"}``, ``{"T2.gain": 0.99}``.
+    free : iterable of str
+        ``"gain"`` and ``"offset"`` of sensor 2 relative to sensor 1, to be fitted.
+    second_order : iterable of str
+        Sensors with a second lag that is fitted, by name.
+    noise_std_k : pair of float, optional
+        Noise standard deviations, K; found from the data if left out. `noise_ratio` where only ``s2/s1`` is known.
+    quiet_s : iterable of pairs, optional
+        Stretches ``(from, to)``, s, in which the gas is at rest: noise levels are taken from there.
+    estimator, optimiser, hold, intervals, noise_colour : str, optional
+        As of the program.
+    discard : int, optional
+        Samples left out at the start, by the published family.
+    best_effort : bool
+        Give numbers that may not be used as well.
+    progress : bool or callable, optional
+        ``callable(task, done, total)``, called now and then; ``True`` for a progress bar where `tqdm` is installed.
+
+    Returns
+    -------
+    Characterisation
+        What data cannot answer is an answer, with its `status`, and no exception.
+
+    Raises
+    ------
+    RecordError
+        The record does not fit the question.
+    ValueError
+        Options that contradict each other.
+
+    Examples
+    --------
+    >>> import twinlag as tl
+    >>> answer = tl.characterise(tl.simulate(tl.EXAMPLE_RIG))
+    >>> answer.ok, answer.sensors["fine"].interval[0] < 0.0238 < answer.sensors["fine"].interval[1]
+    (True, True)
+    """
+    records = _records(record)
+    if model is not None and len(records) > 1:
+        raise ValueError("model: expected one record beside it; diagnose finds the effects of several records together")
+    asked = _asked(_options(records[0].channels, **options), model=_fields(model))
+    with shown(progress) as report:
+        core = _core.characterise([record._inner for record in records], asked, report)
+    return Characterisation._of(core)  # type: ignore[no-any-return]
+
+
+def diagnose(
+    record: Record | Iterable[Record],
+    *,
+    without: Iterable[str] = (),
+    progress: Any = None,
+    **options: Any,
+) -> Diagnosis:
+    """Find what two first-order lags leave over, and which physical effects account for it.
+
+    Parameters
+    ----------
+    record : Record or iterable of Record
+        A record, or several of one rig: then effects have to hold on records that had no part in finding them.
+    without : iterable of str
+        Effects that are not to be considered, such as ``"second-order"``.
+    known, noise_std_k, noise_ratio, quiet_s, best_effort, progress
+        As of `characterise`.
+
+    Examples
+    --------
+    >>> import twinlag as tl
+    >>> answer = tl.diagnose(tl.simulate(tl.EXAMPLE_RIG))
+    >>> answer.verdict
+    'adequate'
+    """
+    records = _records(record)
+    asked = _asked(_options(records[0].channels, **options), without=list(_names(without)))
+    with shown(progress) as report:
+        core = _core.diagnose([record._inner for record in records], asked, report)
+    return Diagnosis._of(core)  # type: ignore[no-any-return]
+
+
+def compensate(
+    record: Record,
+    *,
+    model: Model | None = None,
+    form: str | int = "smoother",
+    trust: str = "T1",
+    without: Iterable[str] = (),
+    progress: Any = None,
+    **options: Any,
+) -> Compensation:
+    """Reconstruct the gas temperature with its standard deviation.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    model : Model, optional
+        A model of another record of the rig; found by a diagnosis if left out.
+    form : {"smoother", "filter"} or int
+        Which readings the answer for an instant rests on: all, those up to it, or those up to so many samples later.
+    trust : str
+        The sensor that is taken to be right where gain, offset or delay differ.
+    without, known, noise_std_k, noise_ratio, quiet_s, best_effort, progress
+        As of `diagnose`.
+
+    Examples
+    --------
+    >>> import twinlag as tl
+    >>> record = tl.simulate(tl.EXAMPLE_RIG)
+    >>> gas = tl.compensate(record)
+    >>> len(gas.gas_c) == len(record), gas.grade
+    (True, 'go')
+    """
+    record = _one(record)
+    sensors = dict(zip((*record.channels, "T1", "T2"), (0, 1, 0, 1)))
+    _expect((trust,), tuple(sensors), "trust")
+    its_form: Any = {"fixed-lag": int(form)} if isinstance(form, int) else form
+    others = {"model": _fields(model), "form": its_form, "trusted": sensors[trust], "without": list(_names(without))}
+    asked = _asked(_options(record.channels, **options), **others)
+    with shown(progress) as report:
+        core = _core.compensate(record._inner, asked, report)
+    return Compensation._of(core)  # type: ignore[no-any-return]
+
+
+def track(
+    record: Record,
+    *,
+    model: Model | None = None,
+    window_s: float | None = None,
+    progress: Any = None,
+    **options: Any,
+) -> Track:
+    """Estimate both time constants along a record, in flow that changes.
+
+    Parameters
+    ----------
+    record : Record
+        The record.
+    model : Model, optional
+        A model of another record of the rig, whose effects are held fixed.
+    window_s : float, optional
+        Length of a sliding window, s, in which each fit is by itself; the whole record at once if left out.
+    known, noise_std_k, noise_ratio, quiet_s, best_effort, progress
+        As of `characterise`.
+    """
+    record = _one(record)
+    asked = _asked(_options(record.channels, **options), model=_fields(model), window_s=window_s)
+    with shown(progress) as report:
+        core = _core.track(record._inner, asked, report)
+    return Track._of(core)  # type: ignore[no-any-return]
+
+
+def simulate(rig: str | os.PathLike[str] | Mapping[str, Any]) -> Record:
+    """Simulate a record of a rig; the true gas temperature is its reference.
+
+    Parameters
+    ----------
+    rig : path-like, str or mapping
+        A TOML file as of ``twinlag simulate``, its text, or the same as a mapping.
+
+    Examples
+    --------
+    >>> import twinlag as tl
+    >>> tl.simulate(tl.EXAMPLE_RIG)
+    <Record 'rig': fine and coarse, 2500 samples, one every 0.002 s>
+    """
+    if isinstance(rig, Mapping):
+        return Record._of(_core.simulate(json.dumps(dict(rig)), True, "rig"))
+    if isinstance(rig, str) and "\n" in rig:
+        return Record._of(_core.simulate(rig, False, "rig"))
+    path = Path(rig)
+    return Record._of(_core.simulate(path.read_text(encoding="utf-8"), False, str(path)))

@@ -1,0 +1,126 @@
+//! Answers: as JSON, as arrays, as pages and pictures.
+
+use std::sync::Arc;
+
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use twinlag::record::Record as Inner;
+use twinlag::{Characterisation, Compensation, Diagnosis, Track, joined};
+use twinlag_pages::{
+    Making, ReportError, diagnosis_report, gas_picture, gas_report, residual_picture, track_picture, track_report,
+};
+
+use crate::error::of_verb;
+
+/// What a verb has said, with the records that it was asked about.
+#[pyclass(frozen, module = "twinlag._core")]
+#[derive(Debug)]
+pub(crate) struct Answer {
+    pub(crate) said: Said,
+    pub(crate) records: Vec<Arc<Inner>>,
+}
+
+/// What was said, by its verb.
+#[derive(Debug)]
+pub(crate) enum Said {
+    Characterisation(Box<Characterisation>),
+    Diagnosis(Box<Diagnosis>),
+    Compensation(Box<Compensation>),
+    Track(Box<Track>),
+}
+
+fn undrawable(error: ReportError) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+impl Answer {
+    /// The record, or all of them joined.
+    fn record(&self) -> PyResult<Arc<Inner>> {
+        match &self.records[..] {
+            [one] => Ok(Arc::clone(one)),
+            all => {
+                let all: Vec<Inner> = all.iter().map(|record| record.as_ref().clone()).collect();
+                Ok(Arc::new(joined(&all).map_err(|error| of_verb(&error))?))
+            }
+        }
+    }
+}
+
+#[pymethods]
+impl Answer {
+    /// The answer in the form of the program's `--json`.
+    fn json(&self, py: Python<'_>) -> PyResult<String> {
+        let text = py.detach(|| match &self.said {
+            Said::Characterisation(answer) => serde_json::to_string(answer),
+            Said::Diagnosis(answer) => serde_json::to_string(answer),
+            Said::Compensation(answer) => serde_json::to_string(answer),
+            Said::Track(answer) => serde_json::to_string(answer),
+        });
+        text.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The series of the answer, by the names of the columns that the program writes; empty where it has none.
+    fn series<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let series = PyDict::new(py);
+        let add = |name: &str, values: &[f64]| series.set_item(name, PyArray1::from_slice(py, values));
+        match &self.said {
+            Said::Characterisation(_) | Said::Diagnosis(_) => {}
+            Said::Compensation(answer) => {
+                add("time_s", &answer.time_s)?;
+                add("gas_C", &answer.gas_c)?;
+                add("gas_std_K", &answer.gas_std_k)?;
+            }
+            Said::Track(answer) => {
+                add("time_s", &answer.time_s)?;
+                for (sensor, number) in answer.sensors.iter().zip(["1", "2"]) {
+                    add(&format!("tau{number}_s"), &sensor.tau_s)?;
+                    add(&format!("tau{number}_low_s"), &sensor.low_s)?;
+                    add(&format!("tau{number}_high_s"), &sensor.high_s)?;
+                }
+                let grades: Vec<String> = answer.grades.iter().map(ToString::to_string).collect();
+                series.set_item("grade", grades)?;
+            }
+        }
+        Ok(series)
+    }
+
+    /// The model that the answer rests on, as JSON; `None` where there is none.
+    fn model(&self) -> PyResult<Option<String>> {
+        let model = match &self.said {
+            Said::Diagnosis(answer) => Some(answer.model()),
+            Said::Compensation(answer) => self.records.first().and_then(|record| answer.model(record)),
+            Said::Characterisation(_) | Said::Track(_) => None,
+        };
+        let text = model.map(|model| serde_json::to_string_pretty(&model)).transpose();
+        text.map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// The page of the answer, one HTML file; `None` of a characterisation, which has none.
+    fn page(&self, py: Python<'_>, made_at: String, is_static: bool) -> PyResult<Option<String>> {
+        let record = self.record()?;
+        let making = Making { made_at, is_static, ..Making::default() };
+        let page = py.detach(|| match &self.said {
+            Said::Characterisation(_) => Ok(None),
+            Said::Diagnosis(answer) => diagnosis_report(&record, answer, &making).map(Some),
+            Said::Compensation(answer) => gas_report(&record, answer, &making).map(Some),
+            Said::Track(answer) => track_report(&record, answer, &making).map(Some),
+        });
+        page.map_err(undrawable)
+    }
+
+    /// One picture that shows the answer, as SVG; `None` where there is nothing to show.
+    fn picture(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let record = self.record()?;
+        let picture = py.detach(|| match &self.said {
+            Said::Characterisation(_) => Ok(None),
+            Said::Diagnosis(answer) => residual_picture(answer),
+            Said::Compensation(answer) if answer.time_s.is_empty() => Ok(None),
+            Said::Compensation(answer) => gas_picture(&record, answer).map(Some),
+            Said::Track(answer) if answer.time_s.is_empty() => Ok(None),
+            Said::Track(answer) => track_picture(answer).map(Some),
+        });
+        picture.map_err(undrawable)
+    }
+}

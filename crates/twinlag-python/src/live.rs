@@ -1,0 +1,72 @@
+//! Gas temperature and time constants, reading by reading.
+
+use std::sync::{Mutex, PoisonError};
+
+use pyo3::prelude::*;
+use serde::Deserialize;
+use twinlag::{Live as Inner, LiveOptions, Model, Options};
+
+use crate::answer::{Answer, Said};
+use crate::error::of_verb;
+use crate::record::Record;
+use crate::verbs::parsed;
+
+/// What is asked of a live track.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Asked {
+    options: Options,
+    #[serde(default)]
+    model: Option<Model>,
+    #[serde(default)]
+    change_per_root_s: Option<f64>,
+}
+
+/// Both ends of a band, where there is one.
+type Band = Option<(f64, f64)>;
+
+/// Tracks both sensors after a start.
+#[pyclass(frozen, module = "twinlag._core")]
+#[derive(Debug)]
+pub(crate) struct Live {
+    inner: Mutex<Inner>,
+    start: Py<Answer>,
+}
+
+#[pymethods]
+impl Live {
+    #[new]
+    fn new(py: Python<'_>, record: PyRef<'_, Record>, asked: &str) -> PyResult<Self> {
+        let Asked { options: characterise, model, change_per_root_s } = parsed(asked)?;
+        let options = LiveOptions { characterise, model, change_per_root_s };
+        let record = record.inner.clone();
+        let live = py.detach(|| Inner::start(&record, &options)).map_err(|error| of_verb(&error))?;
+        let said = Said::Characterisation(Box::new(live.start.clone()));
+        let start = Py::new(py, Answer { said, records: vec![record] })?;
+        Ok(Self { inner: Mutex::new(live), start })
+    }
+
+    /// The characterisation of the start.
+    #[getter]
+    fn start(&self, py: Python<'_>) -> Py<Answer> {
+        self.start.clone_ref(py)
+    }
+
+    /// What is known once a row is read: time, gas temperature and its standard deviation, then time constant and band of each
+    /// sensor, whether they may have left the range that is tracked, and what the bands were multiplied by; `None` of a row that is
+    /// not later than the last one.
+    #[pyo3(signature = (t1_c, t2_c, time_s = None))]
+    #[expect(clippy::type_complexity, reason = "a row, which the package gives its names")]
+    fn push(
+        &self,
+        t1_c: Option<f64>,
+        t2_c: Option<f64>,
+        time_s: Option<f64>,
+    ) -> Option<(f64, f64, f64, (Option<f64>, Option<f64>), (Band, Band), bool, f64)> {
+        let mut live = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = live.push(time_s, [t1_c, t2_c])?;
+        let [first, second] = now.tau_s;
+        let [band, other] = now.tau_95_s.map(|band| band.map(|[low, high]| (low, high)));
+        Some((now.time_s, now.gas_c, now.gas_std_k, (first, second), (band, other), now.is_beyond, now.widened_by))
+    }
+}

@@ -1,0 +1,135 @@
+//! Records: of arrays, or of files.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use twinlag::record::{NamedColumn, Record as Inner, Selection, Table};
+use twinlag_files::Choice;
+
+use crate::error::{of_file, of_options, of_record};
+
+/// Two temperatures over time, checked.
+#[pyclass(frozen, module = "twinlag._core")]
+#[derive(Debug)]
+pub(crate) struct Record {
+    pub(crate) inner: Arc<Inner>,
+}
+
+/// An array of numbers, or of nanoseconds since 1970-01-01 of which the least integer is a missing one, or texts.
+#[derive(FromPyObject)]
+enum Values<'py> {
+    Numbers(PyReadonlyArray1<'py, f64>),
+    Instants(PyReadonlyArray1<'py, i64>),
+    Texts(Vec<String>),
+}
+
+fn column((name, unit, values): (String, String, Values<'_>)) -> PyResult<NamedColumn> {
+    let contiguous = |error: numpy::AsSliceError| PyTypeError::new_err(format!("'{name}': {error}"));
+    let column = match values {
+        Values::Numbers(values) => NamedColumn::numbers(name.clone(), values.as_slice().map_err(contiguous)?.to_vec()),
+        Values::Instants(values) => {
+            let instants = values.as_slice().map_err(contiguous)?.iter();
+            let instants = instants.map(|ns| Some(*ns).filter(|ns| *ns != i64::MIN)).collect::<Vec<_>>();
+            NamedColumn::instants_ns(name.clone(), instants)
+        }
+        Values::Texts(values) => NamedColumn::texts(name.clone(), values),
+    };
+    Ok(column.with_unit(unit))
+}
+
+#[pymethods]
+impl Record {
+    /// A record of columns: name, unit and array of each.
+    #[staticmethod]
+    fn from_columns(
+        py: Python<'_>,
+        source: String,
+        columns: Vec<(String, String, Values<'_>)>,
+        selection: &str,
+    ) -> PyResult<Self> {
+        let selection: Selection = serde_json::from_str(selection).map_err(|error| of_options(&error))?;
+        let columns = columns.into_iter().map(column).collect::<PyResult<Vec<_>>>()?;
+        let made = py.detach(|| Inner::from_owned(Table::from_columns(source, columns)?, &selection));
+        Ok(Self { inner: Arc::new(made.map_err(|error| of_record(&error))?) })
+    }
+
+    /// A record of a file.
+    #[staticmethod]
+    #[pyo3(signature = (path, selection, group = None, join = false))]
+    fn read(py: Python<'_>, path: PathBuf, selection: &str, group: Option<String>, join: bool) -> PyResult<Self> {
+        let selection: Selection = serde_json::from_str(selection).map_err(|error| of_options(&error))?;
+        let channels = [&selection.t1, &selection.t2].into_iter().flatten().map(ToString::to_string).collect();
+        let choice = Choice { group, join, channels };
+        let table = py.detach(|| {
+            if twinlag_files::is_binary(&path) {
+                twinlag_files::read(&path, &choice).map_err(|error| of_file(&error))
+            } else {
+                Table::from_path(&path).map_err(|error| of_record(&error))
+            }
+        })?;
+        let made = py.detach(|| Inner::from_owned(table, &selection));
+        Ok(Self { inner: Arc::new(made.map_err(|error| of_record(&error))?) })
+    }
+
+    /// What it is called in messages.
+    #[getter]
+    fn source(&self) -> &str {
+        &self.inner.source
+    }
+
+    /// Names of the two sensors.
+    #[getter]
+    fn channels(&self) -> (&str, &str) {
+        let [first, second] = &self.inner.channels;
+        (first, second)
+    }
+
+    /// How it was read.
+    #[getter]
+    fn notes(&self) -> Vec<String> {
+        self.inner.notes.iter().map(ToString::to_string).collect()
+    }
+
+    /// Rows in which a temperature is missing.
+    #[getter]
+    fn missing(&self) -> usize {
+        self.inner.missing
+    }
+
+    /// Time between samples, s: of uneven ones the median.
+    #[getter]
+    fn sample_period_s(&self) -> f64 {
+        self.inner.sampling.period_s
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.len()
+    }
+
+    /// Instants, s from the first.
+    #[getter]
+    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.time_s)
+    }
+
+    /// Readings of the first sensor, °C; NaN where one is missing.
+    #[getter]
+    fn t1_c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.t1_c)
+    }
+
+    /// Readings of the second sensor, °C; NaN where one is missing.
+    #[getter]
+    fn t2_c<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.inner.t2_c)
+    }
+
+    /// The reference, °C, if there is one.
+    #[getter]
+    fn reference_c<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f64>>> {
+        self.inner.reference_c.as_ref().map(|reference| PyArray1::from_slice(py, reference))
+    }
+}

@@ -1,0 +1,130 @@
+"""Answers: fields, tables, pages, models, pickling."""
+
+from __future__ import annotations
+
+import json
+import pickle
+
+import numpy as np
+import pytest
+
+import twinlag as tl
+
+
+@pytest.fixture(scope="module")
+def diagnosis(calibrated) -> tl.Diagnosis:
+    return tl.diagnose(calibrated)
+
+
+def test_effects_are_found_with_their_numbers(diagnosis) -> None:
+    assert diagnosis.verdict == "explained" and diagnosis.ok
+    found = {effect.effect: effect for effect in diagnosis.effects}
+    low, high = found["calibration"].numbers["offset"].interval_95
+    assert low < 2.0 < high
+    low, high = found["second-order"].numbers["second_time_constant"].interval_95
+    assert low < 0.02 < high
+    assert "second-order" in str(diagnosis) and "explained" in repr(diagnosis)
+    assert diagnosis.error.chi2_per_dof.after < diagnosis.error.chi2_per_dof.before
+
+
+def test_fields_are_attributes_and_what_is_not_there_is_named(diagnosis) -> None:
+    assert diagnosis.record.samples == 2500
+    assert diagnosis.sensors["coarse"].interval == tuple(diagnosis.sensors[1]["interval_95_s"])
+    with pytest.raises(AttributeError, match="no field 'verdicts'"):
+        _ = diagnosis.verdicts
+    with pytest.raises(KeyError, match="there are fine, coarse"):
+        _ = diagnosis.sensors["T1"]
+    assert json.loads(json.dumps(diagnosis.to_dict())) == diagnosis.to_dict()
+
+
+def test_tables_and_pages(diagnosis, tmp_path) -> None:
+    pytest.importorskip("pandas")
+    frame = diagnosis.to_frame()
+    assert set(frame["number"]) >= {"time constant", "difference", "offset", "second_time_constant"}
+    page = tmp_path / "page.html"
+    diagnosis.report(page, static=True)
+    assert "<html" in page.read_text(encoding="utf-8") and "Diagnosis of" in page.read_text(encoding="utf-8")
+    html = diagnosis._repr_html_()
+    assert "<svg" in html and "second-order in coarse" in html
+    with pytest.raises(ValueError, match="no page"):
+        tl.characterise(tl.simulate(tl.EXAMPLE_RIG)).report(page)
+
+
+def test_a_name_that_is_a_script_stays_a_name(arrays) -> None:
+    time_s, t1, t2 = arrays
+    answer = tl.diagnose(tl.Record(time_s, t1, t2, names=("<script>alert(1)</script>", "b")))
+    assert "<script" not in answer._repr_html_()
+
+
+def test_an_answer_survives_pickling_with_its_numbers(diagnosis, rig) -> None:
+    again = pickle.loads(pickle.dumps(diagnosis))
+    assert again.to_dict() == diagnosis.to_dict() and type(again) is tl.Diagnosis
+    with pytest.raises(ValueError, match="pickled"):
+        again.report("page.html")
+    gas = tl.compensate(rig)
+    assert np.array_equal(pickle.loads(pickle.dumps(gas)).gas_c, gas.gas_c)
+
+
+def test_a_model_goes_to_another_record(diagnosis, calibrated, tmp_path) -> None:
+    path = tmp_path / "model.json"
+    diagnosis.model.save(path)
+    model = tl.load_model(path)
+    assert model == diagnosis.model and pickle.loads(pickle.dumps(model)) == model
+    gas = model.compensate(calibrated)
+    assert gas.status == "ok" and len(gas.gas_c) == len(calibrated)
+    inside = np.abs(gas.gas_c - calibrated.reference_c) < 1.96 * gas.gas_std_k
+    # Of 2500 that hang together; the level is 95 %.
+    assert np.mean(inside) > 0.85
+    assert model.characterise(calibrated).sensors["fine"].time_constant_s is not None
+    path.write_text("{}")
+    with pytest.raises(ValueError, match="expected a model"):
+        tl.load_model(path)
+
+
+def test_forms_of_compensation(rig) -> None:
+    errors = {}
+    for form in ("smoother", "filter", 5):
+        gas = tl.compensate(rig, form=form)
+        errors[form] = np.sqrt(np.mean((gas.gas_c - rig.reference_c) ** 2))
+    assert max(errors["smoother"], errors[5]) < errors["filter"]
+    with pytest.raises(ValueError, match="trust"):
+        tl.compensate(rig, trust="T3")
+
+
+def test_tracks_and_live(rig) -> None:
+    answer = tl.track(rig)
+    assert answer.change == "constant"
+    assert answer.series("tau1_s").shape == rig.time_s.shape
+    live = tl.Live(rig)
+    assert live.start.ok
+    rows = [live.push(t1, t2, t) for t, t1, t2 in zip(rig.time_s[:50], rig.t1_c, rig.t2_c)]
+    assert all(row.gas_std_k > 0 for row in rows) and rows[10].time_s == rig.time_s[10]
+    assert live.push(450.0, float("nan")) is not None
+    assert live.push(450.0, 450.0, time_s=-1.0) is None
+    with pytest.raises(tl.RecordError):
+        tl.Live(tl.simulate(tl.EXAMPLE_RIG.replace("samples = 2500", "samples = 30")))
+
+
+def test_pictures(diagnosis, rig) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    assert tl.compensate(rig).plot().get_ylabel() == "temperature (°C)"
+    assert tl.track(rig).plot().get_yscale() == "log"
+    axes = diagnosis.plot()
+    assert diagnosis.plot(ax=axes) is axes
+
+
+def test_rigs_come_as_text_mapping_or_file(tmp_path) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(tl.EXAMPLE_RIG)
+    text, file = tl.simulate(tl.EXAMPLE_RIG), tl.simulate(path)
+    assert np.array_equal(text.t1_c, file.t1_c) and file.reference_c is not None
+    rig = {
+        "seed": 1,
+        "record": {"samples": 100, "sample_period_s": 0.1},
+        "gas": {"kind": "turbulence", "mean_c": 20.0, "std_k": 1.0, "corner_hz": 0.1, "cutoff_hz": 1.0},
+        "sensors": [{"channel": "a", "time_constant_s": 0.5}, {"channel": "b", "time_constant_s": 2.0}],
+    }
+    assert tl.simulate(rig).channels == ("a", "b")
+    with pytest.raises(ValueError, match="seed|missing|expected"):
+        tl.simulate({"seed": 1})

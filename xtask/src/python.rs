@@ -1,0 +1,117 @@
+//! The Python package: built as a wheel, installed in an empty environment, and tried there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+
+use crate::root;
+
+/// What the tests of the package use, each where a user would have it.
+const TEST_PACKAGES: [&str; 7] = ["pytest>=8", "pandas", "polars", "xarray", "matplotlib", "tqdm", "mypy"];
+
+/// Builds the wheel and tests it.
+#[derive(Args, Debug)]
+pub(crate) struct Python {
+    /// The Python that the environments are made with.
+    #[arg(long, default_value = "python3")]
+    python: PathBuf,
+}
+
+impl Default for Python {
+    fn default() -> Self {
+        Self { python: "python3".into() }
+    }
+}
+
+/// Builds the wheel from the sources, installs it in an empty environment, and runs its tests, its types and its stubs there.
+pub(crate) fn run(Python { python }: &Python) -> Result<()> {
+    let work = root()?.join("target/python");
+    if work.exists() {
+        fs::remove_dir_all(&work).with_context(|| format!("{} cannot be removed", work.display()))?;
+    }
+    let package = root()?.join("crates/twinlag-python");
+    let builder = Environment::new(python, &work.join("builder"))?;
+    builder.install(&["maturin>=1.9.4,<2"])?;
+    let wheels = work.join("wheels");
+    step(
+        "the wheel",
+        builder.program("maturin").args(["build", "--release", "--out"]).arg(&wheels).current_dir(&package),
+    )?;
+    let wheel = the_wheel(&wheels)?;
+    println!("== {}: {} bytes", wheel.display(), fs::metadata(&wheel)?.len());
+
+    let user = Environment::new(python, &work.join("user"))?;
+    user.install(&[&wheel.display().to_string()])?;
+    // Beside no other package but NumPy.
+    let first = "import twinlag as tl; assert tl.characterise(tl.simulate(tl.EXAMPLE_RIG)).ok; print(tl.__version__)";
+    step("the package alone", user.program("python").args(["-c", first]).current_dir(&work))?;
+    user.install(&TEST_PACKAGES)?;
+    let program = root()?.join("target/release/twinlag");
+    step("the program of the same sources", Command::new("cargo").args(["build", "--release"]).current_dir(root()?))?;
+    // The tests in a folder in which the sources of the package are not: what is tried is what was installed.
+    let tests = package.join("tests");
+    step(
+        "tests",
+        user.program("python")
+            .args(["-m", "pytest", "-p", "no:cacheprovider"])
+            .arg(&tests)
+            .env("TWINLAG_PROGRAM", program)
+            .current_dir(&work),
+    )?;
+    step(
+        "examples of the documentation",
+        user.program("python")
+            .args(["-m", "pytest", "-p", "no:cacheprovider", "--doctest-modules", "--pyargs", "twinlag"])
+            .current_dir(&work),
+    )?;
+    let settings = package.join("pyproject.toml");
+    let checked = |arguments: &[&str]| {
+        let mut command = user.program("python");
+        command.arg("-m").args(arguments).arg(&settings).current_dir(&work);
+        command
+    };
+    step("types", &mut checked(&["mypy", "--package", "twinlag", "--config-file"]))?;
+    step("stubs", &mut checked(&["mypy.stubtest", "twinlag", "--mypy-config-file"]))
+}
+
+/// An environment of its own, with `pip`.
+struct Environment {
+    folder: PathBuf,
+}
+
+impl Environment {
+    fn new(python: &Path, folder: &Path) -> Result<Self> {
+        step("an empty environment", Command::new(python).args(["-m", "venv"]).arg(folder))?;
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    fn program(&self, name: &str) -> Command {
+        let mut command = Command::new(self.folder.join(if cfg!(windows) { "Scripts" } else { "bin" }).join(name));
+        command.env("VIRTUAL_ENV", &self.folder).env_remove("PYTHONPATH");
+        command
+    }
+
+    fn install(&self, packages: &[&str]) -> Result<()> {
+        step("pip install", self.program("python").args(["-m", "pip", "install", "--quiet"]).args(packages))
+    }
+}
+
+fn the_wheel(folder: &Path) -> Result<PathBuf> {
+    let is_wheel = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "whl");
+    let entries = fs::read_dir(folder).with_context(|| format!("{} cannot be read", folder.display()))?;
+    let mut wheels = entries.filter_map(|entry| entry.ok().map(|entry| entry.path())).filter(is_wheel);
+    wheels.next().with_context(|| format!("no wheel in {}", folder.display()))
+}
+
+fn step(name: &str, command: &mut Command) -> Result<()> {
+    println!("== {name}: {command:?}");
+    let start = Instant::now();
+    let status = command.status().with_context(|| format!("{name}: could not be started"))?;
+    ensure!(status.success(), "{name}: ended with {status}");
+    println!("== {name}: {:.0} s", start.elapsed().as_secs_f64());
+    Ok(())
+}
