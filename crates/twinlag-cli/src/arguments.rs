@@ -121,8 +121,9 @@ PowerShell:  twinlag completions powershell >> $PROFILE")]
 /// Estimate both time constants of a record, or of several of one rig.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-FILE is delimited text as loggers write it (comma, semicolon or tab; decimal comma; units in the header; comments; ISO or
-numeric time; gaps and missing values). Columns are guessed from the header, and the guess is printed.
+FILE is text as loggers write it (comma, semicolon or tab; decimal comma; units in the header; comments; ISO or numeric time;
+gaps and missing values), or the file of a measurement program (MDF, TDMS, xlsx, Parquet, HDF5, netCDF, MATLAB, NumPy); `-` is
+standard input. Columns are guessed from the header, and the guess is printed.
 
 Status:
   ok                 both time constants are determined, and the residual is consistent with noise

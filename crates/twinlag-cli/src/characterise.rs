@@ -24,8 +24,11 @@ pub(crate) fn run(command: &Characterise, console: Console) -> Result<u8, Failur
             files.len()
         )));
     }
-    let records = several::read(&files, &command.input, console)?;
+    let mut records = several::read(&files, &command.input, console)?;
     let given = command.model.as_deref().map(|path| Ok::<_, Failure>((path, model(path)?))).transpose()?;
+    if let (Some((_, model)), [record]) = (&given, &mut records[..]) {
+        several::with_sensors(record, &model.channels, "the model", &command.input.columns.profile()?, console);
+    }
     let run = |options: Options| ask(&records, given.as_ref().map(|(path, model)| (*path, model)), &options, console);
     let plausibility = command.physics.plausibility(&records)?;
     let answer = plausibility.answer(options, run, |answer| answer)?;

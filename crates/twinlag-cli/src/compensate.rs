@@ -17,6 +17,7 @@ use crate::print;
 use crate::progress::Progress;
 use crate::read::read_watched;
 use crate::report;
+use crate::several::with_sensors;
 
 pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure> {
     let views =
@@ -26,7 +27,10 @@ pub(crate) fn run(command: &Compensate, console: Console) -> Result<u8, Failure>
     let asked = command.input.method.options()?;
     let model = model_file.map(model).transpose()?;
     let profile = command.input.columns.profile()?;
-    let record = read_watched(&command.input.file, &profile, console)?;
+    let mut record = read_watched(&command.input.file, &profile, console)?;
+    if let Some(model) = &model {
+        with_sensors(&mut record, &model.channels, "the model", &profile, console);
+    }
     Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let plausibility = command.physics.plausibility(std::slice::from_ref(&record))?;

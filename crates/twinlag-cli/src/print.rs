@@ -64,7 +64,8 @@ pub(crate) fn notes_in_words(record: &Record) -> impl Iterator<Item = String> {
             Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
             _ => String::new(),
         };
-        format!("{note}{option}")
+        // A name in a file may hold what a terminal takes for a command.
+        format!("{note}{option}").replace(|c: char| c.is_control() && c != '\n', "\u{FFFD}")
     })
 }
 

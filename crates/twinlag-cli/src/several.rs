@@ -46,30 +46,44 @@ pub(crate) fn read(files: &[&Path], input: &Input, console: Console) -> Result<V
     of_one_rig(records, &profile, console)
 }
 
-/// The records with the names that the sensors have in the first one, where the columns were chosen; refused where one shares
-/// rows with another.
+/// The records with the sensors of the first one; refused where one shares rows with another.
 pub(crate) fn of_one_rig(
     mut records: Vec<Record>,
     profile: &Profile,
     console: Console,
 ) -> Result<Vec<Record>, Failure> {
-    if profile.selection.t1.is_some()
-        && profile.selection.t2.is_some()
-        && let [first, others @ ..] = &mut records[..]
-    {
-        others.iter_mut().for_each(|record| named_as(record, first, console));
+    if let [first, others @ ..] = &mut records[..] {
+        others.iter_mut().for_each(|record| with_sensors(record, &first.channels, &first.source, profile, console));
     }
     no_shared_rows(&records)?;
     Ok(records)
 }
 
-/// Gives the sensors of a record the names that they have in the first one, where the columns of both were chosen.
-fn named_as(record: &mut Record, first: &Record, console: Console) {
-    if record.channels != first.channels && !console.quiet {
-        let ([one, two], [as_one, as_two]) = (&record.channels, &first.channels);
-        eprintln!("note: {}: {one} and {two} are the sensors {as_one} and {as_two} of {}", record.source, first.source);
+/// Gives a record the sensors of others: in their order where that was not chosen, as of a file whose columns are sorted by name; with
+/// their names where the columns were chosen.
+///
+/// - `whose`: what has the sensors of these names
+pub(crate) fn with_sensors(
+    record: &mut Record,
+    sensors: &[String; 2],
+    whose: &str,
+    profile: &Profile,
+    console: Console,
+) {
+    let ([one, two], [as_one, as_two]) = (&record.channels, sensors);
+    let is_chosen = profile.selection.t1.is_some() && profile.selection.t2.is_some();
+    let is_reversed = one == as_two && two == as_one;
+    if record.channels == *sensors || is_chosen == is_reversed {
+        return;
     }
-    record.channels.clone_from(&first.channels);
+    let source = &record.source;
+    if is_reversed {
+        console.note(|| format!("note: {source}: {two} is taken as the first sensor, as in {whose}"));
+        std::mem::swap(&mut record.t1_c, &mut record.t2_c);
+    } else {
+        console.note(|| format!("note: {source}: {one} and {two} are the sensors {as_one} and {as_two} of {whose}"));
+    }
+    record.channels.clone_from(sensors);
 }
 
 /// Refuses a record that shares rows with another: where one of them is left out, these would be there all the same.

@@ -14,6 +14,7 @@ use crate::print;
 use crate::progress::Progress;
 use crate::read::read_watched;
 use crate::report;
+use crate::several::with_sensors;
 
 pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
     let views = Views { picture: command.picture.as_deref(), report: command.report.as_deref(), ..Views::default() };
@@ -28,7 +29,10 @@ pub(crate) fn run(command: &Track, console: Console) -> Result<u8, Failure> {
         window_s: command.window,
     };
     let profile = command.input.columns.profile()?;
-    let record = read_watched(&command.input.file, &profile, console)?;
+    let mut record = read_watched(&command.input.file, &profile, console)?;
+    if let Some(model) = &options.model {
+        with_sensors(&mut record, &model.channels, "the model", &profile, console);
+    }
     Kept::check(&command.input.file, &profile, &command.keep, &record, console)?;
     print::notes(&record, console);
     let answer = {

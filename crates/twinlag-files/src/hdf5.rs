@@ -221,6 +221,10 @@ fn fault(error: Error) -> Fault {
         Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) | Error::ResourceLimit(_) => {
             Fault::unsupported(format!("has what is not read ({text})"), "write it with gzip or without compression")
         }
+        // Deeper in the reader it has no variant of its own.
+        _ if text.contains("unsupported filter") => {
+            Fault::unsupported(format!("has what is not read ({text})"), "write it with gzip or without compression")
+        }
         _ => Fault::damaged("what the format prescribes", text),
     }
 }

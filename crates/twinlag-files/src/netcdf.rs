@@ -183,6 +183,10 @@ fn fault(error: Error) -> Fault {
             format!("has what is not read ({text})"),
             "write it as netCDF-4 with deflate, or classic",
         ),
+        // Deeper in the reader it has no variant of its own.
+        _ if text.contains("unsupported filter") => {
+            Fault::unsupported(format!("has what is not read ({text})"), "write it with deflate or without compression")
+        }
         _ => Fault::damaged("what the format prescribes", text),
     }
 }

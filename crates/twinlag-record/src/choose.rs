@@ -8,8 +8,8 @@ use crate::clock;
 use crate::column::{Column, Kind};
 use crate::error::Candidates;
 use crate::names::{
-    OTHER_QUANTITIES, SURROUNDINGS, TEMPERATURE, first_word, has, is_apart, is_called_temperature, is_index,
-    is_temperature, is_time,
+    OTHER_QUANTITIES, SURROUNDINGS, TEMPERATURE, counts_rows, first_word, has, is_apart, is_called_temperature,
+    is_index, is_temperature, is_time,
 };
 use crate::note::Note;
 use crate::selection::{ColumnRef, Selection, Setting};
@@ -142,10 +142,10 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let named = open().find(|&index| is_time(&columns[index]));
     named.or_else(|| open().find(|&index| is_called_by_unit(&columns[index]))).or_else(|| {
         // Without a telling name: the first column, if it rises from row to row and is not a row
-        // number.
+        // number, by its name or as it counts.
         let first = columns.first().filter(|_| free(&0))?;
-        let open =
-            *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index(first) && !is_apart(first, columns);
+        let is_index = is_index(first) || counts_rows(first);
+        let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index && !is_apart(first, columns);
         (rises(first) && open).then_some(0)
     })
 }

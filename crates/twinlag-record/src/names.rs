@@ -4,9 +4,10 @@
 use crate::column::{Column, Kind};
 use crate::unit::Unit;
 
-const TIME: [&str; 20] = [
+const TIME: [&str; 21] = [
     "time",
     "zeit",
+    "zeitpunkt",
     "timestamp",
     "datetime",
     "date",
@@ -140,6 +141,15 @@ pub(crate) fn has(column: &Column, list: &[&str]) -> bool {
         let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
         list.contains(&word.as_str()) || list.contains(&bare)
     })
+}
+
+/// Whether its numbers go 0, 1, 2 or 1, 2, 3 from row to row, as the index of a data frame does; a clock of one sample a second does so
+/// too.
+pub(crate) fn counts_rows(column: &Column) -> bool {
+    let raw = column.raw();
+    column.kind() == Kind::Number
+        && raw.first().is_some_and(|first| [0.0, 1.0].contains(first))
+        && raw.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
 }
 
 pub(crate) fn is_index(column: &Column) -> bool {

@@ -72,11 +72,12 @@ impl Unit {
             "d" | "day" | "days" | "tage" => return time("d", 86_400.0),
             _ => {}
         }
-        // `º` is the ordinal sign and U+FFFD what a wrong encoding left of `°`; both are met in
+        // `º` is the ordinal sign, `˚` a ring above, and U+FFFD what a wrong encoding left of `°`; all are met in
         // real files.
-        let bare: String = lower.chars().filter(|c| !c.is_whitespace() && !"°º\u{FFFD}._*'".contains(*c)).collect();
-        match bare.strip_prefix("degrees").or_else(|| bare.strip_prefix("deg")).unwrap_or(&bare) {
-            "c" | "℃" | "celsius" | "centigrade" => Some(Self::Celsius),
+        let bare: String = lower.chars().filter(|c| !c.is_whitespace() && !"°º˚\u{FFFD}._*'".contains(*c)).collect();
+        let degrees = ["degrees", "degree", "deg", "grad"].into_iter().find_map(|degrees| bare.strip_prefix(degrees));
+        match degrees.unwrap_or(&bare) {
+            "c" | "oc" | "℃" | "celsius" | "centigrade" => Some(Self::Celsius),
             "k" | "kelvin" => Some(Self::Kelvin),
             "f" | "℉" | "fahrenheit" => Some(Self::Fahrenheit),
             _ => None,
@@ -235,6 +236,12 @@ mod tests {
             ("Temp 1 (deg C)", "Temp 1", Unit::Celsius),
             ("Gas T (C) fine", "Gas T fine", Unit::Celsius),
             ("T090C [ITS-90, deg C]", "T090C", Unit::Celsius),
+            ("T1 [degree_Celsius]", "T1", Unit::Celsius),
+            ("T1 [degreesC]", "T1", Unit::Celsius),
+            ("T1 [˚C]", "T1", Unit::Celsius),
+            ("T1 [Grad Celsius]", "T1", Unit::Celsius),
+            ("T1 [oC]", "T1", Unit::Celsius),
+            ("T1 [degree_Fahrenheit]", "T1", Unit::Fahrenheit),
             ("depth [mm]", "depth", Unit::Other("mm".to_owned())),
             ("time [seconds since 2020-01-01]", "time", second),
             ("millis()", "millis", ms.clone()),

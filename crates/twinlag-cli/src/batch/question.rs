@@ -193,7 +193,10 @@ impl<'a> Question<'a> {
 
     /// The rows of what the records of a unit answer.
     fn ask(&self, unit: &Unit, records: Vec<Record>, gas_file: Option<&PathBuf>) -> Result<Vec<Row>, Failure> {
-        let records = several::of_one_rig(records, &self.profile, SILENT)?;
+        let mut records = several::of_one_rig(records, &self.profile, SILENT)?;
+        if let (Some((_, model)), [record]) = (&self.model, &mut records[..]) {
+            several::with_sensors(record, &model.channels, "the model", &self.profile, SILENT);
+        }
         let plausibility = self.physics.plausibility(&records)?;
         let options = self.options.clone();
         let diagnose = |characterise| DiagnoseOptions {

@@ -90,6 +90,17 @@ fn standard_input_without_a_table_is_refused_by_that_name() {
     answer.says(&["standard input", "empty"]);
 }
 
+/// Failed: it was said to be no text.
+#[test]
+fn a_binary_file_is_read_from_standard_input() {
+    let fixture = concat!(env!("CARGO_MANIFEST_DIR"), "/../twinlag-files/tests/fixtures/plain.mf4");
+    let bytes = std::fs::read(fixture).expect("a committed fixture");
+    let bench = Bench::with("binary_input", "plain.mf4", &bytes);
+    let [file, input] =
+        [bench.run(&["characterise", "plain.mf4"]), bench.run_with_input(&["characterise", "-"], &bytes)];
+    assert_eq!((file.code, file.stderr), (input.code, input.stderr.replace("standard input", "plain.mf4")));
+}
+
 // Columns.
 
 #[test]

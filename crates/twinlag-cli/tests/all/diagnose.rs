@@ -265,6 +265,31 @@ fn a_saved_model_knows_its_channels_by_name() {
     recovers(&answer.status(&["ok"]), [slow_s, fast_s]);
 }
 
+/// Failed: a file of the same rig whose columns have other names, or are sorted by name, could not be used with the model, nor in a group.
+#[test]
+fn sensors_of_other_files_are_those_of_the_first() {
+    let bench = offset("sensors");
+    diagnosis(&bench, &["--save", "model.json"], 0);
+    let rows = |file: &str| {
+        let text = String::from_utf8(bench.read(file)).expect("text");
+        text.split_once('\n').expect("a header").1.to_owned()
+    };
+    bench.write("renamed.csv", format!("time_s,fine,coarse\n{}", rows("later.csv")));
+    let renamed = bench.characterise("renamed.csv", &["--model", "model.json", "--t1", "fine", "--t2", "coarse"]);
+    recovers(&renamed.status(&["ok"]), Trace::GOOD.tau_s);
+    let reversed = rows("run.csv")
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            format!("{},{},{}\n", cells[0], cells[2], cells[1])
+        })
+        .collect::<String>();
+    bench.write("sorted.csv", format!("time_s,coarse,fine\n{reversed}"));
+    let together = bench.run(&["characterise", "renamed.csv", "sorted.csv"]);
+    let note = "note: sorted.csv: fine is taken as the first sensor, as in renamed.csv";
+    assert!(together.stderr.contains(note), "{together:#?}");
+}
+
 /// Nothing but noise: neither time constant is determined, and both schemas say so by the same names.
 #[test]
 fn what_is_unknown_has_the_names_of_a_characterisation() {

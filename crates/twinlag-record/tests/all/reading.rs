@@ -1,6 +1,6 @@
 //! What loggers write is read, and what was made of it is said. The oracle is the numbers that the text was made from.
 
-use crate::common::{assert_is_the_rig, notes, plain, record, record_with, rows};
+use crate::common::{assert_is_the_rig, assert_says, notes, plain, record, record_with, refusal, rows};
 use twinlag_record::{Channels, ColumnRef, Kind, Note, Record, SamplingChoice, SamplingKind, Selection, Table};
 
 fn comma(value: f64) -> String {
@@ -240,6 +240,21 @@ fn t1_and_t2_go_before_other_temperatures_and_a_reference_is_never_one() {
         &record(&rows("time_s,Dew Point [°C],fine_C,coarse_C", |_, t, a, b| format!("{t},7,{a},{b}"))),
         0.0,
     );
+}
+
+/// Failed: the index of a data frame was taken for seconds, also where the time stood beside it.
+#[test]
+fn a_column_that_counts_rows_is_no_time_without_a_name() {
+    for name in ["", "Unnamed: 0", "n", "Messpunkt"] {
+        for first in [0, 1] {
+            let counted = rows(&format!("{name},T1,T2"), |k, _, a, b| format!("{},{a},{b}", k + first));
+            assert_says(&refusal(&counted), &["no column is recognisably the time"]);
+            let beside = rows(&format!("{name},Zeitpunkt,T1,T2"), |k, t, a, b| format!("{},{t},{a},{b}", k + first));
+            assert_is_the_rig(&record(&beside), 0.0);
+        }
+    }
+    let named = rows("time,T1,T2", |k, _, a, b| format!("{k},{a},{b}"));
+    assert_eq!(record(&named).time_s[3], 3.0);
 }
 
 #[test]
