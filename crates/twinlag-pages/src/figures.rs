@@ -59,7 +59,8 @@ pub(crate) fn trace(name: impl Into<String>, x: &[f64], y: &[f64], colour: Colou
     let (mut at, mut values) = (Vec::with_capacity(x.len()), Vec::with_capacity(x.len()));
     for (k, (x_k, y_k)) in x.iter().zip(y).enumerate() {
         if k > 0 && x_k - x[k - 1] > longest {
-            at.push(*x_k);
+            // Between the two: a place that has a value as well is none.
+            at.push(0.5 * (x[k - 1] + x_k));
             values.push(f64::NAN);
         }
         at.push(*x_k);

@@ -1,5 +1,7 @@
 //! A batch as a page: how many answered, why others did not, both time constants of all of them, and which lie apart.
 
+use std::path::{Path, PathBuf};
+
 use twinlag_batch::{Fleet, Member, MemberTau};
 use twinlag_report::{Axis, Chart, Document, Figure, KeyNumber, ReportError, Series, Table, Tone, between, rounded};
 
@@ -21,6 +23,36 @@ const MAX_ROWS: usize = 50;
 /// A normal distribution's standard deviation over its median absolute deviation, and over the half width of its 95 % interval.
 const STD_OVER_MAD: f64 = 1.4826;
 const STD_OVER_HALF_95: f64 = 1.0 / 1.96;
+
+/// Names of files and rigs without the folders that all of them are in, which are the user's own business.
+struct Names {
+    folder: PathBuf,
+}
+
+impl Names {
+    fn of(fleet: &Fleet) -> Self {
+        let members = fleet.members.iter().map(|member| &member.name);
+        let others = fleet.contradicting.iter().map(|(_, file)| file);
+        let names = members.chain(others).chain(fleet.reasons.iter().map(|reason| &reason.first));
+        let folders = names.map(|name| Path::new(name).parent().unwrap_or(Path::new("")));
+        let shared = |one: PathBuf, other: &Path| one.ancestors().find(|a| other.starts_with(a)).map(Path::to_owned);
+        let mut folders = folders.peekable();
+        let first = folders.peek().map_or(PathBuf::new(), |folder| folder.to_path_buf());
+        Self { folder: folders.fold(first, |one, other| shared(one, other).unwrap_or_default()) }
+    }
+
+    /// A name below the folder of all; the last part alone where they have none but the root.
+    fn short(&self, name: &str) -> String {
+        match Path::new(name).strip_prefix(&self.folder) {
+            Ok(below)
+                if self.folder.parent().is_some() || self.folder.as_os_str().is_empty() && below.is_relative() =>
+            {
+                below.display().to_string()
+            }
+            _ => file_name(name).to_owned(),
+        }
+    }
+}
 
 /// The summary of a batch: an HTML page that needs no other file. Equal summaries give equal bytes.
 ///
@@ -49,12 +81,13 @@ pub fn fleet_report(
         .byline(making.byline(&[format!("{} {unit}", counts.total())]))
         .verdict(tone, grade, sentence(fleet, unit))
         .key_numbers(keys(fleet));
+    let names = Names::of(fleet);
     let document = time_constants(document, fleet)?;
-    let document = each(document, fleet);
+    let document = each(document, fleet, &names);
     let document = found(document, fleet, unit);
-    let document = apart(document, fleet);
-    let document = contradictions(document, fleet);
-    let document = reasons(document, fleet);
+    let document = apart(document, fleet, &names);
+    let document = contradictions(document, fleet, &names);
+    let document = reasons(document, fleet, &names);
     let [program, version] = made_by;
     Ok(making.page(&making.reproduction(document, program, version)))
 }
@@ -159,7 +192,7 @@ fn found(document: Document, fleet: &Fleet, unit: &str) -> Document {
 }
 
 /// Each member with its numbers, where there are few.
-fn each(document: Document, fleet: &Fleet) -> Document {
+fn each(document: Document, fleet: &Fleet, names: &Names) -> Document {
     if fleet.members.is_empty() || fleet.members.len() > MAX_ROWS {
         return document;
     }
@@ -173,14 +206,14 @@ fn each(document: Document, fleet: &Fleet) -> Document {
     let row = |table: Table, (place, member): (usize, &Member)| {
         let [one, two] = member.tau.map(number);
         let found = if member.effects.is_empty() { &member.verdict } else { &member.effects };
-        table.row([(place + 1).to_string(), file_name(&member.name).to_owned(), one, two, found.clone()])
+        table.row([(place + 1).to_string(), names.short(&member.name), one, two, found.clone()])
     };
     let table = Table::new(["number", "name", "T1", "T2", "found"]);
     document.table(fleet.members.iter().enumerate().fold(table, row).caption("Time constants with 95 % intervals"))
 }
 
 /// Members whose time constants lie furthest from the median, in units of how far members scatter and of their own uncertainty.
-fn apart(document: Document, fleet: &Fleet) -> Document {
+fn apart(document: Document, fleet: &Fleet, names: &Names) -> Document {
     let mut distances: Vec<(f64, usize, &Member, MemberTau)> = Vec::new();
     for i in 0..2 {
         let given = given(fleet, i);
@@ -199,7 +232,7 @@ fn apart(document: Document, fleet: &Fleet) -> Document {
     distances.sort_by(|a, b| b.0.total_cmp(&a.0));
     let row = |table: Table, (distance, i, member, tau): &(f64, usize, &Member, MemberTau)| {
         table.row([
-            file_name(&member.name).to_owned(),
+            names.short(&member.name),
             format!("T{}", i + 1),
             format!("{} s", rounded(tau.value_s, 4)),
             format!("{} s", between(tau.interval_95_s)),
@@ -214,22 +247,22 @@ fn apart(document: Document, fleet: &Fleet) -> Document {
     ))
 }
 
-fn contradictions(document: Document, fleet: &Fleet) -> Document {
+fn contradictions(document: Document, fleet: &Fleet, names: &Names) -> Document {
     if fleet.contradicting.is_empty() {
         return document;
     }
-    let row = |table: Table, (rig, file): &(String, String)| table.row([rig.as_str(), file_name(file)]);
+    let row = |table: Table, (rig, file): &(String, String)| table.row([rig.clone(), names.short(file)]);
     let table = fleet.contradicting.iter().take(MAX_ROWS).fold(Table::new(["rig", "record"]), row);
     document.heading("Records that contradict the others of their rig").table(table)
 }
 
-fn reasons(document: Document, fleet: &Fleet) -> Document {
+fn reasons(document: Document, fleet: &Fleet, names: &Names) -> Document {
     if fleet.reasons.is_empty() {
         return document;
     }
     let table = Table::new(["first file", "how many", "why, as the first of them says it"]);
     let row = |table: Table, reason: &twinlag_batch::ReasonCount| {
-        table.row([file_name(&reason.first).to_owned(), reason.count.to_string(), reason.reason.clone()])
+        table.row([names.short(&reason.first), reason.count.to_string(), reason.reason.clone()])
     };
     document.heading("What has no answer").table(fleet.reasons.iter().take(MAX_ROWS).fold(table, row))
 }
@@ -266,5 +299,21 @@ mod tests {
             assert!(is_fleet_report(&page.expect("nothing to draw").as_bytes()[..4096]));
         }
         assert!(!is_fleet_report(b"<!DOCTYPE html><title>Notes</title>"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Names;
+
+    /// Failed: records of one name in two folders were both called by it.
+    #[test]
+    fn names_are_those_below_the_folder_of_all() {
+        let short = |folder: &str, name: &str| Names { folder: folder.into() }.short(name);
+        assert_eq!(short("same", "same/mon/run1.csv"), "mon/run1.csv");
+        assert_eq!(short("", "mon/run1.csv"), "mon/run1.csv");
+        assert_eq!(short("/home/someone/runs", "/home/someone/runs/mon/run1.csv"), "mon/run1.csv");
+        assert_eq!(short("/", "/home/someone/run1.csv"), "run1.csv");
+        assert_eq!(short("", "/home/someone/run1.csv"), "run1.csv");
     }
 }

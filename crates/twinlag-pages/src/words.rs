@@ -144,10 +144,14 @@ pub fn plausibility_in_words(one: &PlausibleTimeConstant) -> String {
     format!("implausible: {channel} has {found}, expected are {expected}{take}")
 }
 
-/// A name that does not fill a legend.
+/// A name that does not fill a legend: its middle is left out, since names of one rig differ at their ends.
 pub(crate) fn short(name: &str) -> String {
-    const MOST: usize = 28;
-    if name.chars().count() <= MOST { name.into() } else { name.chars().take(MOST - 1).chain(['…']).collect() }
+    const END: usize = 14;
+    let length = name.chars().count();
+    if length <= 2 * END {
+        return name.into();
+    }
+    name.chars().take(END).chain(['…']).chain(name.chars().skip(length - END + 1)).collect()
 }
 
 /// A unit as it is printed: numbers without one have `1`.

@@ -131,10 +131,11 @@
     const draw = () => {
       const off = drawn ? drawn.series.map((s) => !s.show) : [];
       if (drawn) drawn.destroy();
-      /* As many digits as keep neighbouring ticks apart. */
+      /* As many digits as the step has: of 2.5 one. */
       const ticks = (_, splits) => {
         const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-        const digits = Math.min(12, Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+        let digits = 0;
+        while (digits < 12 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6 * step * 10 ** digits) digits++;
         return splits.map((v) => (v == null ? "" : v.toFixed(digits).replace("-", "−")));
       };
       const axis = (label) => ({ label, stroke: style("ink"), grid: { stroke: style("grid"), width: 1 }, values: ticks, gap: 4,

@@ -176,6 +176,15 @@ fn busiest(record: &Record, window: usize) -> Range<usize> {
             })
             .sum()
     };
-    let start = (0..=n - window).max_by(|a, b| variance(*a).total_cmp(&variance(*b))).unwrap_or(0);
+    // Across a gap, or from one record to the next, readings jump without having moved.
+    let gap_s = record.sampling.gap_s();
+    let mut gaps = vec![0];
+    gaps.extend(record.time_s.windows(2).scan(0, |count, pair| {
+        *count += usize::from(pair[1] - pair[0] > gap_s);
+        Some(*count)
+    }));
+    let is_whole = |start: &usize| window == 0 || gaps[*start] == gaps[start + window - 1];
+    let busiest = |starts: &mut dyn Iterator<Item = usize>| starts.max_by(|a, b| variance(*a).total_cmp(&variance(*b)));
+    let start = busiest(&mut (0..=n - window).filter(is_whole)).or_else(|| busiest(&mut (0..=n - window))).unwrap_or(0);
     start..start + window
 }
