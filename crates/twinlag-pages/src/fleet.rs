@@ -289,7 +289,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Fleet, Making, fleet_report, is_fleet_report};
+    use super::{Fleet, Making, Names, fleet_report, is_fleet_report};
 
     #[test]
     fn a_summary_is_known_by_its_first_bytes() {
@@ -300,11 +300,6 @@ mod tests {
         }
         assert!(!is_fleet_report(b"<!DOCTYPE html><title>Notes</title>"));
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Names;
 
     /// Failed: records of one name in two folders were both called by it.
     #[test]

@@ -277,14 +277,13 @@ fn sensors_of_other_files_are_those_of_the_first() {
     bench.write("renamed.csv", format!("time_s,fine,coarse\n{}", rows("later.csv")));
     let renamed = bench.characterise("renamed.csv", &["--model", "model.json", "--t1", "fine", "--t2", "coarse"]);
     recovers(&renamed.status(&["ok"]), Trace::GOOD.tau_s);
-    let reversed = rows("run.csv")
-        .lines()
-        .map(|line| {
-            let cells: Vec<&str> = line.split(',').collect();
-            format!("{},{},{}\n", cells[0], cells[2], cells[1])
-        })
-        .collect::<String>();
-    bench.write("sorted.csv", format!("time_s,coarse,fine\n{reversed}"));
+    let mut sorted = "time_s,coarse,fine\n".to_owned();
+    for line in rows("run.csv").lines() {
+        let cells: Vec<&str> = line.split(',').collect();
+        sorted.push_str(&[cells[0], cells[2], cells[1]].join(","));
+        sorted.push('\n');
+    }
+    bench.write("sorted.csv", sorted);
     let together = bench.run(&["characterise", "renamed.csv", "sorted.csv"]);
     let note = "note: sorted.csv: fine is taken as the first sensor, as in renamed.csv";
     assert!(together.stderr.contains(note), "{together:#?}");
