@@ -10,9 +10,6 @@ use clap::Args;
 
 use crate::root;
 
-/// What the tests of the package use, each where a user would have it.
-const TEST_PACKAGES: [&str; 7] = ["pytest>=8", "pandas", "polars", "xarray", "matplotlib", "tqdm", "mypy"];
-
 /// Builds the wheel and tests it.
 #[derive(Args, Debug)]
 pub(crate) struct Python {
@@ -49,7 +46,7 @@ pub(crate) fn run(Python { python }: &Python) -> Result<()> {
     // Beside no other package but NumPy.
     let first = "import twinlag as tl; assert tl.characterise(tl.simulate(tl.EXAMPLE_RIG)).ok; print(tl.__version__)";
     step("the package alone", user.program("python").args(["-c", first]).current_dir(&work))?;
-    user.install(&TEST_PACKAGES)?;
+    user.install(&[&format!("{}[test]", wheel.display())])?;
     let program = root()?.join("target/release/twinlag");
     step("the program of the same sources", Command::new("cargo").args(["build", "--release"]).current_dir(root()?))?;
     // The tests in a folder in which the sources of the package are not: what is tried is what was installed.

@@ -11,7 +11,7 @@ static INVOCATION: OnceLock<Invocation> = OnceLock::new();
 pub(crate) struct Invocation {
     /// What is to be started to call it again; `None` where nobody knows.
     pub(crate) program: Option<PathBuf>,
-    /// The arguments, behind the name of the program.
+    /// The arguments, the first of which is the name of the program.
     pub(crate) arguments: Vec<OsString>,
 }
 

@@ -13,6 +13,7 @@ use twinlag_pages::{
 };
 
 use crate::error::of_verb;
+use crate::verbs::in_a_row;
 
 /// What a verb has said, with the records that it was asked about.
 #[pyclass(frozen, module = "twinlag._core")]
@@ -40,10 +41,7 @@ impl Answer {
     fn record(&self) -> PyResult<Arc<Inner>> {
         match &self.records[..] {
             [one] => Ok(Arc::clone(one)),
-            all => {
-                let all: Vec<Inner> = all.iter().map(|record| record.as_ref().clone()).collect();
-                Ok(Arc::new(joined(&all).map_err(|error| of_verb(&error))?))
-            }
+            several => Ok(Arc::new(joined(&in_a_row(several)).map_err(|error| of_verb(&error))?)),
         }
     }
 }

@@ -9,7 +9,8 @@ use pyo3::prelude::*;
 use twinlag::record::{NamedColumn, Record as Inner, Selection, Table};
 use twinlag_files::Choice;
 
-use crate::error::{of_file, of_options, of_record};
+use crate::error::{of_file, of_record};
+use crate::verbs::parsed;
 
 /// Two temperatures over time, checked.
 #[pyclass(frozen, module = "twinlag._core")]
@@ -50,7 +51,7 @@ impl Record {
         columns: Vec<(String, String, Values<'_>)>,
         selection: &str,
     ) -> PyResult<Self> {
-        let selection: Selection = serde_json::from_str(selection).map_err(|error| of_options(&error))?;
+        let selection: Selection = parsed(selection)?;
         let columns = columns.into_iter().map(column).collect::<PyResult<Vec<_>>>()?;
         let made = py.detach(|| Inner::from_owned(Table::from_columns(source, columns)?, &selection));
         Ok(Self { inner: Arc::new(made.map_err(|error| of_record(&error))?) })
@@ -60,7 +61,7 @@ impl Record {
     #[staticmethod]
     #[pyo3(signature = (path, selection, group = None, join = false))]
     fn read(py: Python<'_>, path: PathBuf, selection: &str, group: Option<String>, join: bool) -> PyResult<Self> {
-        let selection: Selection = serde_json::from_str(selection).map_err(|error| of_options(&error))?;
+        let selection: Selection = parsed(selection)?;
         let channels = [&selection.t1, &selection.t2].into_iter().flatten().map(ToString::to_string).collect();
         let choice = Choice { group, join, channels };
         let table = py.detach(|| {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -44,7 +45,7 @@ fn shared(records: &[PyRef<'_, Record>]) -> Vec<Arc<Inner>> {
 }
 
 /// Copies for verbs that take several records in a row. Their readings are shared, not copied.
-fn in_a_row(records: &[Arc<Inner>]) -> Vec<Inner> {
+pub(crate) fn in_a_row(records: &[Arc<Inner>]) -> Vec<Inner> {
     records.iter().map(|record| record.as_ref().clone()).collect()
 }
 
@@ -122,9 +123,11 @@ pub(crate) fn track(
 /// Simulates a rig, given as TOML or, with `is_json`, as JSON.
 #[pyfunction]
 pub(crate) fn simulate(py: Python<'_>, rig: &str, is_json: bool, source: String) -> PyResult<Record> {
-    let wrong = |reason: String| pyo3::exceptions::PyValueError::new_err(reason);
-    let rig: Rig =
-        if is_json { parsed(rig)? } else { toml::from_str(rig).map_err(|error| wrong(error.to_string()))? };
+    let rig: Rig = if is_json {
+        parsed(rig)?
+    } else {
+        toml::from_str(rig).map_err(|error| PyValueError::new_err(error.to_string()))?
+    };
     let simulated = py.detach(|| rig.simulate()).map_err(|error| of_verb(&error.into()))?;
     let channels = Channels {
         source,

@@ -46,8 +46,8 @@ def test_ctrl_c_stops_a_diagnosis() -> None:
         import twinlag as tl
         rig = tl.EXAMPLE_RIG.replace("samples = 2500", "samples = 200000")
         record = tl.simulate(rig)
-        print("begun", flush=True)
         try:
+            print("begun", flush=True)
             while True:
                 tl.diagnose(record)
         except KeyboardInterrupt:

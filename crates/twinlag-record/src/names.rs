@@ -78,7 +78,7 @@ const APART: [&str; 20] = [
     "uncertainty",
 ];
 /// Never T1 or T2: temperatures that are computed, of Sea-Bird's names those of potential temperature, `potemp090C`.
-const COMPUTED: [&str; 8] = ["potemp", "potential", "theta", "dew", "dewpoint", "taupunkt", "windchill", "heatindex"];
+const COMPUTED: [&str; 7] = ["potemp", "potential", "dew", "dewpoint", "taupunkt", "windchill", "heatindex"];
 /// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
 const GAS: [&str; 2] = ["gas", "tgas"];
 /// Perhaps a sensor, perhaps its surroundings: only the caller knows.

@@ -267,14 +267,13 @@ def _columns_of(frame: Any) -> list[Column]:
     """The columns of a frame that can be read: numbers, instants, texts."""
     if hasattr(frame, "data_vars"):
         return _columns_of_dataset(frame)
-    names = [name for name in frame.columns]
     columns: list[Column] = []
     index = getattr(frame, "index", None)
     if index is not None and not callable(index):
         is_of_time = getattr(getattr(index, "dtype", None), "kind", "") in "mM" or getattr(index, "tz", None) is not None
         if index.name is not None or is_of_time:
             columns.append(_column(index.name if index.name is not None else "time", "", index))
-    columns.extend(_column(name, "", frame[name]) for name in names)
+    columns.extend(_column(name, "", frame[name]) for name in frame.columns)
     return columns
 
 

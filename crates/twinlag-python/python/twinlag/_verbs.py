@@ -38,7 +38,7 @@ def _options(
     """The options in the form of the library."""
     free, second_order = _names(free), _names(second_order)
     _expect(free, ("gain", "offset"), "free")
-    sensors = dict(zip((*channels, "T1", "T2"), (0, 1, 0, 1)))
+    sensors = _places(channels)
     _expect(second_order, tuple(sensors), "second_order")
     options: dict[str, Any] = {
         "free_gain": "gain" in free,
@@ -61,6 +61,11 @@ def _options(
     }
     options.update({name: value for name, value in given.items() if value is not None})
     return options
+
+
+def _places(channels: tuple[str, str]) -> dict[str, int]:
+    """Whether a name is that of the first sensor, 0, or of the second, 1."""
+    return dict(zip((*channels, "T1", "T2"), (0, 1, 0, 1)))
 
 
 def _names(names: Iterable[str]) -> tuple[str, ...]:
@@ -236,7 +241,7 @@ def compensate(
     (True, 'go')
     """
     record = _one(record)
-    sensors = dict(zip((*record.channels, "T1", "T2"), (0, 1, 0, 1)))
+    sensors = _places(record.channels)
     _expect((trust,), tuple(sensors), "trust")
     its_form: Any = {"fixed-lag": int(form)} if isinstance(form, int) else form
     others = {"model": _fields(model), "form": its_form, "trusted": sensors[trust], "without": list(_names(without))}

@@ -236,6 +236,8 @@ fn t1_and_t2_go_before_other_temperatures_and_a_reference_is_never_one() {
         &record(&rows("time_s,setpoint_C,Tref,fine_C,coarse_C", |_, t, a, b| format!("{t},9,8,{a},{b}"))),
         0.0,
     );
+    // A name of temperatures as well.
+    assert_is_the_rig(&record(&rows("time_s,Theta_1 [°C],Theta_2 [°C]", |_, t, a, b| format!("{t},{a},{b}"))), 0.0);
     assert_is_the_rig(
         &record(&rows("time_s,Dew Point [°C],fine_C,coarse_C", |_, t, a, b| format!("{t},7,{a},{b}"))),
         0.0,
