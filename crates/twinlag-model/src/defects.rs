@@ -97,7 +97,8 @@ fn scores(part: &Part, channel: usize, samples: usize) -> Vec<f64> {
 
 /// Single wrong readings, by channel: samples counted through all stretches. They stick out of the residual as a change of one
 /// reading does, by `far` robust standard deviations, and out of their own neighbours; and they come when the gas does nothing in
-/// particular. A single one in a channel may be anything.
+/// particular. The only one of a channel may be anything, unless it is plain: both measures show it in full, and it lies farther from
+/// its neighbours than these move in all.
 ///
 /// - `known`: how many each channel has beside these
 pub(crate) fn spikes(
@@ -111,6 +112,7 @@ pub(crate) fn spikes(
     for channel in 0..2 {
         let mut found: Vec<usize> = Vec::new();
         let mut ranks = Vec::new();
+        let mut any_is_plain = false;
         for part in parts {
             let stretch = &observations.stretches[part.stretch];
             let n = stretch.len();
@@ -132,6 +134,13 @@ pub(crate) fn spikes(
                 (score > far && sticks_out > far)
                     || (score > policy.spike_residual_share * far && sticks_out > policy.spike_neighbour_factor * far)
             };
+            let is_plain = |k: usize| {
+                let is_inner = (2..n - 2).contains(&k);
+                is_inner
+                    && scores[k].abs() > far
+                    && beside[k].abs() > far * scale
+                    && beside[k].abs() > path_of_neighbours(y, k)
+            };
             let peaks = |values: &[f64], k: usize| near(k).all(|j| values[j].abs() <= values[k].abs());
             let inner: Vec<usize> = (2..n - 2).filter(|&k| peaks(&scores, k) && is_far(scores[k].abs(), k)).collect();
             // At an end the residual shows less of a reading than of its neighbour, and a wrong neighbour makes it stand out.
@@ -143,13 +152,14 @@ pub(crate) fn spikes(
             let mut of_part: Vec<usize> = inner.iter().copied().chain(outer).collect();
             of_part.sort_unstable();
             for k in of_part.into_iter().filter(|&k| !stretch.masked[channel][k]) {
+                any_is_plain |= is_plain(k);
                 found.push(part.before + k);
                 ranks.push(slopes.partition_point(|s| *s < slope(k)) as f64 / n as f64);
             }
         }
         let m = found.len() as f64;
         let related = (ranks.iter().sum::<f64>() / m.max(1.0) - 0.5) * (12.0 * m).sqrt();
-        if found.len() + known[channel] >= 2
+        if (found.len() + known[channel] >= 2 || any_is_plain)
             && m < policy.most_spikes_share * observations.samples() as f64
             && related < policy.most_spike_rank_standard_errors
         {
@@ -172,6 +182,12 @@ fn beside_neighbours(y: &[f64], k: usize) -> f64 {
         (0 | 1, _) => beyond(y[k + 1], y[k + 2], y[k + 3]),
         _ => beyond(y[k - 1], y[k - 2], y[k - 3]),
     }
+}
+
+/// How far the two readings before reading `k` and the two after it are apart, one after the other: more than the reading sticks out by
+/// wherever a kink or a peak of the gas makes it do so.
+fn path_of_neighbours(y: &[f64], k: usize) -> f64 {
+    [[k - 2, k - 1], [k - 1, k + 1], [k + 1, k + 2]].map(|[from, to]| (y[to] - y[from]).abs()).iter().sum()
 }
 
 /// Masks `samples` of `channel`.
