@@ -311,6 +311,20 @@ fn gas_line_ratio(evaluation: &Evaluation, omega: f64) -> f64 {
 mod tests {
     use super::*;
 
+    /// A kink and a peak of straight lines stick out by a third and two thirds of what they move by from reading to reading, and their
+    /// neighbours move by two of these; those of a wrong reading do not move.
+    #[test]
+    fn kinks_and_peaks_stick_out_less_than_their_neighbours_move() {
+        for (y, sticks_out, path) in [
+            ([0.0, 0.0, 0.0, 1.0, 2.0], -1.0 / 3.0, 2.0),
+            ([0.0, 1.0, 2.0, 1.0, 0.0], 2.0 / 3.0, 2.0),
+            ([0.0, 0.0, 1.0, 0.0, 0.0], 1.0, 0.0),
+        ] {
+            assert!((beside_neighbours(&y, 2) - sticks_out).abs() < 1e-15, "{y:?}");
+            assert_eq!(path_of_neighbours(&y, 2), path, "{y:?}");
+        }
+    }
+
     /// A long series gets zeros after it, no more than a thirty-second of it, and a short one none.
     #[test]
     fn a_long_series_is_padded_to_a_fast_length() {
