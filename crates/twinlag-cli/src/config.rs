@@ -10,7 +10,8 @@
 //! ```
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::fmt;
+use std::path::{Path, PathBuf};
 
 use clap::{Arg, Command, CommandFactory};
 use toml::{Table, Value};
@@ -18,10 +19,24 @@ use toml::{Table, Value};
 use crate::arguments::Arguments;
 use crate::failure::Failure;
 
-/// The arguments with what the file of their `--config` adds; without that option as they are. Paths in the file are relative to the
-/// folder in which the program runs, as on the command line.
-pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>, Failure> {
-    let Some(file) = take_value(&mut arguments, "config") else { return Ok(arguments) };
+/// The options that a file has added to a command line.
+pub(crate) struct Added {
+    file: PathBuf,
+    options: Vec<OsString>,
+}
+
+/// What a message about an option says besides, since the user did not type it.
+impl fmt::Display for Added {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let options: Vec<_> = self.options.iter().map(|option| option.to_string_lossy()).collect();
+        write!(f, "(options from {}: {})", self.file.display(), options.join(" "))
+    }
+}
+
+/// The arguments with what the file of their `--config` adds, and what that is; without that option as they are. Paths in the file are
+/// relative to the folder in which the program runs, as on the command line.
+pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<(Vec<OsString>, Option<Added>), Failure> {
+    let Some(file) = take_value(&mut arguments, "config") else { return Ok((arguments, None)) };
     let file = Path::new(&file);
     let wrong = |what: String| Failure::File(format!("{}: {what}", file.display()));
     let text = std::fs::read_to_string(file).map_err(|error| wrong(format!("cannot be read: {error}")))?;
@@ -52,7 +67,7 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
             None => break,
         }
     }
-    let Some(&(place, command)) = path.last() else { return Ok(arguments) };
+    let Some(&(place, command)) = path.last() else { return Ok((arguments, None)) };
     let is_asked = |named: &Command| path.iter().any(|(_, command)| command.get_name() == named.get_name());
     let mut added = Vec::new();
     for (key, value) in &keys {
@@ -83,8 +98,9 @@ pub(crate) fn with_config(mut arguments: Vec<OsString>) -> Result<Vec<OsString>,
         }
     }
     let behind = place + 1;
-    arguments.splice(behind..behind, added);
-    Ok(arguments)
+    arguments.splice(behind..behind, added.iter().cloned());
+    let added = (!added.is_empty()).then(|| Added { file: file.to_owned(), options: added });
+    Ok((arguments, added))
 }
 
 /// Whether a command, or one within it, has an option of that name.

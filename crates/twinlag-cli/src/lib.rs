@@ -86,16 +86,24 @@ fn taking_negative_numbers(command: clap::Command) -> clap::Command {
 
 fn answer(invocation: &Invocation) -> Result<u8, Failure> {
     let command = taking_negative_numbers(Arguments::command());
-    let given = config::with_config(invocation.arguments.clone())?;
+    let (given, added) = config::with_config(invocation.arguments.clone())?;
     let parsed = command.try_get_matches_from(given).and_then(|matches| Arguments::from_arg_matches(&matches));
     let arguments = match parsed {
         Ok(arguments) => arguments,
         // Help and version are among them, and belong on standard output; a reader that has closed it has read enough.
         Err(error) => {
             let _ = error.print();
+            added.iter().filter(|_| error.use_stderr()).for_each(|added| eprintln!("{added}"));
             return Ok(error.exit_code() as u8);
         }
     };
+    match (carry_out(arguments), added) {
+        (Err(Failure::Usage(text)), Some(added)) => Err(Failure::Usage(format!("{text}\n{added}"))),
+        (answered, _) => answered,
+    }
+}
+
+fn carry_out(arguments: Arguments) -> Result<u8, Failure> {
     let console = arguments.console();
     match arguments.command {
         Command::Characterise(command) => characterise::run(&command, console),

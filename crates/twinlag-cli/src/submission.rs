@@ -396,8 +396,9 @@ pub(crate) fn arguments_without(command: &str, dropped: &[String]) -> Result<Vec
         let option = options.iter().find(|option| option.get_long() == Some(name));
         option.is_some_and(|option| option.get_action().takes_values())
     };
+    let (arguments, _) = config::with_config(Invocation::of_process().arguments.clone())?;
     let (mut kept, mut is_value, mut is_over) = (Vec::new(), false, false);
-    for argument in config::with_config(Invocation::of_process().arguments.clone())?.into_iter().skip(1) {
+    for argument in arguments.into_iter().skip(1) {
         let argument = argument.to_str().ok_or_else(|| no_unicode(&argument))?.to_owned();
         if std::mem::take(&mut is_value) {
             continue;

@@ -10,6 +10,7 @@ use crate::naming::{hull, interval_95};
 use crate::remark::Remark;
 use crate::transfer::EffectInChannel;
 use crate::twins::{ExactTwin, widening};
+use crate::whole_form::cover;
 
 /// Relative change of an end of an interval that is worth a remark.
 const NOTICEABLE: f64 = 1e-3;
@@ -42,8 +43,7 @@ impl OtherCause {
     /// Makes its intervals cover those of another form of the same effect.
     pub(crate) fn cover(&mut self, form: &Self) {
         for (number, other) in self.time_constants.iter_mut().zip(&form.time_constants) {
-            let both = |own| other.interval_95.map_or(own, |form| hull(own, form));
-            number.interval_95 = number.interval_95.map(both);
+            other.interval_95.into_iter().for_each(|other| cover(number, other));
         }
     }
 
@@ -165,4 +165,27 @@ pub(crate) fn widen(
     effects.sort_unstable_by_key(|e| e.name());
     effects.dedup();
     ((!effects.is_empty()).then_some(Remark::Widened { effects }), causes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cause(intervals: [Option<[f64; 2]>; 2]) -> OtherCause {
+        let time_constants = intervals.map(|interval_95| Value {
+            name: "time_constant".to_owned(),
+            value: 1.0,
+            standard_error: interval_95.map(|_| 0.1),
+            interval_95,
+            unit: "s".to_owned(),
+        });
+        OtherCause { effect: Identifier::DELAY, channel: Some(1), time_constants }
+    }
+
+    #[test]
+    fn a_cause_in_two_forms_has_the_interval_of_both() {
+        let mut found = cause([Some([0.8, 1.2]), Some([0.9, 1.1])]);
+        found.cover(&cause([Some([0.9, 1.5]), None]));
+        assert_eq!(found.time_constants.map(|number| number.interval_95), [Some([0.8, 1.5]), Some([0.9, 1.1])]);
+    }
 }

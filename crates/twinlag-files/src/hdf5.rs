@@ -218,11 +218,11 @@ fn fault(error: Error) -> Fault {
             Fault::damaged_at(offset, format!("{needed} bytes"), available)
         }
         Error::OffsetOutOfBounds(offset) => Fault::damaged_at(offset, "a place within the file", "none"),
-        Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) | Error::ResourceLimit(_) => {
-            Fault::unsupported(format!("has what is not read ({text})"), "write it with gzip or without compression")
-        }
-        // Deeper in the reader it has no variant of its own.
-        _ if text.contains("unsupported filter") => {
+        // Deeper in the reader a filter has no variant of its own.
+        error
+            if matches!(error, Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) | Error::ResourceLimit(_))
+                || text.contains("unsupported filter") =>
+        {
             Fault::unsupported(format!("has what is not read ({text})"), "write it with gzip or without compression")
         }
         _ => Fault::damaged("what the format prescribes", text),

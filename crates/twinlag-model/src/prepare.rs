@@ -173,7 +173,9 @@ impl Prepared {
             all.extend(samples);
             all.sort_unstable();
             self.found.retain(|f| f.effect != Identifier::SPIKES || f.channel != i);
-            self.found.push(masking(Identifier::SPIKES, i, format!("{} single readings", all.len()), all.clone()));
+            let readings = if all.len() == 1 { "reading" } else { "readings" };
+            let what = format!("{} single {readings}", all.len());
+            self.found.push(masking(Identifier::SPIKES, i, what, all.clone()));
         }
         any
     }

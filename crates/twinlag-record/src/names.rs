@@ -79,6 +79,8 @@ const APART: [&str; 20] = [
 ];
 /// Never T1 or T2: temperatures that are computed, of Sea-Bird's names those of potential temperature, `potemp090C`.
 const COMPUTED: [&str; 7] = ["potemp", "potential", "dew", "dewpoint", "taupunkt", "windchill", "heatindex"];
+/// What is said of the readings of another column, `temp_qc`, and is no quantity of its own.
+const QUALITY: [&str; 5] = ["qc", "qf", "flag", "flags", "quality"];
 /// Never T1 or T2, unless there are two of them: `Gas T fine`, `Gas T coarse`.
 const GAS: [&str; 2] = ["gas", "tgas"];
 /// Perhaps a sensor, perhaps its surroundings: only the caller knows.
@@ -171,7 +173,8 @@ pub(crate) fn is_time(column: &Column) -> bool {
 
 /// Whether name and unit, whatever the cells hold, are those of a temperature.
 pub(crate) fn is_called_temperature(column: &Column) -> bool {
-    column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE))
+    !has(column, &QUALITY)
+        && (column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE)))
 }
 
 pub(crate) fn is_temperature(column: &Column) -> bool {

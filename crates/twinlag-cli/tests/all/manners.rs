@@ -39,6 +39,17 @@ fn a_file_of_options_that_are_none_is_refused() {
     bench.refuses(3, &["characterise", "run.csv", "--config", "none.toml"], &["none.toml", "cannot be read"]);
 }
 
+/// Failed: a wrong value was refused without a word of the file that it stands in.
+#[test]
+fn a_value_from_a_file_of_options_is_refused_with_that_file() {
+    let bench = Bench::with("config_value", "run.csv", Trace::GOOD.csv());
+    for (text, options) in [("free = \"colour\"", "--free=colour"), ("known = \"T1=blue\"", "--known=T1=blue")] {
+        bench.write("lab.toml", text);
+        let said = format!("(options from lab.toml: {options})");
+        bench.refuses(2, &["characterise", "run.csv", "--config", "lab.toml"], &[&said]);
+    }
+}
+
 /// Failed: a negative number was taken for an option, with the advice to write `-- -1`.
 #[test]
 fn what_says_which_numbers_an_option_may_have_says_it_of_negative_ones() {

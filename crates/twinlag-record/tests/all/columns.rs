@@ -166,6 +166,19 @@ fn headers_as_people_write_them_are_two_sensors() {
     assert!((kelvin.expect("a record").t1_c[1] - 21.0).abs() < 300.0 * f64::EPSILON);
 }
 
+/// Failed: the flags of oceanographic files, `temp_qc`, were proposed as sensors.
+#[test]
+fn quality_flags_are_no_sensors() {
+    let columns = [
+        ramp("time_s", 0.0, 0.5),
+        ramp("temp_1", 20.0, 1.0),
+        ramp("temp_1_qc", 1.0, 0.0),
+        ramp("temp_2", 20.0, 0.5),
+        ramp("temp_2_qc_flag", 1.0, 0.0),
+    ];
+    assert_eq!(record(columns).expect("a record").channels, ["temp_1", "temp_2"]);
+}
+
 /// Slopes differ, so that the channels do.
 #[test]
 fn kelvins_that_may_be_none_are_asked_about() {
