@@ -6,11 +6,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 
-use crate::{book, cluster, python, report, root};
+use crate::{book, cluster, python, report, root, web};
 
 /// The oldest compiler that is promised: `rust-version` of the workspace.
 const OLDEST: &str = "1.89";
-const WASM: &str = "wasm32-unknown-unknown";
 
 /// Runs the checks of every change; with `full`, those of a release.
 ///
@@ -47,6 +46,11 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
         cluster::run(&cluster::Cluster::default())?;
         python::run(&python::Python::default())?;
         report::run(&report::Report::default())?;
+        if installed(&["target", "list", "--installed"], web::TARGET).is_some() {
+            web::run(&web::Web::default())?;
+        } else {
+            println!("== SKIPPED: the page for a browser; `rustup target add {}` installs what it takes", web::TARGET);
+        }
     }
     Ok(())
 }
@@ -83,11 +87,11 @@ fn toolchains() -> Result<()> {
     } else {
         println!("== SKIPPED: the oldest compiler; `rustup toolchain install {OLDEST} --profile minimal` installs it");
     }
-    if installed(&["target", "list", "--installed"], WASM).is_some() {
-        let arguments = ["check", "--target", WASM, "--package", "twinlag", "--no-default-features"];
+    if installed(&["target", "list", "--installed"], web::TARGET).is_some() {
+        let arguments = ["check", "--target", web::TARGET, "--package", "twinlag", "--no-default-features"];
         step("in a browser", "cargo", &arguments)
     } else {
-        println!("== SKIPPED: in a browser; `rustup target add {WASM}` installs what it takes");
+        println!("== SKIPPED: in a browser; `rustup target add {}` installs what it takes", web::TARGET);
         let arguments = ["check", "--package", "twinlag", "--no-default-features"];
         step("the facade without the random solvers", "cargo", &arguments)
     }

@@ -1,6 +1,6 @@
 //! Tasks of the repository: `cargo xtask ci`, `cargo xtask book`, `cargo xtask experiment`, `cargo xtask measured DIR`,
 //! `cargo xtask data DIR`, `cargo xtask bench`, `cargo xtask fleet DIR`, `cargo xtask cluster`, `cargo xtask profile`, `cargo xtask report`,
-//! `cargo xtask python`, `cargo xtask dist`.
+//! `cargo xtask web`, `cargo xtask python`, `cargo xtask dist`.
 
 mod bench;
 mod book;
@@ -13,6 +13,7 @@ mod measured;
 mod profile;
 mod python;
 mod report;
+mod web;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -79,6 +80,8 @@ enum Task {
     Python(python::Python),
     /// Opens reports in a browser: console, accessibility, keyboard, print; needs Chromium and Node.js.
     Report(report::Report),
+    /// Builds the page for a browser, and drives it; needs the target wasm32-unknown-unknown, Chromium and Node.js.
+    Web(web::Web),
 }
 
 fn main() -> ExitCode {
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         Task::Profile(arguments) => profile::run(&arguments),
         Task::Python(arguments) => python::run(&arguments),
         Task::Report(arguments) => report::run(&arguments),
+        Task::Web(arguments) => web::run(&arguments),
         Task::Dist(arguments) => dist::run(&arguments),
         Task::Experiment(task) => experiment::run(task),
     };

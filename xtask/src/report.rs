@@ -60,9 +60,7 @@ pub(crate) fn run(arguments: &Report) -> Result<()> {
         None => built()?,
     };
     let program = program.canonicalize().with_context(|| format!("{}: no program", program.display()))?;
-    let given = arguments.browser.clone();
-    let browser = given.or_else(|| BROWSERS.iter().map(PathBuf::from).find(|path| path.exists()));
-    let browser = browser.context("no browser: install Chromium, or name one with --browser")?;
+    let browser = browser(arguments.browser.as_deref())?;
     let dir = root()?.join("target/report");
     let pages_dir = dir.join("pages");
     let screenshots = dir.join("screenshots");
@@ -93,8 +91,14 @@ pub(crate) fn run(arguments: &Report) -> Result<()> {
     if arguments.write { book(&screenshots) } else { Ok(()) }
 }
 
+/// The browser that is given, or the first that is there.
+pub(crate) fn browser(given: Option<&Path>) -> Result<PathBuf> {
+    let found = || BROWSERS.iter().map(PathBuf::from).find(|path| path.exists());
+    given.map(Path::to_owned).or_else(found).context("no browser: install Chromium, or name one with --browser")
+}
+
 /// The program, built.
-fn built() -> Result<PathBuf> {
+pub(crate) fn built() -> Result<PathBuf> {
     let root = root()?;
     step("cargo", &["build", "--release", "--package", "twinlag-cli"], root)?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
@@ -145,7 +149,7 @@ fn book(screenshots: &Path) -> Result<()> {
     Ok(())
 }
 
-fn step(program: &str, arguments: &[&str], dir: &Path) -> Result<()> {
+pub(crate) fn step(program: &str, arguments: &[&str], dir: &Path) -> Result<()> {
     println!("== {program} {}", arguments.join(" "));
     let status = Command::new(program)
         .args(arguments)

@@ -2,11 +2,10 @@
 
 use clap::ValueEnum;
 use schemars::generate::SchemaSettings;
-use twinlag::{Characterisation, Compensation, Diagnosis, Model, Track};
+use twinlag::{Characterisation, Compensation, Diagnosis, Inspection, Model, Track};
 
 use crate::batch::BatchAnswer;
 use crate::failure::Failure;
-use crate::inspect::Inspection;
 use crate::plan::PlanAnswer;
 use crate::print;
 use crate::shards::BatchPart;

@@ -10,6 +10,18 @@ use twinlag_record::gzip;
 /// a root group stand among them.
 const HEAD_BYTES: u64 = 64 * 1024;
 
+/// The first bytes, enough to recognise the format.
+fn head_of(plain: impl Read) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    plain.take(HEAD_BYTES).read_to_end(&mut head)?;
+    Ok(head)
+}
+
+/// The first bytes of a file in memory, of what gzip has compressed those within.
+pub(crate) fn head_of_bytes(bytes: &[u8]) -> io::Result<Vec<u8>> {
+    head_of(gzip::decompressed(bytes)?.0)
+}
+
 /// A file, or what was read of one.
 #[derive(Debug)]
 pub(crate) enum Input {
@@ -36,9 +48,7 @@ impl Input {
 
     /// The first bytes, enough to recognise the format; of what gzip has compressed those within.
     pub(crate) fn head(&self) -> io::Result<Vec<u8>> {
-        let mut head = Vec::new();
-        self.plain()?.0.take(HEAD_BYTES).read_to_end(&mut head)?;
-        Ok(head)
+        head_of(self.plain()?.0)
     }
 
     /// What gzip has compressed, decompressed in memory; `None` of anything else.

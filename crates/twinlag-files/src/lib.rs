@@ -67,4 +67,4 @@ pub use choice::Choice;
 pub use contents::{Channel, Contents, Group};
 pub use error::{FileError, Listing, Position};
 pub use format::{Foreign, Format};
-pub use read::{contents, contents_of_bytes, is_binary, read, read_bytes};
+pub use read::{are_binary, contents, contents_of_bytes, is_binary, read, read_bytes};

@@ -10,7 +10,7 @@ use crate::contents::{Contents, Group};
 use crate::error::FileError;
 use crate::fault::Fault;
 use crate::format::Format;
-use crate::input::Input;
+use crate::input::{Input, head_of_bytes};
 use crate::join::Base;
 use crate::series::{Loaded, Opened, Series, Values};
 
@@ -56,6 +56,11 @@ pub fn contents_of_bytes(bytes: Vec<u8>, source: &str) -> Result<Contents, FileE
 pub fn is_binary(path: impl AsRef<Path>) -> bool {
     let head = Input::Path(path.as_ref().to_owned()).head();
     head.is_ok_and(|head| Format::of(&head).is_some())
+}
+
+/// As [`is_binary`], of a file in memory.
+pub fn are_binary(bytes: &[u8]) -> bool {
+    head_of_bytes(bytes).is_ok_and(|head| Format::of(&head).is_some())
 }
 
 fn of_path(path: &Path) -> Result<(Input, String), FileError> {

@@ -8,6 +8,7 @@
 
 mod diagnosis;
 mod figures;
+#[cfg(feature = "fleet")]
 mod fleet;
 mod gas;
 mod making;
@@ -16,6 +17,7 @@ mod residual_figures;
 mod words;
 
 pub use diagnosis::{diagnosis_report, residual_picture};
+#[cfg(feature = "fleet")]
 pub use fleet::{fleet_report, is_fleet_report};
 pub use gas::{gas_report, track_report};
 pub use making::Making;

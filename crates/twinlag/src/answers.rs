@@ -6,6 +6,7 @@ mod diagnosis;
 mod fitted;
 mod found_in;
 mod gas_spectrum;
+mod inspection;
 mod model;
 mod plausible;
 mod records;
@@ -20,6 +21,7 @@ pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedCause, NamedEffect, NamedLimit, NamedTwin};
 pub use found_in::FoundIn;
 pub use gas_spectrum::{GasBand, GasSpectrum};
+pub use inspection::{InspectedColumn, InspectedRecord, Inspection};
 pub use model::{Model, ModelEffect, ModelNumber};
 pub use plausible::PlausibleTimeConstant;
 pub use records::{

@@ -10,6 +10,7 @@
 //!   better it is with it; [`characterise_with`] takes that model to other records of the rig;
 //! - [`compensate()`]: the gas temperature at every sample, with its standard deviation;
 //! - [`track()`]: the time constants along the record, in flow that changes;
+//! - [`inspect()`]: what is in a table, and what would be taken as time and as sensors;
 //! - [`Live`]: gas temperature and time constants row by row, as readings come in.
 //!
 //! A verb that may take long has a second form, such as [`diagnose_watched`], that reports how far
@@ -86,8 +87,8 @@ mod watch;
 
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
-    ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, IntervalMethod, LeftOutUnit,
-    MadeBy, Model, ModelEffect, ModelNumber, NamedCause, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
+    ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, InspectedColumn,
+    InspectedRecord, Inspection, IntervalMethod, LeftOutUnit, MadeBy, Model, ModelEffect, ModelNumber, NamedCause, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
     PlausibleTimeConstant, Quality, Ratio, RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag,
     SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
@@ -100,7 +101,7 @@ pub use setting::Setting;
 pub use verbs::{
     CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
     characterise_records, characterise_records_watched, characterise_watched, characterise_with, compensate,
-    compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, joined, readings,
+    compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, inspect, joined, readings,
     track, track_watched,
 };
 pub use watch::Watch;

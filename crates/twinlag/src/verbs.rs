@@ -5,6 +5,7 @@ mod characterise_records;
 mod compensate;
 mod diagnose;
 mod diagnose_records;
+mod inspect;
 mod live;
 mod several;
 mod track;
@@ -17,6 +18,7 @@ pub use characterise_records::{characterise_records, characterise_records_watche
 pub use compensate::{CompensateOptions, compensate, compensate_watched};
 pub use diagnose::{DiagnoseOptions, diagnose, diagnose_watched};
 pub use diagnose_records::{diagnose_records, diagnose_records_watched};
+pub use inspect::inspect;
 pub use live::{Live, LiveAnswer, LiveOptions};
 pub use several::joined;
 pub use track::{TrackOptions, track, track_watched};

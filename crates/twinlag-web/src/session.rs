@@ -1,0 +1,207 @@
+//! Records that were dropped on the page, and what was answered of them.
+
+use serde::de::DeserializeOwned;
+use sha2::{Digest, Sha256};
+use thiserror::Error;
+use twinlag::record::{Decimals, Record, RecordError, Selection, Table, write_csv};
+use twinlag::signal::{Rig, SignalError};
+use twinlag::{
+    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Options, Status, Watch, compensate_watched,
+    diagnose_records_watched, diagnose_watched, inspect, joined,
+};
+use twinlag_files::{Choice, FileError, are_binary, read_bytes};
+use twinlag_pages::{Making, ReportError, diagnosis_report, gas_report};
+
+/// The rig of the example: two thermocouples in the exhaust of an engine, the second of which sits in a sheath.
+const EXAMPLE_RIG: &str = include_str!("example.json");
+
+/// Why there is no answer.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// A file cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A record cannot be made of a table, or not written.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+    /// A verb refuses the record or the options.
+    #[error(transparent)]
+    Verb(#[from] twinlag::Error),
+    /// An answer cannot be drawn.
+    #[error(transparent)]
+    Page(#[from] ReportError),
+    /// A rig cannot be simulated.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// What is to be JSON is not.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// Something is asked before what it rests on.
+    #[error("{expected} comes first")]
+    Order {
+        /// What has to come first.
+        expected: &'static str,
+    },
+}
+
+/// A record of a file.
+#[derive(Debug)]
+struct Added {
+    record: Record,
+    /// SHA-256 of the file, in hexadecimal digits.
+    sha256: String,
+}
+
+/// Records of one rig, and what was answered of them. Options, selections and answers are JSON, in the form of the program.
+#[derive(Debug, Default)]
+pub struct Session {
+    added: Vec<Added>,
+    diagnosis: Option<Diagnosis>,
+    gas: Option<Compensation>,
+}
+
+impl Session {
+    /// A simulated record to try the page on, as CSV.
+    ///
+    /// # Errors
+    /// None, unless the example is broken.
+    pub fn example() -> Result<String, SessionError> {
+        let rig: Rig = parsed(EXAMPLE_RIG)?;
+        let simulated = rig.simulate()?;
+        let [t1, t2] = simulated.channels.each_ref().map(|channel| format!("{channel}_C"));
+        csv(&[("time_s", &simulated.time_s), (&t1, &simulated.t1_c), (&t2, &simulated.t2_c)]).map_err(Into::into)
+    }
+
+    /// Says what is in a file, and adds its record where it has one; returns the answer of `twinlag inspect`. An answer of earlier
+    /// records is forgotten.
+    ///
+    /// - `name`: the file's
+    /// - `selection`: [`Selection`] as JSON
+    ///
+    /// # Errors
+    /// Files that are no table; a selection that is none.
+    pub fn add(&mut self, name: &str, bytes: Vec<u8>, selection: &str) -> Result<String, SessionError> {
+        let selection: Selection = parsed(selection)?;
+        let sha256 = base16ct::lower::encode_string(&Sha256::digest(&bytes));
+        let (inspection, record) = inspect(table(name, bytes, &selection)?, &selection);
+        (self.diagnosis, self.gas) = (None, None);
+        if let Ok(record) = record {
+            self.added.push(Added { record, sha256 });
+        }
+        Ok(serde_json::to_string::<Inspection>(&inspection)?)
+    }
+
+    /// Finds the effects that two first-order lags lack; returns the answer of `twinlag diagnose`.
+    ///
+    /// - `options`: [`Options`] as JSON
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] without a record; those of [`diagnose_watched`].
+    pub fn diagnose(&mut self, options: &str, watch: Watch<'_>) -> Result<String, SessionError> {
+        let options = DiagnoseOptions { characterise: parsed::<Options>(options)?, ..DiagnoseOptions::default() };
+        let answer = match &self.records()[..] {
+            [] => return Err(SessionError::Order { expected: "a record" }),
+            [one] => diagnose_watched(one, &options, watch)?,
+            several => diagnose_records_watched(several, &options, watch)?,
+        };
+        let json = serde_json::to_string(&answer)?;
+        self.diagnosis = Some(answer);
+        Ok(json)
+    }
+
+    /// Reconstructs the gas temperature of the first record by the model of the diagnosis; returns the answer of `twinlag compensate`.
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] without a diagnosis; those of [`compensate_watched`].
+    pub fn compensate(&mut self, watch: Watch<'_>) -> Result<String, SessionError> {
+        let diagnosis = self.diagnosis()?;
+        let options = CompensateOptions { model: Some(diagnosis.model()), ..CompensateOptions::default() };
+        let answer = compensate_watched(&self.added[0].record, &options, watch)?;
+        let json = serde_json::to_string(&answer)?;
+        self.gas = Some(answer);
+        Ok(json)
+    }
+
+    /// The report of the diagnosis, one HTML file.
+    ///
+    /// - `made_at`: when, for a reader
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] without a diagnosis; [`SessionError::Page`].
+    pub fn report(&self, made_at: &str) -> Result<String, SessionError> {
+        let diagnosis = self.diagnosis()?;
+        let page = match &self.records()[..] {
+            [one] => diagnosis_report(one, diagnosis, &self.making(made_at))?,
+            several => diagnosis_report(&joined(several)?, diagnosis, &self.making(made_at))?,
+        };
+        Ok(page)
+    }
+
+    /// The report of the gas temperature, one HTML file.
+    ///
+    /// - `made_at`: when, for a reader
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] without a gas temperature; [`SessionError::Page`].
+    pub fn gas_report(&self, made_at: &str) -> Result<String, SessionError> {
+        Ok(gas_report(&self.added[0].record, self.gas()?, &self.making(made_at))?)
+    }
+
+    /// The gas temperature as CSV, in the columns of `twinlag compensate`; `None` where there is none to give.
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] before [`Session::compensate`].
+    pub fn gas_csv(&self) -> Result<Option<String>, SessionError> {
+        let gas = self.gas()?;
+        if gas.status != Status::Ok {
+            return Ok(None);
+        }
+        Ok(Some(csv(&[("time_s", &gas.time_s), ("gas_C", &gas.gas_c), ("gas_std_K", &gas.gas_std_k)])?))
+    }
+
+    /// The model that was found, as `twinlag diagnose --save` writes it.
+    ///
+    /// # Errors
+    /// [`SessionError::Order`] without a diagnosis.
+    pub fn model(&self) -> Result<String, SessionError> {
+        Ok(serde_json::to_string_pretty(&self.diagnosis()?.model())?)
+    }
+
+    fn diagnosis(&self) -> Result<&Diagnosis, SessionError> {
+        self.diagnosis.as_ref().ok_or(SessionError::Order { expected: "a diagnosis" })
+    }
+
+    fn gas(&self) -> Result<&Compensation, SessionError> {
+        self.gas.as_ref().ok_or(SessionError::Order { expected: "a gas temperature" })
+    }
+
+    /// Copies for verbs that take several records in a row. Their readings are shared, not copied.
+    fn records(&self) -> Vec<Record> {
+        self.added.iter().map(|added| added.record.clone()).collect()
+    }
+
+    fn making(&self, made_at: &str) -> Making {
+        let files = self.added.iter().map(|added| (added.record.source.clone(), added.sha256.clone()));
+        Making { made_at: made_at.to_owned(), files: files.collect(), ..Making::default() }
+    }
+}
+
+fn parsed<T: DeserializeOwned>(json: &str) -> Result<T, SessionError> {
+    Ok(serde_json::from_str(json)?)
+}
+
+fn csv(columns: &[(&str, &[f64])]) -> Result<String, RecordError> {
+    let mut text = Vec::new();
+    write_csv(&mut text, columns, Decimals::Shortest)?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+/// The table of a file in memory, in whatever format it is.
+fn table(name: &str, bytes: Vec<u8>, selection: &Selection) -> Result<Table, SessionError> {
+    if !are_binary(&bytes) {
+        return Ok(Table::from_reader(bytes.as_slice(), name)?);
+    }
+    let channels = [&selection.t1, &selection.t2].into_iter().flatten().map(ToString::to_string).collect();
+    Ok(read_bytes(bytes, &Choice { channels, ..Choice::default() }, name)?)
+}

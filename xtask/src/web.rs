@@ -1,0 +1,205 @@
+//! The page for a browser: built as one HTML file, and driven in Chromium.
+//!
+//! It takes the target `wasm32-unknown-unknown` and, to be driven, what `cargo xtask report` takes; the program that binds WebAssembly to
+//! JavaScript is installed below `target/web`.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use base64ct::{Base64, Encoding};
+use clap::Args;
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use sha2::{Digest, Sha256};
+use twinlag_report::{Axis, Chart, Document, Figure, Series};
+
+use crate::report::{browser, built, step};
+use crate::root;
+
+pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
+/// Four numbers at once, as all browsers have since 2021, and the stack of a thread of the program.
+const FLAGS: &str = "-Ctarget-feature=+simd128 -Clink-arg=-zstack-size=8388608";
+/// The binder of WebAssembly and the library that it binds have one version.
+const BINDER: &str = "wasm-bindgen";
+
+/// Rows of the long record: enough to measure, few enough for continuous integration.
+const LONG_ROWS: usize = 20_000;
+
+/// Builds the page, and drives it in a browser.
+#[derive(Args)]
+pub(crate) struct Web {
+    /// The browser: Chromium, or one that is made of it.
+    #[arg(long)]
+    browser: Option<PathBuf>,
+    /// Only builds the page.
+    #[arg(long)]
+    undriven: bool,
+    /// Rows of the long record that is diagnosed in the page and by the program.
+    #[arg(long, default_value_t = LONG_ROWS)]
+    rows: usize,
+}
+
+impl Default for Web {
+    fn default() -> Self {
+        Self { browser: None, undriven: false, rows: LONG_ROWS }
+    }
+}
+
+pub(crate) fn run(web: &Web) -> Result<()> {
+    let work = root()?.join("target/web");
+    fs::create_dir_all(&work)?;
+    let page = work.join("twinlag.html");
+    let text = assembled(&bound(&work)?)?;
+    fs::write(&page, &text)?;
+    let bytes = text.as_bytes();
+    println!("== {}: {} bytes, {} compressed", page.display(), bytes.len(), gzipped(bytes)?.len());
+    if web.undriven { Ok(()) } else { driven(web, &page, &work) }
+}
+
+/// The WebAssembly and its JavaScript, in the folder that is returned.
+fn bound(work: &Path) -> Result<PathBuf> {
+    let root = root()?;
+    println!("== the page's WebAssembly");
+    let build = ["build", "--profile", "web", "--target", TARGET, "--package", "twinlag-web"];
+    // In place of the flags of `.cargo/config.toml`, which are those of the facade alone.
+    let built = Command::new("cargo").args(build).env("RUSTFLAGS", FLAGS).current_dir(root).status()?;
+    ensure!(built.success(), "cargo {} ended with {built}", build.join(" "));
+    let version = locked_version(&fs::read_to_string(root.join("Cargo.lock"))?)?;
+    let tools = work.join("tools");
+    let binder = tools.join("bin").join(BINDER);
+    let has_version = |program: &Path| {
+        let said = Command::new(program).arg("--version").output();
+        said.is_ok_and(|said| String::from_utf8_lossy(&said.stdout).trim().ends_with(&version))
+    };
+    if !has_version(&binder) {
+        let tools = tools.display().to_string();
+        let install = ["install", "wasm-bindgen-cli", "--version", &version, "--locked", "--force", "--root", &tools];
+        step("cargo", &install, root)?;
+    }
+    let out = work.join("bound");
+    let wasm = root.join("target").join(TARGET).join("web/twinlag_web.wasm");
+    let [binder, out_text, wasm] = [&binder, &out, &wasm].map(|path| path.display().to_string());
+    step(&binder, &["--target", "no-modules", "--no-typescript", "--out-dir", &out_text, &wasm], root)?;
+    Ok(out)
+}
+
+/// The version of the library that binds, as `Cargo.lock` has it.
+fn locked_version(lock: &str) -> Result<String> {
+    let lock: toml::Table = toml::from_str(lock)?;
+    let packages = lock["package"].as_array().context("Cargo.lock has packages")?;
+    let library = packages.iter().find(|package| package["name"].as_str() == Some(BINDER));
+    let version = library.and_then(|library| library["version"].as_str()).context("Cargo.lock has no wasm-bindgen")?;
+    Ok(version.to_owned())
+}
+
+/// The page of its parts, its content security policy with the hash of each script and style: its own, and those of the reports
+/// that it shows.
+fn assembled(bound: &Path) -> Result<String> {
+    let page = root()?.join("crates/twinlag-web/page");
+    let read = |path: PathBuf| fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()));
+    let reports = reports()?;
+    let style = format!("\n{}{}", reports.style, read(page.join("page.css"))?);
+    let script = read(page.join("page.js"))?;
+    let worker = read(bound.join("twinlag_web.js"))? + &read(page.join("worker.js"))?;
+    ensure!(!(worker.clone() + &script).contains("</script"), "a script would end before its end");
+    let wasm = Base64::encode_string(&gzipped(&fs::read(bound.join("twinlag_web_bg.wasm"))?)?);
+    let policy = format!(
+        "default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'wasm-unsafe-eval' '{}' {}; style-src '{}' {}; \
+         worker-src blob:; frame-src 'self' blob:",
+        hash(&script),
+        reports.script_hashes,
+        hash(&style),
+        reports.style_hashes,
+    );
+    let parts = [("policy", policy), ("style", style), ("script", script), ("worker", worker), ("wasm", wasm)];
+    let parts = parts.into_iter().chain([("version", env!("CARGO_PKG_VERSION").to_owned())]);
+    // No part is looked through for the names of others.
+    let template = read(page.join("index.html"))?;
+    let mut places: Vec<(usize, usize, String)> = parts
+        .map(|(name, text)| {
+            let mark = format!("{{{name}}}");
+            let place = template.find(&mark).with_context(|| format!("index.html has no {mark}"))?;
+            Ok((place, mark.len(), text))
+        })
+        .collect::<Result<_>>()?;
+    places.sort_unstable();
+    let (mut out, mut done) = (String::new(), 0);
+    for (place, length, text) in places {
+        out += &template[done..place];
+        out += &text;
+        done = place + length;
+    }
+    Ok(out + &template[done..])
+}
+
+/// What reports need of the policy of a page that shows them.
+struct Reports {
+    /// The style of reports without traces.
+    style: String,
+    /// Hashes of the styles of reports with and without traces, quoted.
+    style_hashes: String,
+    /// That of their script.
+    script_hashes: String,
+}
+
+fn reports() -> Result<Reports> {
+    let chart = Chart::new("", Axis::linear("x"), Axis::linear("y")).series(Series::trace("", [0.0, 1.0], [0.0, 1.0]));
+    let live = Document::new("").drawing(Figure::new("").panel(chart).live(), "")?.to_live_html();
+    let still = Document::new("").to_html();
+    let of_policy = |page: &str, kind: &str| -> Result<String> {
+        let policy = page.split_once("Content-Security-Policy\" content=\"").context("a report has a policy")?.1;
+        let sources = policy.split_once(&format!("{kind} ")).with_context(|| format!("a policy has {kind}"))?.1;
+        Ok(sources.split([';', '"']).next().unwrap_or_default().to_owned())
+    };
+    let style = still.split_once("<style>").and_then(|(_, rest)| rest.split_once("</style>")).context("a style")?.0;
+    Ok(Reports {
+        style: style.trim_start().to_owned(),
+        style_hashes: of_policy(&still, "style-src")? + " " + &of_policy(&live, "style-src")?,
+        script_hashes: of_policy(&live, "script-src")?,
+    })
+}
+
+/// Opens the page in a browser, drops records on it, and compares its answers with the program's.
+fn driven(web: &Web, page: &Path, work: &Path) -> Result<()> {
+    let program = built()?;
+    let browser = browser(web.browser.as_deref())?;
+    let records = work.join("records");
+    fs::create_dir_all(&records)?;
+    let screenshots = work.join("screenshots");
+    fs::create_dir_all(&screenshots)?;
+    let rig = |seed: u32, rows: usize| {
+        format!(
+            "seed = {seed}\n[record]\nsamples = {rows}\nsample_period_s = 0.01\n[gas]\nkind = \"turbulence\"\nmean_c = 300.0\n\
+             std_k = 15.0\ncorner_hz = 0.5\ncutoff_hz = 45.0\n[[sensors]]\nchannel = \"T1\"\ntime_constant_s = 0.12\n\
+             noise = {{ std_k = 0.1 }}\n[[sensors]]\nchannel = \"T2\"\ntime_constant_s = 0.45\noffset_k = 2.0\nnoise = {{ std_k = 0.1 }}\n"
+        )
+    };
+    for (name, seed, rows) in [("first", 7, 3000), ("second", 8, 3000), ("long", 9, web.rows)] {
+        fs::write(records.join(format!("{name}.toml")), rig(seed, rows))?;
+        let (rig, record) = (format!("{name}.toml"), format!("{name}.csv"));
+        step(&program.display().to_string(), &["simulate", &rig, "--out", &record, "--force", "--quiet"], &records)?;
+    }
+    let nasty = fs::read_to_string(records.join("first.csv"))?.replacen("T1", "<script>window.ran=1</script>", 1);
+    fs::write(records.join("nasty.csv"), nasty)?;
+    fs::copy(root()?.join("xtask/report/package.json"), work.join("package.json"))?;
+    if !work.join("node_modules/axe-core").exists() {
+        step("npm", &["install", "--no-audit", "--no-fund"], work)?;
+    }
+    let script = root()?.join("xtask/web/check.mjs");
+    let paths = [&script, page, &records, &screenshots, &browser, &program].map(|path| path.display().to_string());
+    step("node", &paths.each_ref().map(String::as_str), work)
+}
+
+fn gzipped(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes)?;
+    Ok(encoder.finish()?)
+}
+
+/// What a content security policy says of an element with this text.
+fn hash(text: &str) -> String {
+    format!("sha256-{}", Base64::encode_string(&Sha256::digest(text)))
+}

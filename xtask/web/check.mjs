@@ -1,0 +1,214 @@
+// Drives the page as a person does: files are dropped on it, columns chosen, records diagnosed. Ends with an error where an answer differs
+// from the program's, where the page asks the network for anything, where the console says an error, where axe-core finds a violation,
+// where the page is wider than the screen, and where a script from a file has run.
+//
+//   node check.mjs PAGE RECORDS SCREENSHOTS BROWSER PROGRAM
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { createRequire } from "node:module";
+import { pathToFileURL } from "node:url";
+
+const [pagePath, records, screenshots, browserPath, program] = process.argv.slice(2).map((path) => resolve(path));
+const require = createRequire(pathToFileURL(join(process.cwd(), "package.json")));
+const { chromium } = require("playwright-core");
+const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
+// Numbers of two kinds of processor differ in their last digits.
+const RELATIVE = 1e-9;
+const MAX_TIMES_SLOWER = 5;
+const failures = [];
+const fail = (where, text) => { failures.push(`${where}: ${text}`); console.error(`FAILED ${where}: ${text}`); };
+
+const profile = mkdtempSync(join(tmpdir(), "twinlag-web-"));
+const context = await chromium.launchPersistentContext(profile, {
+  executablePath: browserPath, headless: true, acceptDownloads: true,
+  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync"],
+});
+try {
+  await looks();
+  await answers("one record", ["first.csv"]);
+  await answers("two records", ["first.csv", "second.csv"]);
+  await columns();
+  await nasty();
+  await stops();
+  await unreadable();
+  await isFast();
+} finally {
+  await context.close();
+  rmSync(profile, { recursive: true, force: true });
+}
+if (failures.length > 0) {
+  console.error(`${failures.length} failures`);
+  process.exit(1);
+}
+
+async function opened(where, { width = 1280, height = 900, scheme = "light" } = {}) {
+  const page = await context.newPage();
+  page.on("console", (message) => { if (["error", "warning"].includes(message.type())) fail(where, `console: ${message.text()}`); });
+  page.on("pageerror", (error) => fail(where, `script: ${error.message}`));
+  page.on("dialog", (dialog) => { fail(where, `a dialog: ${dialog.message()}`); dialog.dismiss(); });
+  page.on("request", (request) => { if (!/^(file|data|blob|about):/.test(request.url())) fail(where, `asks for ${request.url()}`); });
+  await page.setViewportSize({ width, height });
+  await page.emulateMedia({ colorScheme: scheme });
+  await page.goto(pathToFileURL(pagePath).href);
+  return page;
+}
+
+// Drops files, as a person does.
+async function drop(page, names) {
+  const files = names.map((name) => ({ name, text: readFileSync(join(records, name), "utf8") }));
+  const data = await page.evaluateHandle((files) => {
+    const transfer = new DataTransfer();
+    for (const { name, text } of files) transfer.items.add(new File([text], name));
+    return transfer;
+  }, files);
+  await page.dispatchEvent("#drop", "drop", { dataTransfer: data });
+  await page.waitForSelector("#asking:not([hidden])", { timeout: 60_000 });
+}
+
+async function downloaded(page, title) {
+  const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#downloads a:text-is("${title}")`)]);
+  return readFileSync(await download.path(), "utf8");
+}
+
+async function diagnosed(page) {
+  await page.click("#diagnose");
+  await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: 600_000 });
+  const said = await page.textContent("#said");
+  if (said !== "Diagnosed.") throw new Error(said);
+}
+
+function run(...details) {
+  return execFileSync(program, [...details, "--quiet"], { cwd: records, encoding: "utf8", maxBuffer: 1 << 28 });
+}
+
+// All that differs between two answers, but for who made them.
+function differences(one, other, at = "") {
+  if (typeof one === "number" && typeof other === "number") {
+    return Math.abs(one - other) <= RELATIVE * Math.max(Math.abs(one), Math.abs(other)) ? [] : [`${at}: ${one} and ${other}`];
+  }
+  if (one === null || other === null || typeof one !== "object" || typeof other !== "object") {
+    return one === other ? [] : [`${at}: ${JSON.stringify(one)} and ${JSON.stringify(other)}`];
+  }
+  const keys = new Set([...Object.keys(one), ...Object.keys(other)]);
+  return [...keys].flatMap((key) => differences(one[key], other[key], `${at}.${key}`));
+}
+
+async function answers(where, names) {
+  const page = await opened(where);
+  await drop(page, names);
+  await diagnosed(page);
+  const said = JSON.parse(await downloaded(page, "Answer as JSON"));
+  const wanted = JSON.parse(run("diagnose", ...names, "--json"));
+  differences(said, wanted).forEach((text) => fail(where, text));
+  const report = await downloaded(page, "Report");
+  if (!report.startsWith("<!DOCTYPE html>") || !report.includes("Content-Security-Policy")) fail(where, "the report is none");
+  await page.click("#compensate");
+  await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: 600_000 });
+  if (names.length === 1) {
+    const gas = (await downloaded(page, "Gas temperature as CSV")).trim().split("\n").map((line) => line.split(","));
+    run("diagnose", names[0], "--save", "model.json", "--force");
+    run("compensate", names[0], "--model", "model.json", "--out", "gas.csv", "--force");
+    const wanted = readFileSync(join(records, "gas.csv"), "utf8").trim().split("\n").map((line) => line.split(",").slice(0, 3));
+    const numbers = (rows) => rows.slice(1).map((row) => row.map(Number));
+    if (String(gas[0]) !== String(wanted[0])) fail(where, `gas: ${gas[0]} and ${wanted[0]}`);
+    differences(numbers(gas), numbers(wanted), "gas").slice(0, 5).forEach((text) => fail(where, text));
+  }
+  await page.close();
+  console.log(`== ${where}: as the program`);
+}
+
+// A wrong choice is said, and a right one mends it.
+async function columns() {
+  const where = "columns";
+  const page = await opened(where);
+  await drop(page, ["first.csv"]);
+  const t1 = await page.inputValue("#t1");
+  const t2 = await page.inputValue("#t2");
+  await page.selectOption("#t2", t1);
+  await page.waitForSelector("#read .warning");
+  if (await page.isVisible("#diagnose")) fail(where, "two sensors in one column are diagnosed");
+  await page.selectOption("#t2", t2);
+  await page.waitForSelector("#asking:not([hidden])");
+  await page.close();
+}
+
+async function nasty() {
+  const where = "a name that is a script";
+  const page = await opened(where);
+  const data = readFileSync(join(records, "nasty.csv"));
+  await page.setInputFiles("#files", { name: "nasty.csv", mimeType: "text/csv", buffer: data });
+  await page.waitForSelector("#columns:not([hidden])");
+  if (await page.isHidden("#asking")) {
+    const names = await page.$$eval("#t1 option", (options) => options.map((option) => option.value));
+    await page.selectOption("#t1", names.find((name) => name.includes("script")));
+    await page.selectOption("#t2", names.find((name) => name.startsWith("T2")));
+    await page.waitForSelector("#asking:not([hidden])");
+  }
+  await diagnosed(page);
+  const frames = page.frames();
+  for (const frame of frames) if (await frame.evaluate(() => "ran" in window)) fail(where, "it has run");
+  await page.close();
+}
+
+async function stops() {
+  const where = "stop";
+  const page = await opened(where);
+  await drop(page, ["long.csv"]);
+  await page.click("#diagnose");
+  await page.click("#stop");
+  await page.waitForFunction(() => document.getElementById("said").textContent === "stopped");
+  await page.waitForFunction(() => !document.getElementById("diagnose").disabled);
+  await page.close();
+}
+
+async function unreadable() {
+  const where = "no table";
+  const page = await opened(where);
+  for (const [name, text] of [["empty.csv", ""], ["words.txt", "no table at all"], ["one.csv", "T1\n1\n2\n"], ["nan.csv", "t,a,b\n1,NaN,x\n"]]) {
+    await page.setInputFiles("#files", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
+    await page.waitForFunction((name) => document.getElementById("read").textContent.includes(name), name);
+    if (!(await page.$("#read .warning"))) fail(where, `${name}: nothing is said`);
+    if (await page.isVisible("#diagnose")) fail(where, `${name}: it is diagnosed`);
+  }
+  await page.close();
+}
+
+async function isFast() {
+  const where = "long record";
+  const page = await opened(where);
+  await drop(page, ["long.csv"]);
+  const begun = performance.now();
+  await diagnosed(page);
+  const in_page = performance.now() - begun;
+  const again = performance.now();
+  run("diagnose", "long.csv", "--json");
+  const by_program = performance.now() - again;
+  console.log(`== long record: ${(in_page / 1000).toFixed(2)} s in the page, ${(by_program / 1000).toFixed(2)} s by the program`);
+  if (in_page > MAX_TIMES_SLOWER * by_program) console.log(`== more than ${MAX_TIMES_SLOWER} times as long`);
+  await page.close();
+}
+
+async function looks() {
+  for (const [size, width, height] of [["wide", 1280, 900], ["narrow", 400, 800]]) {
+    for (const scheme of ["light", "dark"]) {
+      const where = `page ${size} ${scheme}`;
+      const page = await opened(where, { width, height, scheme });
+      await page.screenshot({ path: join(screenshots, `begin-${size}-${scheme}.png`) });
+      await page.click("#example");
+      await page.waitForSelector("#asking:not([hidden])", { timeout: 60_000 });
+      await page.screenshot({ path: join(screenshots, `read-${size}-${scheme}.png`), fullPage: true });
+      await diagnosed(page);
+      await page.waitForTimeout(500);
+      await page.screenshot({ path: join(screenshots, `answer-${size}-${scheme}.png`), fullPage: true });
+      const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+      if (overflow > 0) fail(where, `is ${overflow} px wider than the screen`);
+      await page.evaluate(axe);
+      const { violations } = await page.evaluate(() => axe.run(document, { iframes: false }));
+      violations.forEach(({ id, nodes }) => fail(where, `axe: ${id}: ${nodes.map((node) => node.html.slice(0, 90)).join("; ")}`));
+      await page.close();
+    }
+  }
+}
