@@ -65,6 +65,14 @@ pub(crate) fn run(Python { python }: &Python) -> Result<()> {
             .args(["-m", "pytest", "-p", "no:cacheprovider", "--doctest-modules", "--pyargs", "twinlag"])
             .current_dir(&work),
     )?;
+    user.install(&[&format!("{}[notebooks]", wheel.display())])?;
+    step(
+        "notebooks",
+        user.program("python")
+            .args(["-m", "pytest", "-p", "no:cacheprovider", "--nbmake"])
+            .arg(package.join("notebooks"))
+            .current_dir(&work),
+    )?;
     let settings = package.join("pyproject.toml");
     let checked = |arguments: &[&str]| {
         let mut command = user.program("python");
