@@ -220,8 +220,10 @@ fn fault(error: Error) -> Fault {
         Error::OffsetOutOfBounds(offset) => Fault::damaged_at(offset, "a place within the file", "none"),
         // Deeper in the reader a filter has no variant of its own.
         error
-            if matches!(error, Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) | Error::ResourceLimit(_))
-                || text.contains("unsupported filter") =>
+            if matches!(
+                error,
+                Error::UnsupportedFilter(_) | Error::UnsupportedEncoding(_) | Error::ResourceLimit(_)
+            ) || text.contains("unsupported filter") =>
         {
             Fault::unsupported(format!("has what is not read ({text})"), "write it with gzip or without compression")
         }

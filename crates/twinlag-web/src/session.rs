@@ -6,8 +6,8 @@ use thiserror::Error;
 use twinlag::record::{Decimals, Record, RecordError, Selection, Table, write_csv};
 use twinlag::signal::{Rig, SignalError};
 use twinlag::{
-    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Options, Status, Watch, compensate_watched,
-    diagnose_records_watched, diagnose_watched, inspect, joined,
+    CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Options, Status, Watch,
+    compensate_watched, diagnose_records_watched, diagnose_watched, inspect, joined,
 };
 use twinlag_files::{Choice, FileError, are_binary, read_bytes};
 use twinlag_pages::{Making, ReportError, diagnosis_report, gas_report};

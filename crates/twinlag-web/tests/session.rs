@@ -36,7 +36,10 @@ fn a_session_diagnoses_as_the_library_does() {
     assert_eq!(answer, serde_json::to_string(&wanted).expect("JSON"));
     let report = session.report("2026-01-01").expect("a report");
     assert!(report.contains("run.csv") && report.contains("2026-01-01"));
-    assert_eq!(json(&session.model().expect("a model"))["schema"], json(&serde_json::to_string(&wanted.model()).expect("JSON"))["schema"]);
+    assert_eq!(
+        json(&session.model().expect("a model"))["schema"],
+        json(&serde_json::to_string(&wanted.model()).expect("JSON"))["schema"]
+    );
 }
 
 #[test]

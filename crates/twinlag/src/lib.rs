@@ -88,9 +88,9 @@ mod watch;
 pub use answers::{
     Along, Characterisation, Compensation, Diagnosis, Difference, DisagreementAnswer, EffectInPlace, EffectNumber,
     ErrorBeforeAfter, Estimated, FoundIn, FreeParameters, GasBand, GasFault, GasSpectrum, InspectedColumn,
-    InspectedRecord, Inspection, IntervalMethod, LeftOutUnit, MadeBy, Model, ModelEffect, ModelNumber, NamedCause, NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant,
-    PlausibleTimeConstant, Quality, Ratio, RecordAnswer, RecordNumber, RecordSummary, Residual, SecondLag,
-    SensorEstimate, Status, Track, TransferAnswer, TransferError,
+    InspectedRecord, Inspection, IntervalMethod, LeftOutUnit, MadeBy, Model, ModelEffect, ModelNumber, NamedCause,
+    NamedEffect, NamedLimit, NamedTwin, OwnTimeConstant, PlausibleTimeConstant, Quality, Ratio, RecordAnswer,
+    RecordNumber, RecordSummary, Residual, SecondLag, SensorEstimate, Status, Track, TransferAnswer, TransferError,
 };
 pub use error::Error;
 pub use options::Options;
@@ -101,8 +101,8 @@ pub use setting::Setting;
 pub use verbs::{
     CompensateOptions, DiagnoseOptions, Live, LiveAnswer, LiveOptions, TrackOptions, characterise,
     characterise_records, characterise_records_watched, characterise_watched, characterise_with, compensate,
-    compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, inspect, joined, readings,
-    track, track_watched,
+    compensate_watched, diagnose, diagnose_records, diagnose_records_watched, diagnose_watched, inspect, joined,
+    readings, track, track_watched,
 };
 pub use watch::Watch;
 
