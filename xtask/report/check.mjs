@@ -3,57 +3,29 @@
 // Tab key or does nothing, where the page is wider than the screen, and where a script from a file has run.
 //
 //   node check.mjs FOLDER SCREENSHOTS BROWSER
-import { mkdtempSync, mkdirSync, readdirSync, readFileSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { mkdirSync, readdirSync } from "node:fs";
 import { basename, join, resolve } from "node:path";
-import { createRequire } from "node:module";
-import { pathToFileURL } from "node:url";
+import { accessible, fail, fitsItsScreen, opened, withBrowser } from "../browser.mjs";
 
 const [folder, screenshots, browserPath] = process.argv.slice(2).map((path) => resolve(path));
-const require = createRequire(pathToFileURL(join(process.cwd(), "package.json")));
-const { chromium } = require("playwright-core");
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 const SIZES = [["wide", 1280, 900], ["narrow", 400, 800]];
 const SCHEMES = ["light", "dark"];
 const OPERABLE = "a[href], button, input, summary, [tabindex='0']";
-const failures = [];
-const fail = (page, text) => { failures.push(`${page}: ${text}`); console.error(`FAILED ${page}: ${text}`); };
 
 mkdirSync(screenshots, { recursive: true });
-const profile = mkdtempSync(join(tmpdir(), "twinlag-report-"));
-const context = await chromium.launchPersistentContext(profile, {
-  executablePath: browserPath, headless: true, acceptDownloads: true,
-  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync"],
+await withBrowser(browserPath, async (context) => {
+  for (const file of readdirSync(folder).filter((name) => name.endsWith(".html")).sort()) await check(context, file);
 });
-try {
-  for (const file of readdirSync(folder).filter((name) => name.endsWith(".html")).sort()) await check(file);
-} finally {
-  await context.close();
-  rmSync(profile, { recursive: true, force: true });
-}
-if (failures.length > 0) {
-  console.error(`${failures.length} failures`);
-  process.exit(1);
-}
 
-async function check(file) {
+async function check(context, file) {
   const name = basename(file, ".html");
   for (const [size, width, height] of SIZES) {
     for (const scheme of SCHEMES) {
       const where = `${name} ${size} ${scheme}`;
-      const page = await context.newPage();
-      page.on("console", (message) => { if (["error", "warning"].includes(message.type())) fail(where, `console: ${message.text()}`); });
-      page.on("pageerror", (error) => fail(where, `script: ${error.message}`));
-      page.on("dialog", (dialog) => { fail(where, `a dialog: ${dialog.message()}`); dialog.dismiss(); });
-      page.on("request", (request) => { if (!/^(file|data|blob):/.test(request.url())) fail(where, `asks for ${request.url()}`); });
-      await page.setViewportSize({ width, height });
-      await page.emulateMedia({ colorScheme: scheme });
-      await page.goto(pathToFileURL(join(folder, file)).href);
+      const page = await opened(context, join(folder, file), where, { width, height, scheme });
       await page.waitForTimeout(300);
       if (await page.evaluate(() => "ran" in window)) fail(where, "a script from the file has run");
-      const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-      if (overflow > 0) fail(where, `is ${overflow} px wider than the screen`);
+      await fitsItsScreen(page, where);
       await page.screenshot({ path: join(screenshots, `${name}-${size}-${scheme}.png`) });
       await page.screenshot({ path: join(screenshots, `${name}-${size}-${scheme}-whole.png`), fullPage: true });
       await accessible(page, where);
@@ -73,13 +45,6 @@ async function check(file) {
       console.log(`checked ${where}`);
     }
   }
-}
-
-async function accessible(page, where) {
-  await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
-  for (const { id, help, nodes } of violations)
-    fail(where, `axe: ${id}: ${help}: ${nodes.slice(0, 3).map((node) => node.html.slice(0, 160)).join(" | ")}`);
 }
 
 // Tab goes through everything that can be operated, in the order of the page.

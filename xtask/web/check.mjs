@@ -4,57 +4,27 @@
 //
 //   node check.mjs PAGE RECORDS SCREENSHOTS BROWSER PROGRAM
 import { execFileSync } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { readFileSync } from "node:fs";
 import { join, resolve } from "node:path";
-import { createRequire } from "node:module";
-import { pathToFileURL } from "node:url";
+import { accessible, fail, fitsItsScreen, opened, withBrowser } from "../browser.mjs";
 
 const [pagePath, records, screenshots, browserPath, program] = process.argv.slice(2).map((path) => resolve(path));
-const require = createRequire(pathToFileURL(join(process.cwd(), "package.json")));
-const { chromium } = require("playwright-core");
-const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
 // Numbers of two kinds of processor differ in their last digits.
 const RELATIVE = 1e-9;
 const MAX_TIMES_SLOWER = 5;
-const failures = [];
-const fail = (where, text) => { failures.push(`${where}: ${text}`); console.error(`FAILED ${where}: ${text}`); };
+const DESK = { width: 1280, height: 900, scheme: "light" };
 
-const profile = mkdtempSync(join(tmpdir(), "twinlag-web-"));
-const context = await chromium.launchPersistentContext(profile, {
-  executablePath: browserPath, headless: true, acceptDownloads: true,
-  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync"],
+await withBrowser(browserPath, async (context) => {
+  const open = (where, look = DESK) => opened(context, pagePath, where, look);
+  await looks(open);
+  await answers(open, "one record", ["first.csv"]);
+  await answers(open, "two records", ["first.csv", "second.csv"]);
+  await columns(open);
+  await nasty(open);
+  await stops(open);
+  await unreadable(open);
+  await isFast(open);
 });
-try {
-  await looks();
-  await answers("one record", ["first.csv"]);
-  await answers("two records", ["first.csv", "second.csv"]);
-  await columns();
-  await nasty();
-  await stops();
-  await unreadable();
-  await isFast();
-} finally {
-  await context.close();
-  rmSync(profile, { recursive: true, force: true });
-}
-if (failures.length > 0) {
-  console.error(`${failures.length} failures`);
-  process.exit(1);
-}
-
-async function opened(where, { width = 1280, height = 900, scheme = "light" } = {}) {
-  const page = await context.newPage();
-  page.on("console", (message) => { if (["error", "warning"].includes(message.type())) fail(where, `console: ${message.text()}`); });
-  page.on("pageerror", (error) => fail(where, `script: ${error.message}`));
-  page.on("dialog", (dialog) => { fail(where, `a dialog: ${dialog.message()}`); dialog.dismiss(); });
-  page.on("request", (request) => { if (!/^(file|data|blob|about):/.test(request.url())) fail(where, `asks for ${request.url()}`); });
-  await page.setViewportSize({ width, height });
-  await page.emulateMedia({ colorScheme: scheme });
-  await page.goto(pathToFileURL(pagePath).href);
-  return page;
-}
 
 // Drops files, as a person does.
 async function drop(page, names) {
@@ -96,8 +66,8 @@ function differences(one, other, at = "") {
   return [...keys].flatMap((key) => differences(one[key], other[key], `${at}.${key}`));
 }
 
-async function answers(where, names) {
-  const page = await opened(where);
+async function answers(open, where, names) {
+  const page = await open(where);
   await drop(page, names);
   await diagnosed(page);
   const said = JSON.parse(await downloaded(page, "Answer as JSON"));
@@ -121,9 +91,9 @@ async function answers(where, names) {
 }
 
 // A wrong choice is said, and a right one mends it.
-async function columns() {
+async function columns(open) {
   const where = "columns";
-  const page = await opened(where);
+  const page = await open(where);
   await drop(page, ["first.csv"]);
   const t1 = await page.inputValue("#t1");
   const t2 = await page.inputValue("#t2");
@@ -135,9 +105,9 @@ async function columns() {
   await page.close();
 }
 
-async function nasty() {
+async function nasty(open) {
   const where = "a name that is a script";
-  const page = await opened(where);
+  const page = await open(where);
   const data = readFileSync(join(records, "nasty.csv"));
   await page.setInputFiles("#files", { name: "nasty.csv", mimeType: "text/csv", buffer: data });
   await page.waitForSelector("#columns:not([hidden])");
@@ -153,9 +123,9 @@ async function nasty() {
   await page.close();
 }
 
-async function stops() {
+async function stops(open) {
   const where = "stop";
-  const page = await opened(where);
+  const page = await open(where);
   await drop(page, ["long.csv"]);
   await page.click("#diagnose");
   await page.click("#stop");
@@ -164,9 +134,9 @@ async function stops() {
   await page.close();
 }
 
-async function unreadable() {
+async function unreadable(open) {
   const where = "no table";
-  const page = await opened(where);
+  const page = await open(where);
   for (const [name, text] of [["empty.csv", ""], ["words.txt", "no table at all"], ["one.csv", "T1\n1\n2\n"], ["nan.csv", "t,a,b\n1,NaN,x\n"]]) {
     await page.setInputFiles("#files", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
     await page.waitForFunction((name) => document.getElementById("read").textContent.includes(name), name);
@@ -176,9 +146,9 @@ async function unreadable() {
   await page.close();
 }
 
-async function isFast() {
+async function isFast(open) {
   const where = "long record";
-  const page = await opened(where);
+  const page = await open(where);
   await drop(page, ["long.csv"]);
   const begun = performance.now();
   await diagnosed(page);
@@ -191,11 +161,11 @@ async function isFast() {
   await page.close();
 }
 
-async function looks() {
+async function looks(open) {
   for (const [size, width, height] of [["wide", 1280, 900], ["narrow", 400, 800]]) {
     for (const scheme of ["light", "dark"]) {
       const where = `page ${size} ${scheme}`;
-      const page = await opened(where, { width, height, scheme });
+      const page = await open(where, { width, height, scheme });
       await page.screenshot({ path: join(screenshots, `begin-${size}-${scheme}.png`) });
       await page.click("#example");
       await page.waitForSelector("#asking:not([hidden])", { timeout: 60_000 });
@@ -203,11 +173,8 @@ async function looks() {
       await diagnosed(page);
       await page.waitForTimeout(500);
       await page.screenshot({ path: join(screenshots, `answer-${size}-${scheme}.png`), fullPage: true });
-      const overflow = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-      if (overflow > 0) fail(where, `is ${overflow} px wider than the screen`);
-      await page.evaluate(axe);
-      const { violations } = await page.evaluate(() => axe.run(document, { iframes: false }));
-      violations.forEach(({ id, nodes }) => fail(where, `axe: ${id}: ${nodes.map((node) => node.html.slice(0, 90)).join("; ")}`));
+      await fitsItsScreen(page, where);
+      await accessible(page, where);
       await page.close();
     }
   }
