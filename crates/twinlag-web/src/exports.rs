@@ -9,7 +9,7 @@ use crate::session::{Session, SessionError};
 
 #[wasm_bindgen]
 extern "C" {
-    /// A function of the worker, which tells the page.
+    /// A function of the worker, which passes it on to the page.
     #[wasm_bindgen(js_name = sayProgress)]
     fn say_progress(task: &str, done: usize, total: usize);
 }

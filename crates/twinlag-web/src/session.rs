@@ -80,7 +80,7 @@ impl Session {
     /// - `selection`: [`Selection`] as JSON
     ///
     /// # Errors
-    /// Files that are no table; a selection that is none.
+    /// Files that are no table, and selections that are not as JSON has them.
     pub fn add(&mut self, name: &str, bytes: Vec<u8>, selection: &str) -> Result<String, SessionError> {
         let selection: Selection = parsed(selection)?;
         let sha256 = base16ct::lower::encode_string(&Sha256::digest(&bytes));
