@@ -101,8 +101,13 @@ pub(crate) fn browser(given: Option<&Path>) -> Result<PathBuf> {
 pub(crate) fn built() -> Result<PathBuf> {
     let root = root()?;
     step("cargo", &["build", "--release", "--package", "twinlag-cli"], root)?;
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
-    Ok(target.join("release/twinlag"))
+    Ok(target_dir()?.join("release/twinlag"))
+}
+
+/// Where cargo builds.
+pub(crate) fn target_dir() -> Result<PathBuf> {
+    let root = root()?;
+    Ok(std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from))
 }
 
 /// Simulates the records, and one whose columns have the names of scripts.

@@ -16,11 +16,11 @@ use flate2::write::GzEncoder;
 use sha2::{Digest, Sha256};
 use twinlag_report::{Axis, Chart, Document, Figure, Series};
 
-use crate::report::{browser, built, step};
+use crate::report::{browser, built, step, target_dir};
 use crate::root;
 
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
-/// Four numbers at once, as all browsers have since 2021, and the stack of a thread of the program.
+/// Several numbers at once, which browsers have been able to since 2023, and the stack of a thread of the program.
 const FLAGS: &str = "-Ctarget-feature=+simd128 -Clink-arg=-zstack-size=8388608";
 /// The binder of WebAssembly and the library that it binds have one version.
 const BINDER: &str = "wasm-bindgen";
@@ -80,7 +80,7 @@ fn bound(work: &Path) -> Result<PathBuf> {
         step("cargo", &install, root)?;
     }
     let out = work.join("bound");
-    let wasm = root.join("target").join(TARGET).join("web/twinlag_web.wasm");
+    let wasm = target_dir()?.join(TARGET).join("web/twinlag_web.wasm");
     let [binder, out_text, wasm] = [&binder, &out, &wasm].map(|path| path.display().to_string());
     step(&binder, &["--target", "no-modules", "--no-typescript", "--out-dir", &out_text, &wasm], root)?;
     Ok(out)
@@ -108,7 +108,7 @@ fn assembled(bound: &Path) -> Result<String> {
     let wasm = Base64::encode_string(&gzipped(&fs::read(bound.join("twinlag_web_bg.wasm"))?)?);
     let policy = format!(
         "default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'wasm-unsafe-eval' '{}' {}; style-src '{}' {}; \
-         worker-src blob:; frame-src 'self' blob:",
+         worker-src blob:",
         hash(&script),
         reports.script_hashes,
         hash(&style),

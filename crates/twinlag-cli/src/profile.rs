@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use twinlag::record::{ColumnRef, Selection};
+use twinlag::record::Selection;
 use twinlag_files::Choice;
 
 use crate::failure::Failure;
@@ -49,12 +49,7 @@ impl Profile {
 
     /// Which group to read. If none is named, the group that alone has the channels named as T1 and T2.
     pub(crate) fn choice(&self) -> Choice {
-        let name = |column: &ColumnRef| match column {
-            ColumnRef::Name(name) => Some(name.clone()),
-            ColumnRef::Number(_) => None,
-        };
-        let channels = [&self.selection.t1, &self.selection.t2].into_iter().flatten().filter_map(name).collect();
-        Choice { group: self.group.clone(), channels, join: self.join }
+        Choice { group: self.group.clone(), join: self.join, ..Choice::of(&self.selection) }
     }
 
     /// This profile, and where it says nothing what the other one says.

@@ -1,5 +1,7 @@
 //! Which group of a file is meant: the one that the caller names, else the only one that can be.
 
+use twinlag_record::{ColumnRef, Selection};
+
 use crate::contents::Group;
 use crate::error::{FileError, Listing};
 use crate::format::Format;
@@ -23,6 +25,18 @@ pub struct Choice {
     /// By default that is the group with the lowest sampling rate; the first one if the file does
     /// not state the rate of every one.
     pub join: bool,
+}
+
+impl Choice {
+    /// What the caller's choice of sensors says of the group.
+    pub fn of(selection: &Selection) -> Self {
+        let name = |column: &ColumnRef| match column {
+            ColumnRef::Name(name) => Some(name.clone()),
+            ColumnRef::Number(_) => None,
+        };
+        let channels = [&selection.t1, &selection.t2].into_iter().flatten().filter_map(name).collect();
+        Self { channels, ..Self::default() }
+    }
 }
 
 /// The group to take, with the reason if it was not the only one.

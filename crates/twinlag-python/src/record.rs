@@ -62,8 +62,7 @@ impl Record {
     #[pyo3(signature = (path, selection, group = None, join = false))]
     fn read(py: Python<'_>, path: PathBuf, selection: &str, group: Option<String>, join: bool) -> PyResult<Self> {
         let selection: Selection = parsed(selection)?;
-        let channels = [&selection.t1, &selection.t2].into_iter().flatten().map(ToString::to_string).collect();
-        let choice = Choice { group, join, channels };
+        let choice = Choice { group, join, ..Choice::of(&selection) };
         let table = py.detach(|| {
             if twinlag_files::is_binary(&path) {
                 twinlag_files::read(&path, &choice).map_err(|error| of_file(&error))

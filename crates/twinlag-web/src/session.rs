@@ -38,7 +38,7 @@ pub enum SessionError {
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// Something is asked before what it rests on.
-    #[error("{expected} comes first")]
+    #[error("expected {expected} before this")]
     Order {
         /// What has to come first.
         expected: &'static str,
@@ -100,6 +100,7 @@ impl Session {
     /// [`SessionError::Order`] without a record; those of [`diagnose_watched`].
     pub fn diagnose(&mut self, options: &str, watch: Watch<'_>) -> Result<String, SessionError> {
         let options = DiagnoseOptions { characterise: parsed::<Options>(options)?, ..DiagnoseOptions::default() };
+        (self.diagnosis, self.gas) = (None, None);
         let answer = match &self.records()[..] {
             [] => return Err(SessionError::Order { expected: "a record" }),
             [one] => diagnose_watched(one, &options, watch)?,
@@ -132,8 +133,8 @@ impl Session {
     pub fn report(&self, made_at: &str) -> Result<String, SessionError> {
         let diagnosis = self.diagnosis()?;
         let page = match &self.records()[..] {
-            [one] => diagnosis_report(one, diagnosis, &self.making(made_at))?,
-            several => diagnosis_report(&joined(several)?, diagnosis, &self.making(made_at))?,
+            [one] => diagnosis_report(one, diagnosis, &making(&self.added, made_at))?,
+            several => diagnosis_report(&joined(several)?, diagnosis, &making(&self.added, made_at))?,
         };
         Ok(page)
     }
@@ -145,7 +146,9 @@ impl Session {
     /// # Errors
     /// [`SessionError::Order`] without a gas temperature; [`SessionError::Page`].
     pub fn gas_report(&self, made_at: &str) -> Result<String, SessionError> {
-        Ok(gas_report(&self.added[0].record, self.gas()?, &self.making(made_at))?)
+        let gas = self.gas()?;
+        let first = &self.added[..1];
+        Ok(gas_report(&first[0].record, gas, &making(first, made_at))?)
     }
 
     /// The gas temperature as CSV, in the columns of `twinlag compensate`; `None` where there is none to give.
@@ -180,11 +183,12 @@ impl Session {
     fn records(&self) -> Vec<Record> {
         self.added.iter().map(|added| added.record.clone()).collect()
     }
+}
 
-    fn making(&self, made_at: &str) -> Making {
-        let files = self.added.iter().map(|added| (added.record.source.clone(), added.sha256.clone()));
-        Making { made_at: made_at.to_owned(), files: files.collect(), ..Making::default() }
-    }
+/// What a page says of its making, from these files.
+fn making(added: &[Added], made_at: &str) -> Making {
+    let files = added.iter().map(|added| (added.record.source.clone(), added.sha256.clone()));
+    Making { made_at: made_at.to_owned(), files: files.collect(), ..Making::default() }
 }
 
 fn parsed<T: DeserializeOwned>(json: &str) -> Result<T, SessionError> {
@@ -202,6 +206,5 @@ fn table(name: &str, bytes: Vec<u8>, selection: &Selection) -> Result<Table, Ses
     if !are_binary(&bytes) {
         return Ok(Table::from_reader(bytes.as_slice(), name)?);
     }
-    let channels = [&selection.t1, &selection.t2].into_iter().flatten().map(ToString::to_string).collect();
-    Ok(read_bytes(bytes, &Choice { channels, ..Choice::default() }, name)?)
+    Ok(read_bytes(bytes, &Choice::of(selection), name)?)
 }

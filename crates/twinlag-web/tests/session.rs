@@ -7,17 +7,22 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde_json::Value;
 use twinlag::record::{Record, Selection, Table};
-use twinlag::{DiagnoseOptions, diagnose};
+use twinlag::{CompensateOptions, DiagnoseOptions, compensate, diagnose};
 use twinlag_web::{Session, SessionError};
 
 fn json(text: &str) -> Value {
     serde_json::from_str(text).expect("JSON")
 }
 
-/// A record of 400 rows: both sensors of the example, in one cycle of the gas.
-fn short() -> Vec<u8> {
+/// The first rows of the example.
+fn example(rows: usize) -> Vec<u8> {
     let example = Session::example().expect("an example");
-    example.lines().take(401).collect::<Vec<_>>().join("\n").into_bytes()
+    example.lines().take(rows + 1).collect::<Vec<_>>().join("\n").into_bytes()
+}
+
+/// Enough for a diagnosis.
+fn short() -> Vec<u8> {
+    example(400)
 }
 
 fn unwatched(_: &str, _: usize, _: usize) -> ControlFlow<()> {
@@ -26,20 +31,40 @@ fn unwatched(_: &str, _: usize, _: usize) -> ControlFlow<()> {
 
 #[test]
 fn a_session_diagnoses_as_the_library_does() {
+    // Enough for a gas temperature.
+    const ROWS: usize = 2500;
     let mut session = Session::default();
-    let found = json(&session.add("run.csv", short(), "{}").expect("a table"));
-    assert_eq!(found["record"]["samples"], 400);
+    let found = json(&session.add("run.csv", example(ROWS), "{}").expect("a table"));
+    assert_eq!(found["record"]["samples"], ROWS);
     let answer = session.diagnose("{}", &unwatched).expect("an answer");
-    let table = Table::from_reader(short().as_slice(), "run.csv").expect("a table");
+    let table = Table::from_reader(example(ROWS).as_slice(), "run.csv").expect("a table");
     let record = Record::from_table(&table, &Selection::default()).expect("a record");
     let wanted = diagnose(&record, &DiagnoseOptions::default()).expect("an answer");
     assert_eq!(answer, serde_json::to_string(&wanted).expect("JSON"));
     let report = session.report("2026-01-01").expect("a report");
     assert!(report.contains("run.csv") && report.contains("2026-01-01"));
-    assert_eq!(
-        json(&session.model().expect("a model"))["schema"],
-        json(&serde_json::to_string(&wanted.model()).expect("JSON"))["schema"]
-    );
+    assert_eq!(session.model().expect("a model"), serde_json::to_string_pretty(&wanted.model()).expect("JSON"));
+
+    session.compensate(&unwatched).expect("an answer");
+    let csv = session.gas_csv().expect("in order").expect("a gas temperature");
+    let options = CompensateOptions { model: Some(wanted.model()), ..CompensateOptions::default() };
+    let gas = compensate(&record, &options).expect("an answer");
+    let last = gas.gas_c.last().expect("a gas temperature");
+    assert_eq!((csv.lines().next(), csv.lines().count()), (Some("time_s,gas_C,gas_std_K"), ROWS + 1));
+    assert_eq!(csv.lines().last().and_then(|row| row.split(',').nth(1)?.parse().ok()), Some(*last));
+    assert!(session.gas_report("").expect("a report").contains("run.csv"));
+    // A new diagnosis is of no gas temperature yet.
+    session.diagnose("{}", &unwatched).expect("an answer");
+    assert!(matches!(session.gas_report(""), Err(SessionError::Order { .. })));
+}
+
+#[test]
+fn what_is_known_is_of_the_first_and_second_sensor() {
+    let mut session = Session::default();
+    session.add("run.csv", short(), "{}").expect("a table");
+    let answer = json(&session.diagnose("{\"known\": [\"T1=0.0238s\"]}", &unwatched).expect("an answer"));
+    let of_first = |key: &str| answer["final"]["sensors"][0][key].clone();
+    assert_eq!((of_first("time_constant_s"), of_first("known")), (Value::from(0.0238), Value::from(true)));
 }
 
 #[test]
@@ -55,9 +80,9 @@ fn what_gzip_has_compressed_is_the_same_record() {
 fn what_comes_before_something_else_is_named() {
     let mut session = Session::default();
     let refused = |error: SessionError| error.to_string();
-    assert_eq!(session.diagnose("{}", &unwatched).map_err(refused), Err("a record comes first".to_owned()));
-    assert_eq!(session.report("").map_err(refused), Err("a diagnosis comes first".to_owned()));
-    assert_eq!(session.gas_csv().map_err(refused), Err("a gas temperature comes first".to_owned()));
+    assert_eq!(session.diagnose("{}", &unwatched).map_err(refused), Err("expected a record before this".to_owned()));
+    assert_eq!(session.report("").map_err(refused), Err("expected a diagnosis before this".to_owned()));
+    assert_eq!(session.gas_csv().map_err(refused), Err("expected a gas temperature before this".to_owned()));
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub struct Inspection {
 pub struct InspectedColumn {
     /// Its number, from 1.
     pub number: usize,
-    /// Its name, without the unit.
+    /// Its name, as in the header.
     pub name: String,
     /// Its unit; empty if none is stated.
     pub unit: String,

@@ -12,7 +12,8 @@ use crate::answers::{InspectedRecord, Inspection};
 /// use twinlag::inspect;
 /// use twinlag::record::{Selection, Table};
 ///
-/// let log = "time (s),fine (°C),coarse (°C),rpm\n0.0,20.0,20.0,900\n0.1,21.0,20.5,900\n0.2,22.5,21.0,901\n0.3,23.0,21.5,900\n";
+/// let row = |k: i32| format!("{:.1},{},{},900\n", 0.1 * f64::from(k), 20 + k % 4, 20 + k % 3);
+/// let log = "time (s),fine (°C),coarse (°C),rpm\n".to_owned() + &(0..10).map(row).collect::<String>();
 /// let (found, record) = inspect(Table::from_reader(log.as_bytes(), "run.csv")?, &Selection::default());
 /// let taken: Vec<_> = found.columns.iter().map(|column| column.taken_as).collect();
 /// assert_eq!(taken, [Some("time"), Some("T1"), Some("T2"), None]);
