@@ -11,7 +11,6 @@ import { accessible, fail, fitsItsScreen, opened, withBrowser } from "../browser
 const [pagePath, records, screenshots, browserPath, program] = process.argv.slice(2).map((path) => resolve(path));
 // Numbers of two kinds of processor differ in their last digits.
 const RELATIVE = 1e-9;
-const MAX_TIMES_SLOWER = 5;
 const DESK = { width: 1280, height: 900, scheme: "light" };
 
 await withBrowser(browserPath, async (context) => {
@@ -23,7 +22,7 @@ await withBrowser(browserPath, async (context) => {
   await nasty(open);
   await stops(open);
   await unreadable(open);
-  await isFast(open);
+  await takes(open);
 });
 
 // Drops files, as a person does.
@@ -39,7 +38,7 @@ async function drop(page, names) {
 }
 
 async function downloaded(page, title) {
-  const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#downloads a:text-is("${title}")`)]);
+  const [download] = await Promise.all([page.waitForEvent("download"), page.click(`.links a:text-is("${title}")`)]);
   return readFileSync(await download.path(), "utf8");
 }
 
@@ -54,7 +53,7 @@ function run(...details) {
   return execFileSync(program, [...details, "--quiet"], { cwd: records, encoding: "utf8", maxBuffer: 1 << 28 });
 }
 
-// All that differs between two answers, but for who made them.
+// All that differs between two answers.
 function differences(one, other, at = "") {
   if (typeof one === "number" && typeof other === "number") {
     return Math.abs(one - other) <= RELATIVE * Math.max(Math.abs(one), Math.abs(other)) ? [] : [`${at}: ${one} and ${other}`];
@@ -77,6 +76,8 @@ async function answers(open, where, names) {
   if (!report.startsWith("<!DOCTYPE html>") || !report.includes("Content-Security-Policy")) fail(where, "the report is none");
   await page.click("#compensate");
   await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: 600_000 });
+  const done = await page.textContent("#said");
+  if (done !== "The gas temperature is reconstructed.") fail(where, done);
   if (names.length === 1) {
     const gas = (await downloaded(page, "Gas temperature as CSV")).trim().split("\n").map((line) => line.split(","));
     run("diagnose", names[0], "--save", "model.json", "--force");
@@ -90,18 +91,23 @@ async function answers(open, where, names) {
   console.log(`== ${where}: as the program`);
 }
 
-// A wrong choice is said, and a right one mends it.
+// A wrong choice is said, and a right one mends it; what is known is of the first sensor, whatever its column is called.
 async function columns(open) {
   const where = "columns";
   const page = await open(where);
   await drop(page, ["first.csv"]);
-  const t1 = await page.inputValue("#t1");
-  const t2 = await page.inputValue("#t2");
+  const names = await page.$$eval("#t1 option", (options) => options.map((option) => option.value));
+  const [t1, t2] = ["T1", "T2"].map((sensor) => names.find((name) => name.startsWith(`"${sensor}`)));
   await page.selectOption("#t2", t1);
   await page.waitForSelector("#read .warning");
   if (await page.isVisible("#diagnose")) fail(where, "two sensors in one column are diagnosed");
   await page.selectOption("#t2", t2);
   await page.waitForSelector("#asking:not([hidden])");
+  await page.fill("#known", "0.12");
+  await diagnosed(page);
+  const said = JSON.parse(await downloaded(page, "Answer as JSON"));
+  const wanted = JSON.parse(run("diagnose", "first.csv", "--t2", JSON.parse(t2), "--known", "T1=0.12s", "--json"));
+  differences(said, wanted).forEach((text) => fail(where, text));
   await page.close();
 }
 
@@ -114,7 +120,7 @@ async function nasty(open) {
   if (await page.isHidden("#asking")) {
     const names = await page.$$eval("#t1 option", (options) => options.map((option) => option.value));
     await page.selectOption("#t1", names.find((name) => name.includes("script")));
-    await page.selectOption("#t2", names.find((name) => name.startsWith("T2")));
+    await page.selectOption("#t2", names.find((name) => name.startsWith('"T2')));
     await page.waitForSelector("#asking:not([hidden])");
   }
   await diagnosed(page);
@@ -129,8 +135,11 @@ async function stops(open) {
   await drop(page, ["long.csv"]);
   await page.click("#diagnose");
   await page.click("#stop");
-  await page.waitForFunction(() => document.getElementById("said").textContent === "stopped");
-  await page.waitForFunction(() => !document.getElementById("diagnose").disabled);
+  await page.waitForFunction(() => document.getElementById("said").textContent === "Stopped.");
+  await page.waitForSelector("#asking:not([hidden])");
+  // What comes after it works.
+  await drop(page, ["first.csv"]);
+  await diagnosed(page);
   await page.close();
 }
 
@@ -146,18 +155,17 @@ async function unreadable(open) {
   await page.close();
 }
 
-async function isFast(open) {
-  const where = "long record";
-  const page = await open(where);
+// Measures; the numbers are for a reader.
+async function takes(open) {
+  const page = await open("long record");
   await drop(page, ["long.csv"]);
   const begun = performance.now();
   await diagnosed(page);
-  const in_page = performance.now() - begun;
+  const inPage = performance.now() - begun;
   const again = performance.now();
   run("diagnose", "long.csv", "--json");
-  const by_program = performance.now() - again;
-  console.log(`== long record: ${(in_page / 1000).toFixed(2)} s in the page, ${(by_program / 1000).toFixed(2)} s by the program`);
-  if (in_page > MAX_TIMES_SLOWER * by_program) console.log(`== more than ${MAX_TIMES_SLOWER} times as long`);
+  const byProgram = performance.now() - again;
+  console.log(`== long record: ${(inPage / 1000).toFixed(2)} s in the page, ${(byProgram / 1000).toFixed(2)} s by the program`);
   await page.close();
 }
 

@@ -1,17 +1,23 @@
 "use strict";
 (() => {
   const byId = (id) => document.getElementById(id);
-  const [drop, input, read, said] = ["drop", "files", "read", "said"].map(byId);
-  const roles = ["time", "t1", "t2"];
-  let files = [];      // name and bytes of each
-  let worker, requests = 0, waiting = new Map();
-  let downloads = [];
+  const columnRoles = { time: "time", t1: "T1", t2: "T2" };
+  let files = [];                       // name and bytes of each
+  let chosen = {};                      // what the user has said of columns and time; the rest is guessed
+  let generation = 0;                   // a reply to an older question is out of date
+  let worker, started, isWorking = false;
+  const waiting = new Map();            // requests that are not answered, by number
+  let requests = 0;
+  const links = { answer: [], gas: [] };
+
+  // --- the worker
 
   const workerUrl = URL.createObjectURL(new Blob([byId("worker").textContent], { type: "text/javascript" }));
-  const wasm = inflated(byId("wasm").textContent.trim());
+  const packed = byId("wasm").textContent.trim();
   byId("wasm").remove();
+  const wasm = unpacked(packed);
 
-  async function inflated(base64) {
+  async function unpacked(base64) {
     const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
     const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
     return new Response(plain).arrayBuffer();
@@ -24,63 +30,87 @@
     return answered;
   }
 
+  function end(reason) {
+    worker?.terminate();
+    for (const { reject } of waiting.values()) reject(Object.assign(new Error(reason), { isEnded: true }));
+    waiting.clear();
+  }
+
   async function begin() {
+    const code = await wasm;
     worker = new Worker(workerUrl);
+    worker.onerror = (event) => end(event.message || "its worker has failed");
     worker.onmessage = ({ data: { id, answer, problem, isBroken, progress } }) => {
       if (progress) return show(progress);
-      const { resolve, reject } = waiting.get(id);
+      const { resolve, reject } = waiting.get(id) ?? {};
       waiting.delete(id);
-      if (problem === undefined) return resolve(answer);
-      reject(Object.assign(new Error(problem), { isBroken }));
+      if (problem === undefined) return resolve?.(answer);
+      reject?.(Object.assign(new Error(problem), { isBroken }));
     };
-    return ask("start", { wasm: await wasm });
+    await ask("start", { wasm: code });
   }
 
-  // Ends what is being worked on, and begins anew with the same files.
-  async function restart() {
-    worker.terminate();
-    for (const { reject } of waiting.values()) reject(new Error("stopped"));
-    waiting.clear();
+  // Begins, and says where the browser cannot.
+  function start() {
     started = begin();
-    await started;
-    if (files.length > 0) await ask("read", { files, selection: selection() });
+    started.catch((error) => {
+      if (error.isEnded && isWorking) return;
+      warn(`This page needs a browser of 2023 or later that runs WebAssembly in a worker: ${error.message}. The program and the Python package `
+        + "read the same files.");
+    });
   }
-  let started = begin();
+  start();
 
-  function show({ task, done, total }) {
-    const bar = byId("progress");
-    if (total > 0) { bar.max = total; bar.value = done; } else bar.removeAttribute("value");
-    byId("task").textContent = total > 0 ? `${task}: ${done} of ${total}` : task;
+  function warn(text) {
+    byId("read").replaceChildren(element("p", text, "warning"));
+  }
+
+  // Ends what is being worked on. What was answered before is of a session that is gone.
+  async function restart() {
+    end("stopped");
+    byId("answer").hidden = byId("gas").hidden = true;
+    start();
+    await started;
   }
 
   // --- files and columns
 
   async function take(list) {
-    files = await Promise.all([...list].map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
-    byId("known").value = "";
-    byId("time-unit").value = "";
-    roles.forEach((role) => byId(role).replaceChildren());
-    await readFiles();
+    const taken = [...list];
+    if (taken.length === 0) return;
+    const mine = ++generation;
+    try {
+      const read = await Promise.all(taken.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
+      if (mine !== generation) return;
+      files = read;
+      chosen = {};
+      for (const id of ["known", "period", "time-unit"]) byId(id).value = "";
+      await readFiles();
+    } catch (error) {
+      if (mine === generation) warn(`What was dropped cannot be read (${error.message}): drop files, not folders.`);
+    }
   }
 
-  function selection() {
-    const chosen = {};
-    for (const role of roles) if (byId(role).value) chosen[role] = byId(role).value;
-    if (byId("time-unit").value) chosen.time_unit = byId("time-unit").value;
-    return JSON.stringify(chosen);
-  }
-
+  // Reads all files anew, with what is chosen.
   async function readFiles() {
     if (files.length === 0) return;
-    await started;
-    byId("answer").hidden = true;
-    said.textContent = "";
-    const found = await ask("read", { files, selection: selection() });
-    read.replaceChildren(...found.map(about));
-    const first = found.find(({ inspection }) => inspection);
-    byId("columns").hidden = !first;
-    if (first) columns(first.inspection);
-    byId("asking").hidden = !found.every(({ inspection }) => inspection && inspection.record);
+    const mine = ++generation;
+    if (isWorking) await restart();
+    byId("answer").hidden = byId("gas").hidden = byId("asking").hidden = true;
+    say("");
+    try {
+      await started;
+      const found = await ask("read", { files, selection: JSON.stringify(chosen) });
+      if (mine !== generation) return;
+      byId("read").replaceChildren(...found.map(about));
+      const first = found.find(({ inspection }) => inspection);
+      byId("columns").hidden = !first;
+      if (first) columns(first.inspection);
+      byId("asking").hidden = !found.every(({ inspection }) => inspection?.record);
+    } catch (error) {
+      if (error.isBroken) await restart();
+      if (mine === generation && !error.isEnded) warn(`The files cannot be read in this page: ${error.message}.`);
+    }
   }
 
   function element(tag, text, className) {
@@ -90,14 +120,16 @@
     return made;
   }
 
+  const digits = (value) => String(Number(value.toPrecision(5)));
+
   function about({ name, problem, inspection }) {
     const box = element("div", undefined, "file");
-    const record = inspection && inspection.record;
+    const record = inspection?.record;
     const length = record && `${record.samples} samples, one every ${digits(record.sampling.period_s)} s, ${digits(record.length_s)} s in all`;
     box.append(element("p", record ? `${name}: ${length}` : name));
-    const fault = problem ?? (inspection && inspection.problem);
+    const fault = problem ?? inspection?.problem;
     if (fault) box.append(element("p", fault, "warning"));
-    const notes = inspection ? inspection.notes : [];
+    const notes = inspection?.notes ?? [];
     if (notes.length > 0) {
       const folded = element("details");
       folded.append(element("summary", `How it was read (${notes.length === 1 ? "1 note" : `${notes.length} notes`})`));
@@ -107,104 +139,155 @@
     return box;
   }
 
-  const digits = (value) => String(Number(value.toPrecision(5)));
-
   function columns({ columns }) {
     const row = (cells, tag) => {
       const made = element("tr");
-      made.append(...cells.map((cell) => element(tag, cell)));
+      made.append(...cells.map((cell) => Object.assign(element(tag, cell), tag === "th" ? { scope: "col" } : {})));
       return made;
     };
     const number = (value) => (value === null ? "" : digits(value));
     byId("found").replaceChildren(
-      row(["", "name", "unit", "holds", "missing", "min", "max", "taken as"], "th"),
+      row(["number", "name", "unit", "holds", "missing", "min", "max", "taken as"], "th"),
       ...columns.map((c) => row([String(c.number), c.name, c.unit, c.kind, String(c.missing), number(c.minimum), number(c.maximum),
         c.taken_as ?? ""], "td")),
     );
-    for (const role of roles) {
-      const select = byId(role);
-      const old = select.value;
-      const options = columns.map((c) => Object.assign(element("option", `${c.number}: ${c.name}`), { value: c.name }));
-      select.replaceChildren(Object.assign(element("option", "choose"), { value: "" }), ...options);
-      const taken = columns.find((c) => c.taken_as === { time: "time", t1: "T1", t2: "T2" }[role]);
-      select.value = taken ? taken.name : old;
+    for (const [role, taken_as] of Object.entries(columnRoles)) {
+      const taken = columns.find((c) => c.taken_as === taken_as);
+      const unsaid = Object.assign(element("option", taken && !chosen[role] ? `as guessed: ${taken.name}` : "as guessed"), { value: "" });
+      const options = columns.map((c) => Object.assign(element("option", `${c.number}: ${c.name}`), { value: JSON.stringify(reference(c, columns)) }));
+      byId(role).replaceChildren(unsaid, ...options);
+      byId(role).value = chosen[role] === undefined ? "" : JSON.stringify(chosen[role]);
     }
+  }
+
+  // A column by its name, where that says which one it is, else by its number.
+  function reference(column, columns) {
+    const isAlone = columns.filter(({ name }) => name === column.name).length === 1;
+    return column.name !== "" && isAlone ? column.name : column.number;
+  }
+
+  function choose(key, value) {
+    if (value === undefined) delete chosen[key]; else chosen[key] = value;
+    readFiles();
   }
 
   // --- questions and answers
 
   const now = () => new Date().toISOString().replace("T", " ").slice(0, 16) + " UTC";
+  const decimal = (id) => byId(id).value.trim().replace(",", ".");
 
-  function options() {
-    const text = byId("known").value.trim().replace(",", ".");
-    if (!text) return "{}";
-    return JSON.stringify({ known: [`${byId("t1").value}=${text}s`] });
+  function say(text) {
+    byId("said").textContent = text;
   }
 
+  function show({ task, done, total }) {
+    const bar = byId("progress");
+    if (total > 0) { bar.max = total; bar.value = done; } else bar.removeAttribute("value");
+    byId("task").textContent = total > 0 ? `${task}: ${done} of ${total}` : task;
+  }
+
+  function setWorking(is) {
+    isWorking = is;
+    for (const id of ["diagnose", "compensate", "example"]) byId(id).disabled = is;
+    byId("working").hidden = !is;
+  }
+
+  // The answer to a question about the files as they are; `undefined` where it is stopped, or refused, which is said.
   async function work(what, details) {
-    const buttons = ["diagnose", "compensate", "example"].map(byId);
-    buttons.forEach((button) => { button.disabled = true; });
-    byId("stop").hidden = byId("working").hidden = false;
+    const mine = generation;
     show({ task: "working", done: 0, total: 0 });
-    said.textContent = "";
+    say("");
+    setWorking(true);
     try {
-      return await ask(what, { madeAt: now(), ...details });
+      const answer = await ask(what, { madeAt: now(), ...details });
+      return mine === generation ? answer : undefined;
     } catch (error) {
-      said.textContent = error.isBroken ? `the page has run out of memory, or has a fault (${error.message})` : error.message;
-      if (error.isBroken) await restart();
+      if (error.isBroken) {
+        await restart();
+        await readFiles();
+        say(`This record is too much for the page (${error.message}). Take fewer rows, or the program, which needs less memory.`);
+      } else if (mine === generation) {
+        say(error.isEnded ? "Stopped." : error.message);
+      }
       return undefined;
     } finally {
-      buttons.forEach((button) => { button.disabled = false; });
-      byId("stop").hidden = byId("working").hidden = true;
+      setWorking(false);
     }
+  }
+
+  async function stop() {
+    await restart();
+    await readFiles();
+    say("Stopped.");
   }
 
   const stem = () => files[0].name.replace(/\.[^.]*$/, "");
 
-  function give(report, links) {
-    downloads.forEach((url) => URL.revokeObjectURL(url));
-    downloads = links.map(([, , text, type]) => URL.createObjectURL(new Blob([text], { type })));
-    byId("downloads").replaceChildren(...links.map(([title, name], index) =>
-      Object.assign(element("a", title), { href: downloads[index], download: name })));
-    byId("report").srcdoc = report;
-    byId("answer").hidden = false;
+  // Shows a report in its section, with what there is to download.
+  function give(section, report, offered) {
+    links[section].forEach((url) => URL.revokeObjectURL(url));
+    links[section] = offered.map(({ text, type }) => URL.createObjectURL(new Blob([text], { type })));
+    byId(`${section}-links`).replaceChildren(...offered.map(({ title, name }, index) =>
+      Object.assign(element("a", title), { href: links[section][index], download: name })));
+    byId(`${section}-report`).srcdoc = report;
+    byId(section).hidden = false;
   }
 
-  byId("diagnose").addEventListener("click", async () => {
-    const answer = await work("diagnose", { options: options() });
-    if (!answer) return;
-    give(answer.report, [
-      ["Report", `${stem()}-report.html`, answer.report, "text/html"],
-      ["Answer as JSON", `${stem()}-diagnosis.json`, answer.json, "application/json"],
-      ["Model", `${stem()}-model.json`, answer.model, "application/json"],
-    ]);
-    said.textContent = "Diagnosed.";
-  });
+  const JSON_TYPE = "application/json";
 
-  byId("compensate").addEventListener("click", async () => {
-    const answer = await work("compensate", {});
+  async function diagnose() {
+    const known = decimal("known");
+    const answer = await work("diagnose", { options: JSON.stringify(known ? { known: [`T1=${known}s`] } : {}) });
     if (!answer) return;
-    const csv = answer.csv ? [["Gas temperature as CSV", `${stem()}-gas.csv`, answer.csv, "text/csv"]] : [];
-    give(answer.report, [
+    byId("gas").hidden = true;
+    give("answer", answer.report, [
+      { title: "Report", name: `${stem()}-report.html`, text: answer.report, type: "text/html" },
+      { title: "Answer as JSON", name: `${stem()}-diagnosis.json`, text: answer.json, type: JSON_TYPE },
+      { title: "Model", name: `${stem()}-model.json`, text: answer.model, type: JSON_TYPE },
+    ]);
+    say("Diagnosed.");
+  }
+
+  async function compensate() {
+    const answer = await work("compensate");
+    if (!answer) return;
+    const csv = answer.csv ? [{ title: "Gas temperature as CSV", name: `${stem()}-gas.csv`, text: answer.csv, type: "text/csv" }] : [];
+    give("gas", answer.report, [
       ...csv,
-      ["Report", `${stem()}-gas-report.html`, answer.report, "text/html"],
-      ["Answer as JSON", `${stem()}-compensation.json`, answer.json, "application/json"],
+      { title: "Report of the gas", name: `${stem()}-gas-report.html`, text: answer.report, type: "text/html" },
+      { title: "Gas as JSON", name: `${stem()}-compensation.json`, text: answer.json, type: JSON_TYPE },
     ]);
-    said.textContent = answer.csv ? "The gas temperature is reconstructed." : "No gas temperature can be given; the report says why.";
-  });
+    say(answer.csv ? "The gas temperature is reconstructed." : "No gas temperature can be given; the report says why.");
+  }
 
-  byId("stop").addEventListener("click", restart);
-  input.addEventListener("change", () => take(input.files));
-  for (const id of [...roles, "time-unit"]) byId(id).addEventListener("change", readFiles);
-  byId("example").addEventListener("click", async () => {
-    await started;
-    await take([new File([await ask("example")], "example.csv", { type: "text/csv" })]);
+  async function example() {
+    try {
+      await started;
+      await take([new File([await ask("example")], "example.csv", { type: "text/csv" })]);
+    } catch (error) {
+      if (!error.isEnded) warn(error.message);
+    }
+  }
+
+  byId("diagnose").addEventListener("click", diagnose);
+  byId("compensate").addEventListener("click", compensate);
+  byId("stop").addEventListener("click", stop);
+  byId("example").addEventListener("click", example);
+  byId("files").addEventListener("change", async ({ target }) => {
+    await take(target.files);
+    // A file that was edited may be chosen again.
+    target.value = "";
   });
-  drop.addEventListener("dragover", (event) => { event.preventDefault(); drop.classList.add("over"); });
-  drop.addEventListener("dragleave", () => drop.classList.remove("over"));
-  drop.addEventListener("drop", (event) => {
+  for (const role of Object.keys(columnRoles))
+    byId(role).addEventListener("change", ({ target }) => choose(role, target.value ? JSON.parse(target.value) : undefined));
+  byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
+  byId("period").addEventListener("change", () => choose("period_s", decimal("period") ? Number(decimal("period")) : undefined));
+  // Anywhere: a file that misses its place would be opened instead of the page.
+  addEventListener("dragover", (event) => { event.preventDefault(); byId("drop").classList.add("over"); });
+  addEventListener("dragleave", () => byId("drop").classList.remove("over"));
+  addEventListener("drop", (event) => {
     event.preventDefault();
-    drop.classList.remove("over");
+    byId("drop").classList.remove("over");
     take(event.dataTransfer.files);
   });
 })();

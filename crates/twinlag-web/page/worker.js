@@ -6,6 +6,9 @@ function sayProgress(task, done, total) {
   self.postMessage({ progress: { task, done, total } });
 }
 
+// What the session refuses is thrown as a plain error; a trap and an exhausted stack are others, after which it is not to be trusted.
+const isRefusal = (error) => error instanceof Error && error.constructor === Error;
+
 const answers = {
   start: ({ wasm }) => {
     wasm_bindgen.initSync({ module: wasm });
@@ -20,6 +23,7 @@ const answers = {
       try {
         return { name, inspection: JSON.parse(page.add(name, new Uint8Array(bytes), selection)) };
       } catch (error) {
+        if (!isRefusal(error)) throw error;
         return { name, problem: error.message };
       }
     });
@@ -36,7 +40,6 @@ self.onmessage = ({ data: { id, ask, ...what } }) => {
   try {
     self.postMessage({ id, answer: answers[ask](what) });
   } catch (error) {
-    // Of a trap the session is not to be trusted any more.
-    self.postMessage({ id, problem: error.message, isBroken: error instanceof WebAssembly.RuntimeError });
+    self.postMessage({ id, problem: error.message, isBroken: !isRefusal(error) });
   }
 };
