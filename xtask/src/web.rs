@@ -76,7 +76,7 @@ fn bound(work: &Path) -> Result<PathBuf> {
     };
     if !has_version(&binder) {
         let tools = tools.display().to_string();
-        let install = ["install", "wasm-bindgen-cli", "--version", &version, "--locked", "--force", "--root", &tools];
+        let install = ["install", "wasm-bindgen-cli", "--version", &version, "--force", "--root", &tools];
         step("cargo", &install, root)?;
     }
     let out = work.join("bound");
