@@ -68,7 +68,7 @@
   // Ends what is being worked on. What was answered before is of a session that is gone.
   async function restart() {
     end("stopped");
-    byId("answer").hidden = byId("gas").hidden = true;
+    byId("answer").hidden = byId("gas").hidden = byId("asking").hidden = true;
     start();
     await started;
   }
