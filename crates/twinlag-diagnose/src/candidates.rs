@@ -28,6 +28,9 @@ const START_GAIN_SHARE: f64 = 0.5;
 const GRID_POINTS: usize = 5;
 const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
+/// Periods of the slowest line in the longest of several records: three half periods, the slowest in a single record, and as many by
+/// which a fit may move its frequency.
+const MIN_LINE_PERIODS: f64 = 3.0;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
 
@@ -213,6 +216,9 @@ impl<'a> Search<'a> {
     pub(crate) fn beside(mut self, current: &Fitted) -> Self {
         self.context.tau_s = [current.theta[0], current.theta[1]];
         let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy);
+        // What is slower is no line but what differs from record to record. Of one record none is.
+        let is_within_a_record = |hz: &f64| hz * self.context.span_s() >= MIN_LINE_PERIODS;
+        let found = found.into_iter().filter(|hz| self.context.members.len() < 2 || is_within_a_record(hz));
         self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
         // After the lines, which take as much memory again, and leave none of it.
         if self.allowed.iter().any(|effect| effect.about().follows_gas) {

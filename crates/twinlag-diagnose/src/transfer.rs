@@ -35,6 +35,9 @@ pub struct LeftOut {
     pub are_others_explained: Option<bool>,
     /// Whether a noise is in the model of the others: it may stand for differences between them. Of a block `false`.
     pub are_others_explained_by_noise: bool,
+    /// Root mean square of the whitened residual that is left over where the effects of all records are fitted to this one by itself, where
+    /// a noise is in the model of all: what is beyond it is what differs between records, and no noise. `None` otherwise.
+    pub normalised_rms_by_itself: Option<f64>,
 }
 
 /// Errors on records, or blocks of one, that were left out, one at a time.
@@ -77,7 +80,9 @@ impl Across {
     ) -> Self {
         // The mean square of n numbers of unit variance has the standard deviation √(2/n).
         let chance = |samples: usize| (1.0 + FAR_DEVIATIONS * (2.0 / samples.max(1) as f64).sqrt()).sqrt();
-        let most = |record: usize| chance(samples[record]) + policy.left_out_rms_margin;
+        // A noise that a record has by itself is left over whatever model it is given.
+        let least = |record: usize| transfer.records[record].normalised_rms_by_itself.unwrap_or(1.0).max(1.0);
+        let most = |record: usize| chance(samples[record]) * least(record) + policy.left_out_rms_margin;
         let errors = |record: usize| transfer.records[record].normalised_rms;
         let unexplained: Vec<usize> =
             (0..samples.len()).filter(|record| errors(*record).after > most(*record)).collect();
@@ -129,6 +134,7 @@ pub(crate) fn places(model: &Model) -> impl Iterator<Item = EffectInChannel> {
 /// What each record is when it is left out, with the model of the others.
 pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>) -> Result<Transfer, ModelError> {
     let records = state.prepared.each_record();
+    let noisy = state.current.model.noise().map(|_| bare(state.current.clone(), state, state));
     let mut out = Errors::default();
     for (done, record) in records.iter().enumerate() {
         report(watch, "records left out", done, records.len())?;
@@ -137,8 +143,17 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
         let squares = [of(&of_others.base)?, of(&of_others.current)?];
         out.add(squares, &of_others.current.model, Some(is_explained(&of_others, settings)));
+        if let (Some(all), Some(left_out)) = (&noisy, out.each.last_mut()) {
+            left_out.normalised_rms_by_itself = Some(by_itself(record, all));
+        }
     }
     Ok(out.transfer())
+}
+
+/// What the effects of `all` leave over in a record where they are fitted to it alone, as a root mean square of the whitened residual.
+fn by_itself(record: &OneRecord, all: &Fitted) -> f64 {
+    let own = all.model.fit(&all.theta, &record.observations, &record.everything, Effort::Compare);
+    Squares::of(&own, &record.observations, |sample| record.tried.holds(sample)).roots()[0]
 }
 
 /// Errors of one record on each of its blocks in turn, with a model of the effects that all of it shows, fitted to the other blocks.
@@ -175,6 +190,7 @@ impl Errors {
             found,
             are_others_explained,
             are_others_explained_by_noise: model.noise().is_some(),
+            normalised_rms_by_itself: None,
         });
     }
 
