@@ -14,6 +14,7 @@ use twinlag_optimise::{End, Scale, Variable};
 
 use crate::grade::Reason;
 use crate::long::is_long;
+use crate::own_in_each::Shortened;
 use crate::rank::{Kind, Score, threshold};
 
 /// Margin of a logarithm from its bound, and of a number as a share of its range, within which a
@@ -56,6 +57,8 @@ pub(crate) struct Candidate {
     pub(crate) held_out_nats: f64,
     /// What its gains count beside those of the others.
     pub(crate) share: f64,
+    /// A shorter form of another effect that comes with it.
+    pub(crate) shortened: Option<Shortened>,
 }
 
 /// An effect that is worth a fit, and where from.
@@ -182,7 +185,7 @@ pub(crate) struct Search<'a> {
     pub(crate) selection: &'a Selection,
     pub(crate) context: Context,
     /// Effects that may be named.
-    allowed: &'a [Identifier],
+    pub(crate) allowed: &'a [Identifier],
     pub(crate) policy: &'a Policy,
     watch: Watch<'a>,
     excerpt: OnceLock<Excerpt>,
@@ -312,7 +315,9 @@ impl<'a> Search<'a> {
 
     /// Every candidate that may be added to `current`: those that may explain something are fitted,
     /// the best few to the end.
-    pub(crate) fn fitted(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
+    ///
+    /// - `taken`: how the effects of `current` were found
+    pub(crate) fn fitted(&self, current: &Fitted, taken: &[&Candidate]) -> Result<Vec<Candidate>, ModelError> {
         let promising = self.screened(current)?;
         let robust_before = self.robust(current);
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
@@ -348,6 +353,7 @@ impl<'a> Search<'a> {
             finished.push(best);
         }
         finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
+        finished.extend(self.own_in_each(current, taken)?);
         if !noise.is_empty() {
             let before = self.at_free_levels(current);
             let after = self.each(&finished, |candidate| self.at_free_levels(&candidate.fitted))?;
@@ -511,6 +517,7 @@ impl<'a> Search<'a> {
             free_level_gain: None,
             held_out_nats: 0.0,
             share: self.share(effect),
+            shortened: None,
         }
     }
 
@@ -659,6 +666,37 @@ mod tests {
     fn fits_from_both_kinds_of_starts_go_to_their_ends() {
         let rig = undeclared(&[Kind::SecondOrder], 1.0, Some(GasKind::Plunge), 307_013).expect("a rig");
         assert_eq!(found_first(&observed(&rig.rig)), (Identifier::SECOND_ORDER, rig.channel));
+    }
+
+    /// Drifts of each record leave over, beside a gain and an offset of all, what looks like part of a period of a line.
+    #[test]
+    fn what_differs_from_record_to_record_is_no_line() {
+        let of = |(seed, mean_c, drift_k_per_s): (u64, f64, f64)| {
+            let gas = Signal::Turbulence(Turbulence { std_k: 15.0, corner_hz: 0.4, cutoff_hz: 6.0 });
+            let mut sensors = [0.1, 0.45].map(|tau_s| Sensor::new(format!("{tau_s}"), tau_s));
+            sensors.iter_mut().for_each(|sensor| sensor.noise = Some(Noise::white(0.1)));
+            (sensors[1].gain, sensors[1].drift_k_per_s) = (1.01, drift_k_per_s);
+            sensors[1].offset_k = 20.0 * drift_k_per_s;
+            observed(&Rig::new(seed, Record::new(2000, 0.02), Gas::new(mean_c, gas), sensors).expect("a rig"))
+        };
+        let records = [(10, 120.0, 0.02), (11, 180.0, -0.015), (12, 240.0, 0.04)].map(of);
+        let settings = Settings::default();
+        let slowest_periods = |observations: &Observations| {
+            let (prepared, base, all) = two_lags(observations, &settings);
+            let is_it = |e: &&Shared| e.identifier() == Identifier::CALIBRATION && e.parameters().len() == 2;
+            let calibration = all.iter().find(is_it).expect("a gain and an offset").clone();
+            let from = [&base.theta[..], &calibration.starts()[0]].concat();
+            let (observations, selection) = (&prepared.observations, &prepared.searched);
+            let fitted = base.model.with(calibration).fit(&from, observations, selection, Effort::Compare);
+            let search = Search::of(&prepared, &settings, &|_, _, _| ControlFlow::Continue(()));
+            let slowest = |lines: Vec<f64>| lines.into_iter().fold(f64::INFINITY, f64::min) * records[0].span_s();
+            let found = lines(&fitted, observations, |s| selection.holds(s), &settings.policy);
+            [slowest(found), slowest(search.beside(&fitted).context.lines.iter().map(|(hz, _)| *hz).collect())]
+        };
+        let [found, kept] = slowest_periods(&Observations::joined(&records).expect("of one period"));
+        assert!(found < MIN_LINE_PERIODS && kept >= MIN_LINE_PERIODS, "{found} and {kept} periods");
+        let [found, kept] = slowest_periods(&records[0]);
+        assert_eq!(found, kept);
     }
 
     /// A second lag that is found, and the same fit with it on its upper bound: nothing of that is an estimate.

@@ -56,6 +56,7 @@ mod naming;
 mod noise;
 mod odd_one;
 mod other_delays;
+mod own_in_each;
 mod propagate;
 mod rank;
 mod rapid;

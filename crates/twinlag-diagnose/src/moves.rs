@@ -8,6 +8,7 @@ use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::evidence::Evidence;
 use crate::other_delays::delay_s;
+use crate::own_in_each::Shortened;
 use crate::rank::{LookAlike, successor, worth};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
@@ -38,7 +39,7 @@ pub enum Move {
         /// What the effect has gained in all.
         evidence: Evidence,
     },
-    /// An effect lost a parameter that effects which came later have made needless.
+    /// An effect lost a parameter that effects which came later have made needless, or have of their own in each record.
     Reduce {
         /// The effect.
         effect: Identifier,
@@ -136,6 +137,13 @@ impl Proposal {
     /// Another form of effect `index`, tied as it was.
     fn of_form(entry: Move, index: usize, candidate: Candidate, ties: &[Candidate]) -> Self {
         Self { entry, change: Change::Put(index, Box::new(Taken { candidate, ties: ties.to_vec() })) }
+    }
+
+    /// A form of effect `index` with fewer parameters, tied as it was.
+    fn shortened(index: usize, candidate: Candidate, ties: &[Candidate]) -> Self {
+        let (effect, channel) = (candidate.effect.identifier(), candidate.effect.channel());
+        let entry = Move::Reduce { effect, channel, evidence: Evidence::of(&candidate) };
+        Self::of_form(entry, index, candidate, ties)
     }
 
     /// Whether one effect takes the place of another.
@@ -246,14 +254,16 @@ impl<'a> State<'a> {
     /// Makes a move, and puts it down.
     pub(crate) fn apply(&mut self, proposal: Proposal) {
         let Proposal { entry, change } = proposal;
+        let mut shortened = None;
         match change {
-            Change::Append(taken) => {
+            Change::Append(mut taken) => {
                 self.current = taken.candidate.fitted.clone().in_order();
                 if taken.effect().about().is_narrow {
                     // A line is in the third differences as well.
                     self.prepared.find_levels(&self.current, self.settings);
                     self.refit();
                 }
+                shortened = taken.candidate.shortened.take();
                 self.taken.push(*taken);
             }
             Change::Put(index, taken) => {
@@ -276,6 +286,9 @@ impl<'a> State<'a> {
             }
         }
         self.moves.push(entry);
+        if let Some(Shortened { index, candidate }) = shortened {
+            self.apply(Proposal::shortened(index, *candidate, &self.taken[index].ties));
+        }
     }
 
     /// Both models with the levels and weights that there are now.
@@ -286,7 +299,8 @@ impl<'a> State<'a> {
     /// Adds the effect that explains best what is left over.
     pub(crate) fn add(&self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
-        let candidates = search.fitted(&self.current)?;
+        let taken: Vec<&Candidate> = self.taken.iter().map(|taken| &taken.candidate).collect();
+        let candidates = search.fitted(&self.current, &taken)?;
         Ok(self.addition(&search, &candidates))
     }
 
@@ -347,9 +361,7 @@ impl<'a> State<'a> {
         }
         let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().reduced(&self.current, index, candidate)?;
-        let (effect, channel) = (candidate.effect.identifier(), candidate.effect.channel());
-        let entry = Move::Reduce { effect, channel, evidence: Evidence::of(&candidate) };
-        Some(Proposal::of_form(entry, index, candidate, ties))
+        Some(Proposal::shortened(index, candidate, ties))
     }
 
     /// Whether later effects can have made effect `index`, or a part of it, needless: there are some, and no noise, whose weights hide what
