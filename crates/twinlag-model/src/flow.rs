@@ -1,5 +1,8 @@
 //! A measured flow velocity or density along the record, or the speed of sensors that move.
 
+use std::sync::Arc;
+
+use crate::effect::{Derived, KnownEffect};
 use crate::error::ModelError;
 use crate::instants::Instants;
 use crate::number::Number;
@@ -25,12 +28,15 @@ pub enum FlowKind {
 pub struct Flow {
     kind: FlowKind,
     time_s: Vec<f64>,
-    /// Logarithm of its size over that of its geometric mean.
+    /// Logarithm of its size over that of the reference.
     log_ratio: Vec<f64>,
-    /// Geometric mean over its values, with their sign.
+    /// The reference over its values, with their sign.
     inverse_ratio: Vec<f64>,
-    mean: f64,
+    reference: f64,
 }
+
+/// Names of the reference, by what is measured.
+const REFERENCES: [&str; 2] = ["mean_flow", "mean_speed"];
 
 impl Flow {
     /// The flow along a record.
@@ -55,7 +61,21 @@ impl Flow {
         let log_mean = sizes.iter().map(|size| size.ln()).sum::<f64>() / count;
         let log_ratio: Vec<f64> = sizes.iter().map(|size| size.ln() - log_mean).collect();
         let inverse_ratio = log_ratio.iter().zip(&values).map(|(l, v)| (-l).exp().copysign(*v)).collect();
-        Ok(Self { kind, time_s, log_ratio, inverse_ratio, mean: log_mean.exp() })
+        Ok(Self { kind, time_s, log_ratio, inverse_ratio, reference: log_mean.exp() })
+    }
+
+    /// This flow about the reference of `known`, an effect that was found in another record: its numbers hold at that flow.
+    pub(crate) fn about_that_of(self: &Arc<Self>, known: &KnownEffect) -> Arc<Self> {
+        let reference = REFERENCES.iter().find_map(|name| known.parameter(name)).filter(|reference| *reference > 0.0);
+        let Some(reference) = reference else { return Arc::clone(self) };
+        let ratio = reference / self.reference;
+        Arc::new(Self {
+            kind: self.kind,
+            time_s: self.time_s.clone(),
+            log_ratio: self.log_ratio.iter().map(|log_ratio| log_ratio - ratio.ln()).collect(),
+            inverse_ratio: self.inverse_ratio.iter().map(|inverse| inverse * ratio).collect(),
+            reference,
+        })
     }
 
     /// What it is.
@@ -63,17 +83,26 @@ impl Flow {
         self.kind
     }
 
-    /// Its geometric mean, in its unit.
-    pub fn mean(&self) -> f64 {
-        self.mean
+    /// The flow that it is compared with, in its unit: its geometric mean, or that of the record in which an effect was found.
+    pub(crate) fn reference(&self) -> f64 {
+        self.reference
     }
 
-    /// `ln(v/v_mean)` of its size at an instant, on straight lines between the samples.
+    /// The reference as a number beside those of an effect.
+    pub(crate) fn derived(&self) -> Derived {
+        let [flow, speed] = REFERENCES;
+        match self.kind {
+            FlowKind::Flow => Derived::constant(flow, "its unit", self.reference),
+            FlowKind::Motion => Derived::constant(speed, "m/s", self.reference),
+        }
+    }
+
+    /// `ln(v/v_ref)` of its size at an instant, on straight lines between the samples.
     pub fn log_ratio_at(&self, time_s: f64) -> f64 {
         self.at(&self.log_ratio, time_s)
     }
 
-    /// `v_mean/v` with its sign at an instant, on straight lines between the samples.
+    /// `v_ref/v` with its sign at an instant, on straight lines between the samples.
     pub(crate) fn inverse_ratio_at(&self, time_s: Number) -> Number {
         let (before, after, share) = self.place(time_s.re);
         let [from, to] = [self.inverse_ratio[before], self.inverse_ratio[after]];
@@ -83,7 +112,7 @@ impl Flow {
         Number::from(from + share * (to - from)) + (time_s - time_s.re) * slope
     }
 
-    /// Rate of change of `v_mean/v` at an instant, 1/s, over the samples on either side and their neighbours.
+    /// Rate of change of `v_ref/v` at an instant, 1/s, over the samples on either side and their neighbours.
     pub(crate) fn inverse_ratio_rate_at(&self, time_s: f64) -> f64 {
         let (before, after, _) = self.place(time_s);
         let (first, last) = (before.saturating_sub(1), (after + 1).min(self.time_s.len() - 1));
@@ -91,7 +120,7 @@ impl Flow {
         if length_s > 0.0 { (self.inverse_ratio[last] - self.inverse_ratio[first]) / length_s } else { 0.0 }
     }
 
-    /// The least and the largest `v_mean/v`.
+    /// The least and the largest `v_ref/v`.
     pub(crate) fn inverse_ratios(&self) -> [f64; 2] {
         let bounds = [f64::INFINITY, f64::NEG_INFINITY];
         self.inverse_ratio.iter().fold(bounds, |[least, largest], ratio| [least.min(*ratio), largest.max(*ratio)])

@@ -415,7 +415,7 @@ fn context(observations: &Observations, levels: &ChannelNoise) -> Context {
         noise_std_k: levels.std_k,
         is_coarse: levels.coarse_step_k().map(|q| q.is_some()),
         tau_s: [10.0 * step_s; 2],
-        flow: observations.flow().filter(|flow| flow.changes()).cloned(),
+        flow: observations.flow().cloned(),
         gas: None,
         lines: Vec::new(),
     }

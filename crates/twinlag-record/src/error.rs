@@ -159,8 +159,6 @@ pub enum RecordError {
          use no flow, or mend the column"
     )]
     BadFlow { file: String, at: Place, column: String, value: f64 },
-    #[error("{file}: column {column}: expected a flow that changes, found {value} throughout; use no flow")]
-    ConstantFlow { file: String, column: String, value: f64 },
     #[error(
         "{file}: {at}, column {column}: expected the position of the sensors in every row that is used, found none; use no position, \
          or mend the column"
@@ -279,7 +277,7 @@ impl RecordError {
             | Self::UnknownColumn { .. }
             | Self::AmbiguousName { .. }
             | Self::SameColumn { .. } => &Setting::COLUMNS,
-            Self::BadFlow { .. } | Self::ConstantFlow { .. } => &[Setting::Flow],
+            Self::BadFlow { .. } => &[Setting::Flow],
             Self::BadPosition { .. } | Self::ConstantPosition { .. } => &[Setting::Position],
             Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],

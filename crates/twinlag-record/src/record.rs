@@ -247,7 +247,7 @@ impl Record {
     /// This record with a flow velocity or density, in any unit, one value for each row.
     ///
     /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::ConstantFlow`];
+    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`];
     /// [`RecordError::FlowAndPosition`] of a record of sensors that move.
     pub fn with_flow(self, flow: Vec<f64>) -> Result<Self, RecordError> {
         self.flowing(flow, "flow", |row| Place::Sample(row + 1))
@@ -265,10 +265,6 @@ impl Record {
         let mut used = self.segments.iter().cloned().flatten();
         if let Some(row) = used.find(|&row| !(flow[row].is_finite() && flow[row] > 0.0)) {
             return Err(RecordError::BadFlow { file, at: at(row), column: column.to_owned(), value: flow[row] });
-        }
-        let mut values = self.segments.iter().cloned().flatten().map(|row| flow[row]);
-        if let Some(value) = values.next().filter(|first| values.all(|value| value == *first)) {
-            return Err(RecordError::ConstantFlow { file, column: column.to_owned(), value });
         }
         self.flow = Some(flow);
         Ok(self)

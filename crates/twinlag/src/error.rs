@@ -60,6 +60,10 @@ pub enum Error {
          those of one period together"
     )]
     OtherPeriod { file: String, first_file: String, first_s: f64, period_s: f64 },
+    #[error(
+        "{file}: expected a flow that changes, along a record or from one to the next, found {value} throughout; use no flow, or diagnose          it together with records in other flows"
+    )]
+    SteadyFlow { file: String, value: f64 },
     #[error("{file}: {error}")]
     InRecord { file: String, error: Box<Error> },
     #[error(
@@ -110,7 +114,7 @@ impl Error {
             Self::QuietSegment { .. } => vec![Setting::QuietSegment],
             Self::Estimate(EstimateError::DiscardsAll { .. }) => vec![Setting::Discard, Setting::Estimator],
             Self::Convection(_) => vec![Setting::Typical, Setting::Fluid],
-            Self::Model(ModelError::NeedsFlow) => vec![Setting::Flow],
+            Self::Model(ModelError::NeedsFlow) | Self::SteadyFlow { .. } => vec![Setting::Flow],
             Self::ModelChannels { .. } | Self::OtherChannels { .. } => vec![Setting::Channels],
             Self::ModelNumber { .. } => vec![Setting::Model],
             Self::LiveEffect { .. } => vec![Setting::Live, Setting::Model],

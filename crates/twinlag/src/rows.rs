@@ -110,6 +110,24 @@ fn on(grid: Grid) -> Result<Observations, Error> {
     Ok(Observations::new(stretches.collect(), period_s)?)
 }
 
+/// Checks that the flow of records that are diagnosed together changes, where it was measured.
+pub(crate) fn check_flow(records: &[Record]) -> Result<(), Error> {
+    let flow = |record: &Record| {
+        let used = record.segments.iter().cloned().flatten();
+        record.flow.as_ref().map(|flow| used.map(|row| flow[row]).collect::<Vec<f64>>())
+    };
+    let Some(values) = records.iter().map(flow).collect::<Option<Vec<_>>>().map(|each| each.concat()) else {
+        return Ok(());
+    };
+    match values.first() {
+        Some(&value) if values.iter().all(|other| *other == value) => {
+            let files: Vec<&str> = records.iter().map(|record| record.source.as_str()).collect();
+            Err(Error::SteadyFlow { file: files.join(", "), value })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// What the options say of noise and time constants beforehand, as settings of a diagnosis.
 pub(crate) fn settings_of(options: &Options) -> Settings {
     let known = options.known.iter().filter_map(|k| {

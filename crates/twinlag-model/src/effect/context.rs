@@ -34,7 +34,7 @@ pub struct Context {
     pub is_coarse: [bool; 2],
     /// Time constants of the model so far, s.
     pub tau_s: [f64; 2],
-    /// Flow, where it was measured and changes.
+    /// Flow, where it was measured.
     pub flow: Option<Arc<Flow>>,
     /// The gas temperature as the model so far has it, where it makes a difference.
     pub gas: Option<Arc<Gas>>,
@@ -61,6 +61,11 @@ impl Context {
     /// Halfway between the ends of the record, s.
     pub fn middle_s(&self) -> f64 {
         0.5 * (self.ends_s[0] + self.ends_s[1])
+    }
+
+    /// The flow, where it changes: along the record, or from record to record.
+    pub(crate) fn changing_flow(&self) -> impl Iterator<Item = &Arc<Flow>> {
+        self.flow.iter().filter(|flow| flow.changes())
     }
 
     /// What is known of each of several records by itself.

@@ -39,25 +39,25 @@ struct Apart {
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
+    context.changing_flow().map(|flow| along(flow, context)).collect()
+}
+
+/// Sensors that stand apart along `flow`.
+fn along(flow: &Arc<Flow>, context: &Context) -> Shared {
     let longest = if context.is_even { (context.reach - 1) as f64 } else { UNEVEN_REACH as f64 - 0.5 } * context.step_s;
-    let of = |flow: &Arc<Flow>| {
-        // At the slowest flow no longer than the model reaches.
-        let [least, largest] = flow.inverse_ratios();
-        let most_varied_s = MAX_VARIATION_PERIODS * context.step_s / (largest - least);
-        let longest_s = (longest / least.abs().max(largest.abs())).min(most_varied_s);
-        let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest_s, longest_s);
-        let delay = Parameter::new("delay_at_mean_flow", "s", variable);
-        let seat = Seat::new(Identifier::SEPARATION, Some(1), vec![delay]);
-        Arc::new(Apart { seat, flow: flow.clone(), step_s: context.step_s }) as Shared
-    };
-    context.flow.iter().map(of).collect()
+    // At the slowest flow no longer than the model reaches.
+    let [least, largest] = flow.inverse_ratios();
+    let most_varied_s = MAX_VARIATION_PERIODS * context.step_s / (largest - least);
+    let longest_s = (longest / least.abs().max(largest.abs())).min(most_varied_s);
+    let variable = Variable::linear("delay", USUAL_PERIODS * context.step_s, -longest_s, longest_s);
+    let delay = Parameter::new("delay_at_mean_flow", "s", variable);
+    let seat = Seat::new(Identifier::SEPARATION, Some(1), vec![delay]);
+    Arc::new(Apart { seat, flow: flow.clone(), step_s: context.step_s })
 }
 
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
-    if context.flow.is_none() {
-        return Err(ModelError::NeedsFlow);
-    }
-    Ok(described_by(known, candidates(context)))
+    let flow = context.flow.as_ref().ok_or(ModelError::NeedsFlow)?.about_that_of(known);
+    Ok(described_by(known, vec![along(&flow, context)]))
 }
 
 impl Effect for Apart {
@@ -74,13 +74,9 @@ impl Effect for Apart {
     }
 
     fn derived(&self) -> Vec<Derived> {
-        let mean = self.flow.mean();
-        match self.flow.kind() {
-            FlowKind::Flow => vec![Derived::constant("mean_flow", "its unit", mean)],
-            FlowKind::Motion => {
-                let distance = Derived { name: "distance", unit: "m", of: Box::new(move |values| values[0] * mean) };
-                vec![Derived::constant("mean_speed", "m/s", mean), distance]
-            }
-        }
+        let reference = self.flow.reference();
+        let distance = Derived { name: "distance", unit: "m", of: Box::new(move |values| values[0] * reference) };
+        let is_motion = self.flow.kind() == FlowKind::Motion;
+        std::iter::once(self.flow.derived()).chain(is_motion.then_some(distance)).collect()
     }
 }

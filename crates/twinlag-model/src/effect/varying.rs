@@ -1,5 +1,5 @@
 //! Time constants that change along the record by the same share: `τᵢ(t) = τᵢ (1 + m(t))`, as they do when the flow changes. `m`
-//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_mean)^p`
+//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_ref)^p`
 //! with the geometric mean of its velocity or density, at which `τᵢ` is then what is found.
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use twinlag_optimise::Variable;
 
 use crate::directions::{Part, Parts};
 use crate::effect::KnownEffect;
-use crate::effect::{About, Context, Effect, Identifier, Parameter, Seat, Shared, described_by};
+use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
 use crate::flow::Flow;
 use crate::number::{Number, TimeFunction};
@@ -110,23 +110,26 @@ pub(crate) fn ratio(ends_s: [f64; 2]) -> Shared {
 }
 
 fn candidates(context: &Context) -> Vec<Shared> {
-    // A sensor behind a pump, or inside a housing, has a flow of its own.
-    let of_flow = context.flow.iter().flat_map(|flow| {
-        [None, Some(0), Some(1)].map(|channel| {
-            let [lowest, highest] = EXPONENTS;
-            let exponent = Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, lowest, highest));
-            let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, channel, vec![exponent]);
-            Arc::new(Varying { of: Of::Flow(flow.clone()), seat }) as Shared
-        })
-    });
+    let of_flow = context.changing_flow().flat_map(with_flow);
     of_size(FIRST_SIZE, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
 
+/// Time constants that go with a flow: of both sensors or, where one is behind a pump or inside a housing, of the other alone.
+fn with_flow(flow: &Arc<Flow>) -> [Shared; 3] {
+    [None, Some(0), Some(1)].map(|channel| {
+        let [lowest, highest] = EXPONENTS;
+        let exponent = Parameter::new("exponent", "1", Variable::linear("exponent", 0.1, lowest, highest));
+        let seat = Seat::new(Identifier::VARYING_TIME_CONSTANT, channel, vec![exponent]);
+        Arc::new(Varying { of: Of::Flow(flow.clone()), seat }) as Shared
+    })
+}
+
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
-    if known.parameter("exponent").is_some() && context.flow.is_none() {
-        return Err(ModelError::NeedsFlow);
+    if known.parameter("exponent").is_none() {
+        return Ok(described_by(known, candidates(context)));
     }
-    Ok(described_by(known, candidates(context)))
+    let flow = context.flow.as_ref().ok_or(ModelError::NeedsFlow)?.about_that_of(known);
+    Ok(described_by(known, with_flow(&flow).into()))
 }
 
 fn function(spline: Spline) -> TimeFunction {
@@ -174,6 +177,10 @@ impl Effect for Varying {
             Part::new(support_s, Arc::new(move |plant| install(&change, channel, plant)))
         };
         Some(Parts::new(splines.into_iter().map(part).collect(), of_parameters))
+    }
+
+    fn derived(&self) -> Vec<Derived> {
+        if let Of::Flow(flow) = &self.of { vec![flow.derived()] } else { Vec::new() }
     }
 
     fn main(&self) -> Option<usize> {

@@ -15,7 +15,7 @@ use crate::answers::{
 use crate::error::Error;
 use crate::options::Options;
 use crate::reference::Reference;
-use crate::rows::{Rows, settings_of};
+use crate::rows::{Rows, check_flow, settings_of};
 use crate::setting::{Setting, listed};
 use crate::watch::{UNWATCHED, Watch};
 
@@ -123,6 +123,7 @@ pub(crate) struct Diagnosed {
 impl Diagnosed {
     pub(crate) fn of(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Self, Error> {
         options.characterise.check()?;
+        check_flow(std::slice::from_ref(record))?;
         let rows = Rows::of(record)?;
         let core = close_the_loop(&rows.observations, &settings(options), watch)?;
         Ok(Self { rows, core })

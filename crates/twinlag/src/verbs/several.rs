@@ -7,7 +7,7 @@ use twinlag_record::Record;
 
 use crate::answers::{Characterisation, LeftOutUnit, RecordAnswer, TransferAnswer};
 use crate::error::Error;
-use crate::rows::Rows;
+use crate::rows::{Rows, check_flow};
 use crate::watch::Watch;
 
 /// Several records, and what a joint diagnosis says of each.
@@ -29,6 +29,7 @@ impl<'a> Several<'a> {
             let (expected, found) = (first.unwrap_or_default(), other.channels.clone());
             return Err(Error::OtherChannels { file: other.source.clone(), expected, found });
         }
+        check_flow(records)?;
         let rows: Vec<Rows> = records.iter().map(rows).collect::<Result<_, _>>()?;
         let observations: Vec<Observations> = rows.iter().map(|rows| rows.observations.clone()).collect();
         let joint = close_the_loop(&observations, settings, watch).map_err(|error| in_files(error, records))?;

@@ -1,9 +1,10 @@
 //! Sensors in a stream whose velocity is recorded: what depends on it is found in its sensor, and nothing where nothing does.
 
-use crate::common::{read, recovers};
+use crate::common::{read, record, recovers};
 use twinlag::diagnosis::{Identifier, Verdict};
+use twinlag::record::Record;
 use twinlag::signal::Rig;
-use twinlag::{DiagnoseOptions, Diagnosis, diagnose};
+use twinlag::{DiagnoseOptions, Diagnosis, Error, Options, Setting, characterise_with, diagnose, diagnose_records};
 
 const TRUTH_S: [f64; 2] = [0.03, 0.11];
 
@@ -56,4 +57,47 @@ fn a_time_constant_that_goes_with_the_velocity_is_found_in_its_sensor() {
 fn a_stream_that_changes_nothing_is_no_effect() {
     let answer = diagnosed("");
     assert_eq!((answer.verdict, answer.effects.len()), (Verdict::Adequate, 0), "{:?}", answer.effects);
+}
+
+/// A record in a steady flow, of time constants that go with the root of its inverse and are those of [`TRUTH_S`] at 12 m/s.
+fn in_steady_flow(seed: u64, velocity_m_s: f64) -> Record {
+    let gas = "kind = \"turbulence\"\nstd_k = 15.0\ncorner_hz = 3.0\ncutoff_hz = 60.0";
+    let factor = (velocity_m_s / 12.0).powf(-0.5);
+    let sensors = TRUTH_S.map(|tau_s| format!("time_constant_s = {}\nnoise = {{ std_k = 0.1 }}", factor * tau_s));
+    let record = record(seed, SAMPLES, 0.002, gas, [&sensors[0], &sensors[1]]);
+    record.with_flow(vec![velocity_m_s; SAMPLES]).expect("positive")
+}
+
+const SAMPLES: usize = 3000;
+
+/// Failed: a steady flow was refused among others, and a model did not say at which flow its numbers hold, so that another record's were
+/// taken to be at its own. Four standard errors each.
+#[test]
+fn records_in_steady_flows_share_an_exponent_and_the_flow_of_their_time_constants() {
+    const VELOCITIES_M_S: [f64; 3] = [6.0, 12.0, 20.0];
+    let records = [0, 1, 2].map(|i| in_steady_flow(1 + i as u64, VELOCITIES_M_S[i]));
+    let answer = diagnose_records(&records, &DiagnoseOptions::default()).expect("three records of one rig");
+    assert_eq!(answer.verdict, Verdict::Explained, "{:?}", answer.effects);
+    let [found] = &answer.effects[..] else { panic!("one effect: {:?}", answer.effects) };
+    assert_eq!((found.effect, found.channel.as_deref()), (Identifier::VARYING_TIME_CONSTANT, None));
+    let [exponent, mean] =
+        ["exponent", "mean_flow"].map(|name| found.parameters.iter().find(|p| p.name == name).expect(name));
+    let [value, error] = [exponent.value, exponent.standard_error].map(|value| value.expect("given"));
+    assert!((value + 0.5).abs() < 4.0 * error && error < 0.05, "{value} ± {error}");
+    // To rounding of some thousand logarithms.
+    let mean_m_s = VELOCITIES_M_S.iter().product::<f64>().cbrt();
+    assert!((mean.value.expect("measured") / mean_m_s - 1.0).abs() < 1e-12, "{mean:?}");
+    let at_mean_s = TRUTH_S.map(|tau_s| tau_s * (mean_m_s / 12.0).powf(-0.5));
+    recovers(&answer.last, at_mean_s, 4.0);
+    // Another record in another steady flow, with that model: at the flow of the model.
+    let other = characterise_with(&in_steady_flow(4, 9.0), &answer.model(), &Options::default()).expect("a record");
+    recovers(&other, at_mean_s, 4.0);
+}
+
+#[test]
+fn a_single_record_in_steady_flow_says_nothing_of_the_flow() {
+    let error = diagnose(&in_steady_flow(1, 6.0), &DiagnoseOptions::default()).expect_err("the flow never changes");
+    assert!(matches!(error, Error::SteadyFlow { value: 6.0, .. }), "{error}");
+    assert_eq!(error.settings(), [Setting::Flow]);
+    assert!(error.to_string().contains("records in other flows"), "{error}");
 }
