@@ -535,6 +535,10 @@ fn verdict_of(answer: &Diagnosis) -> String {
             Some((name, meaning)) if matches!(answer.verdict, Verdict::Adequate | Verdict::Explained) => {
                 format!("{name}{}: {meaning}", nothing_determined(&answer.last))
             }
+            _ if answer.verdict == Verdict::PartlyExplained && answer.unexplained.is_none() => {
+                "partly-explained: with these effects what is left looks like noise, but something speaks against them, as said below"
+                    .into()
+            }
             _ => verdict(answer.verdict).into(),
         },
     }

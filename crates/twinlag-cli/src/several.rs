@@ -26,7 +26,7 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
     };
     match files.iter().enumerate().find(is_seen) {
         Some((_, file)) => Err(Failure::Usage(format!(
-            "{} is named twice: a record that is counted twice is not left out when it is left out once",
+            "{} is named twice: a record that is counted twice is not left out when it is left out once. Name it once",
             file.display()
         ))),
         None => Ok(files),
@@ -93,7 +93,8 @@ fn no_shared_rows(records: &[Record]) -> Result<(), Failure> {
             let rows = shared_rows(record, other).max(shared_rows(other, record));
             if rows > 0 {
                 return Err(Failure::Usage(format!(
-                    "{}: {rows} of its {} rows are rows of {} as well. What is counted twice is not left out when it is left out once",
+                    "{}: {rows} of its {} rows are rows of {} as well. What is counted twice is not left out when it is left out once: \
+                     leave one of the two files out",
                     record.source,
                     record.len(),
                     other.source

@@ -92,7 +92,7 @@ impl Flow {
     pub(crate) fn derived(&self) -> Derived {
         let [flow, speed] = REFERENCES;
         match self.kind {
-            FlowKind::Flow => Derived::constant(flow, "its unit", self.reference),
+            FlowKind::Flow => Derived::constant(flow, "in its unit", self.reference),
             FlowKind::Motion => Derived::constant(speed, "m/s", self.reference),
         }
     }

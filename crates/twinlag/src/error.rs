@@ -61,7 +61,8 @@ pub enum Error {
     )]
     OtherPeriod { file: String, first_file: String, first_s: f64, period_s: f64 },
     #[error(
-        "{file}: expected a flow that changes, along a record or from one to the next, found {value} throughout; use no flow, or diagnose          it together with records in other flows"
+        "{file}: expected a flow that changes, along a record or from one to the next, found {value} throughout; use no flow, or diagnose it \
+         together with records in other flows"
     )]
     SteadyFlow { file: String, value: f64 },
     #[error("{file}: {error}")]

@@ -136,6 +136,11 @@ impl Page<'_> {
                  is left.",
                 if many { "explain" } else { "explains" },
             ),
+            Verdict::PartlyExplained if answer.effects.len() <= answer.policy.most_distinguished_effects => format!(
+                "With {effects} what is left looks like noise, but something speaks against {} as the cause: it is said beside \
+                 the numbers.",
+                if many { "them" } else { "it" },
+            ),
             Verdict::PartlyExplained => format!(
                 "With {effects} what is left looks like noise, but one record cannot keep so many effects apart: \
                  together they may imitate another cause."

@@ -50,8 +50,8 @@ pub fn characterise_records_watched(
     if let [first, others @ ..] = &unused(options)[..] {
         return Err(Error::Setting {
             setting: *first,
-            expected: "one record beside it. Of several records the noise levels and known time constants can be given; what else \
-                       they share, a diagnosis finds"
+            expected: "one record beside it (of several, noise levels and known time constants can be given, and a diagnosis finds \
+                       what else they share)"
                 .into(),
             got: format!("{} records", records.len()),
             also: others.to_vec(),
