@@ -26,7 +26,7 @@ pub(crate) fn files<'a>(input: &'a Input, more: &'a [PathBuf]) -> Result<Vec<&'a
     };
     match files.iter().enumerate().find(is_seen) {
         Some((_, file)) => Err(Failure::Usage(format!(
-            "{} is named twice: a record that is counted twice is not left out when it is left out once. Name it once",
+            "{} is named twice. Name it once: each record must be left out in turn, and this one would still be there",
             file.display()
         ))),
         None => Ok(files),
@@ -93,8 +93,8 @@ fn no_shared_rows(records: &[Record]) -> Result<(), Failure> {
             let rows = shared_rows(record, other).max(shared_rows(other, record));
             if rows > 0 {
                 return Err(Failure::Usage(format!(
-                    "{}: {rows} of its {} rows are rows of {} as well. What is counted twice is not left out when it is left out once: \
-                     leave one of the two files out",
+                    "{}: {rows} of its {} rows are also rows of {}. Take one of the two files: each record must be left out in turn, and \
+                     these rows would still be there",
                     record.source,
                     record.len(),
                     other.source

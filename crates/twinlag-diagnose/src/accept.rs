@@ -22,7 +22,8 @@ impl Search<'_> {
     /// well; `None` where none is.
     pub(crate) fn accepted(&self, current: &Fitted, all: &[Candidate]) -> Option<(Candidate, Vec<Candidate>)> {
         let scores: Vec<Score> = all.iter().map(|c| c.score(current, self.policy)).collect();
-        let considered = self.candidates(&current.model).len();
+        let with_shorter = all.iter().filter(|candidate| candidate.shortened.is_some()).count();
+        let considered = self.candidates(&current.model).len() + with_shorter;
         let mut order = VecDeque::from(rank(&scores, considered, self.policy));
         while let Some(index) = order.pop_front() {
             let mut first = self.resized(current, all[index].clone());

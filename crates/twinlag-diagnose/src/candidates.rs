@@ -14,7 +14,6 @@ use twinlag_optimise::{End, Scale, Variable};
 
 use crate::grade::Reason;
 use crate::long::is_long;
-use crate::own_in_each::Shortened;
 use crate::rank::{Kind, Score, threshold};
 
 /// Margin of a logarithm from its bound, and of a number as a share of its range, within which a
@@ -29,8 +28,8 @@ const START_GAIN_SHARE: f64 = 0.5;
 const GRID_POINTS: usize = 5;
 const GRID_FROM_PERIODS: f64 = 2.0;
 const GRID_TO_SHARE: f64 = 0.03;
-/// Periods of the slowest line in the longest of several records: three half periods, the slowest in a single record, and as many by
-/// which a fit may move its frequency.
+/// Fewest periods of a line in the longest of several records. A search starts from 1.5 periods, the slowest line of a single record, and
+/// a fit may move the frequency by 1.5 more.
 const MIN_LINE_PERIODS: f64 = 3.0;
 /// Parameters of an effect up to which it is fitted from that grid.
 const MOST_GRID_PARAMETERS: usize = 3;
@@ -57,8 +56,8 @@ pub(crate) struct Candidate {
     pub(crate) held_out_nats: f64,
     /// What its gains count beside those of the others.
     pub(crate) share: f64,
-    /// A shorter form of another effect that comes with it.
-    pub(crate) shortened: Option<Shortened>,
+    /// The place of the effect that has lost a parameter to make room for this one.
+    pub(crate) shortened: Option<usize>,
 }
 
 /// An effect that is worth a fit, and where from.
@@ -218,11 +217,11 @@ impl<'a> Search<'a> {
     /// leaves over.
     pub(crate) fn beside(mut self, current: &Fitted) -> Self {
         self.context.tau_s = [current.theta[0], current.theta[1]];
-        let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy);
-        // What is slower is no line but what differs from record to record. Of one record none is.
-        let is_within_a_record = |hz: &f64| hz * self.context.span_s() >= MIN_LINE_PERIODS;
-        let found = found.into_iter().filter(|hz| self.context.members.len() < 2 || is_within_a_record(hz));
-        self.context.lines = found.into_iter().map(|hz| (hz, line_channel(self.observations, hz))).collect();
+        // Of several records, what is slower than this differs from record to record, and is no line.
+        let slowest_hz = if self.context.members.len() < 2 { 0.0 } else { MIN_LINE_PERIODS / self.context.span_s() };
+        let found = lines(current, self.observations, |s| self.selection.holds(s), self.policy).into_iter();
+        let within = found.filter(|hz| *hz >= slowest_hz);
+        self.context.lines = within.map(|hz| (hz, line_channel(self.observations, hz))).collect();
         // After the lines, which take as much memory again, and leave none of it.
         if self.allowed.iter().any(|effect| effect.about().follows_gas) {
             self.context.gas = current.estimated_gas(self.observations);
@@ -315,9 +314,7 @@ impl<'a> Search<'a> {
 
     /// Every candidate that may be added to `current`: those that may explain something are fitted,
     /// the best few to the end.
-    ///
-    /// - `taken`: how the effects of `current` were found
-    pub(crate) fn fitted(&self, current: &Fitted, taken: &[&Candidate]) -> Result<Vec<Candidate>, ModelError> {
+    pub(crate) fn fitted(&self, current: &Fitted) -> Result<Vec<Candidate>, ModelError> {
         let promising = self.screened(current)?;
         let robust_before = self.robust(current);
         // Where the model is far off, every candidate is fitted, from a grid of time constants as
@@ -353,7 +350,7 @@ impl<'a> Search<'a> {
             finished.push(best);
         }
         finished.extend(self.each(&mean, |(_, looked)| self.finished(current, looked, robust_before))?);
-        finished.extend(self.own_in_each(current, taken)?);
+        finished.extend(self.own_in_each(current)?);
         if !noise.is_empty() {
             let before = self.at_free_levels(current);
             let after = self.each(&finished, |candidate| self.at_free_levels(&candidate.fitted))?;
@@ -668,7 +665,7 @@ mod tests {
         assert_eq!(found_first(&observed(&rig.rig)), (Identifier::SECOND_ORDER, rig.channel));
     }
 
-    /// Drifts of each record leave over, beside a gain and an offset of all, what looks like part of a period of a line.
+    /// A gain and an offset of all records leave the drift of each, which looks like part of a period of a line.
     #[test]
     fn what_differs_from_record_to_record_is_no_line() {
         let of = |(seed, mean_c, drift_k_per_s): (u64, f64, f64)| {
@@ -695,8 +692,9 @@ mod tests {
         };
         let [found, kept] = slowest_periods(&Observations::joined(&records).expect("of one period"));
         assert!(found < MIN_LINE_PERIODS && kept >= MIN_LINE_PERIODS, "{found} and {kept} periods");
-        let [found, kept] = slowest_periods(&records[0]);
-        assert_eq!(found, kept);
+        // A single record keeps all that it has.
+        let [found, kept] = slowest_periods(&records[2]);
+        assert!(found < MIN_LINE_PERIODS && kept == found, "{found} and {kept} periods");
     }
 
     /// A second lag that is found, and the same fit with it on its upper bound: nothing of that is an estimate.

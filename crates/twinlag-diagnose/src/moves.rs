@@ -8,7 +8,6 @@ use crate::alternatives::Replacement;
 use crate::candidates::{Candidate, Search, kind};
 use crate::evidence::Evidence;
 use crate::other_delays::delay_s;
-use crate::own_in_each::Shortened;
 use crate::rank::{LookAlike, successor, worth};
 use crate::rapid::RapidVariation;
 use crate::remark::Remark;
@@ -39,7 +38,7 @@ pub enum Move {
         /// What the effect has gained in all.
         evidence: Evidence,
     },
-    /// An effect lost a parameter that effects which came later have made needless, or have of their own in each record.
+    /// An effect lost a parameter: effects that came later have made it needless, or each record has one of its own.
     Reduce {
         /// The effect.
         effect: Identifier,
@@ -109,6 +108,12 @@ pub enum Move {
 }
 
 impl Move {
+    /// That of an effect to a form with fewer parameters.
+    fn reduction(shorter: &Candidate) -> Self {
+        let (effect, channel) = (shorter.effect.identifier(), shorter.effect.channel());
+        Self::Reduce { effect, channel, evidence: Evidence::of(shorter) }
+    }
+
     /// What the reader has to know of it.
     pub(crate) fn remark(&self) -> Option<Remark> {
         match self {
@@ -139,13 +144,6 @@ impl Proposal {
         Self { entry, change: Change::Put(index, Box::new(Taken { candidate, ties: ties.to_vec() })) }
     }
 
-    /// A form of effect `index` with fewer parameters, tied as it was.
-    fn shortened(index: usize, candidate: Candidate, ties: &[Candidate]) -> Self {
-        let (effect, channel) = (candidate.effect.identifier(), candidate.effect.channel());
-        let entry = Move::Reduce { effect, channel, evidence: Evidence::of(&candidate) };
-        Self::of_form(entry, index, candidate, ties)
-    }
-
     /// Whether one effect takes the place of another.
     pub(crate) fn is_exchange(&self) -> bool {
         matches!(self.entry, Move::Exchange { .. })
@@ -153,7 +151,11 @@ impl Proposal {
 }
 
 enum Change {
-    Append(Box<Taken>),
+    /// One effect more, and the shorter form of the one that has lost a parameter to make room for it.
+    Append {
+        taken: Box<Taken>,
+        shorter: Option<Box<Candidate>>,
+    },
     /// Another form of an effect, or another effect, in the place of one.
     Put(usize, Box<Taken>),
     /// Other ties of an effect.
@@ -256,14 +258,14 @@ impl<'a> State<'a> {
         let Proposal { entry, change } = proposal;
         let mut shortened = None;
         match change {
-            Change::Append(mut taken) => {
+            Change::Append { mut taken, shorter } => {
                 self.current = taken.candidate.fitted.clone().in_order();
                 if taken.effect().about().is_narrow {
                     // A line is in the third differences as well.
                     self.prepared.find_levels(&self.current, self.settings);
                     self.refit();
                 }
-                shortened = taken.candidate.shortened.take();
+                shortened = taken.candidate.shortened.take().zip(shorter);
                 self.taken.push(*taken);
             }
             Change::Put(index, taken) => {
@@ -286,8 +288,9 @@ impl<'a> State<'a> {
             }
         }
         self.moves.push(entry);
-        if let Some(Shortened { index, candidate }) = shortened {
-            self.apply(Proposal::shortened(index, *candidate, &self.taken[index].ties));
+        if let Some((index, shorter)) = shortened {
+            self.moves.push(Move::reduction(&shorter));
+            self.taken[index].candidate = *shorter;
         }
     }
 
@@ -299,8 +302,7 @@ impl<'a> State<'a> {
     /// Adds the effect that explains best what is left over.
     pub(crate) fn add(&self) -> Result<Option<Proposal>, ModelError> {
         let search = self.search().beside(&self.current);
-        let taken: Vec<&Candidate> = self.taken.iter().map(|taken| &taken.candidate).collect();
-        let candidates = search.fitted(&self.current, &taken)?;
+        let candidates = search.fitted(&self.current)?;
         Ok(self.addition(&search, &candidates))
     }
 
@@ -325,7 +327,9 @@ impl<'a> State<'a> {
             evidence: Evidence::of(&candidate),
             ties: identifiers(&ties),
         };
-        Some(Proposal { entry, change: Change::Append(Box::new(Taken { candidate, ties })) })
+        let shortened = |index: usize| search.shortened(&candidate.fitted, index, &self.taken[index].candidate);
+        let shorter = candidate.shortened.map(shortened).map(Box::new);
+        Some(Proposal { entry, change: Change::Append { taken: Box::new(Taken { candidate, ties }), shorter } })
     }
 
     /// Takes the shortest of all delays that fit as well as the best.
@@ -361,7 +365,7 @@ impl<'a> State<'a> {
         }
         let Taken { candidate, ties } = &self.taken[index];
         let candidate = self.search().reduced(&self.current, index, candidate)?;
-        Some(Proposal::shortened(index, candidate, ties))
+        Some(Proposal::of_form(Move::reduction(&candidate), index, candidate, ties))
     }
 
     /// Whether later effects can have made effect `index`, or a part of it, needless: there are some, and no noise, whose weights hide what

@@ -35,8 +35,8 @@ pub struct LeftOut {
     pub are_others_explained: Option<bool>,
     /// Whether a noise is in the model of the others: it may stand for differences between them. Of a block `false`.
     pub are_others_explained_by_noise: bool,
-    /// Root mean square of the whitened residual that is left over where the effects of all records are fitted to this one by itself, where
-    /// a noise is in the model of all: what is beyond it is what differs between records, and no noise. `None` otherwise.
+    /// Root mean square of the whitened residual with the effects of all records, noise aside, fitted to this record alone. What the error
+    /// of the record when it is left out has beyond this differs between records. `None` if the model of all has no noise, and of a block.
     pub normalised_rms_by_itself: Option<f64>,
 }
 
@@ -80,9 +80,9 @@ impl Across {
     ) -> Self {
         // The mean square of n numbers of unit variance has the standard deviation √(2/n).
         let chance = |samples: usize| (1.0 + FAR_DEVIATIONS * (2.0 / samples.max(1) as f64).sqrt()).sqrt();
-        // A noise that a record has by itself is left over whatever model it is given.
-        let least = |record: usize| transfer.records[record].normalised_rms_by_itself.unwrap_or(1.0).max(1.0);
-        let most = |record: usize| chance(samples[record]) * least(record) + policy.left_out_rms_margin;
+        // Noise that a record has by itself is left over under any model. Chance and margin are shares of it.
+        let own = |record: usize| transfer.records[record].normalised_rms_by_itself.unwrap_or(1.0).max(1.0);
+        let most = |record: usize| own(record) * (chance(samples[record]) + policy.left_out_rms_margin);
         let errors = |record: usize| transfer.records[record].normalised_rms;
         let unexplained: Vec<usize> =
             (0..samples.len()).filter(|record| errors(*record).after > most(*record)).collect();
@@ -134,7 +134,7 @@ pub(crate) fn places(model: &Model) -> impl Iterator<Item = EffectInChannel> {
 /// What each record is when it is left out, with the model of the others.
 pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>) -> Result<Transfer, ModelError> {
     let records = state.prepared.each_record();
-    let noisy = state.current.model.noise().map(|_| bare(state.current.clone(), state, state));
+    let without_noise_of_all = state.current.model.noise().map(|_| bare(state.current.clone(), state, state));
     let mut out = Errors::default();
     for (done, record) in records.iter().enumerate() {
         report(watch, "records left out", done, records.len())?;
@@ -142,10 +142,8 @@ pub(crate) fn transfer(state: &State<'_>, settings: &Settings, watch: Watch<'_>)
         let (of_others, _) = searched(&others, settings, watch)?;
         let of = |fitted: &Fitted| on(record, &bare(to_the_end(fitted, &of_others), &of_others, state));
         let squares = [of(&of_others.base)?, of(&of_others.current)?];
-        out.add(squares, &of_others.current.model, Some(is_explained(&of_others, settings)));
-        if let (Some(all), Some(left_out)) = (&noisy, out.each.last_mut()) {
-            left_out.normalised_rms_by_itself = Some(by_itself(record, all));
-        }
+        let rms_by_itself = without_noise_of_all.as_ref().map(|all| by_itself(record, all));
+        out.add(squares, &of_others.current.model, Some(is_explained(&of_others, settings)), rms_by_itself);
     }
     Ok(out.transfer())
 }
@@ -164,7 +162,7 @@ pub(crate) fn over_blocks(state: &State<'_>, watch: Watch<'_>) -> Result<Transfe
     for (done, block) in blocks.iter().enumerate() {
         report(watch, "blocks left out", done, blocks.len())?;
         let of = |fitted: &Fitted| on(block, &of_the_others(block, &fitted.model, &fitted.theta));
-        out.add([of(&state.base)?, of(&current)?], &current.model, None);
+        out.add([of(&state.base)?, of(&current)?], &current.model, None, None);
     }
     Ok(out.transfer())
 }
@@ -178,7 +176,14 @@ struct Errors {
 
 impl Errors {
     /// - `model`: that of the others
-    fn add(&mut self, squares: [Squares; 2], model: &Model, are_others_explained: Option<bool>) {
+    /// - `are_others_explained`, `normalised_rms_by_itself`: as of [`LeftOut`]
+    fn add(
+        &mut self,
+        squares: [Squares; 2],
+        model: &Model,
+        are_others_explained: Option<bool>,
+        normalised_rms_by_itself: Option<f64>,
+    ) {
         for (sum, squares) in self.sums.iter_mut().zip(squares) {
             *sum = sum.and(squares);
         }
@@ -190,7 +195,7 @@ impl Errors {
             found,
             are_others_explained,
             are_others_explained_by_noise: model.noise().is_some(),
-            normalised_rms_by_itself: None,
+            normalised_rms_by_itself,
         });
     }
 

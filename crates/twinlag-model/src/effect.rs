@@ -24,6 +24,7 @@ pub(crate) mod varying;
 
 mod about;
 mod context;
+mod flow_reference;
 mod identifier;
 mod known;
 mod of_members;

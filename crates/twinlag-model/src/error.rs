@@ -34,7 +34,9 @@ pub enum ModelError {
     Flow,
     #[error("channel {channel} never changes, so it shows no dynamics")]
     Constant { channel: usize },
-    #[error("the model depends on a measured flow, or on the position of sensors that move: name its column")]
+    #[error(
+        "the model depends on a measured flow, or on the position of sensors that move: name the column of the one that it was made with"
+    )]
     NeedsFlow,
     #[error(
         "the sensors stand apart along the flow, by a delay that changes: no gas temperature is found from both of them"

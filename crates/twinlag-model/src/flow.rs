@@ -1,8 +1,5 @@
 //! A measured flow velocity or density along the record, or the speed of sensors that move.
 
-use std::sync::Arc;
-
-use crate::effect::{Derived, KnownEffect};
 use crate::error::ModelError;
 use crate::instants::Instants;
 use crate::number::Number;
@@ -35,9 +32,6 @@ pub struct Flow {
     reference: f64,
 }
 
-/// Names of the reference, by what is measured.
-const REFERENCES: [&str; 2] = ["mean_flow", "mean_speed"];
-
 impl Flow {
     /// The flow along a record.
     ///
@@ -64,18 +58,14 @@ impl Flow {
         Ok(Self { kind, time_s, log_ratio, inverse_ratio, reference: log_mean.exp() })
     }
 
-    /// This flow about the reference of `known`, an effect that was found in another record: its numbers hold at that flow.
-    pub(crate) fn about_that_of(self: &Arc<Self>, known: &KnownEffect) -> Arc<Self> {
-        let reference = REFERENCES.iter().find_map(|name| known.parameter(name)).filter(|reference| *reference > 0.0);
-        let Some(reference) = reference else { return Arc::clone(self) };
+    /// This flow with its ratios taken to `reference` in place of its geometric mean.
+    ///
+    /// - `reference`: in the unit of the flow, finite and positive
+    pub(crate) fn relative_to(mut self, reference: f64) -> Self {
         let ratio = reference / self.reference;
-        Arc::new(Self {
-            kind: self.kind,
-            time_s: self.time_s.clone(),
-            log_ratio: self.log_ratio.iter().map(|log_ratio| log_ratio - ratio.ln()).collect(),
-            inverse_ratio: self.inverse_ratio.iter().map(|inverse| inverse * ratio).collect(),
-            reference,
-        })
+        self.log_ratio.iter_mut().for_each(|log_ratio| *log_ratio -= ratio.ln());
+        self.inverse_ratio.iter_mut().for_each(|inverse| *inverse *= ratio);
+        Self { reference, ..self }
     }
 
     /// What it is.
@@ -84,17 +74,8 @@ impl Flow {
     }
 
     /// The flow that it is compared with, in its unit: its geometric mean, or that of the record in which an effect was found.
-    pub(crate) fn reference(&self) -> f64 {
+    pub fn reference(&self) -> f64 {
         self.reference
-    }
-
-    /// The reference as a number beside those of an effect.
-    pub(crate) fn derived(&self) -> Derived {
-        let [flow, speed] = REFERENCES;
-        match self.kind {
-            FlowKind::Flow => Derived::constant(flow, "in its unit", self.reference),
-            FlowKind::Motion => Derived::constant(speed, "m/s", self.reference),
-        }
     }
 
     /// `ln(v/v_ref)` of its size at an instant, on straight lines between the samples.

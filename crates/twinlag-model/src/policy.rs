@@ -167,7 +167,7 @@ policy! {
     /// Probability that records of one rig seem to differ, in their noise or in a number that they share, of a right model: as of
     /// parts of a record.
     records_rejection_probability: f64 = 1e-3,
-    /// How much more than chance the root mean square of a whitened residual may exceed 1 in a record that was left out: what the
+    /// How much more than chance the root mean square of a whitened residual may exceed 1, or what a record leaves over by itself, in one that was left out: what the
     /// parameters of the others are uncertain by adds to it. Chosen: a record whose sensor is 15 % slower exceeds it
     /// (test `campaign` of `twinlag-diagnose`); experiment `campaign` counts the records that are accused.
     left_out_rms_margin: f64 = 0.1,

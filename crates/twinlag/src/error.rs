@@ -61,10 +61,10 @@ pub enum Error {
     )]
     OtherPeriod { file: String, first_file: String, first_s: f64, period_s: f64 },
     #[error(
-        "{file}: expected a flow that changes, along a record or from one to the next, found {value} throughout; use no flow, or diagnose it \
-         together with records in other flows"
+        "{}: expected a flow that changes, got {value} throughout. Use no flow, or diagnose at least three records in different flows \
+         together", files.join(", ")
     )]
-    SteadyFlow { file: String, value: f64 },
+    SteadyFlow { files: Vec<String>, value: f64 },
     #[error("{file}: {error}")]
     InRecord { file: String, error: Box<Error> },
     #[error(

@@ -1,6 +1,7 @@
 //! The rows of a record as the model of a rig takes them.
 
 use twinlag_diagnose::{Instants, KnownTimeConstant, Masked, Observations, Settings, Stretch};
+use twinlag_model::FlowKind;
 use twinlag_record::{Grid, Record};
 
 use twinlag_cross_relation::Parameter;
@@ -110,19 +111,14 @@ fn on(grid: Grid) -> Result<Observations, Error> {
     Ok(Observations::new(stretches.collect(), period_s)?)
 }
 
-/// Checks that the flow of records that are diagnosed together changes, where it was measured.
-pub(crate) fn check_flow(records: &[Record]) -> Result<(), Error> {
-    let flow = |record: &Record| {
-        let used = record.segments.iter().cloned().flatten();
-        record.flow.as_ref().map(|flow| used.map(|row| flow[row]).collect::<Vec<f64>>())
-    };
-    let Some(values) = records.iter().map(flow).collect::<Option<Vec<_>>>().map(|each| each.concat()) else {
-        return Ok(());
-    };
-    match values.first() {
-        Some(&value) if values.iter().all(|other| *other == value) => {
-            let files: Vec<&str> = records.iter().map(|record| record.source.as_str()).collect();
-            Err(Error::SteadyFlow { file: files.join(", "), value })
+/// Checks that a flow that was measured changes, along a record or from record to record.
+///
+/// - `observations`: of all `records`
+pub(crate) fn check_flow(observations: &Observations, records: &[Record]) -> Result<(), Error> {
+    match observations.flow() {
+        Some(flow) if flow.kind() == FlowKind::Flow && !flow.changes() => {
+            let files = records.iter().map(|record| record.source.clone()).collect();
+            Err(Error::SteadyFlow { files, value: flow.reference() })
         }
         _ => Ok(()),
     }

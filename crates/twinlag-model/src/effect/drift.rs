@@ -10,8 +10,8 @@ use crate::plant::Plant;
 
 pub(crate) static ABOUT: About = About::new("drift", 12, candidates)
     .in_words(
-        "the offset between the channels changes linearly along the record, or from one record to the next: a \
-         reference junction or an amplifier that warms up, a wire that ages",
+        "the offset between the channels changes linearly along the record, of several records along a line of its own in each: \
+         a reference junction or an amplifier that warms up, a wire that ages",
         "let the electronics warm up, hold the reference junction at one temperature",
         "drift that both channels share",
     )

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use twinlag_optimise::Variable;
 
 use crate::chain::UNEVEN_REACH;
+use crate::effect::flow_reference;
 use crate::effect::parameter::inside;
 use crate::effect::{About, Context, Derived, Effect, Identifier, KnownEffect, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
@@ -56,8 +57,7 @@ fn along(flow: &Arc<Flow>, context: &Context) -> Shared {
 }
 
 fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, ModelError> {
-    let flow = context.flow.as_ref().ok_or(ModelError::NeedsFlow)?.about_that_of(known);
-    Ok(described_by(known, vec![along(&flow, context)]))
+    Ok(described_by(known, vec![along(&flow_reference::restored(known, context)?, context)]))
 }
 
 impl Effect for Apart {
@@ -77,6 +77,6 @@ impl Effect for Apart {
         let reference = self.flow.reference();
         let distance = Derived { name: "distance", unit: "m", of: Box::new(move |values| values[0] * reference) };
         let is_motion = self.flow.kind() == FlowKind::Motion;
-        std::iter::once(self.flow.derived()).chain(is_motion.then_some(distance)).collect()
+        std::iter::once(flow_reference::derived(&self.flow)).chain(is_motion.then_some(distance)).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! Time constants that change along the record by the same share: `τᵢ(t) = τᵢ (1 + m(t))`, as they do when the flow changes. `m`
-//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_ref)^p`
-//! with the geometric mean of its velocity or density, at which `τᵢ` is then what is found.
+//! is a cubic spline with mean zero, so `τᵢ` is the mean over the record; or, where the flow was measured, `1 + m = (v/v_ref)^p`.
+//! `v_ref` is the geometric mean of its velocity or density over the records in which the effect was found, and `τᵢ` holds at that flow.
 
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use twinlag_optimise::Variable;
 
 use crate::directions::{Part, Parts};
 use crate::effect::KnownEffect;
+use crate::effect::flow_reference;
 use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
 use crate::flow::Flow;
@@ -18,8 +19,8 @@ use crate::spline::{LocalSpline, Spline, on_knots, parts};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
     .in_words(
-        "time constants change along the record, as they do when the flow changes: both by the same factor, or with a \
-         measured flow that of one sensor alone",
+        "time constants change along the record, as they do when the flow changes (with a measured flow from record to record as \
+         well): both by the same factor, or with a measured flow that of one sensor alone",
         "log the flow velocity, or take records at steady flow",
         "which sensor causes a change of their ratio",
     )
@@ -114,7 +115,8 @@ fn candidates(context: &Context) -> Vec<Shared> {
     of_size(FIRST_SIZE, context.ends_s, context.samples).into_iter().chain(of_flow).collect()
 }
 
-/// Time constants that go with a flow: of both sensors or, where one is behind a pump or inside a housing, of the other alone.
+/// Time constants that are proportional to a power of `flow`: of both sensors, or of one alone where the other is behind a pump or inside a
+/// housing.
 fn with_flow(flow: &Arc<Flow>) -> [Shared; 3] {
     [None, Some(0), Some(1)].map(|channel| {
         let [lowest, highest] = EXPONENTS;
@@ -128,8 +130,7 @@ fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, Mod
     if known.parameter("exponent").is_none() {
         return Ok(described_by(known, candidates(context)));
     }
-    let flow = context.flow.as_ref().ok_or(ModelError::NeedsFlow)?.about_that_of(known);
-    Ok(described_by(known, with_flow(&flow).into()))
+    Ok(described_by(known, with_flow(&flow_reference::restored(known, context)?).into()))
 }
 
 fn function(spline: Spline) -> TimeFunction {
@@ -180,7 +181,7 @@ impl Effect for Varying {
     }
 
     fn derived(&self) -> Vec<Derived> {
-        if let Of::Flow(flow) = &self.of { vec![flow.derived()] } else { Vec::new() }
+        if let Of::Flow(flow) = &self.of { vec![flow_reference::derived(flow)] } else { Vec::new() }
     }
 
     fn main(&self) -> Option<usize> {

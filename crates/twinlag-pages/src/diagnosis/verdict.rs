@@ -137,8 +137,8 @@ impl Page<'_> {
                 if many { "explain" } else { "explains" },
             ),
             Verdict::PartlyExplained if answer.effects.len() <= answer.policy.most_distinguished_effects => format!(
-                "With {effects} what is left looks like noise, but something speaks against {} as the cause: it is said beside \
-                 the numbers.",
+                "With {effects} what is left looks like noise, but a check contradicts {} as the cause; the reasons are beside the \
+                 numbers.",
                 if many { "them" } else { "it" },
             ),
             Verdict::PartlyExplained => format!(

@@ -50,7 +50,7 @@ pub fn characterise_records_watched(
     if let [first, others @ ..] = &unused(options)[..] {
         return Err(Error::Setting {
             setting: *first,
-            expected: "one record beside it (of several, noise levels and known time constants can be given, and a diagnosis finds \
+            expected: "one record beside it (for several, only noise levels and known time constants can be given; a diagnosis finds \
                        what else they share)"
                 .into(),
             got: format!("{} records", records.len()),

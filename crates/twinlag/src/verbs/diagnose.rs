@@ -123,8 +123,8 @@ pub(crate) struct Diagnosed {
 impl Diagnosed {
     pub(crate) fn of(record: &Record, options: &DiagnoseOptions, watch: Watch<'_>) -> Result<Self, Error> {
         options.characterise.check()?;
-        check_flow(std::slice::from_ref(record))?;
         let rows = Rows::of(record)?;
+        check_flow(&rows.observations, std::slice::from_ref(record))?;
         let core = close_the_loop(&rows.observations, &settings(options), watch)?;
         Ok(Self { rows, core })
     }

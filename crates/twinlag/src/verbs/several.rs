@@ -29,9 +29,13 @@ impl<'a> Several<'a> {
             let (expected, found) = (first.unwrap_or_default(), other.channels.clone());
             return Err(Error::OtherChannels { file: other.source.clone(), expected, found });
         }
-        check_flow(records)?;
         let rows: Vec<Rows> = records.iter().map(rows).collect::<Result<_, _>>()?;
         let observations: Vec<Observations> = rows.iter().map(|rows| rows.observations.clone()).collect();
+        // Without effects to find a flow is not used.
+        if !settings.effects.is_empty() {
+            let joined = Observations::joined(&observations).map_err(|error| in_files(error, records))?;
+            check_flow(&joined, records)?;
+        }
         let joint = close_the_loop(&observations, settings, watch).map_err(|error| in_files(error, records))?;
         let joined = in_a_row(records, &observations)?;
         let of_all = Self { records, rows, joined, of_records: joint.records, transfer: joint.transfer };

@@ -70,8 +70,7 @@ fn in_steady_flow(seed: u64, velocity_m_s: f64) -> Record {
 
 const SAMPLES: usize = 3000;
 
-/// Failed: a steady flow was refused among others, and a model did not say at which flow its numbers hold, so that another record's were
-/// taken to be at its own. Four standard errors each.
+/// Failed: a steady flow was refused beside others, and a model did not say at which flow its numbers hold. Four standard errors each.
 #[test]
 fn records_in_steady_flows_share_an_exponent_and_the_flow_of_their_time_constants() {
     const VELOCITIES_M_S: [f64; 3] = [6.0, 12.0, 20.0];
@@ -99,5 +98,5 @@ fn a_single_record_in_steady_flow_says_nothing_of_the_flow() {
     let error = diagnose(&in_steady_flow(1, 6.0), &DiagnoseOptions::default()).expect_err("the flow never changes");
     assert!(matches!(error, Error::SteadyFlow { value: 6.0, .. }), "{error}");
     assert_eq!(error.settings(), [Setting::Flow]);
-    assert!(error.to_string().contains("records in other flows"), "{error}");
+    assert!(error.to_string().contains("three records in different flows"), "{error}");
 }
