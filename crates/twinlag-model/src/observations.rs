@@ -9,6 +9,9 @@ use crate::instants::Instants;
 
 /// Fewest samples of a stretch that is used.
 const MIN_STRETCH_SAMPLES: usize = 8;
+/// Fewest and most samples that a delay may reach. Chosen.
+const MIN_REACH_SAMPLES: usize = 2;
+const MAX_REACH_SAMPLES: usize = 64;
 /// Fewest samples of a record that can be diagnosed: fewer leave no blocks to be held out.
 const MIN_RECORD_SAMPLES: usize = 60;
 
@@ -291,6 +294,11 @@ impl Observations {
         self.reach
     }
 
+    /// These with delays that reach over no more samples than `most`, or the fewest that they need.
+    pub(crate) fn reaching_at_most(self, most: usize) -> Self {
+        Self { reach: self.reach.min(most.max(MIN_REACH_SAMPLES)), ..self }
+    }
+
     /// Some stretches of the record, with the flow and the reach of all of it.
     pub(crate) fn with_stretches(&self, stretches: Vec<Arc<Stretch>>) -> Self {
         Self { stretches, flow: self.flow.clone(), ..*self }
@@ -307,5 +315,5 @@ fn reach(stretches: &[Arc<Stretch>]) -> usize {
         shorter += n;
         10 * shorter >= samples
     });
-    (samples / 50).min(typical.unwrap_or(0) / 10).clamp(2, 64)
+    (samples / 50).min(typical.unwrap_or(0) / 10).clamp(MIN_REACH_SAMPLES, MAX_REACH_SAMPLES)
 }

@@ -109,10 +109,11 @@ impl Observations {
         self.keeping(|stretch| stretch.member != number)
     }
 
-    /// Some of the stretches, shared with these.
+    /// Some of the stretches, shared with these. A delay reaches as far as in all of them, if that leaves half of the longest one.
     fn keeping(&self, is_kept: impl Fn(&Stretch) -> bool) -> Self {
-        let stretches = self.stretches.iter().filter(|stretch| is_kept(stretch)).cloned().collect();
-        self.with_stretches(stretches)
+        let stretches: Vec<_> = self.stretches.iter().filter(|stretch| is_kept(stretch)).cloned().collect();
+        let longest = stretches.iter().map(|stretch| stretch.len()).max().unwrap_or(0);
+        self.with_stretches(stretches).reaching_at_most(longest / 4)
     }
 
     /// Noise of each channel over that of all records together, in one of them; one where these are several.

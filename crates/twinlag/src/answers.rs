@@ -20,6 +20,7 @@ pub use characterisation::{
 pub use compensation::{Compensation, Quality};
 pub use diagnosis::{Diagnosis, EffectNumber, ErrorBeforeAfter, NamedCause, NamedEffect, NamedLimit, NamedTwin};
 pub use found_in::FoundIn;
+pub(crate) use found_in::rounded;
 pub use gas_spectrum::{GasBand, GasSpectrum};
 pub use inspection::{InspectedColumn, InspectedRecord, Inspection};
 pub use model::{Model, ModelEffect, ModelNumber};

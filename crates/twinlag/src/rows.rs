@@ -118,7 +118,9 @@ pub(crate) fn check_flow(observations: &Observations, records: &[Record]) -> Res
     match observations.flow() {
         Some(flow) if flow.kind() == FlowKind::Flow && !flow.changes() => {
             let files = records.iter().map(|record| record.source.clone()).collect();
-            Err(Error::SteadyFlow { files, value: flow.reference() })
+            let first = |record: &Record| Some(record.flow.as_ref()?[record.segments.first()?.start]);
+            let value = records.first().and_then(first).unwrap_or_else(|| flow.reference());
+            Err(Error::SteadyFlow { files, value })
         }
         _ => Ok(()),
     }

@@ -124,8 +124,18 @@ const NUMBERS: [(&str, &str, &[Identifier]); 29] = [
          position grows. Negative where it is the earlier one",
         &[Identifier::SEPARATION],
     ),
-    ("mean-flow", "the geometric mean of the measured flow, in its unit", &[Identifier::SEPARATION]),
-    ("mean-speed", "the geometric mean of the speed at which the sensors move, m/s", &[Identifier::SEPARATION]),
+    (
+        "mean-flow",
+        "the geometric mean of the measured flow, in its unit, over the records in which the effect was found: delays and time constants \
+         hold at that flow",
+        &[Identifier::SEPARATION, Identifier::VARYING_TIME_CONSTANT],
+    ),
+    (
+        "mean-speed",
+        "the geometric mean of the speed at which the sensors move, m/s, over the records in which the effect was found: delays and time \
+         constants hold at that speed",
+        &[Identifier::SEPARATION, Identifier::VARYING_TIME_CONSTANT],
+    ),
     (
         "distance",
         "how far the second sensor is behind the first along their own motion while the position grows, m; negative where it is ahead",

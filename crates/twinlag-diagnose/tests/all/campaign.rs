@@ -250,6 +250,33 @@ fn a_noise_that_every_record_has_refutes_nothing() {
     assert!(joint.records.iter().all(of_itself), "{told}");
 }
 
+/// The same noise, and a second sensor that is 15 % slower in the last of four records: no number holds for all of them.
+#[test]
+fn a_noise_that_every_record_has_makes_no_rig_of_two() {
+    let of = |(seed, slower): (u64, f64)| {
+        record(seed, |sensors| {
+            sensors[1].noise = Some(Noise { std_k: 3.0 * NOISE_K, ar1: 0.9 });
+            sensors[1].time_constant_s *= slower;
+        })
+    };
+    let joint = joint(&[(SEED, 1.0), (SEED + 1, 1.0), (SEED + 2, 1.0), (SEED + 3, 1.15)].map(of));
+    let told = told(&joint.diagnosis);
+    assert!(joint.diagnosis.judgements.time_constants.iter().all(|judgement| judgement.grade == Grade::NoGo), "{told}");
+}
+
+/// A delay of all records may reach over more samples than the last has, which is of another rig. Failed: it ended in a panic where that
+/// record was looked at alone.
+#[test]
+fn a_record_of_a_hundred_samples_goes_with_long_ones() {
+    let of_another = |sensors: &mut [Sensor; 2]| sensors[1].time_constant_s *= 0.5;
+    let simulated = readings(SEED + 2, turbulence(), of_another);
+    let short = even(simulated.t1_c[..100].to_vec(), simulated.t2_c[..100].to_vec()).expect("finite and long");
+    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), short]);
+    let told = told(&joint.diagnosis);
+    assert!(joint.records[2].left_out.normalised_rms.after > 1.0 + Policy::default().left_out_rms_margin, "{told}");
+    assert_eq!(joint.records[2].agrees, Some(false), "{told}");
+}
+
 /// A gas of one tone in one record, and of many in the others: two equations more.
 #[test]
 fn one_record_of_a_single_tone_refuses_no_others() {

@@ -109,7 +109,7 @@ fn sha256(record: &Record) -> String {
 }
 
 /// `value` to four digits.
-fn rounded(value: f64) -> f64 {
+pub(crate) fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 

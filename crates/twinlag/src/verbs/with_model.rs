@@ -1,15 +1,20 @@
 //! A record with the effects of a model that was found in another one.
 
 use twinlag_diagnose::{
-    Basis, Circumstances, Identifier, ModelFit, Reason, Remark, Settings, excess, fit_with, is_single_tone,
+    Basis, Circumstances, Identifier, ModelFit, Observations, Reason, Remark, Settings, excess, fit_with,
+    is_single_tone,
 };
 use twinlag_record::Record;
 
-use crate::answers::{Characterisation, FittedAnswer, Model, Status};
+use crate::answers::{Characterisation, FittedAnswer, Model, Status, rounded};
 use crate::error::Error;
 use crate::options::Options;
 use crate::rows::{Rows, settings_of};
 use crate::verbs::characterise;
+
+/// Relative difference of two mean flows that a reader has to know of: with the root of the flow, time constants differ by half as much.
+/// Chosen.
+const MIN_FLOW_DIFFERENCE: f64 = 0.01;
 
 /// Estimates both time constants of `record`, with the effects of `model` held fixed.
 ///
@@ -94,6 +99,7 @@ pub(crate) fn with_model(
             "effects held at the values of the model: {names}. The intervals do not cover the uncertainty of these values"
         ));
     }
+    out.warnings.extend(model.and_then(|model| at_other_flow(model, &observations)));
     if !known.fitted_again.is_empty() {
         let again = listed(&mut known.fitted_again.iter().copied());
         out.warnings.push(format!("effects fitted again, because they belong to a record and not to the rig: {again}"));
@@ -106,4 +112,21 @@ pub(crate) fn with_model(
         );
     }
     Ok((out, known.fit))
+}
+
+/// At which flow the numbers of a model hold, where that is not the mean flow of the record.
+fn at_other_flow(model: &Model, observations: &Observations) -> Option<String> {
+    let own = observations.flow()?.reference();
+    let references = ["mean_flow", "mean_speed"];
+    let numbers = model.effects.iter().flat_map(|effect| &effect.parameters);
+    let reference = numbers.into_iter().find(|p| references.contains(&p.value.name.as_str()))?;
+    let (name, value) = (reference.value.name.replace('_', " "), reference.value.value);
+    ((own / value - 1.0).abs() > MIN_FLOW_DIFFERENCE).then(|| {
+        format!(
+            "time constants and delays are those at the {name} of the model, {}, not at that of this record, {}: they change with it as the \
+             model says",
+            rounded(value),
+            rounded(own)
+        )
+    })
 }

@@ -4,24 +4,31 @@ use crate::common::{read, record, recovers};
 use twinlag::diagnosis::{Identifier, Verdict};
 use twinlag::record::Record;
 use twinlag::signal::Rig;
-use twinlag::{DiagnoseOptions, Diagnosis, Error, Options, Setting, characterise_with, diagnose, diagnose_records};
+use twinlag::{
+    DiagnoseOptions, Diagnosis, Error, Options, Setting, Status, characterise_with, diagnose, diagnose_records,
+};
 
 const TRUTH_S: [f64; 2] = [0.03, 0.11];
 
-/// The diagnosis of 12 s of turbulence in a stream of 12 m/s that changes by 40 %, with `second` in the second sensor.
-fn diagnosed(second: &str) -> Diagnosis {
+/// 12 s of turbulence in a stream of `mean_m_s` that changes by 40 %, with `second` in the second sensor.
+fn in_stream(seed: u64, mean_m_s: f64, second: &str) -> Record {
     let [first_s, second_s] = TRUTH_S;
     let text = format!(
-        "seed = 5\n[record]\nsamples = 6000\nsample_period_s = 0.002\n\
+        "seed = {seed}\n[record]\nsamples = 6000\nsample_period_s = 0.002\n\
          [gas]\nkind = \"turbulence\"\nmean_c = 450.0\nstd_k = 20.0\ncorner_hz = 1.0\ncutoff_hz = 60.0\n\
-         [stream]\nmean_m_per_s = 12.0\ndepth = 0.4\nperiod_s = 5.0\n\
+         [stream]\nmean_m_per_s = {mean_m_s}\ndepth = 0.4\nperiod_s = 5.0\n\
          [[sensors]]\nchannel = \"T1\"\ntime_constant_s = {first_s}\nnoise = {{ std_k = 0.1 }}\n\
          [[sensors]]\nchannel = \"T2\"\ntime_constant_s = {second_s}\nnoise = {{ std_k = 0.1 }}\n{second}\n"
     );
     let rig: Rig = toml::from_str(&text).expect("a rig");
     let (record, stream) = (read(&rig), *rig.stream().expect("it has one"));
     let velocity_m_s = record.time_s.iter().map(|t| stream.velocity_m_per_s(*t)).collect();
-    diagnose(&record.with_flow(velocity_m_s).expect("positive"), &DiagnoseOptions::default()).expect("a sound question")
+    record.with_flow(velocity_m_s).expect("positive")
+}
+
+/// The diagnosis of a stream of 12 m/s.
+fn diagnosed(second: &str) -> Diagnosis {
+    diagnose(&in_stream(5, 12.0, second), &DiagnoseOptions::default()).expect("a sound question")
 }
 
 /// The only effect named, and its number `name` with its standard error.
@@ -44,6 +51,11 @@ fn a_distance_along_the_stream_delays_the_gas_and_not_the_reading() {
     let want_s = 0.06 / mean_m_s;
     assert!((delay_s - want_s).abs() < 4.0 * error_s, "{delay_s} ± {error_s} s, want {want_s} s");
     recovers(&answer.last, TRUTH_S, 4.0);
+    // In a slower stream the same distance takes longer. Taken for the delay at its own mean, it left the time constants wrong.
+    let slower = in_stream(6, 8.0, "downstream_m = 0.06");
+    let other = characterise_with(&slower, &answer.model(), &Options::default()).expect("a record");
+    assert_eq!(other.status, Status::Ok);
+    recovers(&other, TRUTH_S, 4.0);
 }
 
 #[test]
@@ -59,13 +71,17 @@ fn a_stream_that_changes_nothing_is_no_effect() {
     assert_eq!((answer.verdict, answer.effects.len()), (Verdict::Adequate, 0), "{:?}", answer.effects);
 }
 
-/// A record in a steady flow, of time constants that go with the root of its inverse and are those of [`TRUTH_S`] at 12 m/s.
-fn in_steady_flow(seed: u64, velocity_m_s: f64) -> Record {
+/// A record of time constants that go with the root of the inverse of a steady flow, and are those of [`TRUTH_S`] at 12 m/s.
+fn at(seed: u64, velocity_m_s: f64) -> Record {
     let gas = "kind = \"turbulence\"\nstd_k = 15.0\ncorner_hz = 3.0\ncutoff_hz = 60.0";
     let factor = (velocity_m_s / 12.0).powf(-0.5);
     let sensors = TRUTH_S.map(|tau_s| format!("time_constant_s = {}\nnoise = {{ std_k = 0.1 }}", factor * tau_s));
-    let record = record(seed, SAMPLES, 0.002, gas, [&sensors[0], &sensors[1]]);
-    record.with_flow(vec![velocity_m_s; SAMPLES]).expect("positive")
+    record(seed, SAMPLES, 0.002, gas, [&sensors[0], &sensors[1]])
+}
+
+/// As [`at`], with the flow beside the readings.
+fn in_steady_flow(seed: u64, velocity_m_s: f64) -> Record {
+    at(seed, velocity_m_s).with_flow(vec![velocity_m_s; SAMPLES]).expect("positive")
 }
 
 const SAMPLES: usize = 3000;
@@ -91,6 +107,31 @@ fn records_in_steady_flows_share_an_exponent_and_the_flow_of_their_time_constant
     // Another record in another steady flow, with that model: at the flow of the model.
     let other = characterise_with(&in_steady_flow(4, 9.0), &answer.model(), &Options::default()).expect("a record");
     recovers(&other, at_mean_s, 4.0);
+    assert!(
+        other.warnings.iter().any(|w| w.contains("mean flow of the model, 11.29, not at that of this record, 9:")),
+        "{:?}",
+        other.warnings
+    );
+    // A speed of the sensors is no flow.
+    let moving = at(5, 9.0);
+    let position_m: Vec<f64> = moving.time_s.iter().map(|t| 9.0 * t).collect();
+    let moving = moving.with_position(&position_m).expect("it changes");
+    let error = characterise_with(&moving, &answer.model(), &Options::default()).expect_err("a model of a flow");
+    assert_eq!(error.settings(), [Setting::Flow], "{error}");
+}
+
+/// Where one is left out, the other says nothing of the flow.
+#[test]
+fn two_records_in_steady_flows_are_one_too_few() {
+    let records = [in_steady_flow(1, 6.0), in_steady_flow(2, 20.0)];
+    let answer = diagnose_records(&records, &DiagnoseOptions::default()).expect("two records of one rig");
+    assert_eq!(
+        (answer.verdict, answer.unexplained.is_none()),
+        (Verdict::PartlyExplained, true),
+        "{:?}",
+        answer.effects
+    );
+    assert!(answer.last.sensors.iter().all(|sensor| sensor.time_constant_s.is_none()));
 }
 
 #[test]
