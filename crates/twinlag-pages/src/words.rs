@@ -164,13 +164,18 @@ pub fn spacing_in_words(record: &RecordSummary) -> &'static str {
     if record.sampling.kind == SamplingKind::Irregular { "apart on average" } else { "apart" }
 }
 
+/// A unit as it stands behind a number: that of a flow is known to the user alone.
+fn behind_a_number(unit: &str) -> &str {
+    if unit == "its unit" { "in its unit" } else { unit }
+}
+
 /// A unit behind a number, with the blank between them; nothing of a number without one.
 pub fn unit_suffix(of: &str) -> String {
-    if unit(of).is_empty() { String::new() } else { format!(" {of}") }
+    if unit(of).is_empty() { String::new() } else { format!(" {}", behind_a_number(of)) }
 }
 
 pub(crate) fn with_unit(number: &str, of: &str) -> String {
-    if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {of}") }
+    if number == ABSENT || unit(of).is_empty() { number.into() } else { format!("{number} {}", behind_a_number(of)) }
 }
 
 /// A number with its interval.
