@@ -167,9 +167,9 @@ policy! {
     /// Probability that records of one rig seem to differ, in their noise or in a number that they share, of a right model: as of
     /// parts of a record.
     records_rejection_probability: f64 = 1e-3,
-    /// How much more than chance the root mean square of a whitened residual may exceed 1, or what a record leaves over by itself, in one that was left out: what the
-    /// parameters of the others are uncertain by adds to it. Chosen: a record whose sensor is 15 % slower exceeds it
-    /// (test `campaign` of `twinlag-diagnose`); experiment `campaign` counts the records that are accused.
+    /// How much more than chance the root mean square of a whitened residual may exceed 1 in a record that was left out, or what the record
+    /// leaves over by itself as a share of that: what the parameters of the others are uncertain by adds to it. Chosen: a record whose sensor
+    /// is 15 % slower exceeds it (test `campaign` of `twinlag-diagnose`); experiment `campaign` counts the records that are accused.
     left_out_rms_margin: f64 = 0.1,
     /// Probability that a record has an effect that the search has not named: chosen, one in four, of which each kind of effect
     /// that has a size has an equal share, and its places, forms and starts share that.
