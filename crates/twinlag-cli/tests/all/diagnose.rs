@@ -341,7 +341,7 @@ fn a_copy_of_a_record_is_refused() {
     bench.refuses(
         2,
         &["diagnose", "run.csv", "copy.csv"],
-        &["copy.csv: 2000 of its 2000 rows are rows of run.csv as well"],
+        &["copy.csv: 2000 of its 2000 rows are also rows of run.csv"],
     );
 }
 
@@ -362,17 +362,17 @@ fn records_with_readings_of_each_other_are_refused() {
     bench.refuses(
         2,
         &["diagnose", "run.csv", "cut.csv"],
-        &["cut.csv: 1200 of its 1200 rows are rows of run.csv as well"],
+        &["cut.csv: 1200 of its 1200 rows are also rows of run.csv"],
     );
     bench.refuses(
         2,
         &["characterise", "cut.csv", "run.csv"],
-        &["run.csv: 1200 of its 2000 rows are rows of cut.csv as well"],
+        &["run.csv: 1200 of its 2000 rows are also rows of cut.csv"],
     );
     bench.refuses(
         2,
         &["diagnose", "run.csv", "next.csv"],
-        &["next.csv: 500 of its 1300 rows are rows of run.csv as well"],
+        &["next.csv: 500 of its 1300 rows are also rows of run.csv"],
     );
 }
 
@@ -388,7 +388,7 @@ fn records_that_rest_alike_are_two_records() {
         bench.write(name, csv(&rows));
     }
     let answer = bench.run(&["characterise", "one.csv", "two.csv"]);
-    assert!(answer.code != 2 && !answer.stderr.contains("as well"), "{answer:#?}");
+    assert!(answer.code != 2 && !answer.stderr.contains("are also rows"), "{answer:#?}");
 }
 
 /// Both time constants of several records: what is read of each is said with its name, and a model is of one.
