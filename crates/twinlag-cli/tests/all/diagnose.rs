@@ -359,11 +359,7 @@ fn records_with_readings_of_each_other_are_refused() {
     let mut goes_on = [&run[1500..], &later[..800]].concat();
     goes_on.iter_mut().enumerate().for_each(|(k, row)| row[0] = Trace::GOOD.period_s * k as f64);
     bench.write("next.csv", csv(&goes_on));
-    bench.refuses(
-        2,
-        &["diagnose", "run.csv", "cut.csv"],
-        &["cut.csv: 1200 of its 1200 rows are also rows of run.csv"],
-    );
+    bench.refuses(2, &["diagnose", "run.csv", "cut.csv"], &["cut.csv: 1200 of its 1200 rows are also rows of run.csv"]);
     bench.refuses(
         2,
         &["characterise", "cut.csv", "run.csv"],
