@@ -36,9 +36,12 @@ fn the_power_of_a_measured_velocity_is_found() {
     assert_eq!(d.verdict, Verdict::Explained, "{told}");
     let [effect] = &d.effects[..] else { panic!("{told}") };
     assert_eq!(effect.effect, Identifier::VARYING_TIME_CONSTANT, "{told}");
-    let [exponent] = &effect.parameters[..] else { panic!("{told}") };
+    let [exponent, mean] = &effect.parameters[..] else { panic!("{told}") };
     let error = exponent.standard_error.expect("a fitted number has one");
-    assert_eq!(exponent.name, "exponent");
+    assert_eq!((exponent.name.as_str(), mean.name.as_str()), ("exponent", "mean_flow"));
+    // Factors of the time constants are the inverse root of the velocity. To rounding of some thousand logarithms.
+    let factor = truth_s()[0] / TAU_S[0];
+    assert!((mean.value * factor * factor / 8.0 - 1.0).abs() < 1e-12, "{}", mean.value);
     assert!((exponent.value + 0.5).abs() < 4.0 * error && error < 0.05, "{told}");
     recovers(&d.last, truth_s(), &told);
 
