@@ -156,8 +156,8 @@ pub(crate) struct Characterise {
 Verdict:
   adequate          two first-order lags leave only noise in the residual
   explained         with the effects that are named, only noise is left
-  partly-explained  the effects that are named explain part of the residual; or only noise is left, but a check contradicts them,
-                    such as records that had no part in finding them
+  partly-explained  the effects that are named explain part of the residual; or only noise is left, but they are not known to be the
+                    cause, as where records that had no part in finding them contradict them
   unexplained       more than noise is left, and no known effect explains it
   refused           the record cannot be diagnosed, for example because the gas has a single tone
 

@@ -536,7 +536,7 @@ fn verdict_of(answer: &Diagnosis) -> String {
                 format!("{name}{}: {meaning}", nothing_determined(&answer.last))
             }
             _ if answer.verdict == Verdict::PartlyExplained && answer.unexplained.is_none() => {
-                "partly-explained: with these effects only noise is left, but a check contradicts them (see the reasons below)"
+                "partly-explained: with these effects only noise is left where they were fitted, but they are not known to be the cause (see the reasons below)"
                     .into()
             }
             _ => verdict(answer.verdict).into(),

@@ -20,6 +20,16 @@ pub enum FlowKind {
     Motion,
 }
 
+impl FlowKind {
+    /// What the reference of such a flow is called beside the numbers of an effect.
+    pub fn reference_name(self) -> &'static str {
+        match self {
+            Self::Flow => "mean_flow",
+            Self::Motion => "mean_speed",
+        }
+    }
+}
+
 /// A flow along a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flow {

@@ -6,20 +6,13 @@ use crate::effect::{Context, Derived, KnownEffect};
 use crate::error::ModelError;
 use crate::flow::{Flow, FlowKind};
 
-fn name(kind: FlowKind) -> &'static str {
-    match kind {
-        FlowKind::Flow => "mean_flow",
-        FlowKind::Motion => "mean_speed",
-    }
-}
-
 /// The reference of `flow`, as a number beside the parameters.
 pub(crate) fn derived(flow: &Flow) -> Derived {
     let unit = match flow.kind() {
         FlowKind::Flow => "its unit",
         FlowKind::Motion => "m/s",
     };
-    Derived::constant(name(flow.kind()), unit, flow.reference())
+    Derived::constant(flow.kind().reference_name(), unit, flow.reference())
 }
 
 /// The flow of this record relative to the reference of `known`; relative to its own mean where `known` has none.
@@ -31,14 +24,14 @@ pub(crate) fn restored(known: &KnownEffect, context: &Context) -> Result<Arc<Flo
     let flow = context.flow.as_ref().ok_or(ModelError::NeedsFlow)?;
     let kind = flow.kind();
     let other = if kind == FlowKind::Flow { FlowKind::Motion } else { FlowKind::Flow };
-    match (known.parameter(name(kind)), known.parameter(name(other))) {
-        (None, Some(_)) => Err(ModelError::NeedsFlow),
-        (None, None) => Ok(Arc::clone(flow)),
-        (Some(reference), _) if reference.is_finite() && reference > 0.0 => {
+    match [kind, other].map(|kind| known.parameter(kind.reference_name())) {
+        [None, Some(_)] => Err(ModelError::NeedsFlow),
+        [None, None] => Ok(Arc::clone(flow)),
+        [Some(reference), _] if reference.is_finite() && reference > 0.0 => {
             Ok(Arc::new(flow.as_ref().clone().relative_to(reference)))
         }
-        (Some(got), _) => {
-            let (effect, name, expected) = (known.effect.name(), name(kind), "a finite positive number");
+        [Some(got), _] => {
+            let (effect, name, expected) = (known.effect.name(), kind.reference_name(), "a finite positive number");
             Err(ModelError::Parameter { effect, name, got, expected })
         }
     }

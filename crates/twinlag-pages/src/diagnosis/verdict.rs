@@ -1,7 +1,7 @@
 //! What a diagnosis says in short: verdict, effects, the record.
 
 use twinlag::diagnosis::{Grade, Identifier, Judgement, Value, Verdict};
-use twinlag::{NamedCause, NamedEffect, NamedTwin, SensorEstimate};
+use twinlag::{Diagnosis, NamedCause, NamedEffect, NamedTwin, SensorEstimate};
 use twinlag_report::{Document, KeyNumber, ReportError, Table, Tone, rounded};
 
 use super::Page;
@@ -136,11 +136,13 @@ impl Page<'_> {
                  is left.",
                 if many { "explain" } else { "explains" },
             ),
-            Verdict::PartlyExplained if answer.effects.len() <= answer.policy.most_distinguished_effects => format!(
-                "With {effects} what is left looks like noise, but a check contradicts {} as the cause; the reasons are beside the \
-                 numbers.",
-                if many { "them" } else { "it" },
-            ),
+            Verdict::PartlyExplained if effects_of_the_model(answer) <= answer.policy.most_distinguished_effects => {
+                format!(
+                    "With {effects} what is left looks like noise where the model was fitted, but {} not known to be the cause; the \
+                 reasons are beside the numbers.",
+                    if many { "they are" } else { "it is" },
+                )
+            }
             Verdict::PartlyExplained => format!(
                 "With {effects} what is left looks like noise, but one record cannot keep so many effects apart: \
                  together they may imitate another cause."
@@ -152,6 +154,11 @@ impl Page<'_> {
             _ => "The verdict is one that this report does not know.".into(),
         }
     }
+}
+
+/// Effects that were named, noise aside.
+fn effects_of_the_model(answer: &Diagnosis) -> usize {
+    answer.effects.iter().filter(|found| !found.effect.is_noise()).count()
 }
 
 /// `delay (T2) or second order`.

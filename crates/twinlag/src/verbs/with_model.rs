@@ -116,10 +116,10 @@ pub(crate) fn with_model(
 
 /// At which flow the numbers of a model hold, where that is not the mean flow of the record.
 fn at_other_flow(model: &Model, observations: &Observations) -> Option<String> {
-    let own = observations.flow()?.reference();
-    let references = ["mean_flow", "mean_speed"];
-    let numbers = model.effects.iter().flat_map(|effect| &effect.parameters);
-    let reference = numbers.into_iter().find(|p| references.contains(&p.value.name.as_str()))?;
+    let flow = observations.flow()?;
+    let own = flow.reference();
+    let mut numbers = model.effects.iter().flat_map(|effect| &effect.parameters);
+    let reference = numbers.find(|p| p.value.name == flow.kind().reference_name())?;
     let (name, value) = (reference.value.name.replace('_', " "), reference.value.value);
     ((own / value - 1.0).abs() > MIN_FLOW_DIFFERENCE).then(|| {
         format!(
