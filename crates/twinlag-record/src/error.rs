@@ -155,15 +155,16 @@ pub enum RecordError {
     #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example 2")]
     UnknownColumn { file: String, wanted: String, columns: String },
     #[error(
-        "{file}: {at}, column {column}: expected a positive flow velocity or density in every row that is used, found {value}; \
-         use no flow, or mend the column"
+        "{file}: {at}, column {column}: expected a positive flow velocity or density, found {value}; use no flow, or mend the cell \
+         or empty it"
     )]
     BadFlow { file: String, at: Place, column: String, value: f64 },
     #[error(
-        "{file}: {at}, column {column}: expected the position of the sensors in every row that is used, found none; use no position, \
-         or mend the column"
+        "{file}: column {column} has a value in {rows} in which both temperatures are there too, expected at least {least}; use no \
+         flow or position, or mend the column",
+        rows = Counted(*usable, "row")
     )]
-    BadPosition { file: String, at: Place, column: String },
+    FewFlows { file: String, column: String, usable: usize, least: usize },
     #[error("{file}: column {column}: expected a position that changes, found the same throughout; use no position")]
     ConstantPosition { file: String, column: String },
     #[error("{file}: both a flow and a position are given, expected one of them: time constants go with one velocity")]
@@ -278,7 +279,8 @@ impl RecordError {
             | Self::AmbiguousName { .. }
             | Self::SameColumn { .. } => &Setting::COLUMNS,
             Self::BadFlow { .. } => &[Setting::Flow],
-            Self::BadPosition { .. } | Self::ConstantPosition { .. } => &[Setting::Position],
+            Self::FewFlows { .. } => &[Setting::Flow, Setting::Position],
+            Self::ConstantPosition { .. } => &[Setting::Position],
             Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
             Self::NotATimeUnit { .. } | Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit],
@@ -313,7 +315,6 @@ impl RecordError {
             Self::NotANumber { file, at, .. }
             | Self::TextColumn { file, at, .. }
             | Self::BadFlow { file, at, .. }
-            | Self::BadPosition { file, at, .. }
             | Self::NotATime { file, at, .. }
             | Self::AmbiguousDate { file, at, .. }
             | Self::MissingTime { file, at, .. }

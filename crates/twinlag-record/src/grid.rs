@@ -13,7 +13,7 @@ use crate::record::Record;
 use crate::sampling::SamplingKind;
 
 /// Most samples in a row that may be missing within a stretch; a longer gap ends it.
-const MAX_MISSING_SAMPLES: usize = 20;
+pub(crate) const MAX_MISSING_SAMPLES: usize = 20;
 /// How far, in steps, a stamp may be from the grid and lie on it. The steps of stamps that jitter
 /// by less than a hundredth of a step, which counts as uniform sampling, differ by up to twice as
 /// much.

@@ -43,6 +43,7 @@ mod dialect;
 mod encoding;
 mod error;
 mod fill;
+mod flow;
 mod form;
 mod from_columns;
 mod grid;

@@ -168,6 +168,15 @@ pub enum Note {
         /// Rows with T2 missing.
         t2: usize,
     },
+    /// Rows in which the flow or the position is missing and both temperatures are there.
+    FlowMissing {
+        /// The column.
+        column: String,
+        /// Rows that take the flow from the straight line between the readings before and after.
+        bridged: usize,
+        /// Rows too far from these: in no segment.
+        unused: usize,
+    },
     /// A step in time that ends a segment.
     Gap {
         /// The row after the gap.
@@ -297,6 +306,13 @@ impl fmt::Display for Note {
             Self::Masked { rows, t1, t2 } => {
                 let rows = Counted(*rows, "row");
                 write!(f, "{rows} masked for a missing temperature (T1 in {t1}, T2 in {t2}); none was filled")
+            }
+            Self::FlowMissing { column, bridged, unused } => {
+                let missing = Counted(bridged + unused, "row");
+                write!(
+                    f,
+                    "column {column} is empty in {missing}: {bridged} on a straight line between its readings, {unused} not used"
+                )
             }
             Self::Gap { at, from_s, length_s } => {
                 write!(

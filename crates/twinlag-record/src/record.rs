@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
-use crate::motion;
 use crate::note::Note;
 use crate::row_lines::RowLines;
 use crate::sampling::{self, Clock, Sampling, SamplingKind};
@@ -24,7 +23,7 @@ use crate::{Place, RecordError};
 
 /// Fewest samples in segments that make a record. Fewer do not even determine two time constants
 /// and a noise level.
-const MIN_SAMPLES: usize = 8;
+pub(crate) const MIN_SAMPLES: usize = 8;
 /// Gaps that get a note each.
 const MAX_LISTED_GAPS: usize = 5;
 pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
@@ -208,66 +207,9 @@ impl Record {
         match (chosen.flow, chosen.position) {
             (Some(_), Some(_)) => Err(RecordError::FlowAndPosition { file: record.source }),
             (Some(index), None) => record.flowing(table.numbers(index)?.to_vec(), &table.title(index), at),
-            (None, Some(index)) => record.moving(table.numbers(index)?, &table.title(index), at),
+            (None, Some(index)) => record.moving(table.numbers(index)?, &table.title(index)),
             (None, None) => Ok(record),
         }
-    }
-
-    /// This record of sensors that move, with their position in each row, m.
-    ///
-    /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::BadPosition`], [`RecordError::ConstantPosition`];
-    /// [`RecordError::FlowAndPosition`] of a record that has a flow.
-    pub fn with_position(self, position_m: &[f64]) -> Result<Self, RecordError> {
-        self.moving(position_m, "position", |row| Place::Sample(row + 1))
-    }
-
-    fn moving(mut self, position_m: &[f64], column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
-        let (file, expected) = (self.source.clone(), self.len());
-        if self.flow.is_some() {
-            return Err(RecordError::FlowAndPosition { file });
-        }
-        if position_m.len() != expected {
-            let (name, like) = (column.to_owned(), "time_s".to_owned());
-            return Err(RecordError::LengthMismatch { file, name, found: position_m.len(), like, expected });
-        }
-        let mut used = self.segments.iter().cloned().flatten();
-        if let Some(row) = used.find(|&row| !position_m[row].is_finite()) {
-            return Err(RecordError::BadPosition { file, at: at(row), column: column.to_owned() });
-        }
-        let mut values = self.segments.iter().cloned().flatten().map(|row| position_m[row]);
-        if values.next().is_none_or(|first| values.all(|value| value == first)) {
-            return Err(RecordError::ConstantPosition { file, column: column.to_owned() });
-        }
-        let runs: Vec<_> = sampling::runs(&self.time_s, self.sampling.gap_s()).collect();
-        self.speed_m_s = Some(motion::speed(&self.time_s, position_m, &runs));
-        Ok(self)
-    }
-
-    /// This record with a flow velocity or density, in any unit, one value for each row.
-    ///
-    /// # Errors
-    /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`];
-    /// [`RecordError::FlowAndPosition`] of a record of sensors that move.
-    pub fn with_flow(self, flow: Vec<f64>) -> Result<Self, RecordError> {
-        self.flowing(flow, "flow", |row| Place::Sample(row + 1))
-    }
-
-    fn flowing(mut self, flow: Vec<f64>, column: &str, at: impl Fn(usize) -> Place) -> Result<Self, RecordError> {
-        let (file, expected) = (self.source.clone(), self.len());
-        if self.speed_m_s.is_some() {
-            return Err(RecordError::FlowAndPosition { file });
-        }
-        if flow.len() != expected {
-            let (name, like) = (column.to_owned(), "time_s".to_owned());
-            return Err(RecordError::LengthMismatch { file, name, found: flow.len(), like, expected });
-        }
-        let mut used = self.segments.iter().cloned().flatten();
-        if let Some(row) = used.find(|&row| !(flow[row].is_finite() && flow[row] > 0.0)) {
-            return Err(RecordError::BadFlow { file, at: at(row), column: column.to_owned(), value: flow[row] });
-        }
-        self.flow = Some(flow);
-        Ok(self)
     }
 
     /// This record without the lines of its rows: they are those of no single file.
@@ -357,12 +299,7 @@ impl Record {
         let sampling = sampling::judge(&time_s, clock, choice);
         let runs: Vec<_> = sampling::runs(&time_s, sampling.gap_s()).collect();
         note_gaps(&time_s, &runs, origin, &mut notes);
-        let segments: Vec<_> = runs.into_iter().flat_map(|run| whole_parts(run, &is_whole)).collect();
-        let lone = segments.iter().filter(|segment| segment.len() < 2).count();
-        if lone > 0 {
-            notes.push(Note::LoneRows { rows: lone });
-        }
-        let segments: Vec<_> = segments.into_iter().filter(|segment| segment.len() > 1).collect();
+        let segments = whole_parts(&runs, is_whole, &mut notes);
         let usable = segments.iter().map(Range::len).sum();
         if usable < MIN_SAMPLES {
             return Err(too_short(usable));
@@ -562,20 +499,31 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// The maximal runs of whole rows within a run.
-fn whole_parts(run: Range<usize>, is_whole: &impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+/// Maximal parts of `runs` whose rows are all whole, of two rows or more; single rows are noted.
+pub(crate) fn whole_parts(
+    runs: &[Range<usize>],
+    is_whole: impl Fn(usize) -> bool,
+    notes: &mut Vec<Note>,
+) -> Vec<Range<usize>> {
     let mut parts = Vec::new();
-    let mut start = None;
-    for row in run.clone() {
-        match (is_whole(row), start) {
-            (true, None) => start = Some(row),
-            (false, Some(first)) => {
-                parts.push(first..row);
-                start = None;
+    for run in runs {
+        let mut start = None;
+        for row in run.clone() {
+            match (is_whole(row), start) {
+                (true, None) => start = Some(row),
+                (false, Some(first)) => {
+                    parts.push(first..row);
+                    start = None;
+                }
+                _ => {}
             }
-            _ => {}
         }
+        parts.extend(start.map(|first| first..run.end));
     }
-    parts.extend(start.map(|first| first..run.end));
+    let lone = parts.iter().filter(|part: &&Range<usize>| part.len() < 2).count();
+    if lone > 0 {
+        notes.push(Note::LoneRows { rows: lone });
+    }
+    parts.retain(|part| part.len() > 1);
     parts
 }
