@@ -530,6 +530,10 @@ mod tests {
         Moving,
         /// Even, in two records of one rig.
         Joined,
+        /// The same, with a flow that is steady in each of them.
+        Steady,
+        /// The same, but for the rounding of one value of the flow in each.
+        NearlySteady,
     }
 
     /// Two lags in a gas of three tones, with some hundredths of a kelvin of noise, and a flow beside them.
@@ -559,14 +563,21 @@ mod tests {
                 channels.each_ref().map(|c| c[samples.clone()].to_vec()),
             );
             let stretch = stretch.with_missing(masked.each_ref().map(|m: &Vec<bool>| m[samples.clone()].to_vec()));
+            let mut steady = vec![4.0 + samples.start as f64 / 100.0; samples.len()];
+            if kind == Kind::NearlySteady {
+                steady[5] = steady[5].next_up();
+            }
             let stretch = match kind {
+                Kind::Steady | Kind::NearlySteady => stretch.with_flow(steady),
                 Kind::Moving => stretch.with_motion(flow[samples].iter().map(|v| -v).collect()),
                 _ => stretch.with_flow(flow[samples].to_vec()),
             };
             Observations::new(vec![stretch], period_s).expect("a record of 60 samples or more")
         };
         match kind {
-            Kind::Joined => Observations::joined(&[of(0..130), of(130..SAMPLES)]).expect("two records"),
+            Kind::Joined | Kind::Steady | Kind::NearlySteady => {
+                Observations::joined(&[of(0..130), of(130..SAMPLES)]).expect("two records")
+            }
             _ => of(0..SAMPLES),
         }
     }
@@ -607,7 +618,7 @@ mod tests {
     }
 
     /// The derivatives of the residual with respect to every parameter of every effect are those of a derivative
-    /// checker, on even, uneven and masked readings, of sensors that move, and in several records. Its central differences
+    /// checker, on even, uneven and masked readings, of sensors that move, and in several records, in flows that are steady too. Its central differences
     /// reach 6e-6 of a hundred times a parameter's size, 6e-4 of it: they are wrong by a third derivative times 6e-8. In
     /// units of the size that is up to some thirty times the first (of `x⁻⁴`: 4 · 5 · 6 / 4), so the bound is 2e-6 of the
     /// largest derivative. Where
@@ -615,7 +626,7 @@ mod tests {
     /// not 1e8: it multiplies the rounding that the differences see.
     #[test]
     fn derivatives_of_every_effect_are_exact() {
-        for kind in [Kind::Even, Kind::Uneven, Kind::Masked, Kind::Moving, Kind::Joined] {
+        for kind in [Kind::Even, Kind::Uneven, Kind::Masked, Kind::Moving, Kind::Joined, Kind::Steady] {
             let observations = record(kind);
             let (context, selection) = (context(&observations), selection(&observations));
             for effect in effects(&context) {
@@ -665,7 +676,7 @@ mod tests {
     /// bound is twice their sum, 1e-10 of the largest.
     #[test]
     fn windows_give_what_the_whole_gives() {
-        for (kind, is_cut) in [(Kind::Even, false), (Kind::Masked, false), (Kind::Even, true)] {
+        for (kind, is_cut) in [(Kind::Even, false), (Kind::Masked, false), (Kind::Even, true), (Kind::Steady, false)] {
             let observations = if is_cut { in_stretches(&record(kind)) } else { record(kind) };
             let (context, selection) = (context(&observations), selection(&observations));
             for effect in effects(&context) {
@@ -711,13 +722,47 @@ mod tests {
         }
     }
 
+    /// Where the flow is steady, rows of weights are the same and the factor settles; where it differs by a rounding, each row has its
+    /// own. The bound is that of windows.
+    #[test]
+    fn a_steady_flow_gives_what_one_gives_that_differs_by_a_rounding() {
+        let of_flow = [Identifier::VARYING_TIME_CONSTANT, Identifier::SEPARATION];
+        let [steady, nearly] = [Kind::Steady, Kind::NearlySteady].map(|kind| {
+            let record = record(kind);
+            let selection = selection(&record);
+            let of = |effect: Shared| {
+                let model = Model::new(&[], [0.05, 0.07]).with(effect.clone());
+                let off = effect.starts().remove(0).into_iter().map(|x| x + 0.3);
+                let theta: Vec<f64> = TAU_S.into_iter().chain(off).collect();
+                let lin = ResidualCost::new(&model, &theta, &record, &selection).into_linearised(&theta, 0);
+                [vec![lin.residual], lin.columns].concat()
+            };
+            candidates(&of_flow, &context(&record)).into_iter().map(of).collect::<Vec<_>>()
+        });
+        assert_eq!(steady.len(), nearly.len());
+        for (i, (got, want)) in steady.iter().zip(&nearly).enumerate() {
+            for (got, want) in got.iter().zip(want) {
+                let largest = want.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                let differs = got.iter().zip(want).position(|(got, want)| (got - want).abs() > 1e-10 * largest);
+                assert_eq!((got.len(), differs), (want.len(), None), "candidate {i}");
+            }
+        }
+    }
+
     /// The slope of the energy without columns is that of columns, and of a record in windows that of the whole: both are sums
     /// of some hundred products, each with the rounding of the test above, 1e-10 of the largest residual and derivative at
     /// most. The bound is that of the product of their lengths.
     #[test]
     fn the_slope_is_that_of_the_columns() {
         let mut most_bands = 0;
-        for (kind, is_cut) in [(Kind::Even, false), (Kind::Uneven, false), (Kind::Even, true), (Kind::Uneven, true)] {
+        let kinds = [
+            (Kind::Even, false),
+            (Kind::Uneven, false),
+            (Kind::Even, true),
+            (Kind::Uneven, true),
+            (Kind::Steady, false),
+        ];
+        for (kind, is_cut) in kinds {
             let observations = if is_cut { in_stretches(&record(kind)) } else { record(kind) };
             let (context, selection) = (context(&observations), selection(&observations));
             for effect in effects(&context) {

@@ -34,38 +34,53 @@ impl FlowKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flow {
     kind: FlowKind,
-    time_s: Vec<f64>,
+    /// In order of time; at least one.
+    runs: Vec<Run>,
+    reference: f64,
+}
+
+/// The flow along a stretch of the record.
+#[derive(Clone, Debug, PartialEq)]
+struct Run {
+    time_s: Instants,
     /// Logarithm of its size over that of the reference.
     log_ratio: Vec<f64>,
     /// The reference over its values, with their sign.
     inverse_ratio: Vec<f64>,
-    reference: f64,
+    /// Whether all of its values are the same to the last bit.
+    is_steady: bool,
 }
 
 impl Flow {
     /// The flow along a record.
     ///
-    /// - `stretches`: instants, s, and values of each
+    /// - `stretches`: instants, s, and values of each, in order of time; those without a sample are left out
     ///
     /// # Errors
-    /// [`ModelError::Flow`] for values that are not finite, not as many as instants, or not positive where they are a flow.
+    /// [`ModelError::Flow`] for values that are not finite, not as many as instants, or not positive where they are a flow; and if there
+    /// are none.
     pub fn new(kind: FlowKind, stretches: &[(&Instants, &[f64])]) -> Result<Self, ModelError> {
         let is_possible = |v: &f64| v.is_finite() && (*v > 0.0 || kind == FlowKind::Motion);
-        if !stretches.iter().all(|(time_s, values)| time_s.len() == values.len() && values.iter().all(is_possible)) {
+        let values = || stretches.iter().flat_map(|(_, values)| values.iter().copied());
+        let count = values().count();
+        if count == 0 || !stretches.iter().all(|(t, v)| t.len() == v.len() && v.iter().all(is_possible)) {
             return Err(ModelError::Flow);
         }
-        let time_s: Vec<f64> = stretches.iter().flat_map(|s| s.0.iter()).collect();
-        let values: Vec<f64> = stretches.iter().flat_map(|s| s.1.iter().copied()).collect();
-        let count = values.len().max(1) as f64;
+        let mean = |of: &dyn Fn(f64) -> f64| values().map(of).sum::<f64>() / count as f64;
         let least = match kind {
             FlowKind::Flow => f64::MIN_POSITIVE,
-            FlowKind::Motion => MIN_SPEED_SHARE * (values.iter().map(|v| v * v).sum::<f64>() / count).sqrt(),
+            FlowKind::Motion => (MIN_SPEED_SHARE * mean(&|v| v * v).sqrt()).max(f64::MIN_POSITIVE),
         };
-        let sizes: Vec<f64> = values.iter().map(|v| v.abs().max(least).max(f64::MIN_POSITIVE)).collect();
-        let log_mean = sizes.iter().map(|size| size.ln()).sum::<f64>() / count;
-        let log_ratio: Vec<f64> = sizes.iter().map(|size| size.ln() - log_mean).collect();
-        let inverse_ratio = log_ratio.iter().zip(&values).map(|(l, v)| (-l).exp().copysign(*v)).collect();
-        Ok(Self { kind, time_s, log_ratio, inverse_ratio, reference: log_mean.exp() })
+        let log_size = |v: f64| v.abs().max(least).ln();
+        let log_mean = mean(&log_size);
+        let run = |(time_s, values): &(&Instants, &[f64])| {
+            let log_ratio: Vec<f64> = values.iter().map(|v| log_size(*v) - log_mean).collect();
+            let inverse_ratio = log_ratio.iter().zip(*values).map(|(l, v)| (-l).exp().copysign(*v)).collect();
+            let is_steady = values.iter().all(|v| *v == values[0]);
+            Run { time_s: Instants::clone(time_s), log_ratio, inverse_ratio, is_steady }
+        };
+        let runs = stretches.iter().filter(|(_, values)| !values.is_empty()).map(run).collect();
+        Ok(Self { kind, runs, reference: log_mean.exp() })
     }
 
     /// This flow with its ratios taken to `reference` in place of its geometric mean.
@@ -73,8 +88,10 @@ impl Flow {
     /// - `reference`: in the unit of the flow, finite and positive
     pub(crate) fn relative_to(mut self, reference: f64) -> Self {
         let ratio = reference / self.reference;
-        self.log_ratio.iter_mut().for_each(|log_ratio| *log_ratio -= ratio.ln());
-        self.inverse_ratio.iter_mut().for_each(|inverse| *inverse *= ratio);
+        for run in &mut self.runs {
+            run.log_ratio.iter_mut().for_each(|log_ratio| *log_ratio -= ratio.ln());
+            run.inverse_ratio.iter_mut().for_each(|inverse| *inverse *= ratio);
+        }
         Self { reference, ..self }
     }
 
@@ -88,16 +105,18 @@ impl Flow {
         self.reference
     }
 
-    /// `ln(v/v_ref)` of its size at an instant, on straight lines between the samples.
+    /// `ln(v/v_ref)` of its size at an instant, on straight lines between the samples of a stretch, and as at its ends beyond these.
     pub fn log_ratio_at(&self, time_s: f64) -> f64 {
-        self.at(&self.log_ratio, time_s)
+        let (run, before, after, share) = self.place(time_s);
+        let [from, to] = [run.log_ratio[before], run.log_ratio[after]];
+        from + share * (to - from)
     }
 
-    /// `v_ref/v` with its sign at an instant, on straight lines between the samples.
+    /// `v_ref/v` with its sign at an instant, in the same way.
     pub(crate) fn inverse_ratio_at(&self, time_s: Number) -> Number {
-        let (before, after, share) = self.place(time_s.re);
-        let [from, to] = [self.inverse_ratio[before], self.inverse_ratio[after]];
-        let step_s = self.time_s[after] - self.time_s[before];
+        let (run, before, after, share) = self.place(time_s.re);
+        let [from, to] = [run.inverse_ratio[before], run.inverse_ratio[after]];
+        let step_s = run.time_s.at(after) - run.time_s.at(before);
         let is_between = share > 0.0 && share < 1.0;
         let slope = if is_between { (to - from) / step_s } else { 0.0 };
         Number::from(from + share * (to - from)) + (time_s - time_s.re) * slope
@@ -105,36 +124,44 @@ impl Flow {
 
     /// Rate of change of `v_ref/v` at an instant, 1/s, over the samples on either side and their neighbours.
     pub(crate) fn inverse_ratio_rate_at(&self, time_s: f64) -> f64 {
-        let (before, after, _) = self.place(time_s);
-        let (first, last) = (before.saturating_sub(1), (after + 1).min(self.time_s.len() - 1));
-        let length_s = self.time_s[last] - self.time_s[first];
-        if length_s > 0.0 { (self.inverse_ratio[last] - self.inverse_ratio[first]) / length_s } else { 0.0 }
+        let (run, before, after, _) = self.place(time_s);
+        let (first, last) = (before.saturating_sub(1), (after + 1).min(run.time_s.len() - 1));
+        let length_s = run.time_s.at(last) - run.time_s.at(first);
+        if length_s > 0.0 { (run.inverse_ratio[last] - run.inverse_ratio[first]) / length_s } else { 0.0 }
     }
 
     /// The least and the largest `v_ref/v`.
     pub(crate) fn inverse_ratios(&self) -> [f64; 2] {
         let bounds = [f64::INFINITY, f64::NEG_INFINITY];
-        self.inverse_ratio.iter().fold(bounds, |[least, largest], ratio| [least.min(*ratio), largest.max(*ratio)])
+        let all = self.runs.iter().flat_map(|run| &run.inverse_ratio);
+        all.fold(bounds, |[least, largest], ratio| [least.min(*ratio), largest.max(*ratio)])
     }
 
-    fn at(&self, values: &[f64], time_s: f64) -> f64 {
-        let (before, after, share) = self.place(time_s);
-        values[before] + share * (values[after] - values[before])
-    }
-
-    /// The samples on either side of an instant, and the share of the way from one to the other.
-    fn place(&self, time_s: f64) -> (usize, usize, f64) {
-        let last = self.time_s.len() - 1;
-        let after = self.time_s.partition_point(|t| *t <= time_s).clamp(1, last.max(1)).min(last);
+    /// The run that an instant is of, its samples on either side of that, and the share of the way from one to the other.
+    fn place(&self, time_s: f64) -> (&Run, usize, usize, f64) {
+        let run = self.run_at(time_s);
+        let last = run.time_s.len() - 1;
+        let after = run.time_s.first_after(time_s).clamp(1, last.max(1)).min(last);
         let before = after.saturating_sub(1);
-        let step_s = self.time_s[after] - self.time_s[before];
-        let share = if step_s > 0.0 { ((time_s - self.time_s[before]) / step_s).clamp(0.0, 1.0) } else { 0.0 };
-        (before, after, share)
+        let [before_s, after_s] = [before, after].map(|k| run.time_s.at(k));
+        let share = if after_s > before_s { ((time_s - before_s) / (after_s - before_s)).clamp(0.0, 1.0) } else { 0.0 };
+        (run, before, after, share)
+    }
+
+    /// The last run that begins before an instant; the first one where none does.
+    fn run_at(&self, time_s: f64) -> &Run {
+        let later = self.runs.partition_point(|run| run.time_s.at(0) <= time_s);
+        &self.runs[later.saturating_sub(1)]
     }
 
     /// Whether its size or its direction changes by more than rounding.
     pub fn changes(&self) -> bool {
         let [least, largest] = self.inverse_ratios();
         largest - least > MIN_RELATIVE_CHANGE
+    }
+
+    /// Whether it is the same, to the last bit, in all of the stretch that an instant is of.
+    pub(crate) fn is_steady_around(&self, time_s: f64) -> bool {
+        self.run_at(time_s).is_steady
     }
 }

@@ -100,6 +100,25 @@ impl Instants {
         from
     }
 
+    /// The first sample later than `time_s`; how many there are if none is.
+    pub(crate) fn first_after(&self, time_s: f64) -> usize {
+        match &self.0 {
+            Kind::Even { origin_s, step_s, places } => {
+                let place = ((time_s - origin_s) / step_s).floor() + 1.0 - places.start as f64;
+                let mut first = place.clamp(0.0, places.len() as f64) as usize;
+                // A quotient that rounds across a whole number is off by one.
+                while first > 0 && self.at(first - 1) > time_s {
+                    first -= 1;
+                }
+                while first < places.len() && self.at(first) <= time_s {
+                    first += 1;
+                }
+                first
+            }
+            Kind::Stamped(stamps_s) => stamps_s.partition_point(|t| *t <= time_s),
+        }
+    }
+
     /// Some of them.
     pub(crate) fn cut(&self, samples: Range<usize>) -> Self {
         match &self.0 {
@@ -158,8 +177,11 @@ mod tests {
         }
         for (k, time_s) in all.iter().enumerate() {
             assert_eq!([&all, &stamped].map(|i| i.first_not_before(time_s)), [k; 2]);
+            assert_eq!([&all, &stamped].map(|i| i.first_after(time_s)), [k + 1; 2]);
+            assert_eq!([&all, &stamped].map(|i| i.first_after(time_s.next_down())), [k; 2]);
         }
         assert_eq!(all.first_not_before(1e9), 1000);
+        assert_eq!([-1e300, 1e300].map(|time_s| all.first_after(time_s)), [0, 1000]);
         assert_eq!(all.later(2.0).at(5), 2.3 + 5.0 * 0.1);
     }
 }

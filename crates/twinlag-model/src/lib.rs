@@ -74,7 +74,7 @@ pub use normal::{Beside, NormalEquations};
 pub use num_dual::DualNum;
 pub use number::{Curve, Number, TimeFunction};
 pub use observations::{Observations, Stretch, evenly_spread};
-pub use plant::{Extra, Place, Plant, Reading, Sensor, Separation, SlowPath, ZERO_CELSIUS_K};
+pub use plant::{Extra, Place, Plant, Reading, Sensor, Separation, SlowPath, TimeConstantChange, ZERO_CELSIUS_K};
 pub use policy::Policy;
 pub use prediction::Prediction;
 pub use prepare::Prepared;

@@ -124,6 +124,13 @@ pub(crate) struct Cut<'a> {
     pub(crate) reading_c: [&'a [f64]; 2],
 }
 
+impl Cut<'_> {
+    /// The first of these instants.
+    pub(crate) fn first_s(&self) -> f64 {
+        self.time_s.at(self.first)
+    }
+}
+
 /// Both channels of a record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observations {

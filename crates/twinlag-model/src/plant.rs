@@ -77,6 +77,40 @@ pub struct SlowPath {
     pub tau_s: Number,
 }
 
+/// A relative change `m` of a time constant.
+#[derive(Clone)]
+pub struct TimeConstantChange {
+    /// `m` at an instant, s.
+    pub at: TimeFunction,
+    /// The flow that it is a function of, where it is one of nothing else.
+    flow: Option<Arc<Flow>>,
+}
+
+/// What it is a function of.
+impl fmt::Debug for TimeConstantChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("TimeConstantChange").field("flow", &self.flow.is_some()).finish_non_exhaustive()
+    }
+}
+
+impl TimeConstantChange {
+    /// A function of time.
+    pub fn of_time(at: TimeFunction) -> Self {
+        Self { at, flow: None }
+    }
+
+    /// A function of a flow, at its `ln(v/v_ref)`.
+    pub fn of_flow(flow: Arc<Flow>, of_log_ratio: impl Fn(f64) -> Number + Send + Sync + 'static) -> Self {
+        let along = flow.clone();
+        Self { at: Arc::new(move |time_s| of_log_ratio(along.log_ratio_at(time_s))), flow: Some(flow) }
+    }
+
+    /// Whether it is one number in all of the stretch that an instant is of.
+    fn is_steady_around(&self, time_s: f64) -> bool {
+        self.flow.as_ref().is_some_and(|flow| flow.is_steady_around(time_s))
+    }
+}
+
 /// One sensor: `(1 + τ₂ s) [τ(t) d/dt G(T) + F(T)] = x [1 + (1 − φ) τ_s s]/(1 + τ_s s)`.
 #[derive(Clone)]
 pub struct Sensor {
@@ -85,7 +119,7 @@ pub struct Sensor {
     /// Time constant `τ`, s: that of no change, at the temperature of no change.
     pub tau_s: Number,
     /// Relative changes `m` of the time constant along the record, which is `τ Π (1 + m(t))`.
-    pub changes: Vec<TimeFunction>,
+    pub changes: Vec<TimeConstantChange>,
     /// Second time constant `τ₂` in series, s.
     pub second_tau_s: Option<Number>,
     /// Slow parallel path.
@@ -117,7 +151,7 @@ impl Sensor {
 
     /// The factor `Π (1 + m(t))` of its time constant at an instant.
     pub fn tau_factor_at(&self, time_s: f64) -> Number {
-        let factor = self.changes.iter().fold(Number::from(1.0), |product, m| product * (m(time_s) + 1.0));
+        let factor = self.changes.iter().fold(Number::from(1.0), |product, m| product * ((m.at)(time_s) + 1.0));
         if factor.re < MIN_TAU_FACTOR { Number::from(MIN_TAU_FACTOR) } else { factor }
     }
 }
@@ -231,9 +265,15 @@ impl Plant {
         }
     }
 
-    /// Whether the time constant of a sensor changes along a record.
-    pub(crate) fn changes_tau(&self, channel: usize) -> bool {
-        !self.sensors[channel].changes.is_empty() || (channel == 1 && self.separation.is_some())
+    /// Whether the time constant of a sensor changes along the stretch that an instant is of.
+    pub(crate) fn changes_tau_around(&self, channel: usize, time_s: f64) -> bool {
+        let changes = !self.sensors[channel].changes.iter().all(|change| change.is_steady_around(time_s));
+        changes || (channel == 1 && self.changes_delay_around(time_s))
+    }
+
+    /// Whether the delay between the channels changes along the stretch that an instant is of.
+    pub(crate) fn changes_delay_around(&self, time_s: f64) -> bool {
+        self.separation.as_ref().is_some_and(|apart| !apart.flow.is_steady_around(time_s))
     }
 
     /// The least and the largest delay along the record, s.

@@ -9,7 +9,7 @@ use crate::column::{Column, Kind};
 use crate::error::Candidates;
 use crate::names::{
     OTHER_QUANTITIES, SURROUNDINGS, TEMPERATURE, counts_rows, first_word, has, is_apart, is_called_temperature,
-    is_index, is_temperature, is_time,
+    is_index, is_temperature, is_time, is_velocity,
 };
 use crate::note::Note;
 use crate::selection::{ColumnRef, Selection, Setting};
@@ -82,6 +82,13 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         [Some(t1), Some(t2)] => [t1, t2],
         _ => guess_channels(table, named, time, [reference, flow, position], notes)?,
     };
+    if flow.is_none() && position.is_none() {
+        let is_free = |(index, column): &(usize, &Column)| {
+            !channels.contains(index) && column.kind == Kind::Number && is_velocity(column)
+        };
+        let unused = table.columns().iter().enumerate().find(is_free);
+        notes.extend(unused.map(|(index, _)| Note::FlowUnused { column: table.title(index), number: index + 1 }));
+    }
     if selection.period_s.is_some() {
         return Ok(Chosen { time: None, channels, reference, flow, position });
     }

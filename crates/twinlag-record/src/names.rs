@@ -133,6 +133,18 @@ pub(crate) const OTHER_QUANTITIES: [&str; 40] = [
     "error",
 ];
 
+/// The motion of the gas past sensors: words for it, and units.
+const FLOW: [&str; 7] = ["flow", "velocity", "speed", "airspeed", "windspeed", "wind", "windgeschwindigkeit"];
+const VELOCITY_UNITS: [&str; 8] = ["m/s", "m s-1", "cm/s", "km/h", "mph", "kn", "knots", "ft/s"];
+
+/// Whether it is the velocity of something by its name and its unit: `U [m/s]`, `velocity_m_s`, `wind speed`, but not `fan speed [rpm]`.
+pub(crate) fn is_velocity(column: &Column) -> bool {
+    match column.unit() {
+        Unit::Other(unit) => VELOCITY_UNITS.contains(&unit.to_lowercase().as_str()),
+        _ => column.name().to_lowercase().ends_with("_m_s") || (has(column, &FLOW) && *column.unit() == Unit::Unstated),
+    }
+}
+
 fn words(text: &str) -> impl Iterator<Item = String> {
     text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase)
 }

@@ -168,6 +168,13 @@ pub enum Note {
         /// Rows with T2 missing.
         t2: usize,
     },
+    /// A column may be the velocity of the gas, and is not used.
+    FlowUnused {
+        /// The column.
+        column: String,
+        /// Its number, from 1.
+        number: usize,
+    },
     /// Rows in which the flow or the position is missing and both temperatures are there.
     FlowMissing {
         /// The column.
@@ -306,6 +313,12 @@ impl fmt::Display for Note {
             Self::Masked { rows, t1, t2 } => {
                 let rows = Counted(*rows, "row");
                 write!(f, "{rows} masked for a missing temperature (T1 in {t1}, T2 in {t2}); none was filled")
+            }
+            Self::FlowUnused { column, .. } => {
+                write!(
+                    f,
+                    "column {column} is not used; if it is the velocity of the gas, choose it as the flow: time constants may go with it"
+                )
             }
             Self::FlowMissing { column, bridged, unused } => {
                 let missing = Counted(bridged + unused, "row");

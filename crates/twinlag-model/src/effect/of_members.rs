@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Effect, Parameter, Seat, Shared};
 use crate::directions::{Part, Parts};
 use crate::number::{Number, TimeFunction};
-use crate::plant::Plant;
+use crate::plant::{Plant, TimeConstantChange};
 use crate::records::Member;
 
 /// One effect in each of several records.
@@ -79,8 +79,10 @@ fn install_within(member: &Member, plant: &mut Plant, install: impl FnOnce(&mut 
         if own_k.re != 0.0 || own_k.eps != 0.0 {
             sensor.reading.disturbances.push(Arc::new(move |_| own_k));
         }
-        let new = sensor.reading.disturbances[disturbances..].iter_mut().chain(&mut sensor.changes[changes..]);
-        new.for_each(|function| *function = within(function));
+        sensor.reading.disturbances[disturbances..].iter_mut().for_each(|function| *function = within(function));
+        sensor.changes[changes..]
+            .iter_mut()
+            .for_each(|change| *change = TimeConstantChange::of_time(within(&change.at)));
     }
 }
 

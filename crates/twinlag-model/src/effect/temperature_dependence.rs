@@ -11,8 +11,8 @@ use crate::effect::KnownEffect;
 use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
 use crate::gas::Gas;
-use crate::number::{Curve, Number, TimeFunction};
-use crate::plant::{Plant, ZERO_CELSIUS_K};
+use crate::number::{Curve, Number};
+use crate::plant::{Plant, TimeConstantChange, ZERO_CELSIUS_K};
 
 pub(crate) static ABOUT: About = About::new("temperature-dependent-time-constant", 10, candidates)
     .in_words(
@@ -127,11 +127,11 @@ impl Effect for TemperatureDependence {
                 Follows::Sensor => sensor.heat = Some(heat(exponent, reference_k)),
                 Follows::Gas { gas, share } => {
                     let (gas, share) = (gas.clone(), share.map_or_else(|| values[1], Number::from));
-                    let change: TimeFunction = Arc::new(move |time_s| {
+                    let change = TimeConstantChange::of_time(Arc::new(move |time_s| {
                         let ratio = gas.between_k(i, share, time_s) / reference_k;
                         let ratio = if ratio.re < MIN_RATIO { Number::from(MIN_RATIO) } else { ratio };
                         (ratio.ln() * exponent).exp_m1()
-                    });
+                    }));
                     sensor.changes.push(change);
                 }
             }

@@ -13,8 +13,8 @@ use crate::effect::flow_reference;
 use crate::effect::{About, Context, Derived, Effect, Identifier, Parameter, Seat, Shared, described_by};
 use crate::error::ModelError;
 use crate::flow::Flow;
-use crate::number::{Number, TimeFunction};
-use crate::plant::Plant;
+use crate::number::Number;
+use crate::plant::{Plant, TimeConstantChange};
 use crate::spline::{LocalSpline, Spline, on_knots, parts};
 
 pub(crate) static ABOUT: About = About::new("varying-time-constant", 9, candidates)
@@ -133,12 +133,12 @@ fn restore(known: &KnownEffect, context: &Context) -> Result<Option<Shared>, Mod
     Ok(described_by(known, with_flow(&flow_reference::restored(known, context)?).into()))
 }
 
-fn function(spline: Spline) -> TimeFunction {
-    Arc::new(move |time_s| spline.at(time_s))
+fn along(spline: Spline) -> TimeConstantChange {
+    TimeConstantChange::of_time(Arc::new(move |time_s| spline.at(time_s)))
 }
 
 /// A relative change of both time constants, or of that of one sensor.
-fn install(change: &TimeFunction, channel: Option<usize>, plant: &mut Plant) {
+fn install(change: &TimeConstantChange, channel: Option<usize>, plant: &mut Plant) {
     let sensors = plant.sensors.iter_mut().enumerate().filter(|(i, _)| channel.is_none_or(|channel| channel == *i));
     sensors.for_each(|(_, sensor)| sensor.changes.push(change.clone()));
 }
@@ -153,17 +153,19 @@ impl Effect for Varying {
     }
 
     fn install(&self, values: &[Number], plant: &mut Plant) {
-        let change: TimeFunction = match &self.of {
+        let change = match &self.of {
             Of::Time { ends_s: [first_s, last_s], .. } | Of::Ratio { ends_s: [first_s, last_s] } => {
-                function(Spline::new(*first_s, *last_s, values))
+                along(Spline::new(*first_s, *last_s, values))
             }
             Of::Flow(flow) => {
-                let (exponent, flow) = (values[0], flow.clone());
-                Arc::new(move |time_s| (exponent * flow.log_ratio_at(time_s)).exp_m1())
+                let exponent = values[0];
+                TimeConstantChange::of_flow(flow.clone(), move |log_ratio| (exponent * log_ratio).exp_m1())
             }
             Of::Step { at_s } => {
                 let (change, at_s) = (values[0], *at_s);
-                Arc::new(move |time_s| if time_s < at_s { Number::from(0.0) } else { change })
+                TimeConstantChange::of_time(Arc::new(
+                    move |time_s| if time_s < at_s { Number::from(0.0) } else { change },
+                ))
             }
         };
         install(&change, self.seat.channel, plant);
@@ -174,7 +176,7 @@ impl Effect for Varying {
         let (splines, of_parameters) = parts(ends_s[0], ends_s[1], values);
         let channel = self.seat.channel;
         let part = |(spline, support_s): LocalSpline| {
-            let change = function(spline);
+            let change = along(spline);
             Part::new(support_s, Arc::new(move |plant| install(&change, channel, plant)))
         };
         Some(Parts::new(splines.into_iter().map(part).collect(), of_parameters))

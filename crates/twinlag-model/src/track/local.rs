@@ -30,7 +30,7 @@ use crate::model::Model;
 use crate::normal::NormalEquations;
 use crate::number::Number;
 use crate::observations::Observations;
-use crate::plant::Plant;
+use crate::plant::{Plant, TimeConstantChange};
 use crate::selection::Selection;
 use crate::spline::{Spline, on_knots, weights};
 
@@ -83,7 +83,8 @@ impl Effect for Given {
         let times = values.first().copied().unwrap_or(Number::from(1.0));
         for sensor in usize::from(self.seat.channel.is_some())..2 {
             let function = self.function.clone();
-            plant.sensors[sensor].changes.push(Arc::new(move |time_s| times * function(time_s)));
+            let change = TimeConstantChange::of_time(Arc::new(move |time_s| times * function(time_s)));
+            plant.sensors[sensor].changes.push(change);
         }
     }
 

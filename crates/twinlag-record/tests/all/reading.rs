@@ -226,6 +226,28 @@ fn a_flow_is_read_as_it_stands_and_is_never_a_sensor() {
     assert_eq!(got.flow.as_ref().unwrap()[..3], [1.0, 2.0, 3.0]);
 }
 
+/// What may be a velocity is said, unless a flow or a position is chosen.
+#[test]
+fn a_velocity_that_is_not_used_is_said() {
+    let of = |name: &str, selection: &Selection| {
+        let text = rows(&format!("time_s,T1,T2,{name}"), |row, t, a, b| format!("{t},{a},{b},{}", 1 + row));
+        let record = record_with(text.as_bytes(), selection).expect("a record");
+        notes(&record).contains(&format!("column 4 '{name}' is not used"))
+    };
+    for (name, is_said) in [
+        ("U_m_s", true),
+        ("velocity_m_s", true),
+        ("wind speed", true),
+        ("U [m/s]", true),
+        ("fan speed [rpm]", false),
+        ("pressure [Pa]", false),
+        ("T3_C", false),
+    ] {
+        assert_eq!(of(name, &Selection::default()), is_said, "{name}");
+        assert!(!of(name, &Selection { flow: name.parse().ok(), ..Selection::default() }), "{name}");
+    }
+}
+
 #[test]
 fn t1_and_t2_go_before_other_temperatures_and_a_reference_is_never_one() {
     let text = rows("time_s,Tref,T2_b_C,depth_m,T1_a_C,ambient_C", |_, t, a, b| format!("{t},9,{b},1,{a},8"));
