@@ -92,19 +92,21 @@ fn disagreeing(change_last: impl Fn(&mut [Sensor; 2])) -> (JointDiagnosis, Vec<b
 /// alone, and with it no two are.
 #[test]
 fn of_three_records_that_one_is_named_without_which_the_others_are_explained() {
-    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
-    let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
-    let told = told(&joint.diagnosis);
-    let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
-    assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
-    let rms = joint.records[2].left_out.normalised_rms.after;
-    assert!(rms > 1.0 + Policy::default().left_out_rms_margin, "{rms}");
-    // Its time constant and theirs, each within four standard errors.
-    let [of_t2] = &joint.records[2].disagreements[..] else { panic!("{:?}", joint.records[2].disagreements) };
-    let Contradicted { own, others, others_error, .. } = of_t2.values;
-    assert_eq!((of_t2.name.as_str(), own.record), ("T2", 2));
-    assert!((own.value - 1.15 * TAU_S[1]).abs() < 4.0 * own.standard_error, "{own:?}");
-    assert!((others - TAU_S[1]).abs() < 4.0 * others_error, "{others} ± {others_error} s");
+    for factor in [1.15, 1.5] {
+        let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = factor * TAU_S[1]);
+        let joint = joint(&[record(SEED, |_| ()), record(SEED + 1, |_| ()), of_another]);
+        let told = told(&joint.diagnosis);
+        let agrees: Vec<Option<bool>> = joint.records.iter().map(|record| record.agrees).collect();
+        assert_eq!(agrees, [Some(true), Some(true), Some(false)], "{told}");
+        let rms = joint.records[2].left_out.normalised_rms.after;
+        assert!(rms > 1.0 + Policy::default().left_out_rms_margin, "{rms}");
+        // Its time constant and theirs, each within four standard errors.
+        let [of_t2] = &joint.records[2].disagreements[..] else { panic!("{:?}", joint.records[2].disagreements) };
+        let Contradicted { own, others, others_error, .. } = of_t2.values;
+        assert_eq!((of_t2.name.as_str(), own.record), ("T2", 2));
+        assert!((own.value - factor * TAU_S[1]).abs() < 4.0 * own.standard_error, "{own:?}");
+        assert!((others - TAU_S[1]).abs() < 4.0 * others_error, "{others} ± {others_error} s");
+    }
 }
 
 /// A sensor of 50 ms among records of one of 45 ms leaves a residual that looks like gas which both sensors do not share. No record left
@@ -127,16 +129,18 @@ fn a_record_of_another_rig_is_no_noise() {
 /// Of two records that differ either may be the odd one.
 #[test]
 fn of_two_records_none_is_named() {
-    let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
-    let joint = joint(&[record(SEED, |_| ()), of_another]);
-    let told = told(&joint.diagnosis);
-    assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{told}");
-    // Together they look as if the gas were not the same: that is no cause, and nothing is explained by it.
-    assert_eq!(joint.diagnosis.verdict, Verdict::Unexplained, "{told}");
-    for (record, second_s) in joint.records.iter().zip([TAU_S[1], 1.15 * TAU_S[1]]) {
-        let [of_t2] = &record.disagreements[..] else { panic!("{:?}", record.disagreements) };
-        let OwnValue { value, standard_error, .. } = of_t2.values.own;
-        assert!((value - second_s).abs() < 4.0 * standard_error, "{value} ± {standard_error} s");
+    for factor in [1.15, 1.5] {
+        let of_another = record(SEED + 2, |sensors| sensors[1].time_constant_s = factor * TAU_S[1]);
+        let joint = joint(&[record(SEED, |_| ()), of_another]);
+        let told = told(&joint.diagnosis);
+        assert!(joint.records.iter().all(|record| record.agrees.is_none()), "{told}");
+        // Together they look as if the gas were not the same: that is no cause, and nothing is explained by it.
+        assert_eq!(joint.diagnosis.verdict, Verdict::Unexplained, "{told}");
+        for (record, second_s) in joint.records.iter().zip([TAU_S[1], factor * TAU_S[1]]) {
+            let [of_t2] = &record.disagreements[..] else { panic!("{:?}", record.disagreements) };
+            let OwnValue { value, standard_error, .. } = of_t2.values.own;
+            assert!((value - second_s).abs() < 4.0 * standard_error, "{value} ± {standard_error} s");
+        }
     }
 }
 
@@ -156,13 +160,17 @@ fn what_an_odd_record_shows_alone_is_said() {
     );
 }
 
-/// Someone exchanged the second sensor before the last record: that one is named, with its time constant.
+/// Someone exchanged the second sensor before the last record: that one is named, with its time constant and theirs, each within four
+/// standard errors. A Newton step from the joint fit was 125 standard errors short of it.
 #[test]
 fn a_record_of_another_sensor_is_named() {
-    let (joint, disagreeing) = disagreeing(|sensors| sensors[1].time_constant_s = 1.15 * TAU_S[1]);
+    let (joint, disagreeing) = disagreeing(|sensors| sensors[1].time_constant_s = 1.3 * TAU_S[1]);
     let told = told(&joint.diagnosis);
     assert_eq!(disagreeing, [false, false, false, false, false, true], "{told}");
-    assert!(joint.records[5].disagreements.iter().any(|d| d.name == "T2"), "{:?}", joint.records[5].disagreements);
+    let of_t2 = joint.records[5].disagreements.iter().find(|d| d.name == "T2").expect("T2 is another");
+    let Contradicted { own, others, others_error, .. } = of_t2.values;
+    assert!((own.value - 1.3 * TAU_S[1]).abs() < 4.0 * own.standard_error, "{own:?}");
+    assert!((others - TAU_S[1]).abs() < 4.0 * others_error, "{others} ± {others_error} s");
     assert_ne!(joint.diagnosis.verdict, Verdict::Adequate, "{told}");
 }
 
