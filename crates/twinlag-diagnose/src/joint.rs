@@ -11,7 +11,10 @@ use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
 use crate::naming::own_numbers;
 use crate::odd_one::OddOne;
-use crate::transfer::{Across, EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer};
+use crate::transfer::{
+    Across, EffectInChannel, LeftOut, Transfer, transfer, withdraw_what_does_not_transfer,
+    withdraw_what_lowers_no_error,
+};
 
 /// A number that belongs to a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,16 +129,19 @@ pub fn diagnose_records(
     withdraw_what_does_not_transfer(&mut state, watch)?;
     let transfer = transfer(&state, settings, watch)?;
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
-    let is_one_rig = !state.has_noise() && is_explained(&state, settings);
+    let is_whole = is_explained(&state, settings);
+    if !is_whole {
+        withdraw_what_lowers_no_error(&mut state, &transfer);
+    }
+    let is_one_rig = is_whole && !state.has_noise();
     let odd = if is_one_rig { None } else { OddOne::find(&state, &transfer, settings, watch)? };
     if let Some(odd) = odd.as_ref().filter(|odd| odd.differs()) {
         odd.withdraw_what_neither_needs(&mut state);
     }
-    let samples: Vec<usize> = records.iter().map(Observations::samples).collect();
     let across = Across::new(
         &transfer,
         &state.current.model,
-        &samples,
+        records,
         odd.as_ref().is_some_and(OddOne::differs),
         &settings.policy,
     );
@@ -162,7 +168,7 @@ pub fn diagnose_records(
         samples: records[record].samples(),
         left_out: transfer.records[record].clone(),
         noise_std_k: noise_std_k[record],
-        time_constants_s: [0, 1].map(|i| own_value(record, between?.parameters[i].as_ref()?)),
+        time_constants_s: [0, 1].map(|i| own_time_constant(record, between?.parameters[i].as_ref()?, &settings.policy)),
         own: if is_whole { own_numbers(record, &last, &diagnosis.last) } else { Vec::new() },
         agrees: agrees(record),
         disagreements: match (&contradictions[record][..], beside_the_others(record)) {
@@ -175,8 +181,10 @@ pub fn diagnose_records(
     Ok(JointDiagnosis { diagnosis, records, transfer })
 }
 
-fn own_value(record: usize, between: &BetweenRecords) -> Option<OwnValue> {
-    between.own.iter().find(|own| own.record == record).copied()
+/// A time constant as a record has it by itself; `None` where it is so uncertain that it is no estimate.
+fn own_time_constant(record: usize, between: &BetweenRecords, policy: &Policy) -> Option<OwnValue> {
+    let is_estimate = |own: &&OwnValue| own.standard_error < policy.vague_log_std * own.value;
+    between.own.iter().find(|own| own.record == record).filter(is_estimate).copied()
 }
 
 /// Whether the records differ in a shared number by more than chance.

@@ -82,10 +82,23 @@ pub(crate) fn name(
         exact_twins,
         other_causes: Vec::new(),
         first_state,
-        seen: is_of_records.then(|| "each record has numbers of its own".to_owned()),
+        seen: is_of_records.then(|| in_each_record(effect, index, (last, fit)).to_owned()),
         masked: Vec::new(),
         is_of_each_record: is_of_records,
         is_in_the_model: true,
+    }
+}
+
+/// What each record shows of an effect of its own.
+fn in_each_record(effect: &Shared, index: usize, (last, fit): (&Fitted, &ModelFit)) -> &'static str {
+    let own = numbers(effect, last.model.range(index), last, fit.covariance.as_deref());
+    let holds_zero = |rate: &Value| rate.interval_95.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0);
+    let is_offset =
+        effect.identifier() == Identifier::DRIFT && own.iter().filter(|number| number.name == "drift").all(holds_zero);
+    if is_offset {
+        "each record has an offset of its own, which none of them shows to change"
+    } else {
+        "each record has numbers of its own"
     }
 }
 

@@ -70,6 +70,8 @@ pub enum Remark {
         /// How many records these are.
         records: usize,
     },
+    /// The records are two in steady flows.
+    TwoSteadyFlows,
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,
     /// Something changes faster than a model of the whole record can follow.
@@ -121,7 +123,7 @@ impl Remark {
         match self {
             Self::SingleTone => 0,
             Self::Contradicted { .. } => 1,
-            Self::LagAlone | Self::NotOneRig { .. } => 2,
+            Self::LagAlone | Self::NotOneRig { .. } | Self::TwoSteadyFlows => 2,
             Self::BiasUnknown { .. } => 3,
             Self::VariesTooFast { .. } => 4,
             Self::ModelErrorAsNoise => 5,
@@ -230,6 +232,10 @@ impl fmt::Display for Remark {
                 "the model fits these records together, but the model of the others leaves more than noise in {}, left out in turn: it makes up for something that changes from record to record, and is no cause. Diagnose each record alone, \
                  and together those that were taken without a change of the rig",
                 counted_records(*records)
+            ),
+            Self::TwoSteadyFlows => f.write_str(
+                "two records in steady flows do not show that time constants go with the flow: where one of them is left out, the other \
+                 shows nothing of it. Diagnose three or more together, each in another flow",
             ),
             Self::Needless { effect } => write!(
                 f,

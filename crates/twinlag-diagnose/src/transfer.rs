@@ -7,7 +7,9 @@
 //! Of a single record errors are those of its blocks, and show how far the model carries within it. Nothing is taken out for them: a
 //! block may be hotter than all others, and what goes with temperature is then not tried on it but extrapolated to it.
 
-use twinlag_model::{Effort, Fitted, Identifier, Model, ModelError, OneRecord, Policy, Settings, Watch, report};
+use twinlag_model::{
+    Effort, Fitted, Identifier, Model, ModelError, Observations, OneRecord, Policy, Settings, Watch, report,
+};
 
 use crate::conclude::{is_explained, to_the_end};
 use crate::diagnose::searched;
@@ -66,18 +68,20 @@ pub(crate) struct Across {
     pub(crate) are_of_several_rigs: bool,
     /// Whether a noise is in the model of all: it may stand for what differs among them.
     has_noise: bool,
+    /// Whether they are two in steady flows: where one is left out, the other shows nothing of its flow.
+    are_two_steady_flows: bool,
 }
 
 impl Across {
     /// - `model`: of all records
-    /// - `samples`: of each record
     pub(crate) fn new(
         transfer: &Transfer,
         model: &Model,
-        samples: &[usize],
+        records: &[Observations],
         are_of_several_rigs: bool,
         policy: &Policy,
     ) -> Self {
+        let samples: Vec<usize> = records.iter().map(Observations::samples).collect();
         // The mean square of n numbers of unit variance has the standard deviation √(2/n).
         let chance = |samples: usize| (1.0 + FAR_DEVIATIONS * (2.0 / samples.max(1) as f64).sqrt()).sqrt();
         // Noise that a record has by itself is left over under any model. Chance and margin are shares of it.
@@ -98,7 +102,9 @@ impl Across {
             [record] => Some(record),
             _ => places(model).find_map(lacking),
         };
-        Self { unexplained, rests_on, are_of_several_rigs, has_noise: model.noise().is_some() }
+        let is_flow_steady = |record: &Observations| record.flow().is_some_and(|flow| !flow.changes());
+        let are_two_steady_flows = records.len() == 2 && records.iter().all(is_flow_steady);
+        Self { unexplained, rests_on, are_of_several_rigs, has_noise: model.noise().is_some(), are_two_steady_flows }
     }
 
     /// Whether the model is no cause of what the records show: those that had no part in finding it are not explained by it. One such
@@ -117,7 +123,9 @@ impl Across {
 
     /// What to know of records that a model fits together and does not explain.
     pub(crate) fn remark(&self) -> Option<Remark> {
-        self.is_refuted().then_some(Remark::NotOneRig { records: self.unexplained.len() })
+        let records = self.unexplained.len();
+        let remark = if self.are_two_steady_flows { Remark::TwoSteadyFlows } else { Remark::NotOneRig { records } };
+        self.is_refuted().then_some(remark)
     }
 
     /// Whether it is not known that a record is of one rig with the others, even if all of them are explained together.
@@ -236,6 +244,20 @@ pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watc
         state.apply(withdrawal);
     }
     state.compare_again()
+}
+
+/// Takes out all effects, noise aside, where the models of the others lower no error of records that were left out, and more than noise is
+/// left in all of them together: then nothing speaks for them but the fit that found them.
+pub(crate) fn withdraw_what_lowers_no_error(state: &mut State<'_>, transfer: &Transfer) {
+    let BeforeAfter { before, after } = transfer.normalised_rms;
+    if after < before {
+        return;
+    }
+    let gain = (before.powi(2) - after.powi(2)) * state.prepared.observations.samples() as f64;
+    while let Some(index) = state.current.model.effects.iter().rposition(|effect| !effect.is_noise()) {
+        let withdrawal = state.withdrawal(index, gain);
+        state.apply(withdrawal);
+    }
 }
 
 /// The effect, noise aside, that saves the least deviance on records which had no part in fitting it, and this deviance.

@@ -13,6 +13,7 @@ use twinlag_cross_relation::Z_975;
 
 use crate::dense;
 use crate::fit::{Effort, Fitted};
+use crate::normal::NormalEquations;
 use crate::observations::Observations;
 use crate::policy::Policy;
 use crate::selection::Selection;
@@ -25,6 +26,10 @@ const SCATTER_PROBABILITY: f64 = 0.05;
 /// Longest Newton step, in standard errors of the number that moves, over which the energy is taken for a parabola. Chosen: where records
 /// differ by noise alone, one number in 370 steps further, and is fitted in vain.
 const MAX_NEWTON_STEP_SE: f64 = 3.0;
+/// Variance inflation from which on a record is taken not to determine a number by itself: one over the share of its squared derivatives
+/// that those of the numbers before it do not make up. Chosen between what rounding leaves of derivatives that others make up
+/// wholly, 1e12 and more, and a record that shows a part in a thousand of a derivative by itself, 1e6.
+const MAX_VARIANCE_INFLATION: f64 = 1e8;
 /// Fewest records of which one can be said to contradict the others.
 const FEWEST_TO_CONTRADICT: usize = 3;
 
@@ -58,6 +63,8 @@ pub struct BetweenRecords {
     pub ratio: f64,
     /// Probability of at least as large a scatter if the model is right.
     pub p_value: f64,
+    /// Shared numbers that no record determines, but the differences between them alone: each takes up a degree of freedom.
+    pub determined_between: usize,
 }
 
 /// A record that contradicts the others on a number.
@@ -109,6 +116,11 @@ impl BetweenRecords {
     /// assert!(BetweenRecords::of(&[(0, 1.0, 0.1)]).is_none());
     /// ```
     pub fn of(values: &[(usize, f64, f64)]) -> Option<Self> {
+        Self::with_determined_between(values, 0)
+    }
+
+    /// As [`Self::of`], where the estimates hold numbers that only the differences between records determine.
+    fn with_determined_between(values: &[(usize, f64, f64)], determined_between: usize) -> Option<Self> {
         let own: Vec<OwnValue> = values
             .iter()
             .filter(|(_, value, error)| value.is_finite() && error.is_finite() && *error > 0.0)
@@ -118,10 +130,7 @@ impl BetweenRecords {
                 standard_error: *standard_error,
             })
             .collect();
-        if own.len() < 2 {
-            return None;
-        }
-        let dof = (own.len() - 1) as f64;
+        let dof = own.len().checked_sub(1 + determined_between).filter(|dof| *dof > 0)? as f64;
         let (_, at_rest) = scatter(&own, 0.0);
         let p_value = ChiSquared::new(dof).map_or(1.0, |chi2| chi2.sf(at_rest));
         let does_vary = p_value < SCATTER_PROBABILITY;
@@ -137,6 +146,7 @@ impl BetweenRecords {
             interval_95: [mean - half, mean + half],
             ratio: (at_rest / dof).sqrt(),
             p_value,
+            determined_between,
             own,
         })
     }
@@ -154,7 +164,7 @@ impl BetweenRecords {
     /// Records that contradict all the others together, by chance once in `1/probability` numbers.
     pub fn contradicted(&self, probability: f64) -> Vec<Contradicted> {
         let records = self.own.len();
-        if records < FEWEST_TO_CONTRADICT {
+        if records < FEWEST_TO_CONTRADICT + self.determined_between {
             return Vec::new();
         }
         let of = |place: usize| {
@@ -165,10 +175,10 @@ impl BetweenRecords {
                 .filter(|other| other.record != own.record)
                 .map(|other| (other.record, other.value, other.standard_error))
                 .collect();
-            let others = Self::of(&others)?;
+            let others = Self::with_determined_between(&others, self.determined_between)?;
             let spread = others.standard_error.hypot(others.standard_deviation);
             let deviations = (own.value - others.mean).abs() / own.standard_error.hypot(spread);
-            let student = StudentsT::new(0.0, 1.0, (records - 2) as f64).ok()?;
+            let student = StudentsT::new(0.0, 1.0, (records - 2 - self.determined_between) as f64).ok()?;
             let p_value = 2.0 * student.sf(deviations);
             let is_far = p_value * (records as f64) < probability;
             is_far.then_some(Contradicted { own, others: others.mean, others_error: others.standard_error, p_value })
@@ -231,6 +241,8 @@ pub(crate) fn between(fitted: &Fitted, observations: &Observations, selection: &
             Some((member.number, estimate))
         })
         .collect();
+    let is_held_in_all = |i: &usize| !own.is_empty() && own.iter().all(|(_, own)| own.held.contains(i));
+    let determined_between = (0..fitted.theta.len()).filter(|i| is_shared(*i)).filter(is_held_in_all).count();
     let of = |sum: &[(usize, f64)]| {
         let values: Vec<(usize, f64, f64)> = own
             .iter()
@@ -241,7 +253,7 @@ pub(crate) fn between(fitted: &Fitted, observations: &Observations, selection: &
                 (*record, value, variance.max(0.0).sqrt())
             })
             .collect();
-        BetweenRecords::of(&values)
+        BetweenRecords::with_determined_between(&values, determined_between)
     };
     let parameters = (0..fitted.theta.len()).map(|i| if is_shared(i) { of(&[(i, 1.0)]) } else { None }).collect();
     Some(Between { parameters, difference: of(&[(0, -1.0), (1, 1.0)]) })
@@ -256,6 +268,8 @@ fn is_of_noise(fitted: &Fitted, parameter: usize) -> bool {
 struct OwnEstimate {
     theta: Vec<f64>,
     covariance: Vec<Vec<f64>>,
+    /// Parameters that the record does not determine: they are as in the joint fit.
+    held: Vec<usize>,
 }
 
 impl OwnEstimate {
@@ -276,8 +290,12 @@ impl OwnEstimate {
                 step.powi(2) <= MAX_NEWTON_STEP_SE.powi(2) * estimate.covariance[i][i]
             })
         };
-        let by_step = Self::by_newton_step(joint, observations, selection)?;
-        if is_near(&by_step, joint) {
+        let NormalEquations { products, .. } =
+            joint.model.normal_equations(&joint.theta, observations, selection, None);
+        let mut joint = joint.clone();
+        joint.model.held = undetermined(&products);
+        let by_step = Self::by_newton_step(&joint, observations, selection)?;
+        if is_near(&by_step, &joint) {
             return Some(by_step);
         }
         let own = Fitted {
@@ -296,8 +314,28 @@ impl OwnEstimate {
             step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias);
         }
         let covariance = covariance(fitted, observations, selection, false)?;
-        Some(Self { theta: theta.iter().zip(step).map(|(theta, step)| theta - step).collect(), covariance })
+        let theta = theta.iter().zip(step).map(|(theta, step)| theta - step).collect();
+        Some(Self { theta, covariance, held: model.held.clone() })
     }
+}
+
+/// Parameters whose derivatives those of the parameters before them make up, to rounding.
+///
+/// - `products`: of the derivatives with each other
+fn undetermined(products: &[Vec<f64>]) -> Vec<usize> {
+    let (mut determined, mut out): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
+    for i in (0..products.len()).filter(|i| products[*i][*i] > 0.0) {
+        let tried: Vec<usize> = determined.iter().copied().chain([i]).collect();
+        let part: Vec<Vec<f64>> = tried.iter().map(|a| tried.iter().map(|b| products[*a][*b]).collect()).collect();
+        let last = tried.len() - 1;
+        let inflation = dense::inverse(&part).map(|inverse| inverse[last][last] * products[i][i]);
+        if inflation.is_some_and(|inflation| inflation < MAX_VARIANCE_INFLATION) {
+            determined = tried;
+        } else {
+            out.push(i);
+        }
+    }
+    out
 }
 
 /// Shared numbers that a record contradicts, each with its place among the parameters; the difference has none.
@@ -348,6 +386,30 @@ mod tests {
         let [with, without] = [&four[..], &three[..]].map(|v| BetweenRecords::of(v).expect("several"));
         assert!((with.mean - without.mean).abs() < 1e-4, "{} {}", with.mean, without.mean);
         assert_eq!(BetweenRecords::of(&[(0, 1.0, 0.1), (1, f64::NAN, 0.1), (2, 1.0, 0.0)]), None);
+    }
+
+    /// The third derivative is the sum of the others, the fourth one but for a hundredth; the fifth is none.
+    #[test]
+    fn what_others_make_up_is_not_determined() {
+        let columns: Vec<Vec<f64>> = vec![
+            vec![1.0, 0.0, 2.0, 0.0],
+            vec![0.0, 1e3, 1e3, 0.0],
+            vec![1.0, 1e3, 1002.0, 0.0],
+            vec![1.0, 0.0, 2.0, 0.02],
+            vec![0.0; 4],
+        ];
+        assert_eq!(undetermined(&dense::gram(&columns)), [2]);
+    }
+
+    /// Three values of which two numbers were made: one of them by the differences alone, so that one degree of freedom is left.
+    #[test]
+    fn numbers_that_differences_determine_take_degrees_of_freedom() {
+        let values = [(0, 1.0, 0.1), (1, 1.3, 0.1), (2, 0.9, 0.1)];
+        let of = |between| BetweenRecords::with_determined_between(&values, between);
+        let [all, fewer] = [of(0), of(1)].map(|between| between.expect("three records"));
+        assert!((fewer.ratio / all.ratio - 2.0_f64.sqrt()).abs() < 1e-12);
+        assert_eq!((all.standard_deviation > 0.0, of(2)), (true, None));
+        assert!(fewer.contradicted(0.9).is_empty());
     }
 
     /// Of five records one is off by fifty standard errors: it contradicts the others, and none of these does.

@@ -44,15 +44,17 @@ pub struct Model {
     noise_std_k: [f64; 2],
     /// Whether the effects stay as they are, and the time constants alone are fitted.
     pub(crate) is_frozen: bool,
+    /// Parameters, by their places, that stay as they are because the observations do not determine them.
+    pub(crate) held: Vec<usize>,
 }
 
 impl fmt::Debug for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { effects, known, noise_std_k, is_frozen } = self;
+        let Self { effects, known, noise_std_k, is_frozen, held } = self;
         let effects: Vec<&str> = effects.iter().map(|e| e.identifier().name()).collect();
         let mut out = f.debug_struct("Model");
         out.field("effects", &effects).field("known", known).field("noise_std_k", noise_std_k);
-        out.field("is_frozen", is_frozen).finish()
+        out.field("is_frozen", is_frozen).field("held", held).finish()
     }
 }
 
@@ -62,7 +64,7 @@ impl Model {
     /// - `known`: what is known of the time constants beforehand
     /// - `noise_std_k`: white noise of the channels, K
     pub fn new(known: &[KnownTimeConstant], noise_std_k: [f64; 2]) -> Self {
-        Self { effects: Vec::new(), known: known.to_vec(), noise_std_k, is_frozen: false }
+        Self { effects: Vec::new(), known: known.to_vec(), noise_std_k, is_frozen: false, held: Vec::new() }
     }
 
     /// This model and one more effect.
@@ -345,7 +347,7 @@ impl Model {
         };
         let mut out = vec![tau(0), tau(1)];
         out.extend(self.parameters().map(|p| p.variable.clone()));
-        for i in self.of_other_records(observations) {
+        for i in self.of_other_records(observations).into_iter().chain(self.held.iter().copied()) {
             out[i] = out[i].clone().held_at(theta[i]);
         }
         for (index, effect) in self.effects.iter().enumerate() {

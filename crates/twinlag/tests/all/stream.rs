@@ -104,6 +104,13 @@ fn records_in_steady_flows_share_an_exponent_and_the_flow_of_their_time_constant
     assert!((mean.value.expect("measured") / mean_m_s - 1.0).abs() < 1e-12, "{mean:?}");
     let at_mean_s = TRUTH_S.map(|tau_s| tau_s * (mean_m_s / 12.0).powf(-0.5));
     recovers(&answer.last, at_mean_s, 4.0);
+    // Each record by itself, with the exponent of all: in its steady flow it does not show one.
+    for record in &answer.records {
+        for (own, truth_s) in record.time_constants.iter().zip(at_mean_s) {
+            let own = own.expect("the record determines it");
+            assert!((own.value_s - truth_s).abs() < 4.0 * own.standard_error_s, "{own:?}, {truth_s} s");
+        }
+    }
     // Another record in another steady flow, with that model: at the flow of the model.
     let other = characterise_with(&in_steady_flow(4, 9.0), &answer.model(), &Options::default()).expect("a record");
     recovers(&other, at_mean_s, 4.0);
@@ -132,6 +139,7 @@ fn two_records_in_steady_flows_are_one_too_few() {
         answer.effects
     );
     assert!(answer.last.sensors.iter().all(|sensor| sensor.time_constant_s.is_none()));
+    assert!(answer.remarks.iter().any(|remark| remark.contains("three or more")), "{:?}", answer.remarks);
 }
 
 #[test]
