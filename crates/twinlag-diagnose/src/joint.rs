@@ -125,15 +125,10 @@ pub fn diagnose_records(
     if records.len() < 2 {
         return Err(ModelError::TooFewRecords { records: records.len() });
     }
-    let (mut state, tones) = searched(&Observations::joined(records)?, settings, watch)?;
-    withdraw_what_does_not_transfer(&mut state, watch)?;
-    let transfer = transfer(&state, settings, watch)?;
+    let without_noise = without_noise(settings);
+    let Look { mut state, tones, transfer, are_explained } = look(records, settings, &without_noise, watch)?;
     let noise_std_k: Vec<[f64; 2]> = records_noise_k(&state);
-    let is_whole = is_explained(&state, settings);
-    if !is_whole {
-        withdraw_what_lowers_no_error(&mut state, &transfer);
-    }
-    let is_one_rig = is_whole && !state.has_noise();
+    let is_one_rig = are_explained && !state.has_noise();
     let odd = if is_one_rig { None } else { OddOne::find(&state, &transfer, settings, watch)? };
     if let Some(odd) = odd.as_ref().filter(|odd| odd.differs()) {
         odd.withdraw_what_neither_needs(&mut state);
@@ -179,6 +174,60 @@ pub fn diagnose_records(
     };
     let records = (0..records.len()).map(of).collect();
     Ok(JointDiagnosis { diagnosis, records, transfer })
+}
+
+/// The loop over all records, and what it finds on records that were left out.
+struct Look<'a> {
+    state: State<'a>,
+    tones: Option<usize>,
+    transfer: Transfer,
+    /// Whether what was found explains them together.
+    are_explained: bool,
+}
+
+impl<'a> Look<'a> {
+    fn at(joined: &Observations, settings: &'a Settings, watch: Watch<'a>) -> Result<Self, ModelError> {
+        let (mut state, tones) = searched(joined, settings, watch)?;
+        withdraw_what_does_not_transfer(&mut state, watch)?;
+        let transfer = transfer(&state, settings, watch)?;
+        let are_explained = is_explained(&state, settings);
+        if !are_explained {
+            withdraw_what_lowers_no_error(&mut state, &transfer);
+        }
+        Ok(Self { state, tones, transfer, are_explained })
+    }
+
+    fn is_refuted(&self, records: &[Observations], policy: &Policy) -> bool {
+        Across::new(&self.transfer, &self.state.current.model, records, false, policy).is_refuted()
+    }
+}
+
+/// Looks at all records, and once more without noise where one was found that does not hold on records which were left out: a noise that is
+/// found first may stand for several effects, none of which helps beside it. What that finds counts where it explains the records and
+/// holds on each.
+fn look<'a>(
+    records: &[Observations],
+    settings: &'a Settings,
+    without_noise: &'a Settings,
+    watch: Watch<'a>,
+) -> Result<Look<'a>, ModelError> {
+    let (joined, policy) = (Observations::joined(records)?, &settings.policy);
+    let first = Look::at(&joined, settings, watch)?;
+    if !first.state.has_noise() || !first.is_refuted(records, policy) {
+        return Ok(first);
+    }
+    let mut second = Look::at(&joined, without_noise, watch)?;
+    if !second.are_explained || second.is_refuted(records, policy) {
+        return Ok(first);
+    }
+    second.state.begin_with_withdrawn_noise(&first.state);
+    Ok(second)
+}
+
+/// The same, with no noise among the effects that may be named.
+fn without_noise(settings: &Settings) -> Settings {
+    let effects = settings.effects.iter().copied().filter(|effect| !effect.is_noise()).collect();
+    Settings { effects, ..settings.clone() }
 }
 
 /// A time constant as a record has it by itself; `None` where it is so uncertain that it is no estimate.

@@ -411,6 +411,19 @@ impl<'a> State<'a> {
         Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
+    /// Puts down before all moves that a noise was added in another search, and taken out again.
+    pub(crate) fn begin_with_withdrawn_noise(&mut self, other: &State<'_>) {
+        let is_noise = |entry: &&Move| matches!(entry, Move::Add { effect, .. } if effect.is_noise());
+        let added = other.moves.iter().filter(is_noise).take(1).cloned();
+        let with_withdrawal = added.flat_map(|entry| {
+            let Move::Add { effect, channel, .. } = &entry else { return vec![] };
+            let withdrawal = Move::Withdraw { effect: *effect, channel: *channel, gain: 0.0 };
+            vec![entry, withdrawal]
+        });
+        let moves = with_withdrawal.chain(std::mem::take(&mut self.moves)).collect();
+        self.moves = moves;
+    }
+
     fn removal(&self, index: usize, without: Fitted, loss: Option<f64>) -> Proposal {
         let effect = &self.taken[index].candidate.effect;
         let entry = Move::Remove { effect: effect.identifier(), channel: effect.channel(), loss };
