@@ -197,14 +197,15 @@ impl<'a> Look<'a> {
         Ok(Self { state, tones, transfer, are_explained })
     }
 
-    fn is_refuted(&self, records: &[Observations], policy: &Policy) -> bool {
-        Across::new(&self.transfer, &self.state.current.model, records, false, policy).is_refuted()
+    /// Whether what was found explains the records together, and holds on each that was left out.
+    fn holds(&self, records: &[Observations], policy: &Policy) -> bool {
+        let across = Across::new(&self.transfer, &self.state.current.model, records, false, policy);
+        self.are_explained && !across.is_refuted()
     }
 }
 
-/// Looks at all records, and once more without noise where one was found that does not hold on records which were left out: a noise that is
-/// found first may stand for several effects, none of which helps beside it. What that finds counts where it explains the records and
-/// holds on each.
+/// Looks at all records, and once more without noise where one was found and what was found does not hold: a noise that is found first may
+/// stand for several effects, none of which helps beside it. What that finds counts where it holds.
 fn look<'a>(
     records: &[Observations],
     settings: &'a Settings,
@@ -213,11 +214,11 @@ fn look<'a>(
 ) -> Result<Look<'a>, ModelError> {
     let (joined, policy) = (Observations::joined(records)?, &settings.policy);
     let first = Look::at(&joined, settings, watch)?;
-    if !first.state.has_noise() || !first.is_refuted(records, policy) {
+    if !first.state.has_noise() || first.holds(records, policy) {
         return Ok(first);
     }
     let mut second = Look::at(&joined, without_noise, watch)?;
-    if !second.are_explained || second.is_refuted(records, policy) {
+    if !second.holds(records, policy) {
         return Ok(first);
     }
     second.state.begin_with_withdrawn_noise(&first.state);

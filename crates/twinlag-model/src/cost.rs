@@ -730,14 +730,17 @@ mod tests {
         let [steady, nearly] = [Kind::Steady, Kind::NearlySteady].map(|kind| {
             let record = record(kind);
             let selection = selection(&record);
-            let of = |effect: Shared| {
+            let of = |effect: Shared, off: f64| {
                 let model = Model::new(&[], [0.05, 0.07]).with(effect.clone());
-                let off = effect.starts().remove(0).into_iter().map(|x| x + 0.3);
-                let theta: Vec<f64> = TAU_S.into_iter().chain(off).collect();
+                let values = effect.starts().remove(0).into_iter().map(|x| x + off);
+                let theta: Vec<f64> = TAU_S.into_iter().chain(values).collect();
                 let lin = ResidualCost::new(&model, &theta, &record, &selection).into_linearised(&theta, 0);
                 [vec![lin.residual], lin.columns].concat()
             };
-            candidates(&of_flow, &context(&record)).into_iter().map(of).collect::<Vec<_>>()
+            let effects = candidates(&of_flow, &context(&record));
+            // A negative delay leads out of a record at its first sample.
+            let both_ways = |effect: Shared| [of(effect.clone(), 0.3), of(effect, -0.7)];
+            effects.into_iter().flat_map(both_ways).collect::<Vec<_>>()
         });
         assert_eq!(steady.len(), nearly.len());
         for (i, (got, want)) in steady.iter().zip(&nearly).enumerate() {

@@ -148,10 +148,14 @@ impl Flow {
         (run, before, after, share)
     }
 
-    /// The last run that begins before an instant; the first one where none does.
+    /// The run that an instant is in, or that is nearest to it: a delay leads out of a stretch at its ends.
     fn run_at(&self, time_s: f64) -> &Run {
-        let later = self.runs.partition_point(|run| run.time_s.at(0) <= time_s);
-        &self.runs[later.saturating_sub(1)]
+        let next = self.runs.partition_point(|run| run.time_s.at(0) <= time_s);
+        let before = &self.runs[next.saturating_sub(1)];
+        match self.runs.get(next) {
+            Some(run) if run.time_s.at(0) - time_s < time_s - before.time_s.at(before.time_s.len() - 1) => run,
+            _ => before,
+        }
     }
 
     /// Whether its size or its direction changes by more than rounding.
@@ -163,5 +167,29 @@ impl Flow {
     /// Whether it is the same, to the last bit, in all of the stretch that an instant is of.
     pub(crate) fn is_steady_around(&self, time_s: f64) -> bool {
         self.run_at(time_s).is_steady
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two stretches, 100 s apart; what lies between them is as at the nearer end.
+    #[test]
+    fn each_stretch_has_its_own_flow() {
+        let (early, late) = (Instants::even(0.0, 1.0, 11), Instants::even(110.0, 1.0, 11));
+        let rising: Vec<f64> = (0..11).map(|k| 4.0 + f64::from(k)).collect();
+        let flow = Flow::new(FlowKind::Flow, &[(&early, &[2.0; 11]), (&late, &rising)]).expect("positive");
+        let ratio = |time_s: f64| flow.log_ratio_at(time_s).exp() * flow.reference();
+        // To the rounding of logarithms of order one.
+        for (time_s, want) in
+            [(-5.0, 2.0), (3.3, 2.0), (10.1, 2.0), (59.0, 2.0), (61.0, 4.0), (109.9, 4.0), (130.0, 14.0)]
+        {
+            assert!((ratio(time_s) / want - 1.0).abs() < 1e-14, "{time_s} s: {}", ratio(time_s));
+        }
+        // Straight in the logarithm.
+        assert!((ratio(110.5) / 20.0_f64.sqrt() - 1.0).abs() < 1e-14);
+        assert!(flow.is_steady_around(10.1) && !flow.is_steady_around(109.9) && flow.changes());
+        assert_eq!(flow.inverse_ratio_rate_at(10.0), 0.0);
     }
 }

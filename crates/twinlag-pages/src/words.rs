@@ -111,7 +111,24 @@ fn contradiction_in_words(record: &RecordAnswer) -> Vec<String> {
         )
     };
     out.extend(record.disagreements.iter().map(of));
+    if are_exchanged(&record.disagreements) {
+        out.push(format!(
+            "{source} gives the time constants of {others} the other way round: its columns seem to be exchanged"
+        ));
+    }
     out
+}
+
+/// Whether a record has each time constant that the others have of the other sensor, within four standard errors.
+fn are_exchanged(disagreements: &[DisagreementAnswer]) -> bool {
+    let mut time_constants = disagreements.iter().filter(|one| one.of.is_none());
+    let is_that_of = |one: &DisagreementAnswer, other: &DisagreementAnswer| {
+        (one.value - other.others).abs() < 4.0 * one.standard_error.hypot(other.others_standard_error)
+    };
+    match [time_constants.next(), time_constants.next()] {
+        [Some(first), Some(second)] => is_that_of(first, second) && is_that_of(second, first),
+        _ => false,
+    }
 }
 
 /// Whether a time constant is what was expected of it, and what it would take where it is not.
@@ -246,5 +263,25 @@ pub(crate) fn question(test: TestName) -> &'static str {
         TestName::RepeatedValues => "Do readings equal the one before no more often than noise explains?",
         TestName::Calibration => "Do both sensors agree at rest?",
         _ => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exchanged_columns_are_recognised() {
+        let one = |name: &str, value: f64, others: f64| -> DisagreementAnswer {
+            let answer = serde_json::json!({
+                "of": null, "name": name, "value": value, "standard_error": 0.001, "others": others,
+                "others_standard_error": 0.001, "unit": "s", "p_value": 1e-9
+            });
+            serde_json::from_value(answer).expect("a disagreement")
+        };
+        let exchanged = [one("fine", 0.4506, 0.1202), one("coarse", 0.1204, 0.4499)];
+        assert!(are_exchanged(&exchanged));
+        assert!(!are_exchanged(&exchanged[..1]));
+        assert!(!are_exchanged(&[one("fine", 0.4506, 0.1202), one("coarse", 0.13, 0.4499)]));
     }
 }
