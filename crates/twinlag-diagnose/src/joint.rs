@@ -5,7 +5,7 @@ use twinlag_model::{
     Value, Watch,
 };
 
-use crate::conclude::{conclude, is_explained};
+use crate::conclude::{conclude, is_explained, leaves_more_than_noise};
 use crate::diagnose::searched;
 use crate::diagnosis::{Diagnosis, Verdict};
 use crate::moves::State;
@@ -197,10 +197,11 @@ impl<'a> Look<'a> {
         Ok(Self { state, tones, transfer, are_explained })
     }
 
-    /// Whether what was found explains the records together, and holds on each that was left out.
-    fn holds(&self, records: &[Observations], policy: &Policy) -> bool {
-        let across = Across::new(&self.transfer, &self.state.current.model, records, false, policy);
-        self.are_explained && !across.is_refuted()
+    /// Whether only noise is left with what was found, in the records together and in each that was left out. More effects than explain a
+    /// record do.
+    fn holds(&self, records: &[Observations], settings: &Settings) -> bool {
+        let across = Across::new(&self.transfer, &self.state.current.model, records, false, &settings.policy);
+        !across.is_refuted() && (self.are_explained || !leaves_more_than_noise(&self.state, settings))
     }
 }
 
@@ -212,13 +213,13 @@ fn look<'a>(
     without_noise: &'a Settings,
     watch: Watch<'a>,
 ) -> Result<Look<'a>, ModelError> {
-    let (joined, policy) = (Observations::joined(records)?, &settings.policy);
+    let joined = Observations::joined(records)?;
     let first = Look::at(&joined, settings, watch)?;
-    if !first.state.has_noise() || first.holds(records, policy) {
+    if !first.state.has_noise() || first.holds(records, settings) {
         return Ok(first);
     }
     let mut second = Look::at(&joined, without_noise, watch)?;
-    if !second.holds(records, policy) {
+    if !second.holds(records, settings) {
         return Ok(first);
     }
     second.state.begin_with_withdrawn_noise(&first.state);
