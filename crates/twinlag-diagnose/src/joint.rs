@@ -57,7 +57,8 @@ pub struct OfRecord {
     pub left_out: LeftOut,
     /// Noise of its channels, K.
     pub noise_std_k: [f64; 2],
-    /// What it says of each time constant by itself, the rest of the model at its best; `None` where it says nothing.
+    /// What it says of each time constant by itself, the rest of the model at its best; `None` where it says nothing, or so little that the
+    /// standard error is no less than [`Policy::vague_log_std`] of the value.
     pub time_constants_s: [Option<OwnValue>; 2],
     /// Numbers of its own; none where more than noise is left over.
     pub own: Vec<OwnNumber>,
@@ -222,11 +223,11 @@ fn look<'a>(
     if !second.holds(records, settings) {
         return Ok(first);
     }
-    second.state.begin_with_withdrawn_noise(&first.state);
+    second.state.begin_with_removed_noise(&first.state);
     Ok(second)
 }
 
-/// The same, with no noise among the effects that may be named.
+/// Settings without noise among the effects that may be named.
 fn without_noise(settings: &Settings) -> Settings {
     let effects = settings.effects.iter().copied().filter(|effect| !effect.is_noise()).collect();
     Settings { effects, ..settings.clone() }

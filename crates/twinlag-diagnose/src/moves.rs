@@ -85,7 +85,7 @@ pub enum Move {
         effect: Identifier,
         /// Its channel, 0 or 1; `None` where it is of both, or relative.
         channel: Option<usize>,
-        /// Deviance that it saves there, not above 0.
+        /// Deviance that it saves there, not above 0: it alone, or all effects that were taken out together.
         gain: f64,
     },
     /// Of delays that fit as well as the best, the shortest was taken.
@@ -411,17 +411,15 @@ impl<'a> State<'a> {
         Proposal { entry, change: Change::Drop(index, Box::new(without)) }
     }
 
-    /// Puts down before all moves that a noise was added in another search, and taken out again.
-    pub(crate) fn begin_with_withdrawn_noise(&mut self, other: &State<'_>) {
-        let is_noise = |entry: &&Move| matches!(entry, Move::Add { effect, .. } if effect.is_noise());
-        let added = other.moves.iter().filter(is_noise).take(1).cloned();
-        let with_withdrawal = added.flat_map(|entry| {
-            let Move::Add { effect, channel, .. } = &entry else { return vec![] };
-            let withdrawal = Move::Withdraw { effect: *effect, channel: *channel, gain: 0.0 };
-            vec![entry, withdrawal]
+    /// Puts the noise that another search added, and its removal, before all moves.
+    pub(crate) fn begin_with_removed_noise(&mut self, other: &State<'_>) {
+        let noise = other.moves.iter().find_map(|entry| match entry {
+            Move::Add { effect, channel, .. } if effect.is_noise() => Some((entry.clone(), *effect, *channel)),
+            _ => None,
         });
-        let moves = with_withdrawal.chain(std::mem::take(&mut self.moves)).collect();
-        self.moves = moves;
+        if let Some((added, effect, channel)) = noise {
+            self.moves.splice(0..0, [added, Move::Remove { effect, channel, loss: None }]);
+        }
     }
 
     fn removal(&self, index: usize, without: Fitted, loss: Option<f64>) -> Proposal {

@@ -93,10 +93,10 @@ pub(crate) fn name(
 fn in_each_record(effect: &Shared, index: usize, (last, fit): (&Fitted, &ModelFit)) -> &'static str {
     let own = numbers(effect, last.model.range(index), last, fit.covariance.as_deref());
     let holds_zero = |rate: &Value| rate.interval_95.is_some_and(|[low, high]| low <= 0.0 && high >= 0.0);
-    let is_offset =
-        effect.identifier() == Identifier::DRIFT && own.iter().filter(|number| number.name == "drift").all(holds_zero);
+    let mut rates = own.iter().filter(|number| number.name == "drift").peekable();
+    let is_offset = effect.identifier() == Identifier::DRIFT && rates.peek().is_some() && rates.all(holds_zero);
     if is_offset {
-        "each record has an offset of its own, which none of them shows to change"
+        "each record has an offset of its own; none shows that it changes within a record"
     } else {
         "each record has numbers of its own"
     }

@@ -70,7 +70,7 @@ pub enum Remark {
         /// How many records these are.
         records: usize,
     },
-    /// The records are two in steady flows.
+    /// The records are two, each in a steady flow of its own.
     TwoSteadyFlows,
     /// What was taken for noise goes with the gas.
     ModelErrorAsNoise,

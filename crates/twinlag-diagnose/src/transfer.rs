@@ -68,7 +68,7 @@ pub(crate) struct Across {
     pub(crate) are_of_several_rigs: bool,
     /// Whether a noise is in the model of all: it may stand for what differs among them.
     has_noise: bool,
-    /// Whether they are two in steady flows: where one is left out, the other shows nothing of its flow.
+    /// Whether the records are two, each in a steady flow of its own: the other shows nothing of the flow of one that is left out.
     are_two_steady_flows: bool,
 }
 
@@ -102,8 +102,10 @@ impl Across {
             [record] => Some(record),
             _ => places(model).find_map(lacking),
         };
-        let is_flow_steady = |record: &Observations| record.flow().is_some_and(|flow| !flow.changes());
-        let are_two_steady_flows = records.len() == 2 && records.iter().all(is_flow_steady);
+        let are_two_steady_flows = match records {
+            [one, other] => one.flow().zip(other.flow()).is_some_and(|(one, other)| one.is_another_than(other)),
+            _ => false,
+        };
         Self { unexplained, rests_on, are_of_several_rigs, has_noise: model.noise().is_some(), are_two_steady_flows }
     }
 
@@ -125,7 +127,7 @@ impl Across {
     pub(crate) fn remark(&self) -> Option<Remark> {
         let records = self.unexplained.len();
         let remark = if self.are_two_steady_flows { Remark::TwoSteadyFlows } else { Remark::NotOneRig { records } };
-        self.is_refuted().then_some(remark)
+        Some(remark).filter(|_| self.is_refuted())
     }
 
     /// Whether it is not known that a record is of one rig with the others, even if all of them are explained together.
@@ -246,11 +248,12 @@ pub(crate) fn withdraw_what_does_not_transfer(state: &mut State<'_>, watch: Watc
     state.compare_again()
 }
 
-/// Takes out all effects, noise aside, where the models of the others lower no error of records that were left out, and more than noise is
-/// left in all of them together: then nothing speaks for them but the fit that found them.
+/// Takes out all effects, noise aside, where the models of the others lower no error of the records that were left out: nothing speaks for
+/// them then but the fit that found them. For records that are not explained together. Each withdrawal has the gain of all of
+/// these effects: they are judged together.
 pub(crate) fn withdraw_what_lowers_no_error(state: &mut State<'_>, transfer: &Transfer) {
     let BeforeAfter { before, after } = transfer.normalised_rms;
-    if after < before {
+    if after.is_nan() || after < before {
         return;
     }
     let gain = (before.powi(2) - after.powi(2)) * state.prepared.observations.samples() as f64;

@@ -26,9 +26,9 @@ const SCATTER_PROBABILITY: f64 = 0.05;
 /// Longest Newton step, in standard errors of the number that moves, over which the energy is taken for a parabola. Chosen: where records
 /// differ by noise alone, one number in 370 steps further, and is fitted in vain.
 const MAX_NEWTON_STEP_SE: f64 = 3.0;
-/// Variance inflation from which on a record is taken not to determine a number by itself: one over the share of its squared derivatives
-/// that those of the numbers before it do not make up. Chosen between what rounding leaves of derivatives that others make up
-/// wholly, 1e12 and more, and a record that shows a part in a thousand of a derivative by itself, 1e6.
+/// Variance inflation above which a record is taken not to determine a number: `1/(1 − R²)` of its derivative regressed on those of the
+/// numbers before it. Chosen between 1e12, which rounding leaves where `R² = 1` and where [`dense::inverse`] gives up, and 1e6, where a
+/// thousandth of the derivative is its own.
 const MAX_VARIANCE_INFLATION: f64 = 1e8;
 /// Fewest records of which one can be said to contradict the others.
 const FEWEST_TO_CONTRADICT: usize = 3;
@@ -63,7 +63,9 @@ pub struct BetweenRecords {
     pub ratio: f64,
     /// Probability of at least as large a scatter if the model is right.
     pub p_value: f64,
-    /// Shared numbers that no record determines, but the differences between them alone: each takes up a degree of freedom.
+    /// Shared numbers that no record determines by itself, but only the differences between records. The scatter of every number has one
+    /// degree of freedom less for each of them. That is too few for numbers which they do not move, so that intervals are long rather
+    /// than short.
     pub determined_between: usize,
 }
 
@@ -388,17 +390,19 @@ mod tests {
         assert_eq!(BetweenRecords::of(&[(0, 1.0, 0.1), (1, f64::NAN, 0.1), (2, 1.0, 0.0)]), None);
     }
 
-    /// The third derivative is the sum of the others, the fourth one but for a hundredth; the fifth is none.
+    /// The third derivative is the sum of the others. Of the fourth a thousandth is its own, of the fifth a hundred-thousandth; the sixth is
+    /// none.
     #[test]
     fn what_others_make_up_is_not_determined() {
         let columns: Vec<Vec<f64>> = vec![
-            vec![1.0, 0.0, 2.0, 0.0],
-            vec![0.0, 1e3, 1e3, 0.0],
-            vec![1.0, 1e3, 1002.0, 0.0],
-            vec![1.0, 0.0, 2.0, 0.02],
+            vec![1.0, 0.0, 0.0, 0.0],
+            vec![0.0, 1e3, 0.0, 0.0],
+            vec![1.0, 1e3, 0.0, 0.0],
+            vec![1.0, 0.0, 1e-3, 0.0],
+            vec![1.0, 0.0, 0.0, 1e-5],
             vec![0.0; 4],
         ];
-        assert_eq!(undetermined(&dense::gram(&columns)), [2]);
+        assert_eq!(undetermined(&dense::gram(&columns)), [2, 4]);
     }
 
     /// Three values of which two numbers were made: one of them by the differences alone, so that one degree of freedom is left.
@@ -408,8 +412,9 @@ mod tests {
         let of = |between| BetweenRecords::with_determined_between(&values, between);
         let [all, fewer] = [of(0), of(1)].map(|between| between.expect("three records"));
         assert!((fewer.ratio / all.ratio - 2.0_f64.sqrt()).abs() < 1e-12);
-        assert_eq!((all.standard_deviation > 0.0, of(2)), (true, None));
-        assert!(fewer.contradicted(0.9).is_empty());
+        assert_eq!(of(2), None);
+        // By the scatter alone the second record is at odds with the others.
+        assert!(!all.contradicted(0.9).is_empty() && fewer.contradicted(0.9).is_empty());
     }
 
     /// Of five records one is off by fifty standard errors: it contradicts the others, and none of these does.

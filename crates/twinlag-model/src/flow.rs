@@ -76,7 +76,7 @@ impl Flow {
         let run = |(time_s, values): &(&Instants, &[f64])| {
             let log_ratio: Vec<f64> = values.iter().map(|v| log_size(*v) - log_mean).collect();
             let inverse_ratio = log_ratio.iter().zip(*values).map(|(l, v)| (-l).exp().copysign(*v)).collect();
-            let is_steady = values.iter().all(|v| *v == values[0]);
+            let is_steady = values.iter().all(|v| v.to_bits() == values[0].to_bits());
             Run { time_s: Instants::clone(time_s), log_ratio, inverse_ratio, is_steady }
         };
         let runs = stretches.iter().filter(|(_, values)| !values.is_empty()).map(run).collect();
@@ -105,14 +105,16 @@ impl Flow {
         self.reference
     }
 
-    /// `ln(v/v_ref)` of its size at an instant, on straight lines between the samples of a stretch, and as at its ends beyond these.
+    /// `ln(v/v_ref)` of its size at an instant: on straight lines between the samples of a stretch, and beyond its ends as at the nearest
+    /// end of any.
     pub fn log_ratio_at(&self, time_s: f64) -> f64 {
         let (run, before, after, share) = self.place(time_s);
         let [from, to] = [run.log_ratio[before], run.log_ratio[after]];
         from + share * (to - from)
     }
 
-    /// `v_ref/v` with its sign at an instant, in the same way.
+    /// `v_ref/v` with its sign at an instant: on straight lines between the samples of a stretch, and beyond its ends as at the nearest end
+    /// of any.
     pub(crate) fn inverse_ratio_at(&self, time_s: Number) -> Number {
         let (run, before, after, share) = self.place(time_s.re);
         let [from, to] = [run.inverse_ratio[before], run.inverse_ratio[after]];
@@ -158,6 +160,12 @@ impl Flow {
         }
     }
 
+    /// Whether two steady flows are different ones, by more than rounding; `false` where either changes.
+    pub fn is_another_than(&self, other: &Self) -> bool {
+        let are_steady = !self.changes() && !other.changes();
+        are_steady && (self.reference / other.reference - 1.0).abs() > MIN_RELATIVE_CHANGE
+    }
+
     /// Whether its size or its direction changes by more than rounding.
     pub fn changes(&self) -> bool {
         let [least, largest] = self.inverse_ratios();
@@ -181,14 +189,14 @@ mod tests {
         let rising: Vec<f64> = (0..11).map(|k| 4.0 + f64::from(k)).collect();
         let flow = Flow::new(FlowKind::Flow, &[(&early, &[2.0; 11]), (&late, &rising)]).expect("positive");
         let ratio = |time_s: f64| flow.log_ratio_at(time_s).exp() * flow.reference();
-        // To the rounding of logarithms of order one.
-        for (time_s, want) in
-            [(-5.0, 2.0), (3.3, 2.0), (10.1, 2.0), (59.0, 2.0), (61.0, 4.0), (109.9, 4.0), (130.0, 14.0)]
-        {
-            assert!((ratio(time_s) / want - 1.0).abs() < 1e-14, "{time_s} s: {}", ratio(time_s));
+        // At 110.5 s halfway in the logarithm. Sums of some twenty logarithms of order one are rounded to 20 · 2.2e-16.
+        let halfway = 20.0_f64.sqrt();
+        let expected =
+            [(-5.0, 2.0), (3.3, 2.0), (10.1, 2.0), (59.0, 2.0), (61.0, 4.0), (110.5, halfway), (130.0, 14.0)];
+        for (time_s, want) in expected {
+            let got = ratio(time_s);
+            assert!((got / want - 1.0).abs() < 5e-15, "{time_s} s: got {got}, want {want} within 5e-15");
         }
-        // Straight in the logarithm.
-        assert!((ratio(110.5) / 20.0_f64.sqrt() - 1.0).abs() < 1e-14);
         assert!(flow.is_steady_around(10.1) && !flow.is_steady_around(109.9) && flow.changes());
         assert_eq!(flow.inverse_ratio_rate_at(10.0), 0.0);
     }

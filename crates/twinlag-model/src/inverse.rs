@@ -57,9 +57,9 @@ impl<T: Real> Inverse<T> {
             }
             if has[1] {
                 let at = |time_s| T::of(plant.delay_at(time_s));
-                let (ends_s, first_s) = (plant.delays_s(), cut.first_s());
-                let is_same = !plant.changes_delay_around(first_s);
-                let delay = if is_same { Delay::Same(at(first_s)) } else { Delay::Each { at: &at, ends_s } };
+                let (ends_s, middle_s) = (plant.delays_s(), cut.middle_s());
+                let is_same = !plant.changes_delay_around(middle_s);
+                let delay = if is_same { Delay::Same(at(middle_s)) } else { Delay::Each { at: &at, ends_s } };
                 chains[1].advance(delay, plant.reach);
             }
             if has_gas {
@@ -81,7 +81,7 @@ impl<T: Real> Inverse<T> {
             }
         }
         for i in (0..2).filter(|i| has[*i]) {
-            lag(&mut chains[i], plant, i, cut.first_s(), tau_s);
+            lag(&mut chains[i], plant, i, cut.middle_s(), tau_s);
         }
         pass(T::from(0.0));
         for i in 0..2 {
@@ -200,13 +200,13 @@ impl Plant {
 
 /// The first-order factor of a sensor.
 ///
-/// - `first_s`: an instant of the stretch
-fn lag<T: Real>(chain: &mut Chain<T>, plant: &Plant, channel: usize, first_s: f64, along: &mut Vec<T>) {
+/// - `middle_s`: the instant in the middle of the stretch
+fn lag<T: Real>(chain: &mut Chain<T>, plant: &Plant, channel: usize, middle_s: f64, along: &mut Vec<T>) {
     let sensor = &plant.sensors[channel];
     let curves = Curves { value: sensor.rest.as_ref(), slope: sensor.heat.as_ref() };
     let tau_at = |time_s: f64| T::of(sensor.tau_s * plant.tau_factor_at(channel, time_s));
-    if !plant.changes_tau_around(channel, first_s) {
-        return chain.factor(Along::Same(tau_at(first_s)), curves);
+    if !plant.changes_tau_around(channel, middle_s) {
+        return chain.factor(Along::Same(tau_at(middle_s)), curves);
     }
     along.clear();
     along.extend((0..chain.after_factor()).map(|k| tau_at(chain.time_after_factor_s(k))));

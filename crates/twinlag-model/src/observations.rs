@@ -125,9 +125,9 @@ pub(crate) struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    /// The first of these instants.
-    pub(crate) fn first_s(&self) -> f64 {
-        self.time_s.at(self.first)
+    /// The instant in the middle of the stretch, s: no delay leads out of the stretch from there.
+    pub(crate) fn middle_s(&self) -> f64 {
+        self.time_s.at(self.time_s.len() / 2)
     }
 }
 

@@ -80,13 +80,13 @@ pub struct SlowPath {
 /// A relative change `m` of a time constant.
 #[derive(Clone)]
 pub struct TimeConstantChange {
-    /// `m` at an instant, s.
+    /// The relative change at an instant, s.
     pub at: TimeFunction,
-    /// The flow that it is a function of, where it is one of nothing else.
+    /// The flow, where the change depends on nothing else.
     flow: Option<Arc<Flow>>,
 }
 
-/// What it is a function of.
+/// Says whether it follows a flow; functions have no text.
 impl fmt::Debug for TimeConstantChange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TimeConstantChange").field("flow", &self.flow.is_some()).finish_non_exhaustive()
@@ -267,8 +267,8 @@ impl Plant {
 
     /// Whether the time constant of a sensor changes along the stretch that an instant is of.
     pub(crate) fn changes_tau_around(&self, channel: usize, time_s: f64) -> bool {
-        let changes = !self.sensors[channel].changes.iter().all(|change| change.is_steady_around(time_s));
-        changes || (channel == 1 && self.changes_delay_around(time_s))
+        let does_any_change = !self.sensors[channel].changes.iter().all(|change| change.is_steady_around(time_s));
+        does_any_change || (channel == 1 && self.changes_delay_around(time_s))
     }
 
     /// Whether the delay between the channels changes along the stretch that an instant is of.

@@ -119,14 +119,20 @@ fn contradiction_in_words(record: &RecordAnswer) -> Vec<String> {
     out
 }
 
-/// Whether a record has each time constant that the others have of the other sensor, within four standard errors.
+/// Standard errors within which two time constants are one. Chosen: by chance one pair in 16 000 is further apart.
+const SAME_SE: f64 = 4.0;
+
+/// Whether a record has each time constant that the others have of the other sensor, where theirs are two.
 fn are_exchanged(disagreements: &[DisagreementAnswer]) -> bool {
     let mut time_constants = disagreements.iter().filter(|one| one.of.is_none());
-    let is_that_of = |one: &DisagreementAnswer, other: &DisagreementAnswer| {
-        (one.value - other.others).abs() < 4.0 * one.standard_error.hypot(other.others_standard_error)
-    };
+    let is_same = |one: [f64; 2], other: [f64; 2]| (one[0] - other[0]).abs() < SAME_SE * one[1].hypot(other[1]);
+    let own = |one: &DisagreementAnswer| [one.value, one.standard_error];
+    let others = |one: &DisagreementAnswer| [one.others, one.others_standard_error];
     match [time_constants.next(), time_constants.next()] {
-        [Some(first), Some(second)] => is_that_of(first, second) && is_that_of(second, first),
+        [Some(first), Some(second)] => {
+            let is_crosswise = is_same(own(first), others(second)) && is_same(own(second), others(first));
+            is_crosswise && !is_same(others(first), others(second))
+        }
         _ => false,
     }
 }
@@ -272,16 +278,19 @@ mod tests {
 
     #[test]
     fn exchanged_columns_are_recognised() {
-        let one = |name: &str, value: f64, others: f64| -> DisagreementAnswer {
+        let within = |error: f64, name: &str, value: f64, others: f64| -> DisagreementAnswer {
             let answer = serde_json::json!({
-                "of": null, "name": name, "value": value, "standard_error": 0.001, "others": others,
-                "others_standard_error": 0.001, "unit": "s", "p_value": 1e-9
+                "of": null, "name": name, "value": value, "standard_error": error, "others": others,
+                "others_standard_error": error, "unit": "s", "p_value": 1e-9
             });
             serde_json::from_value(answer).expect("a disagreement")
         };
+        let one = |name: &str, value: f64, others: f64| within(0.001, name, value, others);
         let exchanged = [one("fine", 0.4506, 0.1202), one("coarse", 0.1204, 0.4499)];
         assert!(are_exchanged(&exchanged));
         assert!(!are_exchanged(&exchanged[..1]));
         assert!(!are_exchanged(&[one("fine", 0.4506, 0.1202), one("coarse", 0.13, 0.4499)]));
+        // Errors so wide that the sensors of the others may be alike.
+        assert!(!are_exchanged(&[within(0.1, "fine", 0.4506, 0.1202), within(0.1, "coarse", 0.1204, 0.4499)]));
     }
 }

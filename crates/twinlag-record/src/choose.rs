@@ -84,7 +84,8 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
     };
     if flow.is_none() && position.is_none() {
         let is_free = |(index, column): &(usize, &Column)| {
-            !channels.contains(index) && column.kind == Kind::Number && is_velocity(column)
+            let is_taken = channels.contains(index) || reference == Some(*index);
+            !is_taken && column.kind == Kind::Number && is_velocity(column)
         };
         let unused = table.columns().iter().enumerate().find(is_free);
         notes.extend(unused.map(|(index, _)| Note::FlowUnused { column: table.title(index), number: index + 1 }));

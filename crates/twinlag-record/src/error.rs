@@ -160,14 +160,15 @@ pub enum RecordError {
     )]
     BadFlow { file: String, at: Place, column: String, value: f64 },
     #[error(
-        "{file}: column {column} has a value in {rows} in which both temperatures are there too, expected at least {least}; use no \
-         flow or position, or mend the column",
+        "{file}: column {column} leaves {rows} of use, expected at least {least}; use no flow or position, or mend the column",
         rows = Counted(*usable, "row")
     )]
     FewFlows { file: String, column: String, usable: usize, least: usize },
     #[error("{file}: column {column}: expected a position that changes, found the same throughout; use no position")]
     ConstantPosition { file: String, column: String },
-    #[error("{file}: both a flow and a position are given, expected one of them: time constants go with one velocity")]
+    #[error(
+        "{file}: a flow or a position is given twice, expected one of them once: time constants go with one velocity"
+    )]
     FlowAndPosition { file: String },
     #[error("{file}: columns {numbers:?} are all called '{wanted}'; choose by number, for example {first}", first = numbers[0])]
     AmbiguousName { file: String, wanted: String, numbers: Vec<usize> },
@@ -279,9 +280,8 @@ impl RecordError {
             | Self::AmbiguousName { .. }
             | Self::SameColumn { .. } => &Setting::COLUMNS,
             Self::BadFlow { .. } => &[Setting::Flow],
-            Self::FewFlows { .. } => &[Setting::Flow, Setting::Position],
             Self::ConstantPosition { .. } => &[Setting::Position],
-            Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
+            Self::FewFlows { .. } | Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
             Self::NotATimeUnit { .. } | Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],

@@ -16,24 +16,24 @@ const MAX_BRIDGED_ROWS: usize = crate::grid::MAX_MISSING_SAMPLES;
 impl Record {
     /// This record with a flow velocity or density, in any unit, one value for each row: positive, NaN where missing.
     ///
-    /// Up to 20 missing values between two others are taken from the straight line between these; rows further away are in no
-    /// segment. A [`Note`] counts both.
+    /// Where up to 20 rows in succession lack it, the straight line between the values before and after stands in; other rows
+    /// without a value are in no segment. A [`Note`] counts both.
     ///
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::BadFlow`], [`RecordError::FewFlows`];
-    /// [`RecordError::FlowAndPosition`] of a record of sensors that move.
+    /// [`RecordError::FlowAndPosition`] of a record that has a flow or a position already.
     pub fn with_flow(self, flow: Vec<f64>) -> Result<Self, RecordError> {
         self.flowing(flow, "flow", |row| Place::Sample(row + 1))
     }
 
-    /// This record of sensors that move, with their position in each row, m; NaN where missing.
+    /// This record of sensors that move, with their position in each row, m; NaN or infinite where missing.
     ///
-    /// The speed is the slope of the positions that are there. Where some are missing, it is found as the flow of
+    /// The speed is the slope of the positions that are there; where some are missing, it stands in as a flow does in
     /// [`with_flow`](Self::with_flow).
     ///
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::FewFlows`], [`RecordError::ConstantPosition`];
-    /// [`RecordError::FlowAndPosition`] of a record that has a flow.
+    /// [`RecordError::FlowAndPosition`] of a record that has a flow or a position already.
     pub fn with_position(self, position_m: &[f64]) -> Result<Self, RecordError> {
         self.moving(position_m, "position")
     }
@@ -51,6 +51,8 @@ impl Record {
             let (file, column) = (self.source, column.to_owned());
             return Err(RecordError::BadFlow { file, at: at(row), column, value: flow[row] });
         }
+        // A row without a temperature may hold anything: no line ends there.
+        flow.iter_mut().filter(|value| is_bad(**value)).for_each(|value| *value = f64::NAN);
         self.bridge(&mut flow, column)?;
         self.flow = Some(flow);
         Ok(self)
@@ -58,7 +60,9 @@ impl Record {
 
     pub(crate) fn moving(mut self, position_m: &[f64], column: &str) -> Result<Self, RecordError> {
         self.check_is_first(column, position_m.len())?;
-        let mut speed_m_s = motion::speed(&self.time_s, position_m, &self.runs());
+        let near = |run| near_parts(run, |row| position_m[row].is_finite());
+        let runs: Vec<Range<usize>> = self.runs().into_iter().flat_map(near).collect();
+        let mut speed_m_s = motion::speed(&self.time_s, position_m, &runs);
         self.bridge(&mut speed_m_s, column)?;
         let rows = self.segments.iter().cloned().flatten();
         let mut values = rows.map(|row| position_m[row]).filter(|value| value.is_finite());
@@ -107,6 +111,18 @@ impl Record {
     }
 }
 
+/// Parts of a run without a hole that is too long for a straight line.
+fn near_parts(run: Range<usize>, is_there: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    let mut parts: Vec<Range<usize>> = Vec::new();
+    for row in run.filter(|row| is_there(*row)) {
+        match parts.last_mut() {
+            Some(part) if row - part.end <= MAX_BRIDGED_ROWS => part.end = row + 1,
+            _ => parts.push(row..row + 1),
+        }
+    }
+    parts
+}
+
 /// Puts straight lines over time in the place of values that are missing between two that are near.
 fn bridge(time_s: &[f64], values: &mut [f64]) {
     let there: Vec<usize> = (0..values.len()).filter(|&row| !values[row].is_nan()).collect();
@@ -145,13 +161,24 @@ mod tests {
         (0..rows).map(|k| if is_missing(k) { f64::NAN } else { 2.0 + 0.5 * f64::from(k) }).collect()
     }
 
-    /// Refused before, with the advice to empty a cell that was empty.
+    /// Failed: one empty cell refused the record. Up to 20 rows are bridged, the next test has 21.
     #[test]
     fn a_flow_that_is_read_less_often_is_bridged() {
-        let record = record(61).with_flow(flow(61, |k| !k.is_multiple_of(20))).expect("a flow in each twentieth row");
-        assert_eq!(record.flow, Some(flow(61, |_| false)));
-        let segments: Vec<Range<usize>> = record.segments;
-        assert_eq!(segments, std::slice::from_ref(&(0..61)));
+        let record = record(64).with_flow(flow(64, |k| !k.is_multiple_of(21))).expect("a flow in each 21st row");
+        assert_eq!(record.flow, Some(flow(64, |_| false)));
+        assert_eq!(record.segments, std::slice::from_ref(&(0..64)));
+    }
+
+    /// Failed: a line began at the flow of a row that lacks a temperature, which nobody had looked at.
+    #[test]
+    fn no_line_ends_at_a_flow_that_is_none() {
+        let mut record = record(61);
+        record.segments = vec![0..10, 11..61];
+        let mut flow = flow(61, |k| k == 11 || k == 12);
+        flow[10] = 0.0;
+        let record = record.with_flow(flow).expect("a flow in the rows that are used");
+        let flow = record.flow.expect("a flow");
+        assert!(record.segments.iter().cloned().flatten().all(|row| flow[row] == 2.0 + 0.5 * row as f64), "{flow:?}");
     }
 
     #[test]
@@ -160,7 +187,8 @@ mod tests {
         let record = record(61).with_flow(flow(61, is_missing)).expect("a flow in most rows");
         assert_eq!(record.segments, [3..20, 41..61]);
         let note = record.notes.last().map(ToString::to_string);
-        let expected = "column flow is empty in 25 rows: 1 on a straight line between its readings, 24 not used";
+        let expected =
+            "column flow is missing in 25 rows: 1 taken from the straight line between readings, 24 not used";
         assert_eq!(note.as_deref(), Some(expected));
     }
 
@@ -180,6 +208,24 @@ mod tests {
             let error = record(61).with_flow(flow).expect_err("no flow");
             assert!(error.to_string().starts_with("rig: sample 7, column flow: expected a positive flow"), "{error}");
         }
+    }
+
+    /// From 0.5 m/s to none, over a hole of 30 rows: nobody knows how the sensors moved there.
+    #[test]
+    fn no_speed_is_taken_across_a_long_hole() {
+        let position: Vec<f64> = (0..90_u32)
+            .map(|k| match k {
+                0..30 => 0.5 * f64::from(k),
+                30..60 => f64::NAN,
+                _ => 100.0 + 1e-3 * f64::from(k),
+            })
+            .collect();
+        let record = record(90).with_position(&position).expect("sensors that move");
+        assert_eq!(record.segments, [0..30, 60..90]);
+        let speed_m_s = record.speed_m_s.expect("a speed");
+        // To the rounding of positions of 100 m in slopes over some seconds.
+        let is_near = |row: usize| (speed_m_s[row] - if row < 30 { 0.5 } else { 1e-3 }).abs() < 1e-12;
+        assert!((0..30).chain(60..90).all(is_near), "{speed_m_s:?}");
     }
 
     /// The position goes 0.5 m in each second.

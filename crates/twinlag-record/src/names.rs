@@ -133,16 +133,23 @@ pub(crate) const OTHER_QUANTITIES: [&str; 40] = [
     "error",
 ];
 
-/// The motion of the gas past sensors: words for it, and units.
-const FLOW: [&str; 7] = ["flow", "velocity", "speed", "airspeed", "windspeed", "wind", "windgeschwindigkeit"];
-const VELOCITY_UNITS: [&str; 8] = ["m/s", "m s-1", "cm/s", "km/h", "mph", "kn", "knots", "ft/s"];
+/// Words for a velocity.
+const VELOCITY: [&str; 8] =
+    ["flow", "velocity", "speed", "airspeed", "windspeed", "wind", "geschwindigkeit", "windgeschwindigkeit"];
+/// Words that make another quantity of a word for a velocity.
+const NO_VELOCITY: [&str; 4] = ["direction", "dir", "richtung", "status"];
+/// Units of a velocity, in lower case. A knot is no `kn` here, which a kilonewton is as well.
+const VELOCITY_UNITS: [&str; 8] = ["m/s", "m s-1", "cm/s", "km/h", "mph", "kt", "knots", "ft/s"];
 
 /// Whether it is the velocity of something by its name and its unit: `U [m/s]`, `velocity_m_s`, `wind speed`, but not `fan speed [rpm]`.
 pub(crate) fn is_velocity(column: &Column) -> bool {
-    match column.unit() {
+    // Of `U_m_s` the last letter reads as a unit of time.
+    let has_velocity_unit = match column.unit() {
         Unit::Other(unit) => VELOCITY_UNITS.contains(&unit.to_lowercase().as_str()),
-        _ => column.name().to_lowercase().ends_with("_m_s") || (has(column, &FLOW) && *column.unit() == Unit::Unstated),
-    }
+        _ => column.name().to_lowercase().ends_with("_m_s"),
+    };
+    let is_called = || has(column, &VELOCITY) && !has(column, &NO_VELOCITY) && !is_called_temperature(column);
+    has_velocity_unit || (*column.unit() == Unit::Unstated && is_called())
 }
 
 fn words(text: &str) -> impl Iterator<Item = String> {

@@ -324,7 +324,7 @@ impl fmt::Display for Note {
                 let missing = Counted(bridged + unused, "row");
                 write!(
                     f,
-                    "column {column} is empty in {missing}: {bridged} on a straight line between its readings, {unused} not used"
+                    "column {column} is missing in {missing}: {bridged} taken from the straight line between readings, {unused} not used"
                 )
             }
             Self::Gap { at, from_s, length_s } => {

@@ -242,6 +242,9 @@ fn a_velocity_that_is_not_used_is_said() {
         ("fan speed [rpm]", false),
         ("pressure [Pa]", false),
         ("T3_C", false),
+        ("flow_temp", false),
+        ("wind_direction", false),
+        ("force [kN]", false),
     ] {
         assert_eq!(of(name, &Selection::default()), is_said, "{name}");
         assert!(!of(name, &Selection { flow: name.parse().ok(), ..Selection::default() }), "{name}");

@@ -178,8 +178,8 @@ pub struct RecordAnswer {
     /// Noise of its channels, K.
     #[serde(rename = "noise_std_K")]
     pub noise_std_k: [f64; 2],
-    /// Both time constants as it has them by itself, the rest of the model at its best; `None` where it does not determine one, and
-    /// where none is given for all records together.
+    /// Both time constants as it has them by itself, the rest of the model at its best; `None` where it does not determine one well
+    /// enough for an estimate, and where none is given for all records together.
     #[serde(default)]
     pub time_constants: [Option<OwnTimeConstant>; 2],
     /// Numbers of its own; none where more than noise is left over.

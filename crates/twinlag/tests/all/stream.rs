@@ -76,7 +76,7 @@ fn at(seed: u64, velocity_m_s: f64) -> Record {
     with_gain(1.0, seed, velocity_m_s)
 }
 
-/// The same with a gain of the second channel about the mean of the gas, 300 °C.
+/// A record as of [`at`], with a gain of the second channel about the mean of the gas, 300 °C.
 fn with_gain(gain: f64, seed: u64, velocity_m_s: f64) -> Record {
     let gas = "kind = \"turbulence\"\nstd_k = 15.0\ncorner_hz = 3.0\ncutoff_hz = 60.0";
     let factor = (velocity_m_s / 12.0).powf(-0.5);
