@@ -80,8 +80,11 @@ fn at(seed: u64, velocity_m_s: f64) -> Record {
 fn with_gain(gain: f64, seed: u64, velocity_m_s: f64) -> Record {
     let gas = "kind = \"turbulence\"\nstd_k = 15.0\ncorner_hz = 3.0\ncutoff_hz = 60.0";
     let factor = (velocity_m_s / 12.0).powf(-0.5);
-    let mut sensors = TRUTH_S.map(|tau_s| format!("time_constant_s = {}\nnoise = {{ std_k = 0.1 }}", factor * tau_s));
-    sensors[1] += &format!("\ngain = {gain}\noffset_k = {}", 300.0 * (1.0 - gain));
+    let sensor = |tau_s: f64, gain: f64| {
+        let offset_k = 300.0 * (1.0 - gain);
+        format!("time_constant_s = {}\nnoise = {{ std_k = 0.1 }}\ngain = {gain}\noffset_k = {offset_k}", factor * tau_s)
+    };
+    let sensors = [sensor(TRUTH_S[0], 1.0), sensor(TRUTH_S[1], gain)];
     record(seed, SAMPLES, 0.002, gas, [&sensors[0], &sensors[1]])
 }
 
