@@ -1,12 +1,14 @@
 //! What several records of one rig say of the numbers that they share.
 //!
 //! Each record has an estimate of its own beside the joint one: a Newton step of its own energy from the joint fit, or, where that is
-//! long, a fit of its own. If the model were the whole truth, these would scatter by their standard errors. Where they scatter by clearly more, something that changes
-//! from record to record is missing in the model, and a shared number is a mean over records that were drawn from many: its
-//! uncertainty is that of a random effect, whose variance between records is that of Paule and Mandel (1982), with the standard
-//! error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a number has a large standard
-//! error, and so little weight: where nothing but such a record is off, it says nothing of a variance between the others, and the
-//! standard error of the mean grows by the ratio of Birge (1932) alone, the scatter over what the standard errors explain.
+//! long, a fit of its own. If the model were the whole truth, these would scatter by their standard errors. Where they scatter by
+//! clearly more, something that changes from record to record is missing in the model, and a shared number is a mean over records
+//! that were drawn from many: its uncertainty is that of a random effect, whose variance between records is that of Paule and
+//! Mandel (1982), with the standard error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a
+//! number has a large standard error, and so little weight: where nothing but such a record is off, it says nothing of a variance
+//! between the others, and the standard error of the mean grows by the ratio of Birge (1932) alone, the scatter over what the
+//! standard errors explain. Where what the joint fit leaves is not white, the standard errors are those of noise that is correlated
+//! as it is in each record, as that of the joint estimate is.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use twinlag_cross_relation::Z_975;
@@ -229,7 +231,14 @@ pub struct Between {
 }
 
 /// What records say of the shared numbers of `fitted`; `None` of one record.
-pub(crate) fn between(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Option<Between> {
+///
+/// - `by_residual`: whether the standard errors are those of noise that is correlated as what the fit leaves is, as in [`covariance`]
+pub(crate) fn between(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    by_residual: bool,
+) -> Option<Between> {
     let members = observations.members();
     if members.len() < 2 {
         return None;
@@ -239,7 +248,11 @@ pub(crate) fn between(fitted: &Fitted, observations: &Observations, selection: &
         .iter()
         .filter_map(|member| {
             let own = observations.of_member(member.number);
-            let estimate = OwnEstimate::of(fitted, &own, &selection.of_samples(member.samples.clone()), is_shared)?;
+            let selection = selection.of_samples(member.samples.clone());
+            let (at, mut estimate) = OwnEstimate::of(fitted, &own, &selection, is_shared)?;
+            if by_residual {
+                estimate.covariance = covariance(&at, &own, &selection, true)?;
+            }
             Some((member.number, estimate))
         })
         .collect();
@@ -275,8 +288,8 @@ struct OwnEstimate {
 }
 
 impl OwnEstimate {
-    /// From the joint fit by a Newton step, or by a fit where that leads far; `None` where the record does not determine the numbers, or
-    /// its fit ends where the energy still falls.
+    /// From the joint fit by a Newton step, or by a fit where that leads far, with the fit from which the step is; `None` where the
+    /// record does not determine the numbers, or its fit ends where the energy still falls.
     ///
     /// - `observations`, `selection`: of the record
     /// - `is_shared`: whether a parameter is one of all records
@@ -285,32 +298,38 @@ impl OwnEstimate {
         observations: &Observations,
         selection: &Selection,
         is_shared: impl Fn(usize) -> bool,
-    ) -> Option<Self> {
+    ) -> Option<(Fitted, Self)> {
         let is_near = |estimate: &Self, from: &Fitted| {
             (0..from.theta.len()).filter(|i| is_shared(*i)).all(|i| {
                 let step = estimate.theta[i] - from.theta[i];
                 step.powi(2) <= MAX_NEWTON_STEP_SE.powi(2) * estimate.covariance[i][i]
             })
         };
-        let NormalEquations { products, .. } =
-            joint.model.normal_equations(&joint.theta, observations, selection, None);
-        let mut joint = joint.clone();
-        joint.model.held = undetermined(&products);
-        let by_step = Self::by_newton_step(&joint, observations, selection)?;
+        let equations = |of: &Fitted| of.model.normal_equations(&of.theta, observations, selection, None);
+        let (mut joint, mut normal) = (joint.clone(), equations(joint));
+        joint.model.held = undetermined(&normal.products);
+        joint.model.held.iter().for_each(|at| normal.hold(*at));
+        let by_step = Self::by_newton_step(&joint, observations, selection, &normal)?;
         if is_near(&by_step, &joint) {
-            return Some(by_step);
+            return Some((joint, by_step));
         }
         let own = Fitted {
             is_mismatch_bias_removed: joint.is_mismatch_bias_removed,
             ..joint.model.fit(&joint.theta, observations, selection, Effort::Finish)
         };
-        Self::by_newton_step(&own, observations, selection).filter(|by_step| is_near(by_step, &own))
+        let by_step = Self::by_newton_step(&own, observations, selection, &equations(&own))?;
+        is_near(&by_step, &own).then_some((own, by_step))
     }
 
-    fn by_newton_step(fitted: &Fitted, observations: &Observations, selection: &Selection) -> Option<Self> {
+    /// - `normal`: the normal equations of the record at `fitted`
+    fn by_newton_step(
+        fitted: &Fitted,
+        observations: &Observations,
+        selection: &Selection,
+        normal: &NormalEquations,
+    ) -> Option<Self> {
         let Fitted { model, theta, .. } = fitted;
-        let normal = model.normal_equations(theta, observations, selection, None);
-        let mut step = dense::times(&model.curvature(theta, observations, selection, &normal)?, &normal.slope);
+        let mut step = dense::times(&model.curvature(theta, observations, selection, normal)?, &normal.slope);
         // The step is to the minimum, and the fit is not there.
         if let Some(bias) = fitted.removed_bias(observations, selection) {
             step.iter_mut().zip(bias).for_each(|(step, bias)| *step -= bias);

@@ -119,7 +119,7 @@ pub fn summarise(
     let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
     // What it holds is as long as the record.
     drop(influence);
-    let between = between(fitted, observations, selection);
+    let between = between(fitted, observations, selection, rejects);
     ModelFit {
         time_constants,
         difference,

@@ -2,4 +2,5 @@
 
 mod mismatch;
 mod saturation;
+mod scatter;
 mod twins;

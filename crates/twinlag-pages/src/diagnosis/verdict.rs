@@ -139,7 +139,7 @@ impl Page<'_> {
             Verdict::PartlyExplained if effects_of_the_model(answer) <= answer.policy.most_distinguished_effects => {
                 format!(
                     "With {effects} what is left looks like noise where the model was fitted, but {} not known to be the cause; the \
-                 reasons are beside the numbers.",
+                     reasons are beside the numbers.",
                     if many { "they are" } else { "it is" },
                 )
             }
