@@ -290,7 +290,8 @@ impl Reason {
                  which the interval covers"
             ),
             Self::RecordsDisagree { ratio, .. } => format!(
-                "the records give values that differ {ratio:.1} times as much as noise explains, so that no value holds for all of them"
+                "the records give values that differ {ratio:.1} times as much as noise explains, and an interval that covers what they differ \
+                 says too little"
             ),
             Self::RestsOnRecord { record } => format!(
                 "right if record {} is of one rig with the others, which do not show without it what was found",
