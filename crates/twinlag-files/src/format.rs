@@ -58,6 +58,10 @@ pub enum Foreign {
     TdmsIndex,
     /// Encrypted Parquet.
     EncryptedParquet,
+    /// Feather, which is a file of Apache Arrow from version 2 on.
+    Feather,
+    /// A database of SQLite.
+    Sqlite,
     /// Excel before version 5.
     OldExcel,
     /// Excel in binary parts, xlsb.
@@ -192,6 +196,8 @@ impl Foreign {
             Self::Dewesoft => "export it from Dewesoft as MDF 4, TDMS or CSV",
             Self::TdmsIndex => "name the .tdms file beside it, which has the samples",
             Self::EncryptedParquet => "write it without encryption",
+            Self::Feather => "save it as Parquet or CSV",
+            Self::Sqlite => "export the table of readings as CSV",
             Self::OldExcel | Self::BinaryExcel => "open it in a spreadsheet program and save it as xlsx or CSV",
             Self::EncryptedOffice => "save it without a password",
             Self::OtherOffice => "save the table as xlsx or CSV",
@@ -210,6 +216,8 @@ impl fmt::Display for Foreign {
             Self::Dewesoft => "a Dewesoft data file",
             Self::TdmsIndex => "the index of a TDMS file, without samples",
             Self::EncryptedParquet => "an encrypted Parquet file",
+            Self::Feather => "a Feather or Arrow file",
+            Self::Sqlite => "an SQLite database",
             Self::OldExcel => "an Excel worksheet from before Excel 5",
             Self::BinaryExcel => "an Excel workbook in binary parts (xlsb)",
             Self::EncryptedOffice => "an Office document with a password",
@@ -307,6 +315,8 @@ fn foreign_of(head: &[u8]) -> Option<Foreign> {
         () if starts(b"MULTI_STREAM_FILE") || (has(&head[..head.len().min(64)], b"Dewesoft_Data")) => {
             Some(Foreign::Dewesoft)
         }
+        () if starts(b"ARROW1\0\0") || starts(b"FEA1") => Some(Foreign::Feather),
+        () if starts(b"SQLite format 3\0") => Some(Foreign::Sqlite),
         () if starts(b"BZh") && head.get(4..7) == Some(b"1AY") => Some(Foreign::Bzip2),
         () if starts(b"\xfd7zXZ\0") => Some(Foreign::Xz),
         () if starts(b"\x28\xb5\x2f\xfd") => Some(Foreign::Zstd),

@@ -10,7 +10,7 @@ fn what_nothing_reads_is_named_with_what_to_do() {
         let length = u16::try_from(name.len()).expect("short").to_le_bytes();
         [b"PK\x03\x04".to_vec(), vec![0; 22], length.to_vec(), vec![0; 2], name.as_bytes().to_vec()].concat()
     };
-    let cases: [(Vec<u8>, Foreign, &str); 17] = [
+    let cases: [(Vec<u8>, Foreign, &str); 20] = [
         (b"DIAEXTENDED  {@:ENGLISH\r\n".to_vec(), Foreign::DiademDat, "export it from DIAdem"),
         (b"<?xml version=\"1.0\"?><usi:tdm xmlns".to_vec(), Foreign::DiademTdm, "TDMS or CSV"),
         (b"<?xml version=\"1.0\"?>\n<atfx_file version".to_vec(), Foreign::Atfx, "MDF 4 or CSV"),
@@ -18,6 +18,9 @@ fn what_nothing_reads_is_named_with_what_to_do() {
         (b"MULTI_STREAM_FILE_VER02106\0\0\0Dewesoft_Data_7.x".to_vec(), Foreign::Dewesoft, "export it from Dewesoft"),
         (b"TDSh\x0e\0\0\0".to_vec(), Foreign::TdmsIndex, ".tdms file beside it"),
         (b"PARE".to_vec(), Foreign::EncryptedParquet, "without encryption"),
+        (b"ARROW1\0\0\xff\xff\xff\xff".to_vec(), Foreign::Feather, "Parquet or CSV"),
+        (b"FEA1\0\0\0\0".to_vec(), Foreign::Feather, "Parquet or CSV"),
+        (b"SQLite format 3\0\x10\0".to_vec(), Foreign::Sqlite, "table of readings as CSV"),
         (b"\x09\x04\x06\x00\x00\x00\x10\x00".to_vec(), Foreign::OldExcel, "save it as xlsx"),
         (compound("EncryptedPackage"), Foreign::EncryptedOffice, "without a password"),
         (compound("WordDocument"), Foreign::OtherOffice, "save the table"),
