@@ -101,22 +101,32 @@ pub struct ResidualTest {
 /// # Source
 /// Ljung and Box 1978; Wilson and Hilferty 1931.
 pub fn residual_tests(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Vec<ResidualTest> {
-    let count: usize = segments.iter().map(Vec::len).sum();
-    let energy: f64 = segments.iter().flatten().map(|r| r * r).sum();
-    let mut tests = Vec::new();
-    if count > fitted {
-        let dof = (count - fitted) as f64;
-        let deviate = (energy / dof - 1.0) / (2.0 / dof + level_std * level_std).sqrt();
-        tests.push(ResidualTest {
-            test: TestName::TotalEnergy,
-            statistic: energy / dof,
-            degrees_of_freedom: Some(dof),
-            p_value: two_sided(deviate),
-        });
-    }
+    let mut tests = Vec::from_iter(total_energy(segments, fitted, level_std));
     tests.extend(band_energy(segments));
     tests.extend(whiteness(segments));
     tests
+}
+
+/// The first of [`residual_tests`] alone; `None` of no more residuals than fitted parameters.
+///
+/// ```
+/// use twinlag_cross_relation::total_energy;
+///
+/// // 800 residuals of half the standard deviation that noise has: a quarter of the energy, whose standard error is 0.05.
+/// let test = total_energy(&[vec![0.5; 800]], 0, 0.0).expect("more residuals than parameters");
+/// assert!(test.statistic == 0.25 && test.p_value < 1e-40);
+/// ```
+pub fn total_energy(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Option<ResidualTest> {
+    let count: usize = segments.iter().map(Vec::len).sum();
+    let energy: f64 = segments.iter().flatten().map(|r| r * r).sum();
+    let dof = count.checked_sub(fitted).filter(|dof| *dof > 0)? as f64;
+    let deviate = (energy / dof - 1.0) / (2.0 / dof + level_std * level_std).sqrt();
+    Some(ResidualTest {
+        test: TestName::TotalEnergy,
+        statistic: energy / dof,
+        degrees_of_freedom: Some(dof),
+        p_value: two_sided(deviate),
+    })
 }
 
 fn two_sided(deviate: f64) -> f64 {

@@ -32,6 +32,9 @@ const MAX_NEWTON_STEP_SE: f64 = 3.0;
 /// numbers before it. Chosen between 1e12, which rounding leaves where `R² = 1` and where [`dense::inverse`] gives up, and 1e6, where a
 /// thousandth of the derivative is its own.
 const MAX_VARIANCE_INFLATION: f64 = 1e8;
+/// What a record knows of a shared number, over the mean of what all records together know of it, below which it is taken not to determine
+/// it. Chosen: the joint value is then ten times as certain as its own, at least.
+const MIN_INFORMATION_SHARE: f64 = 0.01;
 /// Fewest records of which one can be said to contradict the others.
 const FEWEST_TO_CONTRADICT: usize = 3;
 
@@ -232,11 +235,13 @@ pub struct Between {
 
 /// What records say of the shared numbers of `fitted`; `None` of one record.
 ///
+/// - `joint`: covariance of the numbers of all records
 /// - `by_residual`: whether the standard errors are those of noise that is correlated as what the fit leaves is, as in [`covariance`]
 pub(crate) fn between(
     fitted: &Fitted,
     observations: &Observations,
     selection: &Selection,
+    joint: &[Vec<f64>],
     by_residual: bool,
 ) -> Option<Between> {
     let members = observations.members();
@@ -244,12 +249,16 @@ pub(crate) fn between(
         return None;
     }
     let is_shared = |i: usize| fitted.model.record_of(i).is_none() && !is_of_noise(fitted, i);
+    let largest_variance = |i: usize| {
+        let of_one = members.len() as f64 * joint[i][i] / MIN_INFORMATION_SHARE;
+        if is_shared(i) { of_one } else { f64::INFINITY }
+    };
     let own: Vec<(usize, OwnEstimate)> = members
         .iter()
         .filter_map(|member| {
             let own = observations.of_member(member.number);
             let selection = selection.of_samples(member.samples.clone());
-            let (at, mut estimate) = OwnEstimate::of(fitted, &own, &selection, is_shared)?;
+            let (at, mut estimate) = OwnEstimate::of(fitted, &own, &selection, is_shared, largest_variance)?;
             if by_residual {
                 estimate.covariance = covariance(&at, &own, &selection, true)?;
             }
@@ -293,11 +302,13 @@ impl OwnEstimate {
     ///
     /// - `observations`, `selection`: of the record
     /// - `is_shared`: whether a parameter is one of all records
+    /// - `largest_variance`: variance of a parameter from which on the record does not determine it
     fn of(
         joint: &Fitted,
         observations: &Observations,
         selection: &Selection,
         is_shared: impl Fn(usize) -> bool,
+        largest_variance: impl Fn(usize) -> f64,
     ) -> Option<(Fitted, Self)> {
         let is_near = |estimate: &Self, from: &Fitted| {
             (0..from.theta.len()).filter(|i| is_shared(*i)).all(|i| {
@@ -307,7 +318,7 @@ impl OwnEstimate {
         };
         let equations = |of: &Fitted| of.model.normal_equations(&of.theta, observations, selection, None);
         let (mut joint, mut normal) = (joint.clone(), equations(joint));
-        joint.model.held = undetermined(&normal.products);
+        joint.model.held = undetermined(&normal.products, largest_variance);
         joint.model.held.iter().for_each(|at| normal.hold(*at));
         let by_step = Self::by_newton_step(&joint, observations, selection, &normal)?;
         if is_near(&by_step, &joint) {
@@ -340,17 +351,19 @@ impl OwnEstimate {
     }
 }
 
-/// Parameters whose derivatives those of the parameters before them make up, to rounding.
+/// Parameters whose derivatives those of the parameters before them make up, to rounding or up to a variance.
 ///
 /// - `products`: of the derivatives with each other
-fn undetermined(products: &[Vec<f64>]) -> Vec<usize> {
+/// - `largest_variance`: of a parameter beside those before it
+fn undetermined(products: &[Vec<f64>], largest_variance: impl Fn(usize) -> f64) -> Vec<usize> {
     let (mut determined, mut out): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
     for i in (0..products.len()).filter(|i| products[*i][*i] > 0.0) {
         let tried: Vec<usize> = determined.iter().copied().chain([i]).collect();
         let part: Vec<Vec<f64>> = tried.iter().map(|a| tried.iter().map(|b| products[*a][*b]).collect()).collect();
         let last = tried.len() - 1;
-        let inflation = dense::inverse(&part).map(|inverse| inverse[last][last] * products[i][i]);
-        if inflation.is_some_and(|inflation| inflation < MAX_VARIANCE_INFLATION) {
+        let variance = dense::inverse(&part).map(|inverse| inverse[last][last]);
+        let longest = largest_variance(i).min(MAX_VARIANCE_INFLATION / products[i][i]);
+        if variance.is_some_and(|variance| variance < longest) {
             determined = tried;
         } else {
             out.push(i);
@@ -421,7 +434,9 @@ mod tests {
             vec![1.0, 0.0, 0.0, 1e-5],
             vec![0.0; 4],
         ];
-        assert_eq!(undetermined(&dense::gram(&columns)), [2, 4]);
+        assert_eq!(undetermined(&dense::gram(&columns), |_| f64::INFINITY), [2, 4]);
+        // What is the fourth's own determines it to a variance of 10⁶.
+        assert_eq!(undetermined(&dense::gram(&columns), |i| if i == 3 { 1e5 } else { f64::INFINITY }), [2, 3, 4]);
     }
 
     /// Three values of which two numbers were made: one of them by the differences alone, so that one degree of freedom is left.

@@ -44,6 +44,11 @@ impl ChannelNoise {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
     }
 
+    /// Standard error of the logarithm of the variance of the channel that is less certain.
+    pub(crate) fn log_variance_error(&self) -> f64 {
+        2.0 * self.log_error[0].max(self.log_error[1])
+    }
+
     /// Replaces the levels, K; none falls below the rounding noise of its converter, or below itself where that is less.
     pub(crate) fn replace(&mut self, std_k: [f64; 2]) {
         for ((level_k, other_k), step_k) in self.std_k.iter_mut().zip(std_k).zip(self.step_k) {

@@ -1,5 +1,7 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
+use twinlag_cross_relation::total_energy;
+
 use crate::blocks;
 use crate::defects::{self, ChannelNoise};
 use crate::effect::{self, Context, Identifier};
@@ -189,14 +191,44 @@ impl Prepared {
     }
 
     /// Whether what `fitted` leaves over is clearly less than noise of the levels that there are, as uncertain as these are: the
-    /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Levels that were given
-    /// are believed.
+    /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Of several records with
+    /// levels of their own, one whose gas is fast is enough, as is a test of all residuals that fails. Levels that were given are
+    /// believed.
     pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
-        let level_std = 2.0 * self.levels.log_error[0].max(self.levels.log_error[1]);
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
-        let log_std = (2.0 / fitted.count + level_std * level_std).sqrt();
-        let is_clearly_less = fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std;
-        settings.noise_std_k.is_none() && fitted.model.noise().is_none() && !is_coarse && is_clearly_less
+        if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse {
+            return false;
+        }
+        self.is_clearly_less(fitted.chi2, fitted.count, 1.0)
+            || !self.levels.is_of_residual && (self.is_of_a_record(fitted) || self.is_rejected(fitted))
+    }
+
+    /// Whether an energy, as the fit weighs frequencies, is clearly less than that of noise of so many degrees of freedom.
+    ///
+    /// - `share`: of the samples that determine the levels
+    fn is_clearly_less(&self, energy: f64, count: f64, share: f64) -> bool {
+        let log_std = (2.0 / count + self.levels.log_variance_error().powi(2) / share).sqrt();
+        (energy / count).ln() < -self.policy.lower_levels_standard_errors * log_std
+    }
+
+    /// Whether the energy of a record that has levels of its own is clearly less.
+    fn is_of_a_record(&self, fitted: &Fitted) -> bool {
+        let Fitted { model, theta, .. } = fitted;
+        let is_less = |member: Member| {
+            let of_member = self.observations.of_member(member.number);
+            let selection = self.searched.of_samples(member.samples);
+            let count = model.degrees_of_freedom(selection.counted(), theta, &of_member, &selection);
+            let share = of_member.samples() as f64 / self.observations.samples() as f64;
+            self.is_clearly_less(model.energy(theta, &of_member, &selection), count, share)
+        };
+        self.observations.has_own_noise() && self.observations.members().into_iter().any(is_less)
+    }
+
+    /// Whether the test of the energy of all residuals fails for want of energy.
+    fn is_rejected(&self, fitted: &Fitted) -> bool {
+        let left = fitted.model.residual_runs(&fitted.theta, &self.observations, |s| self.everything.holds(s));
+        let test = total_energy(&left, fitted.model.free_count(), self.levels.log_variance_error());
+        test.is_some_and(|test| test.statistic < 1.0 && test.p_value < self.policy.rejection_p_value())
     }
 
     /// Lowers the levels to what `fitted` leaves over, of several records in each of those whose noise is its own; which may show

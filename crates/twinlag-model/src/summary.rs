@@ -119,7 +119,7 @@ pub fn summarise(
     let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
     // What it holds is as long as the record.
     drop(influence);
-    let between = between(fitted, observations, selection, rejects);
+    let between = covariance.as_deref().and_then(|joint| between(fitted, observations, selection, joint, rejects));
     ModelFit {
         time_constants,
         difference,
@@ -158,8 +158,7 @@ impl Left {
         let trace = Trace::of(fitted, &mut details, observations, selection, policy);
         let pairs = Pairs::of(fitted, details, observations, selection);
         let trace = trace.with_bands(&Bands::of(&pairs.residual), observations);
-        let level_std = 2.0 * levels.log_error[0].max(levels.log_error[1]);
-        let mut tests = residual_tests(&pairs.residual, fitted.model.free_count(), level_std);
+        let mut tests = residual_tests(&pairs.residual, fitted.model.free_count(), levels.log_variance_error());
         let count: usize = pairs.residual.iter().map(Vec::len).sum();
         let dof = count.saturating_sub(fitted.model.free_count()).max(1);
         let chi2_per_dof = pairs.residual.iter().flatten().map(|r| r * r).sum::<f64>() / dof as f64;
