@@ -192,43 +192,37 @@ impl Prepared {
 
     /// Whether what `fitted` leaves over is clearly less than noise of the levels that there are, as uncertain as these are: the
     /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Of several records with
-    /// levels of their own, one whose gas is fast is enough, as is a test of all residuals that fails. Levels that were given are
-    /// believed.
+    /// levels of their own, one whose gas is fast is enough. Levels that were given are believed.
     pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
         if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse {
             return false;
         }
-        self.is_clearly_less(fitted.chi2, fitted.count, 1.0)
-            || !self.levels.is_of_residual && (self.is_of_a_record(fitted) || self.is_rejected(fitted))
+        let log_std = (2.0 / fitted.count + self.levels.log_variance_error().powi(2)).sqrt();
+        let is_clearly_less = fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std;
+        is_clearly_less || !self.levels.is_of_residual && self.lacks_energy(fitted)
     }
 
-    /// Whether an energy, as the fit weighs frequencies, is clearly less than that of noise of so many degrees of freedom.
-    ///
-    /// - `share`: of the samples that determine the levels
-    fn is_clearly_less(&self, energy: f64, count: f64, share: f64) -> bool {
-        let log_std = (2.0 / count + self.levels.log_variance_error().powi(2) / share).sqrt();
-        (energy / count).ln() < -self.policy.lower_levels_standard_errors * log_std
-    }
-
-    /// Whether the energy of a record that has levels of its own is clearly less.
-    fn is_of_a_record(&self, fitted: &Fitted) -> bool {
-        let Fitted { model, theta, .. } = fitted;
-        let is_less = |member: Member| {
-            let of_member = self.observations.of_member(member.number);
-            let selection = self.searched.of_samples(member.samples);
-            let count = model.degrees_of_freedom(selection.counted(), theta, &of_member, &selection);
-            let share = of_member.samples() as f64 / self.observations.samples() as f64;
-            self.is_clearly_less(model.energy(theta, &of_member, &selection), count, share)
+    /// Whether the test of the energy of all residuals fails for want of energy, or that of a record that has levels of its own, which costs
+    /// little where it is by chance: those of what is left over are as certain.
+    fn lacks_energy(&self, fitted: &Fitted) -> bool {
+        let fails = |observations: &Observations, selection: &Selection, log_variance_error: f64, p_value: f64| {
+            let left = fitted.model.residual_runs(&fitted.theta, observations, |sample| selection.holds(sample));
+            let test = total_energy(&left, fitted.model.free_count(), log_variance_error);
+            test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
         };
-        self.observations.has_own_noise() && self.observations.members().into_iter().any(is_less)
-    }
-
-    /// Whether the test of the energy of all residuals fails for want of energy.
-    fn is_rejected(&self, fitted: &Fitted) -> bool {
-        let left = fitted.model.residual_runs(&fitted.theta, &self.observations, |s| self.everything.holds(s));
-        let test = total_energy(&left, fitted.model.free_count(), self.levels.log_variance_error());
-        test.is_some_and(|test| test.statistic < 1.0 && test.p_value < self.policy.rejection_p_value())
+        let error = self.levels.log_variance_error();
+        if !self.observations.has_own_noise() {
+            return fails(&self.observations, &self.everything, error, self.policy.rejection_p_value());
+        }
+        let members = self.observations.members();
+        let p_value = self.policy.screening_probability / members.len() as f64;
+        members.into_iter().any(|member| {
+            let of_member = self.observations.of_member(member.number);
+            // The variance of an error goes with the samples that determine the level.
+            let share = of_member.samples() as f64 / self.observations.samples() as f64;
+            fails(&of_member, &self.everything.of_samples(member.samples), error / share.sqrt(), p_value)
+        })
     }
 
     /// Lowers the levels to what `fitted` leaves over, of several records in each of those whose noise is its own; which may show

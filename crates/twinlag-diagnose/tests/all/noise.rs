@@ -3,7 +3,7 @@
 use twinlag_diagnose::{Observations, Verdict};
 use twinlag_signal::{Noise, Signal};
 
-use crate::common::{even, found, joint, ramps, readings, told, turbulence};
+use crate::common::{NOISE_K, even, found, joint, ramps, readings, told, turbulence};
 
 /// White noise of each channel, K.
 const QUIET_K: f64 = 0.02;
@@ -39,15 +39,31 @@ fn both_levels_are_those_of_the_residual() {
 fn each_record_has_the_levels_of_its_own_residual() {
     let d = joint(&[quiet(turbulence()), quiet(ramps(3))]);
     assert_eq!(d.diagnosis.verdict, Verdict::Adequate, "{}", told(&d.diagnosis));
+    println!(
+        "{} {:?}",
+        d.diagnosis.last.is_noise_of_residual,
+        d.records.iter().map(|r| r.noise_std_k).collect::<Vec<_>>()
+    );
     d.records.iter().for_each(|record| assert_right(record.noise_std_k));
 }
 
 /// One record in turbulence, whose third differences are those of the gas, among others in slow gas: what they leave over together is
-/// not clearly less than noise of the levels, what that one leaves is. Failed: it had levels of 0.033 and 0.021 K.
+/// not clearly less than noise of the levels, what that one leaves is. Failed: it kept 0.16 K in T1, where 0.1 K are true, a test of the
+/// residual failed for that, and intervals were five times as long.
 #[test]
 fn one_of_several_records_in_fast_gas_has_the_levels_of_its_residual() {
-    let slow = (3..8).map(|seed| quiet(ramps(seed)));
-    let d = joint(&slow.chain([quiet(turbulence())]).collect::<Vec<_>>());
+    let of = |seed, signal| {
+        let simulated = readings(seed, signal, |sensors| {
+            for (sensor, tau_s) in sensors.iter_mut().zip([0.004, 0.0125]) {
+                sensor.time_constant_s = tau_s;
+            }
+        });
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let d = joint(&[of(1, turbulence()), of(11, ramps(3)), of(21, ramps(4)), of(31, ramps(5))]);
     assert_eq!(d.diagnosis.verdict, Verdict::Adequate, "{}", told(&d.diagnosis));
-    d.records.iter().for_each(|record| assert_right(record.noise_std_k));
+    assert!(d.diagnosis.last.is_noise_of_residual, "{}", told(&d.diagnosis));
+    let levels_k = d.records[0].noise_std_k;
+    // As for `LOG_TOLERANCES`, of the 240 degrees of freedom below the 40 Hz of T1.
+    assert!(levels_k.iter().all(|level_k| (level_k / NOISE_K).ln().abs() < 0.27), "{levels_k:?}");
 }
