@@ -8,6 +8,8 @@ use crate::print::{decimals_of, digits};
 
 /// Rows at most.
 const MAX_ROWS: usize = 8;
+/// Digits of time constants: intervals beside them may be as short as a thousandth.
+const VALUE_DIGITS: i32 = 4;
 /// Parameters of effects, which are columns, at most.
 const MAX_PARAMETERS: usize = 2;
 
@@ -38,9 +40,9 @@ pub(crate) fn lines(answer: &IfKnown<String>) -> Vec<String> {
     let every = values.len().div_ceil(MAX_ROWS).max(1);
     let rows = values.iter().step_by(every).map(|v| {
         let mut row = vec![
-            format!("{} s", digits(v.time_constant_s, 2)),
+            format!("{} s", digits(v.time_constant_s, VALUE_DIGITS)),
             digits(v.deviance, 2),
-            v.other.value_s.map_or("-".into(), |t| format!("{} s", digits(t, 3))),
+            v.other.value_s.map_or("-".into(), |t| format!("{} s", digits(t, VALUE_DIGITS))),
             v.other.interval_95_s.map_or("-".into(), interval),
             v.judgement.grade.to_string(),
             format!("{} K", digits(v.gas_change_k, 2)),

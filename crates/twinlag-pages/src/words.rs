@@ -96,7 +96,10 @@ fn contradiction_in_words(record: &RecordAnswer) -> Vec<String> {
             "{source} {contradicts}: {alone} explain it, {of_others} explain {others}, and nothing explains them together"
         ));
     } else if record.agrees == Some(false) && record.disagreements.is_empty() {
-        out.push(format!("{source} {contradicts}: it is explained alone, and they are without it, but not together"));
+        out.push(format!(
+            "{source} does not go with the others: it is explained alone, and they are without it, by the same effects and with time \
+             constants that do not contradict each other, but not together, as where its noise is of another kind"
+        ));
     }
     let of = |one: &DisagreementAnswer| {
         let what = match &one.of {

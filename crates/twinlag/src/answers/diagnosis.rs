@@ -251,7 +251,8 @@ impl Diagnosis {
         // Four digits are printed.
         let is_worse = |error: BeforeAfter<f64>| error.after > 1.0005 * error.before;
         let budget = &self.error.budget;
-        if !is_worse(budget.chi2_per_dof) && !is_worse(budget.held_out_normalised_rms) {
+        let is_any_worse = is_worse(budget.chi2_per_dof) || is_worse(budget.held_out_normalised_rms);
+        if self.effects.is_empty() || !is_any_worse {
             return Vec::new();
         }
         let is_quieter = (0..2).any(|i| self.last.sensors[i].noise_std_k < 0.999 * self.base.sensors[i].noise_std_k);
