@@ -390,6 +390,11 @@ impl fmt::Display for Reason {
                  it away",
                 rounded(*deviations)
             ),
+            Self::FoundAsNoise { effect } if *effect == Identifier::COLOURED_NOISE => write!(
+                f,
+                "right if the {effect} that was found is noise, and that of the other sensor is white: it would account for a response \
+                 that the model lacks as well, and in part for coloured noise of both"
+            ),
             Self::FoundAsNoise { effect } => write!(
                 f,
                 "right if the {effect} that was found is noise: it would account for a response that the model lacks as well"

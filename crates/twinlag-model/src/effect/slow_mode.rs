@@ -14,8 +14,8 @@ use crate::plant::{Plant, SlowPath};
 pub(crate) static ABOUT: About = About::new("slow-mode", 7, candidates)
     .in_words(
         "part of one sensor's reading arrives through a slow body: conduction along the wires to the support, \
-                  the mass of the housing. The share is the part of a lasting change of the gas that the reading makes only \
-                  with the slow time constant; the rest it makes with the sensor's own",
+                  the mass of the housing. The share is the part of what the sensor follows, with its own time constant, that \
+                  is this body and not the gas; of two paths side by side the slow one has the share times τ_slow/(τ_slow − τ)",
         "use longer or thinner leads between junction and support, or a support that follows faster",
         "the same share through the same support in both sensors",
     )
