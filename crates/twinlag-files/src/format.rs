@@ -60,7 +60,7 @@ pub enum Foreign {
     EncryptedParquet,
     /// Feather, which is a file of Apache Arrow from version 2 on.
     Feather,
-    /// A database of SQLite.
+    /// A database of `SQLite`.
     Sqlite,
     /// Excel before version 5.
     OldExcel,
