@@ -62,7 +62,7 @@ pub use parameters::{CostValue, Parameter};
 pub use parts::{PartScatter, Scatter};
 pub use published::CrossRelation;
 pub use readings::{Readings, Segment, Steps};
-pub use residual::{ResidualTest, TestName, residual_tests, total_energy};
+pub use residual::{ResidualTest, TestName, residual_tests, total_energy_test};
 pub use sandwich::sandwich;
 pub use synthetic::synthetic_filter;
 pub use whitened::{Form, Whitened};

@@ -101,22 +101,25 @@ pub struct ResidualTest {
 /// # Source
 /// Ljung and Box 1978; Wilson and Hilferty 1931.
 pub fn residual_tests(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Vec<ResidualTest> {
-    let mut tests = Vec::from_iter(total_energy(segments, fitted, level_std));
+    let mut tests = Vec::from_iter(total_energy_test(segments, fitted, level_std));
     tests.extend(band_energy(segments));
     tests.extend(whiteness(segments));
     tests
 }
 
-/// The first of [`residual_tests`] alone; `None` of no more residuals than fitted parameters.
+/// Tests whether the energy `Σ r²` of a whitened residual is its degrees of freedom `n − fitted`, two-sided, by the normal deviate
+/// `(Σ r²/dof − 1)/√(2/dof + level²)`; `None` of no more residuals than fitted parameters.
+///
+/// - `segments`, `fitted`, `level_std`: as for [`residual_tests`], of which this is one
 ///
 /// ```
-/// use twinlag_cross_relation::total_energy;
+/// use twinlag_cross_relation::total_energy_test;
 ///
 /// // 800 residuals of half the standard deviation that noise has: a quarter of the energy, whose standard error is 0.05.
-/// let test = total_energy(&[vec![0.5; 800]], 0, 0.0).expect("more residuals than parameters");
+/// let test = total_energy_test(&[vec![0.5; 800]], 0, 0.0).expect("more residuals than parameters");
 /// assert!(test.statistic == 0.25 && test.p_value < 1e-40);
 /// ```
-pub fn total_energy(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Option<ResidualTest> {
+pub fn total_energy_test(segments: &[Vec<f64>], fitted: usize, level_std: f64) -> Option<ResidualTest> {
     let count: usize = segments.iter().map(Vec::len).sum();
     let energy: f64 = segments.iter().flatten().map(|r| r * r).sum();
     let dof = count.checked_sub(fitted).filter(|dof| *dof > 0)? as f64;

@@ -290,8 +290,8 @@ impl Reason {
                  which the interval covers"
             ),
             Self::RecordsDisagree { ratio, .. } => format!(
-                "the records give values that differ {ratio:.1} times as much as noise explains, and an interval that covers what they differ \
-                 says too little"
+                "the records give values that differ {ratio:.1} times as much as noise explains; an interval that covered this would say \
+                 too little"
             ),
             Self::RestsOnRecord { record } => format!(
                 "right if record {} is of one rig with the others, which do not show without it what was found",
@@ -392,8 +392,8 @@ impl fmt::Display for Reason {
             ),
             Self::FoundAsNoise { effect } if *effect == Identifier::COLOURED_NOISE => write!(
                 f,
-                "right if the {effect} that was found is noise, and that of the other sensor is white: it would account for a response \
-                 that the model lacks as well, and in part for coloured noise of both"
+                "right if the {effect} that was found is noise, and the noise of the other sensor is white: a response that the model lacks, \
+                 or coloured noise of both sensors, looks alike"
             ),
             Self::FoundAsNoise { effect } => write!(
                 f,

@@ -6,6 +6,7 @@ use crate::conclude::{is_explained, last_fit};
 use crate::diagnose::searched;
 use crate::joint::Disagreement;
 use crate::moves::State;
+use crate::rapid::change_along_the_record;
 use crate::transfer::{EffectInChannel, LeftOut, Transfer, places};
 
 /// One record and all others, each explained, which together are of more than one rig.
@@ -53,6 +54,10 @@ impl OddOne {
             return Ok(None);
         }
         let (others, _) = searched(&all.without_member(number), settings, watch)?;
+        // Time constants that change along a record take up what the others differ from each other.
+        if change_along_the_record(&others).is_some() {
+            return Ok(None);
+        }
         let [of_alone, of_others] = [&alone, &others].map(|state| last_fit(state, &settings.policy).1);
         let probability = settings.policy.records_rejection_probability / 2.0;
         let side = |record: usize, state: &State<'_>, fits: [&ModelFit; 2]| Side {

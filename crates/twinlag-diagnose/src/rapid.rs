@@ -108,8 +108,8 @@ fn shortened<'a>(
     Ok(found)
 }
 
-/// The place of such a change among what was found.
-fn change_along_the_record(state: &State<'_>) -> Option<usize> {
+/// The place, among what was found, of time constants that change along a record with nothing that was measured.
+pub(crate) fn change_along_the_record(state: &State<'_>) -> Option<usize> {
     state.taken.iter().position(|taken| is_change_along_the_record(&taken.candidate.effect))
 }
 

@@ -7,8 +7,8 @@
 //! Mandel (1982), with the standard error of Hartung and Knapp (2001) and Student's distribution. A record that hardly determines a
 //! number has a large standard error, and so little weight: where nothing but such a record is off, it says nothing of a variance
 //! between the others, and the standard error of the mean grows by the ratio of Birge (1932) alone, the scatter over what the
-//! standard errors explain. Where what the joint fit leaves is not white, the standard errors are those of noise that is correlated
-//! as it is in each record, as that of the joint estimate is.
+//! standard errors explain. Where a test of what the joint fit leaves fails, the standard errors are those of noise that is
+//! correlated as it is in each record, as that of the joint estimate is.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal, StudentsT};
 use twinlag_cross_relation::Z_975;
@@ -235,13 +235,11 @@ pub struct Between {
 
 /// What records say of the shared numbers of `fitted`; `None` of one record.
 ///
-/// - `joint`: covariance of the numbers of all records
 /// - `by_residual`: whether the standard errors are those of noise that is correlated as what the fit leaves is, as in [`covariance`]
 pub(crate) fn between(
     fitted: &Fitted,
     observations: &Observations,
     selection: &Selection,
-    joint: &[Vec<f64>],
     by_residual: bool,
 ) -> Option<Between> {
     let members = observations.members();
@@ -249,9 +247,10 @@ pub(crate) fn between(
         return None;
     }
     let is_shared = |i: usize| fitted.model.record_of(i).is_none() && !is_of_noise(fitted, i);
+    let joint = covariance(fitted, observations, selection, false);
     let largest_variance = |i: usize| {
-        let of_one = members.len() as f64 * joint[i][i] / MIN_INFORMATION_SHARE;
-        if is_shared(i) { of_one } else { f64::INFINITY }
+        let of_one = |joint: &Vec<Vec<f64>>| members.len() as f64 * joint[i][i] / MIN_INFORMATION_SHARE;
+        joint.as_ref().filter(|_| is_shared(i)).map_or(f64::INFINITY, of_one)
     };
     let own: Vec<(usize, OwnEstimate)> = members
         .iter()
@@ -291,6 +290,7 @@ fn is_of_noise(fitted: &Fitted, parameter: usize) -> bool {
 /// The estimate of a record by itself.
 struct OwnEstimate {
     theta: Vec<f64>,
+    /// That of noise alone: the uncertainty of what is held is not in it.
     covariance: Vec<Vec<f64>>,
     /// Parameters that the record does not determine: they are as in the joint fit.
     held: Vec<usize>,
@@ -318,7 +318,9 @@ impl OwnEstimate {
         };
         let equations = |of: &Fitted| of.model.normal_equations(&of.theta, observations, selection, None);
         let (mut joint, mut normal) = (joint.clone(), equations(joint));
-        joint.model.held = undetermined(&normal.products, largest_variance);
+        // What is the record's own is determined by it first.
+        let (shared, own): (Vec<usize>, Vec<usize>) = (0..joint.theta.len()).partition(|i| is_shared(*i));
+        joint.model.held = undetermined(&normal.products, own.into_iter().chain(shared), largest_variance);
         joint.model.held.iter().for_each(|at| normal.hold(*at));
         let by_step = Self::by_newton_step(&joint, observations, selection, &normal)?;
         if is_near(&by_step, &joint) {
@@ -354,16 +356,21 @@ impl OwnEstimate {
 /// Parameters whose derivatives those of the parameters before them make up, to rounding or up to a variance.
 ///
 /// - `products`: of the derivatives with each other
+/// - `order`: the parameters
 /// - `largest_variance`: of a parameter beside those before it
-fn undetermined(products: &[Vec<f64>], largest_variance: impl Fn(usize) -> f64) -> Vec<usize> {
+fn undetermined(
+    products: &[Vec<f64>],
+    order: impl Iterator<Item = usize>,
+    largest_variance: impl Fn(usize) -> f64,
+) -> Vec<usize> {
     let (mut determined, mut out): (Vec<usize>, Vec<usize>) = (Vec::new(), Vec::new());
-    for i in (0..products.len()).filter(|i| products[*i][*i] > 0.0) {
+    for i in order.filter(|i| products[*i][*i] > 0.0) {
         let tried: Vec<usize> = determined.iter().copied().chain([i]).collect();
         let part: Vec<Vec<f64>> = tried.iter().map(|a| tried.iter().map(|b| products[*a][*b]).collect()).collect();
         let last = tried.len() - 1;
         let variance = dense::inverse(&part).map(|inverse| inverse[last][last]);
-        let longest = largest_variance(i).min(MAX_VARIANCE_INFLATION / products[i][i]);
-        if variance.is_some_and(|variance| variance < longest) {
+        let largest = largest_variance(i).min(MAX_VARIANCE_INFLATION / products[i][i]);
+        if variance.is_some_and(|variance| variance < largest) {
             determined = tried;
         } else {
             out.push(i);
@@ -434,9 +441,11 @@ mod tests {
             vec![1.0, 0.0, 0.0, 1e-5],
             vec![0.0; 4],
         ];
-        assert_eq!(undetermined(&dense::gram(&columns), |_| f64::INFINITY), [2, 4]);
+        let products = dense::gram(&columns);
+        assert_eq!(undetermined(&products, 0..6, |_| f64::INFINITY), [2, 4]);
         // What is the fourth's own determines it to a variance of 10⁶.
-        assert_eq!(undetermined(&dense::gram(&columns), |i| if i == 3 { 1e5 } else { f64::INFINITY }), [2, 3, 4]);
+        assert_eq!(undetermined(&products, 0..6, |i| if i == 3 { 1e5 } else { f64::INFINITY }), [2, 3, 4]);
+        assert_eq!(undetermined(&products, (0..6).rev(), |_| f64::INFINITY), [1, 0]);
     }
 
     /// Three values of which two numbers were made: one of them by the differences alone, so that one degree of freedom is left.

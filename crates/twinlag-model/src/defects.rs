@@ -44,7 +44,7 @@ impl ChannelNoise {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
     }
 
-    /// Standard error of the logarithm of the variance of the channel that is less certain.
+    /// The larger standard error of the logarithm of a variance, of the two channels.
     pub(crate) fn log_variance_error(&self) -> f64 {
         2.0 * self.log_error[0].max(self.log_error[1])
     }

@@ -215,7 +215,7 @@ impl Model {
     }
 
     /// Parameters that belong to records which `observations` are not of.
-    fn of_other_records(&self, observations: &Observations) -> Vec<usize> {
+    pub(crate) fn of_other_records(&self, observations: &Observations) -> Vec<usize> {
         let of_records: Vec<(usize, usize)> =
             (2..self.parameter_count()).filter_map(|i| Some((i, self.record_of(i)?))).collect();
         if of_records.is_empty() {

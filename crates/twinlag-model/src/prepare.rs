@@ -1,6 +1,6 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
-use twinlag_cross_relation::total_energy;
+use twinlag_cross_relation::total_energy_test;
 
 use crate::blocks;
 use crate::defects::{self, ChannelNoise};
@@ -24,6 +24,9 @@ const MIN_EXCERPTED_SAMPLES: usize = 7000;
 const EXCERPT_SAMPLES: usize = 500;
 /// Starts of the two-lag fit that the best points of a grid of time constants give.
 pub(crate) const GRID_STARTS: usize = 3;
+/// Probability that any of several records with levels of its own is wrongly said to leave less than noise. Chosen: a false alarm costs
+/// little, since levels of what is left over are as certain as those of third differences.
+const LESS_THAN_NOISE_PROBABILITY: f64 = 0.01;
 /// Times that spikes are looked for.
 const SPIKE_ROUNDS: usize = 3;
 
@@ -192,7 +195,7 @@ impl Prepared {
 
     /// Whether what `fitted` leaves over is clearly less than noise of the levels that there are, as uncertain as these are: the
     /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Of several records with
-    /// levels of their own, one whose gas is fast is enough. Levels that were given are believed.
+    /// levels of their own, one that leaves less is enough. Levels that were given are believed.
     pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
         if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse {
@@ -203,48 +206,46 @@ impl Prepared {
         is_clearly_less || !self.levels.is_of_residual && self.lacks_energy(fitted)
     }
 
-    /// Whether the test of the energy of all residuals fails for want of energy, or that of a record that has levels of its own, which costs
-    /// little where it is by chance: those of what is left over are as certain.
+    /// Whether the residual has too little energy for levels of third differences: in all, or in any record that has levels of its own.
     fn lacks_energy(&self, fitted: &Fitted) -> bool {
-        let fails = |observations: &Observations, selection: &Selection, log_variance_error: f64, p_value: f64| {
-            let left = fitted.model.residual_runs(&fitted.theta, observations, |sample| selection.holds(sample));
-            let test = total_energy(&left, fitted.model.free_count(), log_variance_error);
-            test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
-        };
-        let error = self.levels.log_variance_error();
-        if !self.observations.has_own_noise() {
-            return fails(&self.observations, &self.everything, error, self.policy.rejection_p_value());
+        if self.observations.has_own_noise() {
+            return self.observations.members().iter().any(|member| self.does_record_lack_energy(fitted, member));
         }
-        let members = self.observations.members();
-        let p_value = self.policy.screening_probability / members.len() as f64;
-        members.into_iter().any(|member| {
-            let of_member = self.observations.of_member(member.number);
-            // The variance of an error goes with the samples that determine the level.
-            let share = of_member.samples() as f64 / self.observations.samples() as f64;
-            fails(&of_member, &self.everything.of_samples(member.samples), error / share.sqrt(), p_value)
-        })
+        // The weighted energy is at hand, and hardly less than that of noise where the other is clearly so.
+        fitted.mean_energy() < 1.0
+            && leaves_less_than_noise(
+                fitted,
+                &self.observations,
+                &self.searched,
+                self.levels.log_variance_error(),
+                self.policy.rejection_p_value(),
+            )
     }
 
-    /// Lowers the levels to what `fitted` leaves over, of several records in each of those whose noise is its own; which may show
-    /// that a converter is coarse.
+    /// Whether a record with levels of its own leaves too little energy for them.
+    fn does_record_lack_energy(&self, fitted: &Fitted, member: &Member) -> bool {
+        let of_member = self.observations.of_member(member.number);
+        // The variance of a level is inversely proportional to its samples.
+        let share = of_member.samples() as f64 / self.observations.samples() as f64;
+        let error = self.levels.log_variance_error() / share.sqrt();
+        let p_value = LESS_THAN_NOISE_PROBABILITY / self.observations.members().len() as f64;
+        leaves_less_than_noise(fitted, &of_member, &self.searched.of_samples(member.samples.clone()), error, p_value)
+    }
+
+    /// Lowers the levels to what `fitted` leaves over, of several records whose noise is their own in those that leave less than it; which
+    /// may show that a converter is coarse.
     pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
-        let own: Vec<[f64; 2]> = if self.observations.has_own_noise() {
-            let left = |member: Member| {
-                let (of_member, samples) = (self.observations.of_member(member.number), member.samples);
-                self.levels_left(fitted, &of_member, &self.searched.of_samples(samples))
-            };
-            self.observations.members().into_iter().map(left).collect()
+        let own: Vec<[f64; 2]> = if self.observations.has_own_noise() { self.own_levels(fitted) } else { Vec::new() };
+        let of_all = if own.is_empty() {
+            self.levels_left(fitted, &self.observations, &self.searched)
         } else {
-            Vec::new()
+            let samples: Vec<f64> = self.observations.members().iter().map(|m| m.samples.len() as f64).collect();
+            let sum = |i: usize| own.iter().zip(&samples).map(|(own, samples)| samples * own[i] * own[i]).sum::<f64>();
+            [0, 1].map(|i| (sum(i) / samples.iter().sum::<f64>()).sqrt())
         };
-        let of_all = self.levels_left(fitted, &self.observations, &self.searched);
         self.levels.replace(of_all);
         let over_all = |own: &[f64; 2]| [0, 1].map(|i| own[i] / self.levels.std_k[i]);
         self.observations = self.observations.clone().with_noise_factors(&own.iter().map(over_all).collect::<Vec<_>>());
-        // Their ratio is that of the spectrum, and their size that of all that is left over, which is then clearly less no more.
-        let model = fitted.model.clone().with_noise(self.levels.std_k);
-        let energy = model.energy(&fitted.theta, &self.observations, &self.searched) / fitted.count;
-        self.levels.replace(self.levels.std_k.map(|level_k| level_k * energy.sqrt()));
         self.levels.is_of_residual = true;
         self.context.noise_std_k = self.levels.std_k;
         self.context.is_coarse = self.levels.coarse_step_k().map(|step_k| step_k.is_some());
@@ -253,13 +254,35 @@ impl Prepared {
         }
     }
 
-    /// Noise levels, K, of what `fitted` leaves over in `observations`, these or one of these records.
+    /// Levels of each record, K: of what it leaves over where that is less than noise; by more than chance where it is so in any.
+    fn own_levels(&self, fitted: &Fitted) -> Vec<[f64; 2]> {
+        let members = self.observations.members();
+        let lacks: Vec<bool> = members.iter().map(|member| self.does_record_lack_energy(fitted, member)).collect();
+        let does_any = lacks.contains(&true);
+        let of = |(member, lacks): (Member, bool)| {
+            let of_member = self.observations.of_member(member.number);
+            let selection = self.searched.of_samples(member.samples);
+            if lacks || !does_any && energy_per_degree(&fitted.model, &fitted.theta, &of_member, &selection) < 1.0 {
+                return self.levels_left(fitted, &of_member, &selection);
+            }
+            let factor = of_member.noise_factor();
+            [0, 1].map(|i| factor[i] * self.levels.std_k[i])
+        };
+        members.into_iter().zip(lacks).map(of).collect()
+    }
+
+    /// Noise levels, K, of what `fitted` leaves over in `observations`, these or one of these records: their ratio is that of its spectrum,
+    /// and their size that of its energy.
     fn levels_left(&self, fitted: &Fitted, observations: &Observations, selection: &Selection) -> [f64; 2] {
-        let left = fitted.model.residual_runs(&fitted.theta, observations, |sample| selection.holds(sample));
-        let mut plant = fitted.model.plant(&fitted.theta, observations);
+        let Fitted { model, theta, .. } = fitted;
+        let left = model.residual_runs(theta, observations, |sample| selection.holds(sample));
+        let mut plant = model.plant(theta, observations);
         let factor = observations.noise_factor();
         (0..2).for_each(|i| plant.noise_std_k[i] *= factor[i]);
-        levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse)
+        let levels_k = levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse);
+        let model = model.clone().with_noise([0, 1].map(|i| levels_k[i] / factor[i]));
+        let size = energy_per_degree(&model, theta, observations, selection).sqrt();
+        levels_k.map(|level_k| level_k * size)
     }
 
     /// All of the record and its noise levels as they were before either was weighed by what a fit leaves over.
@@ -309,6 +332,27 @@ impl Prepared {
     pub fn judges(&self, sample: usize) -> bool {
         self.everything.holds(sample) && blocks::is_judge(sample, self.observations.samples(), &self.policy)
     }
+}
+
+/// Energy over its degrees of freedom, as the fit weighs frequencies.
+fn energy_per_degree(model: &Model, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
+    let count = model.degrees_of_freedom(selection.counted(), theta, observations, selection);
+    model.energy(theta, observations, selection) / count
+}
+
+/// Whether the energy of what `fitted` leaves over of a record, or of several, is less than that of noise by more than chance.
+fn leaves_less_than_noise(
+    fitted: &Fitted,
+    observations: &Observations,
+    selection: &Selection,
+    log_variance_error: f64,
+    p_value: f64,
+) -> bool {
+    let Fitted { model, theta, .. } = fitted;
+    let left = model.residual_runs(theta, observations, |sample| selection.holds(sample));
+    let free = model.free_count() - model.of_other_records(observations).len();
+    let test = total_energy_test(&left, free, log_variance_error);
+    test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
 }
 
 /// Saturation and coarse converters, masked and named.

@@ -97,7 +97,10 @@ fn coloured(lin: &Linearised) -> Vec<Vec<f64>> {
     let lags = (2.0 * (n as f64).sqrt()) as usize;
     let mut kernel = autocorrelation(&lin.residual[..n], lags.min(n / 4));
     kernel.iter_mut().enumerate().for_each(|(lag, c)| *c *= 1.0 - lag as f64 / (lags + 1) as f64);
-    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|column| filtered(&column[..n], &kernel)).collect();
+    // A column of another record is zero throughout.
+    let is_zero = |column: &[f64]| column.iter().all(|value| *value == 0.0);
+    let of_column = |column: &[f64]| if is_zero(column) { Vec::new() } else { filtered(column, &kernel) };
+    let filtered: Vec<Vec<f64>> = lin.columns.iter().map(|column| of_column(&column[..n])).collect();
     let of = |a: usize, b: usize| dense::dot(&lin.columns[a][..n], &filtered[b]);
     (0..filtered.len()).map(|a| (0..filtered.len()).map(|b| of(a.max(b), a.min(b))).collect()).collect()
 }
@@ -119,7 +122,7 @@ pub fn summarise(
     let scatter = (0..fitted.theta.len()).map(|i| influence.as_ref()?.scatter(&[(i, 1.0)])).collect();
     // What it holds is as long as the record.
     drop(influence);
-    let between = covariance.as_deref().and_then(|joint| between(fitted, observations, selection, joint, rejects));
+    let between = between(fitted, observations, selection, rejects);
     ModelFit {
         time_constants,
         difference,

@@ -97,8 +97,8 @@ fn contradiction_in_words(record: &RecordAnswer) -> Vec<String> {
         ));
     } else if record.agrees == Some(false) && record.disagreements.is_empty() {
         out.push(format!(
-            "{source} does not go with the others: it is explained alone, and they are without it, by the same effects and with time \
-             constants that do not contradict each other, but not together, as where its noise is of another kind"
+            "{source} is explained alone, and the others are explained without it, but not all together. Effects and time constants \
+             agree: a parameter of an effect or the noise may differ"
         ));
     }
     let of = |one: &DisagreementAnswer| {

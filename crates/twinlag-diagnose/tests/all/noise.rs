@@ -60,7 +60,7 @@ fn one_of_several_records_in_fast_gas_has_the_levels_of_its_residual() {
         });
         even(simulated.t1_c, simulated.t2_c).expect("finite and long")
     };
-    let d = joint(&[of(1, turbulence()), of(11, ramps(3)), of(21, ramps(4)), of(31, ramps(5))]);
+    let d = joint(&[of(4, turbulence()), of(14, ramps(3)), of(24, ramps(4)), of(34, ramps(5))]);
     assert_eq!(d.diagnosis.verdict, Verdict::Adequate, "{}", told(&d.diagnosis));
     assert!(d.diagnosis.last.is_noise_of_residual, "{}", told(&d.diagnosis));
     let levels_k = d.records[0].noise_std_k;
