@@ -3,6 +3,7 @@
 use twinlag_cross_relation::total_energy_test;
 
 use crate::blocks;
+use crate::cost::ResidualCost;
 use crate::defects::{self, ChannelNoise};
 use crate::effect::{self, Context, Identifier};
 use crate::error::ModelError;
@@ -203,49 +204,40 @@ impl Prepared {
         }
         let log_std = (2.0 / fitted.count + self.levels.log_variance_error().powi(2)).sqrt();
         let is_clearly_less = fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std;
-        is_clearly_less || !self.levels.is_of_residual && self.lacks_energy(fitted)
+        is_clearly_less || !self.levels.is_of_residual && self.lacking_energy(fitted).contains(&true)
     }
 
-    /// Whether the residual has too little energy for levels of third differences: in all, or in any record that has levels of its own.
-    fn lacks_energy(&self, fitted: &Fitted) -> bool {
-        if self.observations.has_own_noise() {
-            return self.observations.members().iter().any(|member| self.does_record_lack_energy(fitted, member));
+    /// Of each of several records that have levels of their own, whether it leaves too little energy for levels of third differences.
+    fn lacking_energy(&self, fitted: &Fitted) -> Vec<bool> {
+        if !self.observations.has_own_noise() {
+            return Vec::new();
         }
-        // The weighted energy is at hand, and hardly less than that of noise where the other is clearly so.
-        fitted.mean_energy() < 1.0
-            && leaves_less_than_noise(
-                fitted,
-                &self.observations,
-                &self.searched,
-                self.levels.log_variance_error(),
-                self.policy.rejection_p_value(),
-            )
-    }
-
-    /// Whether a record with levels of its own leaves too little energy for them.
-    fn does_record_lack_energy(&self, fitted: &Fitted, member: &Member) -> bool {
-        let of_member = self.observations.of_member(member.number);
-        // The variance of a level is inversely proportional to its samples.
-        let share = of_member.samples() as f64 / self.observations.samples() as f64;
-        let error = self.levels.log_variance_error() / share.sqrt();
-        let p_value = LESS_THAN_NOISE_PROBABILITY / self.observations.members().len() as f64;
-        leaves_less_than_noise(fitted, &of_member, &self.searched.of_samples(member.samples.clone()), error, p_value)
+        let members = self.observations.members();
+        let p_value = LESS_THAN_NOISE_PROBABILITY / members.len() as f64;
+        let lacks = |member: Member| {
+            let of_member = self.observations.of_member(member.number);
+            // The variance of a level is inversely proportional to its samples.
+            let share = of_member.samples() as f64 / self.observations.samples() as f64;
+            let error = self.levels.log_variance_error() / share.sqrt();
+            let selection = self.searched.of_samples(member.samples);
+            let left = fitted.model.residual_runs(&fitted.theta, &of_member, |sample| selection.holds(sample));
+            let free = fitted.model.free_count() - fitted.model.of_other_records(&of_member).len();
+            let test = total_energy_test(&left, free, error);
+            test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
+        };
+        members.into_iter().map(lacks).collect()
     }
 
     /// Lowers the levels to what `fitted` leaves over, of several records whose noise is their own in those that leave less than it; which
     /// may show that a converter is coarse.
     pub fn lower_levels(&mut self, fitted: &Fitted, settings: &Settings) {
-        let own: Vec<[f64; 2]> = if self.observations.has_own_noise() { self.own_levels(fitted) } else { Vec::new() };
-        let of_all = if own.is_empty() {
-            self.levels_left(fitted, &self.observations, &self.searched)
+        if self.observations.has_own_noise() {
+            self.lower_own_levels(fitted);
         } else {
-            let samples: Vec<f64> = self.observations.members().iter().map(|m| m.samples.len() as f64).collect();
-            let sum = |i: usize| own.iter().zip(&samples).map(|(own, samples)| samples * own[i] * own[i]).sum::<f64>();
-            [0, 1].map(|i| (sum(i) / samples.iter().sum::<f64>()).sqrt())
-        };
-        self.levels.replace(of_all);
-        let over_all = |own: &[f64; 2]| [0, 1].map(|i| own[i] / self.levels.std_k[i]);
-        self.observations = self.observations.clone().with_noise_factors(&own.iter().map(over_all).collect::<Vec<_>>());
+            self.levels.replace(self.levels_left(fitted, &self.observations, &self.searched));
+            let size = self.size_left(fitted, self.levels.std_k, &self.observations, &self.searched);
+            self.levels.replace(self.levels.std_k.map(|level_k| level_k * size));
+        }
         self.levels.is_of_residual = true;
         self.context.noise_std_k = self.levels.std_k;
         self.context.is_coarse = self.levels.coarse_step_k().map(|step_k| step_k.is_some());
@@ -254,35 +246,49 @@ impl Prepared {
         }
     }
 
-    /// Levels of each record, K: of what it leaves over where that is less than noise; by more than chance where it is so in any.
-    fn own_levels(&self, fitted: &Fitted) -> Vec<[f64; 2]> {
+    /// Lowers the levels of each record that leaves less than noise: by more than chance, where that is so in any.
+    fn lower_own_levels(&mut self, fitted: &Fitted) {
         let members = self.observations.members();
-        let lacks: Vec<bool> = members.iter().map(|member| self.does_record_lack_energy(fitted, member)).collect();
-        let does_any = lacks.contains(&true);
-        let of = |(member, lacks): (Member, bool)| {
+        let lacking = self.lacking_energy(fitted);
+        let does_any = lacking.contains(&true);
+        let of = |(member, lacks): (&Member, bool)| {
             let of_member = self.observations.of_member(member.number);
-            let selection = self.searched.of_samples(member.samples);
-            if lacks || !does_any && energy_per_degree(&fitted.model, &fitted.theta, &of_member, &selection) < 1.0 {
-                return self.levels_left(fitted, &of_member, &selection);
-            }
+            let selection = self.searched.of_samples(member.samples.clone());
+            let size = |std_k| self.size_left(fitted, std_k, &of_member, &selection);
             let factor = of_member.noise_factor();
+            if lacks || !does_any && size(self.levels.std_k) < 1.0 {
+                let left_k = self.levels_left(fitted, &of_member, &selection);
+                let size = size([0, 1].map(|i| left_k[i] / factor[i]));
+                return left_k.map(|level_k| level_k * size);
+            }
             [0, 1].map(|i| factor[i] * self.levels.std_k[i])
         };
-        members.into_iter().zip(lacks).map(of).collect()
+        let own: Vec<[f64; 2]> = members.iter().zip(lacking).map(of).collect();
+        // Those of all are a mean.
+        let samples = |member: &Member| member.samples.len() as f64;
+        let all: f64 = members.iter().map(samples).sum();
+        let sum =
+            |i: usize| members.iter().zip(&own).map(|(member, own)| samples(member) * own[i].powi(2)).sum::<f64>();
+        self.levels.replace([0, 1].map(|i| (sum(i) / all).sqrt()));
+        let over_all = |own: &[f64; 2]| [0, 1].map(|i| own[i] / self.levels.std_k[i]);
+        self.observations = self.observations.clone().with_noise_factors(&own.iter().map(over_all).collect::<Vec<_>>());
     }
 
-    /// Noise levels, K, of what `fitted` leaves over in `observations`, these or one of these records: their ratio is that of its spectrum,
-    /// and their size that of its energy.
+    /// Noise levels, K, of what `fitted` leaves over in `observations`, these or one of these records, by its spectrum, which determines
+    /// their ratio.
     fn levels_left(&self, fitted: &Fitted, observations: &Observations, selection: &Selection) -> [f64; 2] {
-        let Fitted { model, theta, .. } = fitted;
-        let left = model.residual_runs(theta, observations, |sample| selection.holds(sample));
-        let mut plant = model.plant(theta, observations);
+        let left = fitted.model.residual_runs(&fitted.theta, observations, |sample| selection.holds(sample));
+        let mut plant = fitted.model.plant(&fitted.theta, observations);
         let factor = observations.noise_factor();
         (0..2).for_each(|i| plant.noise_std_k[i] *= factor[i]);
-        let levels_k = levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse);
-        let model = model.clone().with_noise([0, 1].map(|i| levels_k[i] / factor[i]));
-        let size = energy_per_degree(&model, theta, observations, selection).sqrt();
-        levels_k.map(|level_k| level_k * size)
+        levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse)
+    }
+
+    /// Root mean square, as the fit weighs frequencies, of what `fitted` leaves over, in units of noise of these levels.
+    fn size_left(&self, fitted: &Fitted, std_k: [f64; 2], observations: &Observations, selection: &Selection) -> f64 {
+        let (model, theta) = (fitted.model.clone().with_noise(std_k), &fitted.theta);
+        let cost = ResidualCost::new(&model, theta, observations, selection);
+        (cost.energy(theta) / model.degrees_of_freedom(cost.count(), theta, observations, selection)).sqrt()
     }
 
     /// All of the record and its noise levels as they were before either was weighed by what a fit leaves over.
@@ -332,27 +338,6 @@ impl Prepared {
     pub fn judges(&self, sample: usize) -> bool {
         self.everything.holds(sample) && blocks::is_judge(sample, self.observations.samples(), &self.policy)
     }
-}
-
-/// Energy over its degrees of freedom, as the fit weighs frequencies.
-fn energy_per_degree(model: &Model, theta: &[f64], observations: &Observations, selection: &Selection) -> f64 {
-    let count = model.degrees_of_freedom(selection.counted(), theta, observations, selection);
-    model.energy(theta, observations, selection) / count
-}
-
-/// Whether the energy of what `fitted` leaves over of a record, or of several, is less than that of noise by more than chance.
-fn leaves_less_than_noise(
-    fitted: &Fitted,
-    observations: &Observations,
-    selection: &Selection,
-    log_variance_error: f64,
-    p_value: f64,
-) -> bool {
-    let Fitted { model, theta, .. } = fitted;
-    let left = model.residual_runs(theta, observations, |sample| selection.holds(sample));
-    let free = model.free_count() - model.of_other_records(observations).len();
-    let test = total_energy_test(&left, free, log_variance_error);
-    test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
 }
 
 /// Saturation and coarse converters, masked and named.
