@@ -1,9 +1,8 @@
 //! Before the loop: noise levels, defects of the data, and which residuals fit, choose and judge.
 
-use twinlag_cross_relation::total_energy_test;
+use twinlag_cross_relation::{ResidualTest, total_energy_test};
 
 use crate::blocks;
-use crate::cost::ResidualCost;
 use crate::defects::{self, ChannelNoise};
 use crate::effect::{self, Context, Identifier};
 use crate::error::ModelError;
@@ -194,38 +193,35 @@ impl Prepared {
         }
     }
 
-    /// Whether what `fitted` leaves over is clearly less than noise of the levels that there are, as uncertain as these are: the
-    /// disagreement holds all of the noise, and third differences hold the fastest changes of the gas as well. Of several records with
-    /// levels of their own, one that leaves less is enough. Levels that were given are believed.
+    /// Whether what `fitted` leaves over, of several records in any that has levels of its own, is clearly less than noise of the levels that
+    /// there are, as uncertain as these are: the disagreement holds all of the noise, and third differences hold the fastest changes of the
+    /// gas as well. Levels that were given are believed.
     pub fn has_high_levels(&self, fitted: &Fitted, settings: &Settings) -> bool {
         let is_coarse = self.levels.coarse_step_k().iter().any(Option::is_some);
         if settings.noise_std_k.is_some() || fitted.model.noise().is_some() || is_coarse {
             return false;
         }
+        if self.observations.has_own_noise() {
+            return self.observations.members().iter().any(|member| self.does_leave_less_than_noise(fitted, member));
+        }
         let log_std = (2.0 / fitted.count + self.levels.log_variance_error().powi(2)).sqrt();
-        let is_clearly_less = fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std;
-        is_clearly_less || !self.levels.is_of_residual && self.lacking_energy(fitted).contains(&true)
+        fitted.mean_energy().ln() < -self.policy.lower_levels_standard_errors * log_std
     }
 
-    /// Of each of several records that have levels of their own, whether it leaves too little energy for levels of third differences.
-    fn lacking_energy(&self, fitted: &Fitted) -> Vec<bool> {
-        if !self.observations.has_own_noise() {
-            return Vec::new();
-        }
-        let members = self.observations.members();
-        let p_value = LESS_THAN_NOISE_PROBABILITY / members.len() as f64;
-        let lacks = |member: Member| {
-            let of_member = self.observations.of_member(member.number);
-            // The variance of a level is inversely proportional to its samples.
-            let share = of_member.samples() as f64 / self.observations.samples() as f64;
-            let error = self.levels.log_variance_error() / share.sqrt();
-            let selection = self.searched.of_samples(member.samples);
-            let left = fitted.model.residual_runs(&fitted.theta, &of_member, |sample| selection.holds(sample));
-            let free = fitted.model.free_count() - fitted.model.of_other_records(&of_member).len();
-            let test = total_energy_test(&left, free, error);
-            test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
-        };
-        members.into_iter().map(lacks).collect()
+    /// Whether a record with levels of its own leaves less than noise of these levels by more than chance.
+    fn does_leave_less_than_noise(&self, fitted: &Fitted, member: &Member) -> bool {
+        let of_member = self.observations.of_member(member.number);
+        // The variance of a level is inversely proportional to its samples.
+        let share = of_member.samples() as f64 / self.observations.samples() as f64;
+        let error = self.levels.log_variance_error() / share.sqrt();
+        let test = energy_test(&fitted.model, &fitted.theta, &of_member, &self.searched_of(member), error);
+        let p_value = LESS_THAN_NOISE_PROBABILITY / self.observations.members().len() as f64;
+        test.is_some_and(|test| test.statistic < 1.0 && test.p_value < p_value)
+    }
+
+    /// What is searched of a record.
+    fn searched_of(&self, member: &Member) -> Selection {
+        self.searched.of_samples(member.samples.clone())
     }
 
     /// Lowers the levels to what `fitted` leaves over, of several records whose noise is their own in those that leave less than it; which
@@ -235,8 +231,10 @@ impl Prepared {
             self.lower_own_levels(fitted);
         } else {
             self.levels.replace(self.levels_left(fitted, &self.observations, &self.searched));
-            let size = self.size_left(fitted, self.levels.std_k, &self.observations, &self.searched);
-            self.levels.replace(self.levels.std_k.map(|level_k| level_k * size));
+            // Their ratio is that of the spectrum, and their size that of all that is left over, which is then clearly less no more.
+            let model = fitted.model.clone().with_noise(self.levels.std_k);
+            let energy = model.energy(&fitted.theta, &self.observations, &self.searched) / fitted.count;
+            self.levels.replace(self.levels.std_k.map(|level_k| level_k * energy.sqrt()));
         }
         self.levels.is_of_residual = true;
         self.context.noise_std_k = self.levels.std_k;
@@ -246,25 +244,22 @@ impl Prepared {
         }
     }
 
-    /// Lowers the levels of each record that leaves less than noise: by more than chance, where that is so in any.
+    /// Lowers the levels of each record that leaves less than noise; those of all are a mean.
     fn lower_own_levels(&mut self, fitted: &Fitted) {
         let members = self.observations.members();
-        let lacking = self.lacking_energy(fitted);
-        let does_any = lacking.contains(&true);
-        let of = |(member, lacks): (&Member, bool)| {
-            let of_member = self.observations.of_member(member.number);
-            let selection = self.searched.of_samples(member.samples.clone());
-            let size = |std_k| self.size_left(fitted, std_k, &of_member, &selection);
+        let of = |member: &Member| {
+            let (of_member, selection) = (self.observations.of_member(member.number), self.searched_of(member));
             let factor = of_member.noise_factor();
-            if lacks || !does_any && size(self.levels.std_k) < 1.0 {
-                let left_k = self.levels_left(fitted, &of_member, &selection);
-                let size = size([0, 1].map(|i| left_k[i] / factor[i]));
-                return left_k.map(|level_k| level_k * size);
+            if !self.does_leave_less_than_noise(fitted, member) {
+                return [0, 1].map(|i| factor[i] * self.levels.std_k[i]);
             }
-            [0, 1].map(|i| factor[i] * self.levels.std_k[i])
+            // Their ratio is that of the spectrum, and their size that of all that is left over.
+            let left_k = self.levels_left(fitted, &of_member, &selection);
+            let model = fitted.model.clone().with_noise([0, 1].map(|i| left_k[i] / factor[i]));
+            let test = energy_test(&model, &fitted.theta, &of_member, &selection, 0.0);
+            left_k.map(|level_k| level_k * test.as_ref().map_or(1.0, |test| test.statistic.sqrt()))
         };
-        let own: Vec<[f64; 2]> = members.iter().zip(lacking).map(of).collect();
-        // Those of all are a mean.
+        let own: Vec<[f64; 2]> = members.iter().map(of).collect();
         let samples = |member: &Member| member.samples.len() as f64;
         let all: f64 = members.iter().map(samples).sum();
         let sum =
@@ -282,13 +277,6 @@ impl Prepared {
         let factor = observations.noise_factor();
         (0..2).for_each(|i| plant.noise_std_k[i] *= factor[i]);
         levels_below(&plant, observations, &Bands::of(&left), self.context.is_coarse)
-    }
-
-    /// Root mean square, as the fit weighs frequencies, of what `fitted` leaves over, in units of noise of these levels.
-    fn size_left(&self, fitted: &Fitted, std_k: [f64; 2], observations: &Observations, selection: &Selection) -> f64 {
-        let (model, theta) = (fitted.model.clone().with_noise(std_k), &fitted.theta);
-        let cost = ResidualCost::new(&model, theta, observations, selection);
-        (cost.energy(theta) / model.degrees_of_freedom(cost.count(), theta, observations, selection)).sqrt()
     }
 
     /// All of the record and its noise levels as they were before either was weighed by what a fit leaves over.
@@ -338,6 +326,19 @@ impl Prepared {
     pub fn judges(&self, sample: usize) -> bool {
         self.everything.holds(sample) && blocks::is_judge(sample, self.observations.samples(), &self.policy)
     }
+}
+
+/// The test of the energy that a model leaves over of a record of several; `None` of no more residuals than parameters.
+fn energy_test(
+    model: &Model,
+    theta: &[f64],
+    observations: &Observations,
+    selection: &Selection,
+    log_variance_error: f64,
+) -> Option<ResidualTest> {
+    let left = model.residual_runs(theta, observations, |sample| selection.holds(sample));
+    let free = model.free_count() - model.of_other_records(observations).len();
+    total_energy_test(&left, free, log_variance_error)
 }
 
 /// Saturation and coarse converters, masked and named.

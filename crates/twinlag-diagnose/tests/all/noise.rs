@@ -1,9 +1,12 @@
 //! Levels of noise where the gas reaches so far up the band that third differences are mostly those of the gas.
 
-use twinlag_diagnose::{Observations, Verdict};
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+
+use twinlag_diagnose::{JointDiagnosis, Observations, Settings, Verdict, diagnose_records};
 use twinlag_signal::{Noise, Signal};
 
-use crate::common::{NOISE_K, even, found, joint, ramps, readings, told, turbulence};
+use crate::common::{NOISE_K, SAMPLES, even, found, joint, ramps, readings, told, turbulence};
 
 /// White noise of each channel, K.
 const QUIET_K: f64 = 0.02;
@@ -52,18 +55,44 @@ fn each_record_has_the_levels_of_its_own_residual() {
 /// residual failed for that, and intervals were five times as long.
 #[test]
 fn one_of_several_records_in_fast_gas_has_the_levels_of_its_residual() {
-    let of = |seed, signal| {
-        let simulated = readings(seed, signal, |sensors| {
-            for (sensor, tau_s) in sensors.iter_mut().zip([0.004, 0.0125]) {
-                sensor.time_constant_s = tau_s;
-            }
-        });
-        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
-    };
-    let d = joint(&[of(4, turbulence()), of(14, ramps(3)), of(24, ramps(4)), of(34, ramps(5))]);
+    let d = diagnosed(0.0, &Settings::default());
     assert_eq!(d.diagnosis.verdict, Verdict::Adequate, "{}", told(&d.diagnosis));
     assert!(d.diagnosis.last.is_noise_of_residual, "{}", told(&d.diagnosis));
     let levels_k = d.records[0].noise_std_k;
     // As for `LOG_TOLERANCES`, of the 240 degrees of freedom below the 40 Hz of T1.
     assert!(levels_k.iter().all(|level_k| (level_k / NOISE_K).ln().abs() < 0.27), "{levels_k:?}");
+}
+
+/// Beside a record whose levels are lowered, a line that others have is no noise of theirs: they keep the levels of third differences,
+/// whose logarithm has a standard error of `½ √(4.62/3000)`. The line moves it by 10⁻⁴: third differences make `0.21 (2 sin(π 0.05))³`
+/// = 0.0065 K of it, and `0.1 √20` K of the noise. Failed: the levels of all were such that the energy of all was that of noise.
+#[test]
+fn levels_are_not_raised_to_what_another_record_leaves_over() {
+    let d = diagnosed(0.3, &Settings { effects: Vec::new(), ..Settings::default() });
+    assert_eq!(d.diagnosis.verdict, Verdict::Unexplained, "{}", told(&d.diagnosis));
+    assert!(d.diagnosis.last.is_noise_of_residual, "{}", told(&d.diagnosis));
+    let log_error = 0.5 * (4.62 / SAMPLES as f64).sqrt();
+    for levels_k in d.records[1..].iter().map(|record| record.noise_std_k) {
+        assert!(levels_k.iter().all(|level_k| (level_k / NOISE_K).ln().abs() < 4.0 * log_error), "{levels_k:?}");
+    }
+}
+
+/// Four records, the first of them in turbulence and the others in slow gas, whose T2 has a line of 50 Hz.
+///
+/// - `line_k`: its amplitude
+fn diagnosed(line_k: f64, settings: &Settings) -> JointDiagnosis {
+    let of = |seed, signal, line_k: f64| {
+        let mut simulated = readings(seed, signal, |sensors| {
+            for (sensor, tau_s) in sensors.iter_mut().zip([0.004, 0.0125]) {
+                sensor.time_constant_s = tau_s;
+            }
+        });
+        for (reading_c, time_s) in simulated.t2_c.iter_mut().zip(&simulated.time_s) {
+            *reading_c += line_k * (TAU * 50.0 * time_s).sin();
+        }
+        even(simulated.t1_c, simulated.t2_c).expect("finite and long")
+    };
+    let slow = |seed| of(seed, ramps(seed), line_k);
+    let records = [of(4, turbulence(), 0.0), slow(3), slow(5), slow(7)];
+    diagnose_records(&records, settings, &|_, _, _| ControlFlow::Continue(())).expect("records of one rig")
 }
