@@ -14,7 +14,7 @@ use crate::names::{
 use crate::note::Note;
 use crate::selection::{ColumnRef, Selection, Setting};
 use crate::table::Table;
-use crate::time_axis::TimeColumns;
+use crate::time_axis::{TimeColumns, counter_beside};
 use crate::unit::Unit;
 
 /// The chosen columns, from 0.
@@ -147,7 +147,12 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
         length_s.is_some_and(|length_s| length_s <= LONGEST_NAMING_UNIT_S) && rises(column)
     };
     let open = || (0..columns.len()).filter(free);
-    let named = open().find(|&index| is_time(&columns[index]));
+    let named = open().find(|&index| is_time(&columns[index])).map(|time| {
+        // A logger's own milliseconds are better than the time at which its lines arrived.
+        let is_stamped = columns[time].kind() == Kind::Stamp;
+        let counter = open().filter(|_| is_stamped).find(|&index| counter_beside(table, index, time).is_some());
+        counter.unwrap_or(time)
+    });
     named.or_else(|| open().find(|&index| is_called_by_unit(&columns[index]))).or_else(|| {
         // Without a telling name: the first column, if it rises from row to row and is not a row
         // number, by its name or as it counts.

@@ -222,7 +222,7 @@ pub enum RecordError {
     NotATimeUnit { file: String, column: String, unit: String },
     #[error(
         "{file}: column {column} names no unit of time, and its numbers, with steps of {shown}, are the stamps of no logger in \
-         s, nor in ms, us, ns or days since a usual date; choose the unit, or write it in the header, for example 'time [us]'",
+         s; choose the unit, or write it in the header, for example 'time [ms]'",
         shown = plain(*step)
     )]
     TimeUnitUnclear { file: String, column: String, step: f64 },

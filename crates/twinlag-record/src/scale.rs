@@ -3,7 +3,7 @@
 //! Seconds are assumed unless the numbers cannot be seconds: instants of today in
 //! milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and MATLAB
 //! count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
-//! stay, with a question; where none fits, the column is refused. A factor of 1000 in time is a
+//! stay, with a question; where none fits, or none but a counter whose unit is not known, the column is refused. A factor of 1000 in time is a
 //! factor of 1000 in every time constant: it must not be wrong in silence.
 
 use crate::sampling::{self, Clock};
@@ -65,6 +65,9 @@ const LONGEST_PERIOD_S: f64 = 3600.0;
 const MINUTE_S: f64 = 60.0;
 /// How far, as a fraction, a step may be from a round number: clocks are off by 1e-4 at most.
 const OFF: f64 = 2e-4;
+/// How far, as a fraction, the rise of a counter may be from the time that passes by stamps: stamps in whole seconds are off by this in
+/// ten seconds, and the resonator of a cheap board by a twentieth of it. Units are a factor of 1000 apart.
+const COUNTER_TOLERANCE: f64 = 0.1;
 
 /// Judges the numbers of a column, all of them finite.
 pub(crate) fn judge(values: &[f64]) -> Reading {
@@ -115,13 +118,27 @@ fn of_days(step: f64, days: Counter) -> Reading {
     }
 }
 
-/// Whole numbers with steps of two and more may be those of a counter of milliseconds.
+/// Whole numbers with steps of two and more may be those of a counter of milliseconds. Where no logger has such a step in seconds, they
+/// are of milliseconds or microseconds, and which is not known.
 fn of_counter(step: f64, are_whole: bool) -> Reading {
-    if step > DAY_S && !is_whole(step / DAY_S) {
+    if step > DAY_S && !is_whole(step / DAY_S) || are_whole && !is_loggers_period(step) {
         return Reading::Unclear { step };
     }
     let counter = Counter { symbol: "ms", seconds: 1e-3, name: "milliseconds", step_s: step * 1e-3 };
     if are_whole && step > 1.5 { Reading::Question(counter) } else { Reading::Seconds }
+}
+
+/// Milliseconds or microseconds, where numbers rise by as many of them as pass in a time.
+///
+/// - `rise`: from the first number to the last
+/// - `step`: from number to number, the median
+/// - `duration_s`: what passes by another clock, s
+pub(crate) fn judge_beside(rise: f64, step: f64, duration_s: f64) -> Option<Counter> {
+    let counters = [("ms", 1e-3, "milliseconds"), ("us", 1e-6, "microseconds")];
+    let (symbol, seconds, name) = counters
+        .into_iter()
+        .find(|(_, seconds, _)| (rise * seconds - duration_s).abs() <= COUNTER_TOLERANCE * duration_s)?;
+    Some(Counter { symbol, seconds, name, step_s: step * seconds })
 }
 
 /// Any step up to a minute; beyond it half minutes that divide the hour, and hours that divide the
@@ -179,7 +196,7 @@ mod tests {
         // A step of 1000 s is none of a logger, and 1 ms in a counter of nanoseconds.
         assert_eq!(judge(&stamps(1.8e12, 1e6)), Reading::Unclear { step: 1e6 });
         // 2.8 h in seconds since 1970, or 10 ms in a counter of microseconds.
-        assert_eq!(symbol(judge(&stamps(1.8e9, 1e4))), "s, or ms");
+        assert_eq!(symbol(judge(&stamps(1.8e9, 1e4))), "?");
     }
 
     /// Days of spreadsheets, of MATLAB and of astronomers. Doubles near them lie 6e-7, 1e-5 and 4e-5 s
@@ -227,7 +244,9 @@ mod tests {
             (45_296.5, 10.03 / DAY_S, "s, or d"),
             (0.0, 10.0, "s, or ms"),
             (123.0, 2.0, "s, or ms"),
-            (0.0, 500.0, "s, or ms"),
+            (0.0, 120.0, "s, or ms"),
+            // No logger in seconds; milliseconds at 2 Hz, or microseconds at 2 kHz.
+            (0.0, 500.0, "?"),
             (0.0, 1.0, "s"),
             (0.0, 0.5, "s"),
             (0.0, 1e6, "?"),
@@ -238,6 +257,17 @@ mod tests {
         }
         // Whole milliseconds that jitter by one.
         let jitter: Vec<f64> = (0..ROWS).map(|k| (100 * k + k % 3) as f64).collect();
-        assert_eq!(symbol(judge(&jitter)), "s, or ms");
+        assert_eq!(symbol(judge(&jitter)), "?");
+    }
+
+    /// 0.5 % is what a board's resonator is off.
+    #[test]
+    fn a_counter_beside_stamps_has_the_unit_that_passes() {
+        let unit = |rise: f64, duration_s: f64| judge_beside(rise, 100.0, duration_s).map(|counter| counter.symbol);
+        assert_eq!(unit(20_100.0, 20.0), Some("ms"));
+        assert_eq!(unit(20_100_000.0, 20.0), Some("us"));
+        for rise in [20.0, 15_000.0, 25_000.0, 2e8] {
+            assert_eq!(unit(rise, 20.0), None, "{rise}");
+        }
     }
 }

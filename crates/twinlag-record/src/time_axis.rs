@@ -3,8 +3,9 @@
 use crate::RecordError;
 use crate::clock::{self, DAY_NS, Day, Stamp};
 use crate::column::Kind;
+use crate::names::counts_rows;
 use crate::note::Note;
-use crate::sampling::Clock;
+use crate::sampling::{self, Clock};
 use crate::scale::{self, Counter, Reading};
 use crate::table::Table;
 use crate::unit::Unit;
@@ -102,7 +103,7 @@ pub(crate) fn unit_s(
             }
             Ok(*seconds)
         }
-        Unit::Unstated => match scale::judge(table.columns()[index].raw()) {
+        Unit::Unstated => match judged(table, index) {
             Reading::Recognised(Counter { symbol, seconds, name, step_s }) => {
                 notes.push(Note::TimeRecognised { column: column(), unit: symbol, name, step_s });
                 Ok(seconds)
@@ -122,6 +123,30 @@ pub(crate) fn unit_s(
             Err(RecordError::NotATimeUnit { file: table.source().to_owned(), column: column(), unit: unit.to_string() })
         }
     }
+}
+
+/// What a column without a unit counts, by the stamps beside it or by its numbers.
+fn judged(table: &Table, index: usize) -> Reading {
+    let columns = table.columns();
+    let stamps = columns.iter().position(|column| column.kind() == Kind::Stamp);
+    let counter = stamps.and_then(|stamps| counter_beside(table, index, stamps));
+    counter.map_or_else(|| scale::judge(columns[index].raw()), Reading::Recognised)
+}
+
+/// What a column of numbers counts that rises from row to row as the time of stamps beside it passes: milliseconds or microseconds of the
+/// logger itself. `None` of any other column.
+pub(crate) fn counter_beside(table: &Table, index: usize, stamps: usize) -> Option<Counter> {
+    let column = &table.columns()[index];
+    let values = column.raw();
+    let is_count = *column.unit() == Unit::Unstated
+        && column.kind() == Kind::Number
+        && !counts_rows(column)
+        && values.iter().all(|value| value.fract() == 0.0)
+        && values.windows(2).all(|pair| pair[1] > pair[0]);
+    let (first, last) = values.first().zip(values.last()).filter(|_| is_count)?;
+    let passed = elapsed(table, stamps, &self::stamps(table, stamps).ok()?, &mut Vec::new()).ok()?;
+    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    scale::judge_beside(last - first, sampling::median(&steps), *passed.last()?)
 }
 
 /// Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.

@@ -1048,6 +1048,13 @@ fn time_in_milliseconds_since_1970_is_recognised_and_a_counter_is_asked_about() 
         &[&FILE[..], &["--time-unit", "K"]].concat(),
         &["--time-unit", "expected s, ms, us, ns, min, h or d"],
     );
+    // 100 s in seconds, 0.1 s in milliseconds and 0.1 ms in microseconds: no logger's in seconds.
+    let slow = with_times("counter_slow", |s| format!("{}", (5e4 * s).round()));
+    slow.refuses(
+        3,
+        &FILE,
+        &["column 1 'time' names no unit of time", "steps of 100,", "'time [ms]'", "(option --time-unit)"],
+    );
     let unclear = with_times("unclear_time", |s| format!("{}", (5e8 * s).round()));
     unclear.refuses(3, &FILE, &["column 1 'time' names no unit of time", "steps of 1000000", "(option --time-unit)"]);
 }

@@ -213,6 +213,20 @@ fn a_serial_log_is_read_with_the_time_of_arrival() {
     }
 }
 
+/// A line arrives some milliseconds after it was sent, now more and now fewer. Failed: three columns could be sensors.
+#[test]
+fn a_sketch_that_sends_its_own_milliseconds_has_its_own_time() {
+    let arrival = |t: f64| format!("12:00:{:06.3}", t + 0.003 * (1.0 + (9.0 * t).sin()));
+    let milliseconds = |t: f64| format!("{:.0}", 41_230.0 + 1e3 * t);
+    let text = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t), milliseconds(t)));
+    let got = record(&text);
+    assert_is_the_rig(&got, 1e-12);
+    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeRecognised { unit: "ms", .. })), "{:?}", got.notes);
+    // A number of the row is none, though rows of a fast logger come as often.
+    let rows = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t / 500.0), 2.0 * t));
+    assert_says(&refusal(&rows), &["3 columns have the name or the unit of a temperature"]);
+}
+
 /// A sketch says that it has started, and of a sensor that did not answer.
 #[test]
 fn messages_of_a_serial_log_are_no_rows() {
