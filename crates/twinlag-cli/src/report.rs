@@ -21,5 +21,6 @@ pub(crate) fn making(files: &[impl AsRef<Path>], is_static: bool) -> Making {
         made_at: Timestamp::now().strftime("%Y-%m-%d %H:%M UTC").to_string(),
         files: hashed.collect(),
         is_static,
+        is_first_screen: false,
     }
 }

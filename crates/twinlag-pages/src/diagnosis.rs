@@ -36,6 +36,9 @@ pub fn diagnosis_report(record: &Record, answer: &Diagnosis, making: &Making) ->
     let base = &answer.base;
     let mut document = Document::new(format!("Diagnosis of {}", file_names(&record.source, &answer.records)));
     document = page.first_screen(document, making)?;
+    if making.is_first_screen {
+        return Ok(making.page(&document));
+    }
     document = page.found(document);
     document = page.traces(document)?;
     document = page.residual(document)?;

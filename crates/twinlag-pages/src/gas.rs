@@ -82,6 +82,11 @@ pub fn gas_report(record: &Record, answer: &Compensation, making: &Making) -> Re
                  where it moves most.",
             )?
             .facts(facts);
+    }
+    if making.is_first_screen {
+        return Ok(making.page(&document));
+    }
+    if let Some(gas) = &answer.gas {
         document = budget(document.heading("What the band consists of"), gas);
         let spectra = Figure::new("").columns(1).panel_size(WIDTH_PX, 300.0).panel(spectra(record, answer));
         document = document.heading("Before and after").drawing(
@@ -137,6 +142,9 @@ pub fn track_report(record: &Record, answer: &Track, making: &Making) -> Result<
             .drawing(track_figure(answer, "").live(), "Both time constants with their pointwise 95 % bands.")?;
     }
     document = document.facts(facts);
+    if making.is_first_screen {
+        return Ok(making.page(&document));
+    }
     Ok(end(numbers(document, &answer.last), &answer.last, making))
 }
 

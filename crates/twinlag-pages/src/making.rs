@@ -17,6 +17,8 @@ pub struct Making {
     pub files: Vec<(String, String)>,
     /// Whether the page is for print and mail: without a script, so that traces cannot be enlarged.
     pub is_static: bool,
+    /// Whether the page ends after its first screen: the verdict, the numbers that readers come for and the picture that shows why.
+    pub is_first_screen: bool,
 }
 
 impl Making {

@@ -1,4 +1,4 @@
-//! Answers: as JSON, as arrays, as pages and pictures.
+//! Answers: as JSON, as arrays, as pages.
 
 use std::sync::Arc;
 
@@ -8,9 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use twinlag::record::Record as Inner;
 use twinlag::{Characterisation, Compensation, Diagnosis, Track, joined};
-use twinlag_pages::{
-    Making, ReportError, diagnosis_report, gas_picture, gas_report, residual_picture, track_picture, track_report,
-};
+use twinlag_pages::{Making, diagnosis_report, gas_report, track_report};
 
 use crate::error::of_verb;
 use crate::verbs::in_a_row;
@@ -30,10 +28,6 @@ pub(crate) enum Said {
     Diagnosis(Box<Diagnosis>),
     Compensation(Box<Compensation>),
     Track(Box<Track>),
-}
-
-fn undrawable(error: ReportError) -> PyErr {
-    PyValueError::new_err(error.to_string())
 }
 
 impl Answer {
@@ -95,30 +89,22 @@ impl Answer {
         text.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 
-    /// The page of the answer, one HTML file; `None` of a characterisation, which has none.
-    fn page(&self, py: Python<'_>, made_at: String, is_static: bool) -> PyResult<Option<String>> {
+    /// The page of the answer, one HTML file, or its first screen; `None` of a characterisation, which has none.
+    fn page(
+        &self,
+        py: Python<'_>,
+        made_at: String,
+        is_static: bool,
+        is_first_screen: bool,
+    ) -> PyResult<Option<String>> {
         let record = self.record()?;
-        let making = Making { made_at, is_static, ..Making::default() };
+        let making = Making { made_at, is_static, is_first_screen, ..Making::default() };
         let page = py.detach(|| match &self.said {
             Said::Characterisation(_) => Ok(None),
             Said::Diagnosis(answer) => diagnosis_report(&record, answer, &making).map(Some),
             Said::Compensation(answer) => gas_report(&record, answer, &making).map(Some),
             Said::Track(answer) => track_report(&record, answer, &making).map(Some),
         });
-        page.map_err(undrawable)
-    }
-
-    /// One picture that shows the answer, as SVG; `None` where there is nothing to show.
-    fn picture(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        let record = self.record()?;
-        let picture = py.detach(|| match &self.said {
-            Said::Characterisation(_) => Ok(None),
-            Said::Diagnosis(answer) => residual_picture(answer),
-            Said::Compensation(answer) if answer.time_s.is_empty() => Ok(None),
-            Said::Compensation(answer) => gas_picture(&record, answer).map(Some),
-            Said::Track(answer) if answer.time_s.is_empty() => Ok(None),
-            Said::Track(answer) => track_picture(answer).map(Some),
-        });
-        picture.map_err(undrawable)
+        page.map_err(|error| PyValueError::new_err(error.to_string()))
     }
 }

@@ -108,7 +108,7 @@ class Answer:
             Without a script, for print and mail.
         """
         now = datetime.datetime.now().astimezone()
-        page = self._asked().page(now.strftime("%Y-%m-%d %H:%M %Z"), static)
+        page = self._asked().page(now.strftime("%Y-%m-%d %H:%M %Z"), static, False)
         if page is None:
             raise ValueError("a characterisation has no page: a diagnosis has")
         with open(path, "w", encoding="utf-8") as file:
@@ -137,15 +137,24 @@ class Answer:
         return lines
 
     def _repr_html_(self) -> str:
+        page = None if self._inner is None else self._inner.page("", True, True)
+        return self._table_html() if page is None else _framed(page, repr(self))
+
+    def _table_html(self) -> str:
         head = "".join(f"<th>{name}</th>" for name in ("", "", "value", "95 % interval", "grade"))
         body = "".join(_html_row(row) for row in self._rows())
         title = f"<p><b>{html.escape(type(self).__name__)}: {html.escape(self._verdict())}</b></p>"
-        picture = self._inner.picture() if self._inner is not None else None
-        return f"{title}<table><tr>{head}</tr>{body}</table>{picture or ''}"
+        return f"{title}<table><tr>{head}</tr>{body}</table>"
 
 
 def _ends(interval: Any) -> tuple[float | None, float | None]:
     return (None, None) if interval is None else (interval[0], interval[1])
+
+
+def _framed(page: str, title: str) -> str:
+    """A page in a frame of its own, so that its style is not that of the notebook, and nothing in it runs."""
+    style = "width: 100%; height: 46rem; border: 0"
+    return f'<iframe sandbox srcdoc="{html.escape(page)}" title="{html.escape(title)}" style="{style}"></iframe>'
 
 
 def _html_row(row: tuple[Any, ...]) -> str:
