@@ -13,8 +13,8 @@ use base64ct::{Base64, Encoding};
 use clap::Args;
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use sha2::{Digest, Sha256};
-use twinlag_report::{Axis, Chart, Document, Figure, Series};
+use lzma_rust2::{LzmaOptions, LzmaWriter};
+use twinlag_report::{Axis, Chart, Document, Figure, Series, policy_hash};
 
 use crate::report::{browser, built, step, target_dir};
 use crate::root;
@@ -22,6 +22,14 @@ use crate::root;
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// Several numbers at once, which browsers have been able to since 2023, and the stack of a thread of the program.
 const FLAGS: &str = "-Ctarget-feature=+simd128 -Clink-arg=-zstack-size=8388608";
+/// WebAssembly of the page, and what its JavaScript is called there.
+struct Part {
+    package: &'static str,
+    global: &'static str,
+}
+
+const PARTS: [Part; 2] =
+    [Part { package: "twinlag-web", global: "wasm_bindgen" }, Part { package: "twinlag-unpack", global: "unpacker" }];
 /// The binder of WebAssembly and the library that it binds have one version.
 const BINDER: &str = "wasm-bindgen";
 
@@ -63,9 +71,10 @@ pub(crate) fn run(web: &Web) -> Result<()> {
 fn bound(work: &Path) -> Result<PathBuf> {
     let root = root()?;
     println!("== the page's WebAssembly");
-    let build = ["build", "--profile", "web", "--target", TARGET, "--package", "twinlag-web"];
+    let mut build = vec!["build", "--profile", "web", "--target", TARGET];
+    build.extend(PARTS.iter().flat_map(|part| ["--package", part.package]));
     // In place of the flags of `.cargo/config.toml`, which are those of the facade alone.
-    let built = Command::new("cargo").args(build).env("RUSTFLAGS", FLAGS).current_dir(root).status()?;
+    let built = Command::new("cargo").args(&build).env("RUSTFLAGS", FLAGS).current_dir(root).status()?;
     ensure!(built.success(), "cargo {} ended with {built}", build.join(" "));
     let version = locked_version(&fs::read_to_string(root.join("Cargo.lock"))?)?;
     let tools = work.join("tools");
@@ -80,9 +89,12 @@ fn bound(work: &Path) -> Result<PathBuf> {
         step("cargo", &install, root)?;
     }
     let out = work.join("bound");
-    let wasm = target_dir()?.join(TARGET).join("web/twinlag_web.wasm");
-    let [binder, out_text, wasm] = [&binder, &out, &wasm].map(|path| path.display().to_string());
-    step(&binder, &["--target", "no-modules", "--no-typescript", "--out-dir", &out_text, &wasm], root)?;
+    for Part { package, global } in PARTS {
+        let wasm = target_dir()?.join(TARGET).join("web").join(package.replace('-', "_")).with_extension("wasm");
+        let [binder, out, wasm] = [&binder, &out, &wasm].map(|path| path.display().to_string());
+        let how = ["--target", "no-modules", "--no-modules-global", global, "--no-typescript", "--remove-name-section"];
+        step(&binder, &[&how[..], &["--out-dir", &out, &wasm]].concat(), root)?;
+    }
     Ok(out)
 }
 
@@ -102,23 +114,32 @@ fn assembled(bound: &Path) -> Result<String> {
     let read = |path: PathBuf| fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()));
     let reports = reports()?;
     let style = format!("\n{}{}", reports.style, read(page.join("page.css"))?);
-    let script = read(page.join("page.js"))?;
+    let script = read(bound.join("twinlag_unpack.js"))? + &read(page.join("page.js"))?;
     let worker = read(bound.join("twinlag_web.js"))? + &read(page.join("worker.js"))?;
     ensure!(!(worker.clone() + &script).contains("</script"), "a script would end before its end");
-    let wasm = Base64::encode_string(&gzipped(&fs::read(bound.join("twinlag_web_bg.wasm"))?)?);
+    let wasm = Base64::encode_string(&packed(&fs::read(bound.join("twinlag_web_bg.wasm"))?)?);
+    let unpacker = Base64::encode_string(&gzipped(&fs::read(bound.join("twinlag_unpack_bg.wasm"))?)?);
     let policy = format!(
         "default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'wasm-unsafe-eval' '{}' {}; style-src '{}' {}; \
          worker-src blob:",
-        hash(&script),
+        policy_hash(&script),
         reports.script_hashes,
-        hash(&style),
+        policy_hash(&style),
         reports.style_hashes,
     );
-    let parts = [("policy", policy), ("style", style), ("script", script), ("worker", worker), ("wasm", wasm)];
-    let parts = parts.into_iter().chain([("version", env!("CARGO_PKG_VERSION").to_owned())]);
+    let parts = [
+        ("policy", policy),
+        ("style", style),
+        ("script", script),
+        ("worker", worker),
+        ("unpacker", unpacker),
+        ("wasm", wasm),
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+    ];
     // No part is looked through for the names of others.
     let template = read(page.join("index.html"))?;
     let mut places: Vec<(usize, usize, String)> = parts
+        .into_iter()
         .map(|(name, text)| {
             let mark = format!("{{{name}}}");
             let place = template.find(&mark).with_context(|| format!("index.html has no {mark}"))?;
@@ -193,13 +214,19 @@ fn driven(web: &Web, page: &Path, work: &Path) -> Result<()> {
     step("node", &paths.each_ref().map(String::as_str), work)
 }
 
+/// Packed by LZMA, whose dictionary is as long as the bytes.
+fn packed(bytes: &[u8]) -> Result<Vec<u8>> {
+    let mut options = LzmaOptions::with_preset(9);
+    options.dict_size = u32::try_from(bytes.len())?;
+    // Instructions of WebAssembly begin at any byte.
+    options.pb = 0;
+    let mut writer = LzmaWriter::new_use_header(Vec::new(), &options, Some(bytes.len() as u64))?;
+    writer.write_all(bytes)?;
+    Ok(writer.finish()?)
+}
+
 fn gzipped(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes)?;
     Ok(encoder.finish()?)
-}
-
-/// What a content security policy says of an element with this text.
-fn hash(text: &str) -> String {
-    format!("sha256-{}", Base64::encode_string(&Sha256::digest(text)))
 }

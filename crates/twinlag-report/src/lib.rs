@@ -57,7 +57,7 @@ pub use axis::Axis;
 pub use block::{KeyNumber, Tone};
 pub use chart::{Chart, Reference, Series};
 pub use decimate::decimate;
-pub use document::Document;
+pub use document::{Document, policy_hash};
 pub use error::ReportError;
 pub use figure::{Figure, Panel};
 pub use number::{between, plus_minus, probability, rounded};

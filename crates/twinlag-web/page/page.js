@@ -1,5 +1,5 @@
-"use strict";
 (() => {
+  "use strict";
   const byId = (id) => document.getElementById(id);
   const columnRoles = { time: "time", t1: "T1", t2: "T2" };
   let files = [];                       // name and bytes of each
@@ -13,14 +13,20 @@
   // --- the worker
 
   const workerUrl = URL.createObjectURL(new Blob([byId("worker").textContent], { type: "text/javascript" }));
-  const packed = byId("wasm").textContent.trim();
-  byId("wasm").remove();
-  const wasm = unpacked(packed);
+  const wasm = unpacked();
 
-  async function unpacked(base64) {
-    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
-    const plain = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return new Response(plain).arrayBuffer();
+  // Browsers unpack gzip, which the unpacker of the rest is packed by.
+  async function unpacked() {
+    const plain = new Blob([taken("unpacker")]).stream().pipeThrough(new DecompressionStream("gzip"));
+    await unpacker({ module_or_path: await new Response(plain).arrayBuffer() });
+    return unpacker.unpack(taken("wasm")).buffer;
+  }
+
+  // The bytes that an element holds, which is removed.
+  function taken(id) {
+    const base64 = byId(id).textContent.trim();
+    byId(id).remove();
+    return Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
   }
 
   function ask(what, details = {}) {

@@ -68,7 +68,7 @@ pub struct InspectedRecord {
 
 impl Inspection {
     pub(crate) fn of(table: &Table, selection: Option<Selection>) -> Self {
-        let roles = roles(table, selection.as_ref());
+        let roles = selection.as_ref().map_or_else(Vec::new, |selection| roles(table, selection));
         let about = |(index, column): (usize, &Column)| {
             let values = table.numbers(index).unwrap_or_default();
             let known = || values.iter().copied().filter(|value| value.is_finite());
@@ -85,7 +85,7 @@ impl Inspection {
                 missing: column.missing(),
                 minimum: known().reduce(f64::min),
                 maximum: known().reduce(f64::max),
-                taken_as: roles.iter().find(|(_, taken)| *taken == Some(index)).map(|(role, _)| *role),
+                taken_as: roles.iter().find(|(_, taken)| *taken == index).map(|(role, _)| *role),
             }
         };
         Self {
@@ -113,17 +113,10 @@ impl InspectedRecord {
     }
 }
 
-/// What columns may be taken as, each with the place of its column.
-fn roles(table: &Table, selection: Option<&Selection>) -> [(&'static str, Option<usize>); 6] {
-    let taken = |wanted: &dyn Fn(&Selection) -> Option<&ColumnRef>| {
-        selection.and_then(wanted).and_then(|wanted| table.find(wanted).ok())
-    };
-    [
-        ("time", taken(&|s| s.time.as_ref())),
-        ("T1", taken(&|s| s.t1.as_ref())),
-        ("T2", taken(&|s| s.t2.as_ref())),
-        ("reference", taken(&|s| s.reference.as_ref())),
-        ("flow", taken(&|s| s.flow.as_ref())),
-        ("position", taken(&|s| s.position.as_ref())),
-    ]
+/// What columns are taken as, each with the place of its column.
+fn roles(table: &Table, selection: &Selection) -> Vec<(&'static str, usize)> {
+    let Selection { time, t1, t2, reference, flow, position, .. } = selection;
+    let wanted =
+        [("time", time), ("T1", t1), ("T2", t2), ("reference", reference), ("flow", flow), ("position", position)];
+    wanted.into_iter().filter_map(|(role, column)| Some((role, table.find(column.as_ref()?).ok()?))).collect()
 }
