@@ -1,7 +1,7 @@
 //! What is in a table of readings, and how it would be read.
 
 use serde::Serialize;
-use twinlag_record::{Column, ColumnRef, Kind, Record, Sampling, Selection, Table};
+use twinlag_record::{Column, Kind, Record, Sampling, Selection, Table};
 
 /// What is in a table, what would be taken as time and as sensors, and why it cannot be read if it cannot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
