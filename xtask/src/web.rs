@@ -22,19 +22,27 @@ use crate::root;
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// Several numbers at once, which browsers have been able to since 2023, and the stack of a thread of the program.
 const FLAGS: &str = "-Ctarget-feature=+simd128 -Clink-arg=-zstack-size=8388608";
-/// WebAssembly of the page, and what its JavaScript is called there.
-struct Part {
-    package: &'static str,
-    global: &'static str,
-}
-
-const PARTS: [Part; 2] =
-    [Part { package: "twinlag-web", global: "wasm_bindgen" }, Part { package: "twinlag-unpack", global: "unpacker" }];
+const PARTS: [&Part; 2] = [&SESSION, &UNPACKER];
+const SESSION: Part = Part { package: "twinlag-web", global: "wasm_bindgen" };
+const UNPACKER: Part = Part { package: "twinlag-unpack", global: "unpacker" };
 /// The binder of WebAssembly and the library that it binds have one version.
 const BINDER: &str = "wasm-bindgen";
 
 /// Rows of the long record: enough to measure, few enough for continuous integration.
 const LONG_ROWS: usize = 20_000;
+
+/// A crate of WebAssembly, and what its JavaScript is called in the page.
+struct Part {
+    package: &'static str,
+    global: &'static str,
+}
+
+impl Part {
+    /// The name of a file that is made of it.
+    fn file(&self, end: &str) -> String {
+        self.package.replace('-', "_") + end
+    }
+}
 
 /// Builds the page, and drives it in a browser.
 #[derive(Args)]
@@ -89,10 +97,11 @@ fn bound(work: &Path) -> Result<PathBuf> {
         step("cargo", &install, root)?;
     }
     let out = work.join("bound");
-    for Part { package, global } in PARTS {
-        let wasm = target_dir()?.join(TARGET).join("web").join(package.replace('-', "_")).with_extension("wasm");
+    for part in PARTS {
+        let wasm = target_dir()?.join(TARGET).join("web").join(part.file(".wasm"));
         let [binder, out, wasm] = [&binder, &out, &wasm].map(|path| path.display().to_string());
-        let how = ["--target", "no-modules", "--no-modules-global", global, "--no-typescript", "--remove-name-section"];
+        let how =
+            ["--target", "no-modules", "--no-modules-global", part.global, "--no-typescript", "--remove-name-section"];
         step(&binder, &[&how[..], &["--out-dir", &out, &wasm]].concat(), root)?;
     }
     Ok(out)
@@ -114,11 +123,11 @@ fn assembled(bound: &Path) -> Result<String> {
     let read = |path: PathBuf| fs::read_to_string(&path).with_context(|| format!("{} cannot be read", path.display()));
     let reports = reports()?;
     let style = format!("\n{}{}", reports.style, read(page.join("page.css"))?);
-    let script = read(bound.join("twinlag_unpack.js"))? + &read(page.join("page.js"))?;
-    let worker = read(bound.join("twinlag_web.js"))? + &read(page.join("worker.js"))?;
+    let script = read(bound.join(UNPACKER.file(".js")))? + &read(page.join("page.js"))?;
+    let worker = read(bound.join(SESSION.file(".js")))? + &read(page.join("worker.js"))?;
     ensure!(!(worker.clone() + &script).contains("</script"), "a script would end before its end");
-    let wasm = Base64::encode_string(&packed(&fs::read(bound.join("twinlag_web_bg.wasm"))?)?);
-    let unpacker = Base64::encode_string(&gzipped(&fs::read(bound.join("twinlag_unpack_bg.wasm"))?)?);
+    let wasm = Base64::encode_string(&packed(&fs::read(bound.join(SESSION.file("_bg.wasm")))?)?);
+    let unpacker = Base64::encode_string(&gzipped(&fs::read(bound.join(UNPACKER.file("_bg.wasm")))?)?);
     let policy = format!(
         "default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'wasm-unsafe-eval' '{}' {}; style-src '{}' {}; \
          worker-src blob:",

@@ -161,6 +161,9 @@ fn a_report_on_nothing_has_every_section_and_no_nan() {
                 for is_static in [false, true] {
                     let making = Making { command: command.clone(), is_static, ..Making::default() };
                     has_every_section(&diagnosis_report(&record, &answer, &making).expect("a page"));
+                    let first = Making { is_first_screen: true, ..making };
+                    let page = diagnosis_report(&record, &answer, &first).expect("a page");
+                    assert!(page.contains("class=\"lead") && !page.contains("<h2>"), "{page}");
                 }
             }
         }

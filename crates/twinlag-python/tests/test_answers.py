@@ -12,6 +12,11 @@ import pytest
 import twinlag as tl
 
 
+def shown(answer: tl.Answer) -> str:
+    """The page that an answer shows in a notebook."""
+    return html.unescape(answer._repr_html_().split('srcdoc="')[1].split('"')[0])
+
+
 @pytest.fixture(scope="module")
 def diagnosis(calibrated) -> tl.Diagnosis:
     return tl.diagnose(calibrated)
@@ -45,9 +50,9 @@ def test_tables_and_pages(diagnosis, tmp_path) -> None:
     page = tmp_path / "page.html"
     diagnosis.report(page, static=True)
     assert "<html" in page.read_text(encoding="utf-8") and "Diagnosis of" in page.read_text(encoding="utf-8")
-    shown = html.unescape(diagnosis._repr_html_().split('srcdoc="')[1].split('"')[0])
-    verdict = shown.split('class="lead')[1].split("</p>")[0]
-    assert "<svg" in shown and verdict in page.read_text(encoding="utf-8") and "How to reproduce" not in shown
+    framed = shown(diagnosis)
+    verdict = framed.split('class="lead')[1].split("</p>")[0]
+    assert "<svg" in framed and verdict in page.read_text(encoding="utf-8") and "How to reproduce" not in framed
     with pytest.raises(ValueError, match="no page"):
         tl.characterise(tl.simulate(tl.EXAMPLE_RIG)).report(page)
 
@@ -55,7 +60,14 @@ def test_tables_and_pages(diagnosis, tmp_path) -> None:
 def test_a_name_that_is_a_script_stays_a_name(arrays) -> None:
     time_s, t1, t2 = arrays
     answer = tl.diagnose(tl.Record(time_s, t1, t2, names=("<script>alert(1)</script>", "b")))
+    assert "<script" not in shown(answer) and "alert(1)" in shown(answer)
     assert "<script" not in answer._repr_html_()
+
+
+def test_each_answer_shows_itself_in_a_notebook(rig, diagnosis) -> None:
+    assert "Gas temperature of" in shown(tl.compensate(rig)) and "Time constants along" in shown(tl.track(rig))
+    for without_page in (tl.characterise(rig), pickle.loads(pickle.dumps(diagnosis))):
+        assert "<table>" in without_page._repr_html_() and "<iframe" not in without_page._repr_html_()
 
 
 def test_an_answer_survives_pickling_with_its_numbers(diagnosis, rig) -> None:

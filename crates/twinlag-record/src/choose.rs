@@ -75,12 +75,16 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
         Some(_) => None,
         None => guess_time(table, &taken),
     };
+    // A logger's own clock is better than the time at which its lines arrived, if it has a number in each row.
+    let clock = named_time.or(guessed_time).and_then(|stamps| own_clock(table, stamps, &taken));
+    let whole = clock.filter(|&clock| table.columns()[clock].missing() == 0);
+    let guessed_time = guessed_time.map(|time| whole.unwrap_or(time));
     // Even where a period is given the time column is told, so that it is not taken for a
     // temperature.
     let time = named_time.or(guessed_time).map(|index| with_partner(table, index, &taken));
     let channels = match named {
         [Some(t1), Some(t2)] => [t1, t2],
-        _ => guess_channels(table, named, time, [reference, flow, position], notes)?,
+        _ => guess_channels(table, named, time, [reference, flow, position, clock], notes)?,
     };
     if flow.is_none() && position.is_none() {
         let is_free = |(index, column): &(usize, &Column)| {
@@ -147,12 +151,7 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
         length_s.is_some_and(|length_s| length_s <= LONGEST_NAMING_UNIT_S) && rises(column)
     };
     let open = || (0..columns.len()).filter(free);
-    let named = open().find(|&index| is_time(&columns[index])).map(|time| {
-        // A logger's own milliseconds are better than the time at which its lines arrived.
-        let is_stamped = columns[time].kind() == Kind::Stamp;
-        let counter = open().filter(|_| is_stamped).find(|&index| counter_beside(table, index, time).is_some());
-        counter.unwrap_or(time)
-    });
+    let named = open().find(|&index| is_time(&columns[index]));
     named.or_else(|| open().find(|&index| is_called_by_unit(&columns[index]))).or_else(|| {
         // Without a telling name: the first column, if it rises from row to row and is not a row
         // number, by its name or as it counts.
@@ -161,6 +160,13 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
         let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index && !is_apart(first, columns);
         (rises(first) && open).then_some(0)
     })
+}
+
+/// The milliseconds or microseconds that a logger counts beside a column of stamps.
+fn own_clock(table: &Table, stamps: usize, taken: &[usize]) -> Option<usize> {
+    let columns = table.columns();
+    let mut others = (0..columns.len()).filter(|index| columns[stamps].kind() == Kind::Stamp && !taken.contains(index));
+    others.find(|&index| counter_beside(table, index, stamps).is_some_and(|counter| counter.seconds < 1.0))
 }
 
 /// A date without time of day belongs to a time of day without date beside it.
@@ -189,7 +195,7 @@ fn guess_channels(
     table: &Table,
     named: [Option<usize>; 2],
     time: Option<TimeColumns>,
-    apart: [Option<usize>; 3],
+    apart: [Option<usize>; 4],
     notes: &mut Vec<Note>,
 ) -> Result<[usize; 2], RecordError> {
     let columns = table.columns();

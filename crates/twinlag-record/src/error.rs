@@ -221,8 +221,8 @@ pub enum RecordError {
     )]
     NotATimeUnit { file: String, column: String, unit: String },
     #[error(
-        "{file}: column {column} names no unit of time, and its numbers, with steps of {shown}, are the stamps of no logger in \
-         s; choose the unit, or write it in the header, for example 'time [ms]'",
+        "{file}: column {column} names no unit of time, and its steps of {shown} do not show which it is; choose the unit, or write \
+         it in the header, for example 'time [ms]'",
         shown = plain(*step)
     )]
     TimeUnitUnclear { file: String, column: String, step: f64 },

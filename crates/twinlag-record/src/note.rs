@@ -104,6 +104,19 @@ pub enum Note {
         /// From row to row.
         step_s: f64,
     },
+    /// A time column without a unit counts what passes by the stamps of another column.
+    TimeByStamps {
+        /// The column.
+        column: String,
+        /// The column of stamps.
+        stamps: String,
+        /// Its unit.
+        unit: &'static str,
+        /// What it counts.
+        name: &'static str,
+        /// From row to row.
+        step_s: f64,
+    },
     /// A time column without a unit was taken to be in seconds, and might as well count something
     /// else.
     TimeQuestion {
@@ -243,6 +256,11 @@ impl Note {
                 write!(f, "column {column} names no unit; its numbers are of the size and the step of {name}, ")?;
                 write!(f, "{} s from row to row, and were converted from {unit} to s. ", three(*step_s))?;
                 write!(f, "If that is wrong, choose its unit, or write it in the header, as 'time [s]'")
+            }
+            Self::TimeByStamps { column, stamps, name, step_s, .. } => {
+                write!(f, "column {column} names no unit; by the stamps of column {stamps} it counts {name}, ")?;
+                write!(f, "{} s from row to row. ", three(*step_s))?;
+                write!(f, "If that is wrong, choose its unit, or another column as the time")
             }
             Self::TimeQuestion { column, unit, name, step_s } => {
                 write!(

@@ -3,7 +3,7 @@
 //! Seconds are assumed unless the numbers cannot be seconds: instants of today in
 //! milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and MATLAB
 //! count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
-//! stay, with a question; where none fits, or none but a counter whose unit is not known, the column is refused. A factor of 1000 in time is a
+//! stay, with a question; where none fits, or only counters of which more than one is possible, the column is refused. A factor of 1000 in time is a
 //! factor of 1000 in every time constant: it must not be wrong in silence.
 
 use crate::sampling::{self, Clock};
@@ -18,7 +18,7 @@ pub(crate) enum Reading {
     Question(Counter),
     /// This, by size and step.
     Recognised(Counter),
-    /// No reading fits.
+    /// No reading fits, or several counters do.
     Unclear {
         /// From stamp to stamp, in the unit that is sought.
         step: f64,
@@ -65,9 +65,12 @@ const LONGEST_PERIOD_S: f64 = 3600.0;
 const MINUTE_S: f64 = 60.0;
 /// How far, as a fraction, a step may be from a round number: clocks are off by 1e-4 at most.
 const OFF: f64 = 2e-4;
-/// How far, as a fraction, the rise of a counter may be from the time that passes by stamps: stamps in whole seconds are off by this in
-/// ten seconds, and the resonator of a cheap board by a twentieth of it. Units are a factor of 1000 apart.
-const COUNTER_TOLERANCE: f64 = 0.1;
+/// The longest step of numbers that may be those of rows, which rise by one.
+const ROW_STEP: f64 = 1.5;
+/// How far, as a fraction, the clock of a board may be off: the resonator of a cheap one is by half of this.
+const CLOCK_ERROR: f64 = 0.01;
+/// How far, as a fraction, a counter may be from what passes by stamps, however coarse these are. Units are a factor of 1000 apart.
+const MAX_CLOCK_ERROR: f64 = 0.1;
 
 /// Judges the numbers of a column, all of them finite.
 pub(crate) fn judge(values: &[f64]) -> Reading {
@@ -88,7 +91,8 @@ pub(crate) fn judge(values: &[f64]) -> Reading {
             return if fits { Reading::Recognised(counter) } else { Reading::Unclear { step } };
         }
     }
-    if is_within(EPOCH_S) && is_loggers_period(step) {
+    let is_epoch_s = is_within(EPOCH_S);
+    if is_epoch_s && is_loggers_period(step) {
         return Reading::Seconds;
     }
     if let Some((_, name)) = DAY_COUNTS.into_iter().find(|(range, _)| is_within(*range) && !are_whole) {
@@ -97,7 +101,9 @@ pub(crate) fn judge(values: &[f64]) -> Reading {
         let step = sampling::judge(&relative, Some(Clock { unit_s: 1.0, first }), SamplingChoice::Auto).period_s;
         return of_days(step, Counter { symbol: "d", seconds: DAY_S, name, step_s: step * DAY_S });
     }
-    of_counter(step, are_whole)
+    // A program that waits for a minute between readings takes a second more for them.
+    let is_possible = is_loggers_period(step) || is_epoch_s && step <= LONGEST_PERIOD_S;
+    of_counter(step, are_whole, is_possible)
 }
 
 /// A number of the size of today's serial days with a fraction: days, or seconds of a day or of an
@@ -118,26 +124,26 @@ fn of_days(step: f64, days: Counter) -> Reading {
     }
 }
 
-/// Whole numbers with steps of two and more may be those of a counter of milliseconds. Where no logger has such a step in seconds, they
-/// are of milliseconds or microseconds, and which is not known.
-fn of_counter(step: f64, are_whole: bool) -> Reading {
-    if step > DAY_S && !is_whole(step / DAY_S) || are_whole && !is_loggers_period(step) {
+/// Whole numbers with steps of two and more may be those of a counter of milliseconds. Where seconds are not possible, microseconds are as
+/// well.
+fn of_counter(step: f64, are_whole: bool, is_possible: bool) -> Reading {
+    if !are_whole && step > DAY_S && !is_whole(step / DAY_S) || are_whole && !is_possible {
         return Reading::Unclear { step };
     }
     let counter = Counter { symbol: "ms", seconds: 1e-3, name: "milliseconds", step_s: step * 1e-3 };
-    if are_whole && step > 1.5 { Reading::Question(counter) } else { Reading::Seconds }
+    if are_whole && step > ROW_STEP { Reading::Question(counter) } else { Reading::Seconds }
 }
 
-/// Milliseconds or microseconds, where numbers rise by as many of them as pass in a time.
+/// The unit of a counter that rises by `rise` while `duration_s` passes by stamps: seconds, milliseconds or microseconds. `None` of any
+/// other rise, and of numbers that may be those of rows.
 ///
-/// - `rise`: from the first number to the last
 /// - `step`: from number to number, the median
-/// - `duration_s`: what passes by another clock, s
-pub(crate) fn judge_beside(rise: f64, step: f64, duration_s: f64) -> Option<Counter> {
-    let counters = [("ms", 1e-3, "milliseconds"), ("us", 1e-6, "microseconds")];
-    let (symbol, seconds, name) = counters
-        .into_iter()
-        .find(|(_, seconds, _)| (rise * seconds - duration_s).abs() <= COUNTER_TOLERANCE * duration_s)?;
+/// - `resolution_s`: how far stamps may be off
+pub(crate) fn counter_of(rise: f64, step: f64, duration_s: f64, resolution_s: f64) -> Option<Counter> {
+    let tolerance_s = (CLOCK_ERROR * duration_s + resolution_s).min(MAX_CLOCK_ERROR * duration_s);
+    let units = [("s", 1.0, "seconds"), ("ms", 1e-3, "milliseconds"), ("us", 1e-6, "microseconds")];
+    let is_unit = |(_, seconds, _): &(&str, f64, &str)| (rise * seconds - duration_s).abs() <= tolerance_s;
+    let (symbol, seconds, name) = units.into_iter().find(is_unit).filter(|_| step > ROW_STEP)?;
     Some(Counter { symbol, seconds, name, step_s: step * seconds })
 }
 
@@ -244,7 +250,11 @@ mod tests {
             (45_296.5, 10.03 / DAY_S, "s, or d"),
             (0.0, 10.0, "s, or ms"),
             (123.0, 2.0, "s, or ms"),
+            (0.0, 75.0, "?"),
+            (0.0, 90.0, "s, or ms"),
             (0.0, 120.0, "s, or ms"),
+            // A second more than a minute, in seconds since 1970.
+            (1_769_853_600.0, 61.0, "s, or ms"),
             // No logger in seconds; milliseconds at 2 Hz, or microseconds at 2 kHz.
             (0.0, 500.0, "?"),
             (0.0, 1.0, "s"),
@@ -260,14 +270,20 @@ mod tests {
         assert_eq!(symbol(judge(&jitter)), "?");
     }
 
-    /// 0.5 % is what a board's resonator is off.
+    /// The clock of a board may be off by 0.5 %. One that ticks 1024 times a second counts no milliseconds.
     #[test]
     fn a_counter_beside_stamps_has_the_unit_that_passes() {
-        let unit = |rise: f64, duration_s: f64| judge_beside(rise, 100.0, duration_s).map(|counter| counter.symbol);
-        assert_eq!(unit(20_100.0, 20.0), Some("ms"));
-        assert_eq!(unit(20_100_000.0, 20.0), Some("us"));
-        for rise in [20.0, 15_000.0, 25_000.0, 2e8] {
-            assert_eq!(unit(rise, 20.0), None, "{rise}");
+        let unit = |rise: f64| counter_of(rise, 100.0, 20.0, 0.1).map(|counter| counter.symbol);
+        assert_eq!(unit(20.1), Some("s"));
+        assert_eq!(unit(20_100.0), Some("ms"));
+        assert_eq!(unit(20_100_000.0), Some("us"));
+        for rise in [15.0, 20_480.0, 25_000.0, 2e8] {
+            assert_eq!(unit(rise), None, "{rise}");
         }
+        // Whole seconds may be off by one, but not by more than a tenth in all.
+        assert_eq!(counter_of(20_900.0, 100.0, 20.0, 1.0).map(|counter| counter.symbol), Some("ms"));
+        assert_eq!(counter_of(2_400.0, 100.0, 2.0, 1.0), None);
+        // Rows of a logger of 1 kHz.
+        assert_eq!(counter_of(20_000.0, 1.0, 20.0, 0.1), None);
     }
 }

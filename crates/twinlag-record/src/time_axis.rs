@@ -3,13 +3,16 @@
 use crate::RecordError;
 use crate::clock::{self, DAY_NS, Day, Stamp};
 use crate::column::Kind;
-use crate::names::counts_rows;
+use crate::names::is_index;
 use crate::note::Note;
 use crate::sampling::{self, Clock};
 use crate::scale::{self, Counter, Reading};
 use crate::table::Table;
 use crate::unit::Unit;
 use crate::wording::plain;
+
+/// How late a line may arrive that a logger sends, s: a tenth of a second where a computer is busy.
+const MAX_DELAY_S: f64 = 0.1;
 
 /// Seconds since the first row, and the clock that the stamps were printed from.
 pub(crate) struct TimeAxis {
@@ -76,8 +79,8 @@ fn numeric(
     Ok(TimeAxis { time_s, clock: Clock { unit_s, first } })
 }
 
-/// The unit of a column of numbers: the one that the caller chose, else that of the header, else what its size
-/// and its step show.
+/// The unit of a column of numbers: the one that the caller chose, else that of the header, else what stamps beside it show, else what
+/// its size and its step show.
 ///
 /// # Errors
 /// [`RecordError::NotATimeUnit`], [`RecordError::TimeUnitUnclear`].
@@ -92,7 +95,14 @@ pub(crate) fn unit_s(
     let stated = table.columns()[index].unit();
     let named = Unit::of_time_named(table.columns()[index].name()).filter(|_| *stated == Unit::Unstated);
     let named = named.map(|(symbol, seconds)| Unit::Time { symbol, seconds });
-    match chosen.or(named.as_ref()).unwrap_or(stated) {
+    let unit = chosen.or(named.as_ref()).unwrap_or(stated);
+    if *unit == Unit::Unstated
+        && let Some((stamps, Counter { symbol: unit, seconds, name, step_s })) = shown_by_stamps(table, index)
+    {
+        notes.push(Note::TimeByStamps { column: column(), stamps: table.title(stamps), unit, name, step_s });
+        return Ok(seconds);
+    }
+    match unit {
         Unit::Time { symbol, seconds } if chosen.is_some() => {
             notes.push(Note::TimeUnitChosen { column: column(), unit: symbol, to: to(symbol) });
             Ok(*seconds)
@@ -103,7 +113,7 @@ pub(crate) fn unit_s(
             }
             Ok(*seconds)
         }
-        Unit::Unstated => match judged(table, index) {
+        Unit::Unstated => match scale::judge(table.columns()[index].raw()) {
             Reading::Recognised(Counter { symbol, seconds, name, step_s }) => {
                 notes.push(Note::TimeRecognised { column: column(), unit: symbol, name, step_s });
                 Ok(seconds)
@@ -125,28 +135,30 @@ pub(crate) fn unit_s(
     }
 }
 
-/// What a column without a unit counts, by the stamps beside it or by its numbers.
-fn judged(table: &Table, index: usize) -> Reading {
-    let columns = table.columns();
-    let stamps = columns.iter().position(|column| column.kind() == Kind::Stamp);
-    let counter = stamps.and_then(|stamps| counter_beside(table, index, stamps));
-    counter.map_or_else(|| scale::judge(columns[index].raw()), Reading::Recognised)
+/// What a column counts by the stamps beside it, and the column of these; `None` where they do not show it.
+fn shown_by_stamps(table: &Table, index: usize) -> Option<(usize, Counter)> {
+    let is_stamp = |other: &usize| table.columns()[*other].kind() == Kind::Stamp;
+    let mut stamps = (0..table.columns().len()).filter(is_stamp);
+    stamps.find_map(|stamps| Some((stamps, counter_beside(table, index, stamps)?)))
 }
 
-/// What a column of numbers counts that rises from row to row as the time of stamps beside it passes: milliseconds or microseconds of the
-/// logger itself. `None` of any other column.
+/// The unit in which a column counts what passes by the stamps of another one. `None` if it names a unit, is not whole, does not rise, or
+/// rises otherwise. Numbers may be missing.
 pub(crate) fn counter_beside(table: &Table, index: usize, stamps: usize) -> Option<Counter> {
     let column = &table.columns()[index];
-    let values = column.raw();
-    let is_count = *column.unit() == Unit::Unstated
-        && column.kind() == Kind::Number
-        && !counts_rows(column)
-        && values.iter().all(|value| value.fract() == 0.0)
-        && values.windows(2).all(|pair| pair[1] > pair[0]);
-    let (first, last) = values.first().zip(values.last()).filter(|_| is_count)?;
-    let passed = elapsed(table, stamps, &self::stamps(table, stamps).ok()?, &mut Vec::new()).ok()?;
-    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    scale::judge_beside(last - first, sampling::median(&steps), *passed.last()?)
+    let counts = || column.raw().iter().enumerate().filter(|(_, value)| value.is_finite());
+    let is_count = column.kind() == Kind::Number
+        && *column.unit() == Unit::Unstated
+        && !is_index(column)
+        && counts().all(|(_, value)| value.fract() == 0.0);
+    let (first, last) = counts().next().zip(counts().next_back()).filter(|_| is_count)?;
+    let steps: Vec<f64> = counts().zip(counts().skip(1)).map(|((_, one), (_, next))| next - one).collect();
+    if steps.is_empty() || steps.iter().any(|step| *step <= 0.0) {
+        return None;
+    }
+    let passed_s = elapsed(table, stamps, &self::stamps(table, stamps).ok()?, &mut Vec::new()).ok()?;
+    let resolution_s = if passed_s.iter().all(|time_s| time_s.fract() == 0.0) { 1.0 } else { MAX_DELAY_S };
+    scale::counter_of(last.1 - first.1, sampling::median(&steps), passed_s[last.0] - passed_s[first.0], resolution_s)
 }
 
 /// Divided, where the unit is a part of a second: 7 ms is then the double nearest to 0.007.
@@ -159,7 +171,8 @@ fn stamps(table: &Table, index: usize) -> Result<Vec<Stamp>, RecordError> {
     (0..table.rows())
         .map(|row| match column.text(row) {
             Some(cell) => clock::parse(cell).ok_or_else(|| not_a_time(table, index, row, "a date-time or time of day")),
-            None if column.raw()[row].is_nan() => {
+            // The numbers of a column that is not used are gone by now.
+            None if column.raw().get(row).is_none_or(|value| value.is_nan()) => {
                 let (file, at) = (table.source().to_owned(), table.place_of(row));
                 Err(RecordError::MissingTime { file, at, column: table.title(index) })
             }

@@ -15,15 +15,15 @@
   const workerUrl = URL.createObjectURL(new Blob([byId("worker").textContent], { type: "text/javascript" }));
   const wasm = unpacked();
 
-  // Browsers unpack gzip, which the unpacker of the rest is packed by.
+  // A browser unpacks gzip alone: so is the unpacker packed, and all else by LZMA.
   async function unpacked() {
-    const plain = new Blob([taken("unpacker")]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const plain = new Blob([bytesOf("unpacker")]).stream().pipeThrough(new DecompressionStream("gzip"));
     await unpacker({ module_or_path: await new Response(plain).arrayBuffer() });
-    return unpacker.unpack(taken("wasm")).buffer;
+    return unpacker.unpack(bytesOf("wasm")).buffer;
   }
 
   // The bytes that an element holds, which is removed.
-  function taken(id) {
+  function bytesOf(id) {
     const base64 = byId(id).textContent.trim();
     byId(id).remove();
     return Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));

@@ -1053,7 +1053,7 @@ fn time_in_milliseconds_since_1970_is_recognised_and_a_counter_is_asked_about() 
     slow.refuses(
         3,
         &FILE,
-        &["column 1 'time' names no unit of time", "steps of 100,", "'time [ms]'", "(option --time-unit)"],
+        &["column 1 'time' names no unit of time", "steps of 100 do not show", "'time [ms]'", "(option --time-unit)"],
     );
     let unclear = with_times("unclear_time", |s| format!("{}", (5e8 * s).round()));
     unclear.refuses(3, &FILE, &["column 1 'time' names no unit of time", "steps of 1000000", "(option --time-unit)"]);

@@ -125,8 +125,11 @@ class Answer:
     def _verdict(self) -> str:
         return self.status
 
+    def _headline(self) -> str:
+        return f"{type(self).__name__}: {self._verdict()}"
+
     def __str__(self) -> str:
-        lines = [f"{type(self).__name__}: {self._verdict()}"]
+        lines = [self._headline()]
         lines.extend(self._lines())
         lines.extend(f"warning: {warning}" for warning in self._model_fields["warnings"])
         return "\n".join(lines)
@@ -138,13 +141,13 @@ class Answer:
 
     def _repr_html_(self) -> str:
         page = None if self._inner is None else self._inner.page("", True, True)
-        return self._table_html() if page is None else _framed(page, repr(self))
+        headline = f"<p><b>{html.escape(self._headline())}</b></p>"
+        return headline + (self._table_html() if page is None else _framed(page, self._headline()))
 
     def _table_html(self) -> str:
         head = "".join(f"<th>{name}</th>" for name in ("", "", "value", "95 % interval", "grade"))
         body = "".join(_html_row(row) for row in self._rows())
-        title = f"<p><b>{html.escape(type(self).__name__)}: {html.escape(self._verdict())}</b></p>"
-        return f"{title}<table><tr>{head}</tr>{body}</table>"
+        return f"<table><tr>{head}</tr>{body}</table>"
 
 
 def _ends(interval: Any) -> tuple[float | None, float | None]:

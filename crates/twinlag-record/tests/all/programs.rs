@@ -221,10 +221,45 @@ fn a_sketch_that_sends_its_own_milliseconds_has_its_own_time() {
     let text = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t), milliseconds(t)));
     let got = record(&text);
     assert_is_the_rig(&got, 1e-12);
-    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeRecognised { unit: "ms", .. })), "{:?}", got.notes);
-    // A number of the row is none, though rows of a fast logger come as often.
-    let rows = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t / 500.0), 2.0 * t));
+    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeByStamps { unit: "ms", .. })), "{:?}", got.notes);
+    // A row number is no clock, though a fast logger writes 1000 rows a second.
+    let rows = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t / 500.0), 17.0 + 2.0 * t));
     assert_says(&refusal(&rows), &["3 columns have the name or the unit of a temperature"]);
+    // A log that begins within a line lacks the milliseconds of this one: the times of arrival are there.
+    let (first, rest) = text.split_once('\n').expect("several rows");
+    let got = record(&format!("{}\n{rest}", &first[..first.rfind(',').expect("three cells")]));
+    assert!(got.t1_c[0].is_nan() && got.notes.contains(&Note::CutRows { lines: 1, first_line: 1 }), "{:?}", got.notes);
+    assert!((got.time_s[1] - 0.5).abs() < 0.006, "{:?}", got.time_s);
+}
+
+/// Milliseconds whose unit no stamp shows are asked about. Failed: a column of stamps that is not used had lost the numbers it was asked for.
+#[test]
+fn stamps_that_are_missing_in_most_rows_show_no_unit() {
+    let row = |k: u32, t: f64, a: f64, b: f64| {
+        let stamp = if k.is_multiple_of(5) { format!("2026-01-31 12:00:{t:02.0}") } else { String::new() };
+        format!("{:.0},{stamp},{a},{b}", 1000.0 + 20.0 * t)
+    };
+    let got = record(&rows("time,gps,T1,T2", row));
+    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeQuestion { unit: "ms", .. })), "{:?}", got.notes);
+}
+
+/// Whole seconds of a slow logger, which could be milliseconds of a fast one.
+#[test]
+fn stamps_show_that_a_counter_counts_seconds() {
+    let at = |t: f64| format!("{:02}:{:02}:{:02}", (t / 3600.0) as u64, (t / 60.0) as u64 % 60, t as u64 % 60);
+    let text = rows("elapsed,clock,T1,T2", |_, t, a, b| format!("{:.0},{},{a},{b}", 200.0 * t, at(200.0 * t)));
+    let elapsed = Selection { time: Some(ColumnRef::Number(1)), ..Selection::default() };
+    let got = record_with(text.as_bytes(), &elapsed).expect("stamps show the unit");
+    assert!((got.sampling.period_s - 100.0).abs() < 1e-9, "{:?}", got.sampling);
+    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeByStamps { unit: "s", .. })), "{:?}", got.notes);
+    let bare = rows("time,T1,T2", |_, t, a, b| format!("{:.0},{a},{b}", 200.0 * t));
+    assert_says(&refusal(&bare), &["column 1 'time'", "steps of 100 do not show which", "'time [ms]'"]);
+}
+
+/// Failed: no median of no steps.
+#[test]
+fn a_row_alone_is_too_short_and_no_clock() {
+    assert_says(&refusal("time,T1,T2\n2026-01-31 12:00:00,20,21\n"), &["8"]);
 }
 
 /// A sketch says that it has started, and of a sensor that did not answer.
