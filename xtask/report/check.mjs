@@ -3,7 +3,7 @@
 // Tab key or does nothing, where the page is wider than the screen, and where a script from a file has run.
 //
 //   node check.mjs FOLDER SCREENSHOTS BROWSER
-import { mkdirSync, readdirSync } from "node:fs";
+import { mkdirSync, readFileSync, readdirSync } from "node:fs";
 import { basename, join, resolve } from "node:path";
 import { accessible, fail, fitsItsScreen, opened, withBrowser } from "../browser.mjs";
 

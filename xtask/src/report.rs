@@ -18,6 +18,16 @@ const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "
 const NASTY: &str = "<script>window.ran=1</script>";
 const NASTIER: &str = "\"'><img src=x onerror=window.ran=1>";
 
+/// Screenshots of the book's chapter.
+const IN_BOOK: [&str; 6] = [
+    "single-wide-light",
+    "single-wide-dark",
+    "single-narrow-light",
+    "single-enlarged",
+    "gas-wide-light",
+    "several-wide-light",
+];
+
 /// What is simulated: the name of the record, and the rig after the sensors' common part.
 const RIGS: [(&str, &str); 3] = [
     ("good", "time_constant_s = 0.45\nnoise = { std_k = 0.1 }\n"),
@@ -88,7 +98,7 @@ pub(crate) fn run(arguments: &Report) -> Result<()> {
     let script = root()?.join("xtask/report/check.mjs");
     let paths = [&script, &pages_dir, &screenshots, &browser].map(|path| path.display().to_string());
     step("node", &paths.each_ref().map(String::as_str), &dir)?;
-    if arguments.write { book(&screenshots) } else { Ok(()) }
+    if arguments.write { into_book(&screenshots, "report", &IN_BOOK) } else { Ok(()) }
 }
 
 /// The browser that is given, or the first that is there.
@@ -138,17 +148,10 @@ fn records(program: &Path, dir: &Path) -> Result<()> {
 }
 
 /// The screenshots that the book shows.
-fn book(screenshots: &Path) -> Result<()> {
-    let to = root()?.join("docs/src/report");
+pub(crate) fn into_book(screenshots: &Path, chapter: &str, names: &[&str]) -> Result<()> {
+    let to = root()?.join("docs/src").join(chapter);
     fs::create_dir_all(&to)?;
-    for name in [
-        "single-wide-light",
-        "single-wide-dark",
-        "single-narrow-light",
-        "single-enlarged",
-        "gas-wide-light",
-        "several-wide-light",
-    ] {
+    for name in names {
         fs::copy(screenshots.join(format!("{name}.png")), to.join(format!("{name}.png")))?;
     }
     Ok(())

@@ -16,7 +16,7 @@ use flate2::write::GzEncoder;
 use lzma_rust2::{LzmaOptions, LzmaWriter};
 use twinlag_report::{Axis, Chart, Document, Figure, Series, policy_hash};
 
-use crate::report::{browser, built, step, target_dir};
+use crate::report::{browser, built, into_book, step, target_dir};
 use crate::root;
 
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
@@ -27,6 +27,9 @@ const SESSION: Part = Part { package: "twinlag-web", global: "wasm_bindgen" };
 const UNPACKER: Part = Part { package: "twinlag-unpack", global: "unpacker" };
 /// The binder of WebAssembly and the library that it binds have one version.
 const BINDER: &str = "wasm-bindgen";
+
+/// Screenshots of the book's chapter.
+const IN_BOOK: [&str; 3] = ["read-wide-light", "answer-wide-light", "answer-narrow-dark"];
 
 /// Rows of the long record: enough to measure, few enough for continuous integration.
 const LONG_ROWS: usize = 20_000;
@@ -53,6 +56,9 @@ pub(crate) struct Web {
     /// Only builds the page.
     #[arg(long)]
     undriven: bool,
+    /// Writes the screenshots of the book's chapter on the page as well.
+    #[arg(long, conflicts_with = "undriven")]
+    write: bool,
     /// Rows of the long record that is diagnosed in the page and by the program.
     #[arg(long, default_value_t = LONG_ROWS)]
     rows: usize,
@@ -60,7 +66,7 @@ pub(crate) struct Web {
 
 impl Default for Web {
     fn default() -> Self {
-        Self { browser: None, undriven: false, rows: LONG_ROWS }
+        Self { browser: None, undriven: false, write: false, rows: LONG_ROWS }
     }
 }
 
@@ -220,7 +226,8 @@ fn driven(web: &Web, page: &Path, work: &Path) -> Result<()> {
     }
     let script = root()?.join("xtask/web/check.mjs");
     let paths = [&script, page, &records, &screenshots, &browser, &program].map(|path| path.display().to_string());
-    step("node", &paths.each_ref().map(String::as_str), work)
+    step("node", &paths.each_ref().map(String::as_str), work)?;
+    if web.write { into_book(&screenshots, "browser", &IN_BOOK) } else { Ok(()) }
 }
 
 /// Packed by LZMA, whose dictionary is as long as the bytes.

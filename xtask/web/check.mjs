@@ -181,8 +181,10 @@ async function looks(open) {
       await page.waitForSelector("#asking:not([hidden])", { timeout: 60_000 });
       await page.screenshot({ path: join(screenshots, `read-${size}-${scheme}.png`), fullPage: true });
       await diagnosed(page);
+      // Of the window: a frame is not drawn in a picture that is longer.
+      await page.evaluate(() => document.getElementById("answer").scrollIntoView());
       await page.waitForTimeout(500);
-      await page.screenshot({ path: join(screenshots, `answer-${size}-${scheme}.png`), fullPage: true });
+      await page.screenshot({ path: join(screenshots, `answer-${size}-${scheme}.png`) });
       await fitsItsScreen(page, where);
       await accessible(page, where);
       await page.close();
