@@ -1,10 +1,9 @@
 //! In which unit a column of time counts, where its header names none.
 //!
-//! Seconds are assumed unless the numbers cannot be seconds: instants of today in
-//! milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and MATLAB
-//! count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
-//! stay, with a question; where none fits, or only counters of which more than one is possible, the column is refused. A factor of 1000 in time is a
-//! factor of 1000 in every time constant: it must not be wrong in silence.
+//! Seconds are assumed unless the numbers cannot be seconds: instants of today in milliseconds, microseconds or nanoseconds since 1970, and
+//! serial days as spreadsheets and MATLAB count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
+//! stay, with a question; where none fits, or only counters of which more than one is possible, the column is refused. A factor of 1000 in
+//! time is a factor of 1000 in every time constant: it must not be wrong in silence.
 
 use crate::sampling::{self, Clock};
 use crate::selection::SamplingChoice;
