@@ -1,4 +1,4 @@
-//! SHA-256, as hexadecimal digits.
+//! SHA-256.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -10,9 +10,20 @@ use sha2::{Digest as _, Sha256};
 /// Bytes that are read at once; chosen, so that a file of any length takes little memory.
 const READ_BYTES: usize = 1 << 16;
 
+/// Bytes of a SHA-256.
+const DIGEST_BYTES: usize = 32;
+
+/// A SHA-256, which stands for what is too long to be kept of every unit.
+pub(crate) type Digest = [u8; DIGEST_BYTES];
+
+/// The SHA-256 of bytes.
+pub(crate) fn digest(bytes: &[u8]) -> Digest {
+    Sha256::digest(bytes).into()
+}
+
 /// The SHA-256 of bytes, in hexadecimal digits.
 pub(crate) fn sha256(bytes: &[u8]) -> String {
-    encode_string(&Sha256::digest(bytes))
+    encode_string(&digest(bytes))
 }
 
 /// The SHA-256 of a file, in hexadecimal digits.

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use regex::Regex;
 
+use crate::digest::{Digest, digest};
 use crate::error::BatchError;
 
 /// What the rig of a record is known by: the folder that its file lies in, a column, or a part of the file's name.
@@ -144,6 +145,11 @@ impl Unit {
             Self::Rig { name, .. } => format!("rig {name}"),
             Self::Record(file) | Self::WithoutRig { file, .. } => format!("file {}", name_of(file)),
         }
+    }
+
+    /// What stands for its key in an index, whatever the length of that.
+    pub(crate) fn digest(&self) -> Digest {
+        digest(self.key().as_bytes())
     }
 }
 

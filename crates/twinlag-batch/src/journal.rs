@@ -16,7 +16,7 @@ use serde_json::Value;
 use twinlag_study::Shard;
 
 use crate::asked::difference;
-use crate::digest::sha256;
+use crate::digest::{Digest, digest, sha256};
 use crate::error::BatchError;
 use crate::group::{Unit, name_of};
 use crate::row::Row;
@@ -49,7 +49,8 @@ pub struct Journal {
     path: PathBuf,
     /// Where the next line goes.
     end: u64,
-    done: HashMap<String, Done>,
+    /// What is done, by [`Unit::digest`]: of each unit as many bytes, however many files it has and whatever they are called.
+    done: HashMap<Digest, Done>,
 }
 
 /// Where the rows of a unit are, and of which files they are.
@@ -57,7 +58,7 @@ pub struct Journal {
 struct Done {
     at: u64,
     bytes: usize,
-    stamps: Stamps,
+    stamps: Digest,
 }
 
 /// What shows that a file has changed.
@@ -184,24 +185,24 @@ impl Journal {
         Ok(journal.done.len())
     }
 
-    /// The keys of the units that are done.
-    pub(crate) fn keys(&self) -> impl Iterator<Item = &String> {
+    /// [`Unit::digest`] of the units that are done.
+    pub(crate) fn digests(&self) -> impl Iterator<Item = &Digest> {
         self.done.keys()
     }
 
     /// Has a unit asked again, since what it led to beside its rows is gone.
     pub fn forget(&mut self, unit: &Unit) {
-        self.done.remove(&unit.key());
+        self.done.remove(&unit.digest());
     }
 
     /// How many units it holds that are not among these, which are those of a whole batch.
     pub fn other_units(&self, units: &[Unit]) -> usize {
-        self.done.len() - units.iter().filter(|unit| self.done.contains_key(&unit.key())).count()
+        self.done.len() - units.iter().filter(|unit| self.done.contains_key(&unit.digest())).count()
     }
 
     /// Whether a unit is done, and its files are as they were then.
     pub(crate) fn is_done(&self, unit: &Unit) -> bool {
-        self.done.get(&unit.key()).is_some_and(|done| done.stamps == stamps(unit))
+        self.done.get(&unit.digest()).is_some_and(|done| done.stamps == digest_of(&stamps(unit)))
     }
 
     /// Puts down the rows of a unit.
@@ -209,10 +210,10 @@ impl Journal {
     /// # Errors
     /// [`BatchError::Write`].
     pub(crate) fn append(&mut self, unit: &Unit, seen: Seen, rows: &[Row]) -> Result<(), BatchError> {
-        let (key, at) = (unit.key(), self.end);
-        let text = text_of(&Entry { unit: key.clone(), stamps: seen.0.clone(), rows }, &self.path)?;
+        let (at, stamps) = (self.end, digest_of(&seen.0));
+        let text = text_of(&Entry { unit: unit.key(), stamps: seen.0, rows }, &self.path)?;
         self.write_line(&format!("{} {text}", sha256(text.as_bytes())))?;
-        self.done.insert(key, Done { at, bytes: (self.end - at) as usize, stamps: seen.0 });
+        self.done.insert(unit.digest(), Done { at, bytes: (self.end - at) as usize, stamps });
         Ok(())
     }
 
@@ -247,8 +248,8 @@ impl Journal {
                 let json = checked(&text).ok_or_else(|| damaged("it does not fit its hash".to_owned()))?;
                 let entry: Entry<IgnoredAny> =
                     serde_json::from_slice(json).map_err(|error| damaged(error.to_string()))?;
-                let done = Done { at: self.end, bytes: text.len(), stamps: entry.stamps };
-                self.done.insert(entry.unit, done);
+                let done = Done { at: self.end, bytes: text.len(), stamps: digest_of(&entry.stamps) };
+                self.done.insert(digest(entry.unit.as_bytes()), done);
             }
             self.end += text.len() as u64;
         }
@@ -276,7 +277,7 @@ pub trait Answers {
 
 impl Answers for Journal {
     fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError> {
-        let Some(done) = self.done.get(&unit.key()) else { return Ok(Vec::new()) };
+        let Some(done) = self.done.get(&unit.digest()) else { return Ok(Vec::new()) };
         let mut line = vec![0; done.bytes];
         let mut read = || self.file.seek(SeekFrom::Start(done.at)).and_then(|_| self.file.read_exact(&mut line));
         let wrong = |reason: String| BatchError::Read { path: self.path.clone(), reason };
@@ -357,6 +358,11 @@ type Stamps = Vec<(String, Option<Stamp>)>;
 fn stamps(unit: &Unit) -> Stamps {
     let stamp = |file: &PathBuf| file.metadata().ok().map(|about| Stamp::of(&about));
     unit.files().iter().map(|file| (name_of(file), stamp(file))).collect()
+}
+
+/// What stands for the stamps of a unit in the index.
+fn digest_of(stamps: &Stamps) -> Digest {
+    digest(&serde_json::to_vec(stamps).expect("names and numbers are text"))
 }
 
 impl Stamp {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use twinlag_study::{Shard, ranges};
 
+use crate::digest::Digest;
 use crate::error::BatchError;
 use crate::group::Unit;
 use crate::journal::{Answers, Journal, PartOf};
@@ -70,8 +71,8 @@ fn of_part(error: BatchError) -> BatchError {
 #[derive(Debug)]
 pub struct Parts {
     parts: Vec<Journal>,
-    /// The part that has a unit.
-    places: HashMap<String, usize>,
+    /// The part that has a unit, by [`Unit::digest`].
+    places: HashMap<Digest, usize>,
 }
 
 impl Parts {
@@ -90,7 +91,7 @@ impl Parts {
             let (journal, header) = Journal::read_part(path).map_err(of_part)?;
             let part_of = PartOf { manifest: manifest.sha256().to_owned(), shard: *shard };
             header.expect_part(&part_of, manifest.asked(), path)?;
-            out.places.extend(journal.keys().map(|unit| (unit.clone(), out.parts.len())));
+            out.places.extend(journal.digests().map(|unit| (*unit, out.parts.len())));
             out.parts.push(journal);
         }
         out.expect_all(*division, manifest)?;
@@ -100,7 +101,7 @@ impl Parts {
     /// - `division`: any shard of it
     fn expect_all(&self, division: Shard, manifest: &Manifest) -> Result<(), BatchError> {
         let units = manifest.units();
-        let is_missing = |unit: &Unit| !self.places.contains_key(&unit.key());
+        let is_missing = |unit: &Unit| !self.places.contains_key(&unit.digest());
         let Some(first) = units.iter().find(|unit| is_missing(unit)) else { return Ok(()) };
         let of = division.of();
         let shards = manifest.shards(of);
@@ -118,7 +119,7 @@ impl Parts {
 
 impl Answers for Parts {
     fn rows(&mut self, unit: &Unit) -> Result<Vec<Row>, BatchError> {
-        match self.places.get(&unit.key()) {
+        match self.places.get(&unit.digest()) {
             Some(place) => self.parts[*place].rows(unit),
             None => Ok(Vec::new()),
         }
