@@ -259,7 +259,7 @@ fn stamps_show_that_a_counter_counts_seconds() {
 /// Failed: no median of no steps.
 #[test]
 fn a_row_alone_is_too_short_and_no_clock() {
-    assert_says(&refusal("time,T1,T2\n2026-01-31 12:00:00,20,21\n"), &["8"]);
+    assert_says(&refusal("time,T1,T2\n2026-01-31 12:00:00,20,21\n"), &["at least 8"]);
 }
 
 /// A sketch says that it has started, and of a sensor that did not answer.
