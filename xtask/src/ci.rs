@@ -44,15 +44,37 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
         // In release, which has the line tables that a profile is made of.
         step("profiles of a short record", "cargo", &["xtask", "profile", "--quick"])?;
         cluster::run(&cluster::Cluster::default())?;
-        python::run(&python::Python::default())?;
-        report::run(&report::Report::default())?;
-        if installed(&["target", "list", "--installed"], web::TARGET).is_some() {
-            web::run(&web::Web::default())?;
-        } else {
-            println!("== SKIPPED: the page for a browser; `rustup target add {}` installs what it takes", web::TARGET);
-        }
+        package_and_pages()?;
     }
     Ok(())
+}
+
+/// The package for Python, the reports, and the page for a browser, each where what it takes is there.
+fn package_and_pages() -> Result<()> {
+    if starts(python::PYTHON) {
+        python::run(&python::Python::default())?;
+    } else {
+        println!("== SKIPPED: the package for Python; it takes a Python with `venv`");
+    }
+    let has_browser = starts("node") && starts("npm") && report::browser(None).is_ok();
+    if has_browser {
+        report::run(&report::Report::default())?;
+    } else {
+        println!("== SKIPPED: reports in a browser; they take Chromium, Node.js and npm");
+    }
+    if installed(&["target", "list", "--installed"], web::TARGET).is_none() {
+        println!("== SKIPPED: the page for a browser; `rustup target add {}` installs what it takes", web::TARGET);
+        return Ok(());
+    }
+    if !has_browser {
+        println!("== SKIPPED: the page in a browser, which takes Chromium, Node.js and npm; it is built");
+    }
+    web::run(&if has_browser { web::Web::default() } else { web::Web::undriven() })
+}
+
+/// Whether a program is there.
+fn starts(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok_and(|said| said.status.success())
 }
 
 /// Each optional feature, and what is built apart, one by one: there are so few that they are listed here.

@@ -8,24 +8,39 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 
+use crate::bench::scale::{Step, Verb, child, simulated};
+use crate::report::target_dir;
 use crate::root;
+
+/// The Python that is taken where none is named.
+pub(crate) const PYTHON: &str = "python3";
+
+/// Rows of the record that is measured.
+const LONG_ROWS: usize = 10_000_000;
 
 /// Builds the wheel and tests it.
 #[derive(Args, Debug)]
 pub(crate) struct Python {
     /// The Python that the environments are made with.
-    #[arg(long, default_value = "python3")]
+    #[arg(long, default_value = PYTHON)]
     python: PathBuf,
+    /// Tests a wheel that was built to find faults: with debug assertions and checks for overflow.
+    #[arg(long)]
+    debug: bool,
+    /// Measures in place of the tests: how long it takes to import, eight threads, and a record of ten million samples beside what the
+    /// library takes.
+    #[arg(long, conflicts_with = "debug")]
+    measure: bool,
 }
 
 impl Default for Python {
     fn default() -> Self {
-        Self { python: "python3".into() }
+        Self { python: PYTHON.into(), debug: false, measure: false }
     }
 }
 
 /// Builds the wheel from the sources, installs it in an empty environment, and runs its tests, its types and its stubs there.
-pub(crate) fn run(Python { python }: &Python) -> Result<()> {
+pub(crate) fn run(Python { python, debug, measure }: &Python) -> Result<()> {
     let work = root()?.join("target/python");
     if work.exists() {
         fs::remove_dir_all(&work).with_context(|| format!("{} cannot be removed", work.display()))?;
@@ -34,9 +49,10 @@ pub(crate) fn run(Python { python }: &Python) -> Result<()> {
     let builder = Environment::new(python, &work.join("builder"))?;
     builder.install(&["maturin>=1.9.4,<2"])?;
     let wheels = work.join("wheels");
+    let release: &[&str] = if *debug { &[] } else { &["--release"] };
     step(
         "the wheel",
-        builder.program("maturin").args(["build", "--release", "--out"]).arg(&wheels).current_dir(&package),
+        builder.program("maturin").arg("build").args(release).arg("--out").arg(&wheels).current_dir(&package),
     )?;
     let wheel = the_wheel(&wheels)?;
     println!("== {}: {} bytes", wheel.display(), fs::metadata(&wheel)?.len());
@@ -46,9 +62,15 @@ pub(crate) fn run(Python { python }: &Python) -> Result<()> {
     // Beside no other package but NumPy.
     let first = "import twinlag as tl; assert tl.characterise(tl.simulate(tl.EXAMPLE_RIG)).ok; print(tl.__version__)";
     step("the package alone", user.program("python").args(["-c", first]).current_dir(&work))?;
+    if *measure {
+        return measured(&user, &package, &work);
+    }
     user.install(&[&format!("{}[test]", wheel.display())])?;
-    let program = root()?.join("target/release/twinlag");
-    step("the program of the same sources", Command::new("cargo").args(["build", "--release"]).current_dir(root()?))?;
+    let program = target_dir()?.join(if *debug { "debug/twinlag" } else { "release/twinlag" });
+    step(
+        "the program of the same sources",
+        Command::new("cargo").arg("build").args(release).args(["--package", "twinlag-cli"]).current_dir(root()?),
+    )?;
     // The tests in a folder in which the sources of the package are not: what is tried is what was installed.
     let tests = package.join("tests");
     step(
@@ -81,6 +103,15 @@ pub(crate) fn run(Python { python }: &Python) -> Result<()> {
     };
     step("types", &mut checked(&["mypy", "--package", "twinlag", "--config-file"]))?;
     step("stubs", &mut checked(&["mypy.stubtest", "twinlag", "--mypy-config-file"]))
+}
+
+/// Says what the package takes, and for a long record what the library takes.
+fn measured(user: &Environment, package: &Path, work: &Path) -> Result<()> {
+    let record = simulated(work, LONG_ROWS)?;
+    step("the package", user.program("python").arg(package.join("benches/measure.py")).arg(&record).current_dir(work))?;
+    let took = child(Step::Verb(Verb::Characterise), &record)?;
+    println!("== the library: {}", serde_json::to_string(&took)?);
+    Ok(())
 }
 
 /// An environment of its own, with `pip`.

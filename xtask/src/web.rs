@@ -70,6 +70,13 @@ impl Default for Web {
     }
 }
 
+impl Web {
+    /// Only built.
+    pub(crate) fn undriven() -> Self {
+        Self { undriven: true, ..Self::default() }
+    }
+}
+
 pub(crate) fn run(web: &Web) -> Result<()> {
     let work = root()?.join("target/web");
     fs::create_dir_all(&work)?;
@@ -220,6 +227,7 @@ fn driven(web: &Web, page: &Path, work: &Path) -> Result<()> {
     }
     let nasty = fs::read_to_string(records.join("first.csv"))?.replacen("T1", "<script>window.ran=1</script>", 1);
     fs::write(records.join("nasty.csv"), nasty)?;
+    fs::copy(root()?.join("crates/twinlag-files/tests/fixtures/apart.mf4"), records.join("apart.mf4"))?;
     fs::copy(root()?.join("xtask/report/package.json"), work.join("package.json"))?;
     if !work.join("node_modules/axe-core").exists() {
         step("npm", &["install", "--no-audit", "--no-fund"], work)?;

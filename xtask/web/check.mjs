@@ -4,7 +4,7 @@
 //
 //   node check.mjs PAGE RECORDS SCREENSHOTS BROWSER PROGRAM
 import { execFileSync } from "node:child_process";
-import { readFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { accessible, fail, fitsItsScreen, opened, withBrowser } from "../browser.mjs";
 
@@ -12,25 +12,42 @@ const [pagePath, records, screenshots, browserPath, program] = process.argv.slic
 // Numbers of two kinds of processor differ in their last digits.
 const RELATIVE = 1e-9;
 const DESK = { width: 1280, height: 900, scheme: "light" };
+const PHONE = { width: 400, height: 800, scheme: "light" };
+const DIAGNOSED_MS = 3_600_000;
 
 await withBrowser(browserPath, async (context) => {
   const open = (where, look = DESK) => opened(context, pagePath, where, look);
   await looks(open);
   await answers(open, "one record", ["first.csv"]);
   await answers(open, "two records", ["first.csv", "second.csv"]);
+  writeFileSync(join(records, "first.npy"), structured(readFileSync(join(records, "first.csv"), "utf8")));
+  await answers(open, "a binary file", ["first.npy"]);
   await columns(open);
+  await groups(open);
   await nasty(open);
   await stops(open);
   await unreadable(open);
   await takes(open);
 });
 
+// A table as NumPy saves an array with named columns.
+function structured(csv) {
+  const [names, ...rows] = csv.trim().split("\n").map((line) => line.split(","));
+  const columns = names.map((name) => `('${name}', '<f8')`).join(", ");
+  const header = `{'descr': [${columns}], 'fortran_order': False, 'shape': (${rows.length},), }`;
+  const padded = `${header.padEnd(Math.ceil((header.length + 11) / 64) * 64 - 11)}\n`;
+  const length = Buffer.alloc(2);
+  length.writeUInt16LE(padded.length);
+  const numbers = Float64Array.from(rows.flat(), Number);
+  return Buffer.concat([Buffer.from("\x93NUMPY\x01\x00", "latin1"), length, Buffer.from(padded), Buffer.from(numbers.buffer)]);
+}
+
 // Drops files, as a person does.
 async function drop(page, names) {
-  const files = names.map((name) => ({ name, text: readFileSync(join(records, name), "utf8") }));
+  const files = names.map((name) => ({ name, base64: readFileSync(join(records, name)).toString("base64") }));
   const data = await page.evaluateHandle((files) => {
     const transfer = new DataTransfer();
-    for (const { name, text } of files) transfer.items.add(new File([text], name));
+    for (const { name, base64 } of files) transfer.items.add(new File([Uint8Array.from(atob(base64), (c) => c.charCodeAt(0))], name));
     return transfer;
   }, files);
   await page.dispatchEvent("#drop", "drop", { dataTransfer: data });
@@ -44,7 +61,7 @@ async function downloaded(page, title) {
 
 async function diagnosed(page) {
   await page.click("#diagnose");
-  await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: 600_000 });
+  await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: DIAGNOSED_MS });
   const said = await page.textContent("#said");
   if (said !== "Diagnosed.") throw new Error(said);
 }
@@ -109,6 +126,24 @@ async function columns(open) {
   const said = JSON.parse(await downloaded(page, "Answer as JSON"));
   const wanted = JSON.parse(run("diagnose", "first.csv", "--t1", JSON.parse(t1), "--t2", JSON.parse(t2), "--known", "T1=0.12s", "--json"));
   differences(said, wanted).forEach((text) => fail(where, text));
+  await page.close();
+}
+
+// A file whose sensors are in two groups is read when it is said that they are joined.
+async function groups(open) {
+  const where = "groups";
+  const page = await open(where, PHONE);
+  await page.setInputFiles("#files", join(records, "apart.mf4"));
+  await page.waitForSelector("#read .warning");
+  if (await page.isVisible("#diagnose")) fail(where, "one of two groups is taken unasked");
+  const read = (text) => page.waitForFunction((text) => document.getElementById("read").textContent.includes(text), text);
+  const [, , , joined] = await page.$$eval("#group option", (options) => options.map((option) => option.value));
+  await page.selectOption("#group", joined);
+  await read("apart.mf4: 18 samples");
+  await page.waitForSelector("#asking:not([hidden])");
+  await fitsItsScreen(page, where);
+  await accessible(page, where);
+  await page.screenshot({ path: join(screenshots, "groups-narrow-light.png"), fullPage: true });
   await page.close();
 }
 

@@ -4,6 +4,7 @@
   const columnRoles = { time: "time", t1: "T1", t2: "T2" };
   let files = [];                       // name and bytes of each
   let chosen = {};                      // what the user has said of columns and time; the rest is guessed
+  let grouping = {};                    // and of groups of channels: a group's name, or that they are joined
   let generation = 0;                   // a reply to an older question is out of date
   let worker, started, isWorking = false;
   const waiting = new Map();            // requests that are not answered, by number
@@ -90,6 +91,7 @@
       if (mine !== generation) return;
       files = read;
       chosen = {};
+      grouping = {};
       for (const id of ["known", "period", "time-unit"]) byId(id).value = "";
       await readFiles();
     } catch (error) {
@@ -106,9 +108,10 @@
     say("");
     try {
       await started;
-      const found = await ask("read", { files, selection: JSON.stringify(chosen) });
+      const { groups, found } = await ask("read", { files, selection: JSON.stringify(chosen), join: false, ...grouping });
       if (mine !== generation) return;
       byId("read").replaceChildren(...found.map(about));
+      offer(groups);
       const first = found.find(({ inspection }) => inspection);
       byId("columns").hidden = !first;
       if (first) columns(first.inspection);
@@ -145,6 +148,19 @@
     return box;
   }
 
+  const option = (text, value) => Object.assign(element("option", text), { value });
+
+  // Sheets or groups to choose from, where there are several.
+  function offer(groups) {
+    byId("grouping").hidden = groups.length < 2;
+    byId("group").replaceChildren(
+      option("as guessed", "{}"),
+      ...groups.map(([group, about]) => option(about, JSON.stringify({ group }))),
+      option("all, joined on the stamps of one", JSON.stringify({ join: true })),
+    );
+    byId("group").value = JSON.stringify(grouping);
+  }
+
   function columns({ columns }) {
     const row = (cells, tag) => {
       const made = element("tr");
@@ -159,8 +175,8 @@
     );
     for (const [role, taken_as] of Object.entries(columnRoles)) {
       const taken = columns.find((c) => c.taken_as === taken_as);
-      const unsaid = Object.assign(element("option", taken && !chosen[role] ? `as guessed: ${taken.name}` : "as guessed"), { value: "" });
-      const options = columns.map((c) => Object.assign(element("option", `${c.number}: ${c.name}`), { value: JSON.stringify(reference(c, columns)) }));
+      const unsaid = option(taken && !chosen[role] ? `as guessed: ${taken.name}` : "as guessed", "");
+      const options = columns.map((c) => option(`${c.number}: ${c.name}`, JSON.stringify(reference(c, columns))));
       byId(role).replaceChildren(unsaid, ...options);
       byId(role).value = chosen[role] === undefined ? "" : JSON.stringify(chosen[role]);
     }
@@ -286,6 +302,12 @@
   });
   for (const role of Object.keys(columnRoles))
     byId(role).addEventListener("change", ({ target }) => choose(role, target.value ? JSON.parse(target.value) : undefined));
+  byId("group").addEventListener("change", ({ target }) => {
+    grouping = JSON.parse(target.value);
+    // Another group has columns of its own.
+    Object.keys(columnRoles).forEach((role) => delete chosen[role]);
+    readFiles();
+  });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
   byId("period").addEventListener("change", () => choose("period_s", decimal("period") ? Number(decimal("period")) : undefined));
   // Anywhere: a file that misses its place would be opened instead of the page.

@@ -9,24 +9,31 @@ function sayProgress(task, done, total) {
 // What the session refuses is thrown as a plain error; a trap and an exhausted stack are others, after which it is not to be trusted.
 const isRefusal = (error) => error instanceof Error && error.constructor === Error;
 
+function orRefusal(work, refused) {
+  try {
+    return work();
+  } catch (error) {
+    if (!isRefusal(error)) throw error;
+    return refused(error.message);
+  }
+}
+
 const answers = {
   start: ({ wasm }) => {
     wasm_bindgen.initSync({ module: wasm });
     page = new wasm_bindgen.Page();
   },
   example: () => wasm_bindgen.Page.example(),
-  // A new session with these files; what is in each of them.
-  read: ({ files, selection }) => {
+  // A new session with these files; the groups of the first, and what is in each of them.
+  read: ({ files, selection, group, join }) => {
     page.free();
     page = new wasm_bindgen.Page();
-    return files.map(({ name, bytes }) => {
-      try {
-        return { name, inspection: JSON.parse(page.add(name, new Uint8Array(bytes), selection)) };
-      } catch (error) {
-        if (!isRefusal(error)) throw error;
-        return { name, problem: error.message };
-      }
-    });
+    const read = ({ name, bytes }) => ({ name, inspection: JSON.parse(page.add(name, new Uint8Array(bytes), selection, group, join)) });
+    const groups = ({ name, bytes }) => JSON.parse(wasm_bindgen.Page.groups(name, new Uint8Array(bytes)));
+    return {
+      groups: orRefusal(() => groups(files[0]), () => []),
+      found: files.map((file) => orRefusal(() => read(file), (problem) => ({ name: file.name, problem }))),
+    };
   },
   diagnose: ({ options, madeAt }) => ({
     json: page.diagnose(options), report: page.report(madeAt), model: page.model(),

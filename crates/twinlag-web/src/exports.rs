@@ -44,9 +44,21 @@ impl Page {
         Session::example().map_err(thrown)
     }
 
+    /// [`Session::groups`].
+    pub fn groups(name: &str, bytes: Vec<u8>) -> Result<String, JsError> {
+        Session::groups(name, bytes).map_err(thrown)
+    }
+
     /// [`Session::add`].
-    pub fn add(&mut self, name: &str, bytes: Vec<u8>, selection: &str) -> Result<String, JsError> {
-        self.session.add(name, bytes, selection).map_err(thrown)
+    pub fn add(
+        &mut self,
+        name: &str,
+        bytes: Vec<u8>,
+        selection: &str,
+        group: Option<String>,
+        join: bool,
+    ) -> Result<String, JsError> {
+        self.session.add(name, bytes, selection, group, join).map_err(thrown)
     }
 
     /// [`Session::diagnose`].

@@ -9,7 +9,7 @@
 //!
 //! let log = "time_s,fine_C,coarse_C\n0,20,20\n1,21,20.5\n2,22,21\n3,23,21.5\n";
 //! let mut session = Session::default();
-//! let found = session.add("run.csv", log.as_bytes().to_vec(), "{}")?;
+//! let found = session.add("run.csv", log.as_bytes().to_vec(), "{}", None, false)?;
 //! assert!(found.contains("\"taken_as\":\"T1\""));
 //! # Ok::<(), twinlag_web::SessionError>(())
 //! ```

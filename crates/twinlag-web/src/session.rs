@@ -9,7 +9,7 @@ use twinlag::{
     CompensateOptions, Compensation, DiagnoseOptions, Diagnosis, Inspection, Options, Status, Watch,
     compensate_watched, diagnose_records_watched, diagnose_watched, inspect, joined,
 };
-use twinlag_files::{Choice, FileError, are_binary, read_bytes};
+use twinlag_files::{Choice, FileError, are_binary, contents_of_bytes, read_bytes};
 use twinlag_pages::{Making, ReportError, diagnosis_report, gas_report};
 
 /// The rig of the example: two thermocouples in the exhaust of an engine, the second of which sits in a sheath.
@@ -73,18 +73,39 @@ impl Session {
         csv(&[("time_s", &simulated.time_s), (&t1, &simulated.t1_c), (&t2, &simulated.t2_c)]).map_err(Into::into)
     }
 
+    /// The sheets or groups of channels of a file, as a JSON array of pairs: its name, and what it holds. None of text.
+    ///
+    /// - `name`: the file's
+    ///
+    /// # Errors
+    /// [`SessionError::File`] of a file that cannot be read.
+    pub fn groups(name: &str, bytes: Vec<u8>) -> Result<String, SessionError> {
+        let groups = if are_binary(&bytes) { contents_of_bytes(bytes, name)?.groups } else { Vec::new() };
+        let pairs: Vec<(&str, String)> = groups.iter().map(|group| (&*group.name, group.to_string())).collect();
+        Ok(serde_json::to_string(&pairs)?)
+    }
+
     /// Says what is in a file, and adds its record where it has one; returns the answer of `twinlag inspect`. An answer of earlier
     /// records is forgotten.
     ///
     /// - `name`: the file's
     /// - `selection`: [`Selection`] as JSON
+    /// - `group`, `join`: as of [`Choice`]
     ///
     /// # Errors
     /// Files that are no table, and selections that are not as JSON has them.
-    pub fn add(&mut self, name: &str, bytes: Vec<u8>, selection: &str) -> Result<String, SessionError> {
+    pub fn add(
+        &mut self,
+        name: &str,
+        bytes: Vec<u8>,
+        selection: &str,
+        group: Option<String>,
+        join: bool,
+    ) -> Result<String, SessionError> {
         let selection: Selection = parsed(selection)?;
         let sha256 = base16ct::lower::encode_string(&Sha256::digest(&bytes));
-        let (inspection, record) = inspect(table(name, bytes, &selection)?, &selection);
+        let choice = Choice { group, join, ..Choice::of(&selection) };
+        let (inspection, record) = inspect(table(name, bytes, &choice)?, &selection);
         (self.diagnosis, self.gas) = (None, None);
         if let Ok(record) = record {
             self.added.push(Added { record, sha256 });
@@ -202,9 +223,9 @@ fn csv(columns: &[(&str, &[f64])]) -> Result<String, RecordError> {
 }
 
 /// The table of a file in memory, in whatever format it is.
-fn table(name: &str, bytes: Vec<u8>, selection: &Selection) -> Result<Table, SessionError> {
+fn table(name: &str, bytes: Vec<u8>, choice: &Choice) -> Result<Table, SessionError> {
     if !are_binary(&bytes) {
         return Ok(Table::from_reader(bytes.as_slice(), name)?);
     }
-    Ok(read_bytes(bytes, &Choice::of(selection), name)?)
+    Ok(read_bytes(bytes, choice, name)?)
 }

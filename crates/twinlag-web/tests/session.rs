@@ -34,7 +34,7 @@ fn a_session_diagnoses_as_the_library_does() {
     // Enough for a gas temperature.
     const ROWS: usize = 2500;
     let mut session = Session::default();
-    let found = json(&session.add("run.csv", example(ROWS), "{}").expect("a table"));
+    let found = json(&session.add("run.csv", example(ROWS), "{}", None, false).expect("a table"));
     assert_eq!(found["record"]["samples"], ROWS);
     let answer = session.diagnose("{}", &unwatched).expect("an answer");
     let table = Table::from_reader(example(ROWS).as_slice(), "run.csv").expect("a table");
@@ -61,7 +61,7 @@ fn a_session_diagnoses_as_the_library_does() {
 #[test]
 fn what_is_known_is_of_the_first_and_second_sensor() {
     let mut session = Session::default();
-    session.add("run.csv", short(), "{}").expect("a table");
+    session.add("run.csv", short(), "{}", None, false).expect("a table");
     let answer = json(&session.diagnose("{\"known\": [\"T1=0.0238s\"]}", &unwatched).expect("an answer"));
     let of_first = |key: &str| answer["final"]["sensors"][0][key].clone();
     assert_eq!((of_first("time_constant_s"), of_first("known")), (Value::from(0.0238), Value::from(true)));
@@ -72,8 +72,26 @@ fn what_gzip_has_compressed_is_the_same_record() {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
     encoder.write_all(&short()).expect("in memory");
     let compressed = encoder.finish().expect("in memory");
-    let samples = |bytes| json(&Session::default().add("run.csv.gz", bytes, "{}").expect("a table"))["record"].clone();
+    let samples = |bytes| {
+        json(&Session::default().add("run.csv.gz", bytes, "{}", None, false).expect("a table"))["record"].clone()
+    };
     assert_eq!(samples(compressed), samples(short()));
+}
+
+#[test]
+fn groups_are_listed_chosen_and_joined() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../twinlag-files/tests/fixtures/apart.mf4");
+    let bytes = std::fs::read(path).expect("a fixture");
+    let groups = json(&Session::groups("apart.mf4", bytes.clone()).expect("groups"));
+    assert_eq!((&groups[0][0], &groups[1][0]), (&Value::from("ECU1"), &Value::from("ECU2")));
+    assert!(groups[0][1].as_str().is_some_and(|about| about.contains("40 rows")), "{groups}");
+    let add = |group: Option<&str>, join| {
+        Session::default().add("apart.mf4", bytes.clone(), "{}", group.map(str::to_owned), join)
+    };
+    assert!(add(None, false).is_err_and(|error| error.to_string().contains("choose one by its name")));
+    let rows = |found: Result<String, SessionError>| json(&found.expect("a table"))["rows"].clone();
+    assert_eq!((rows(add(Some("ECU1"), false)), rows(add(None, true))), (Value::from(40), Value::from(18)));
+    assert_eq!(Session::groups("run.csv", short()).expect("no group"), "[]");
 }
 
 #[test]
@@ -88,7 +106,8 @@ fn what_comes_before_something_else_is_named() {
 #[test]
 fn a_file_without_a_record_is_inspected_and_not_added() {
     let mut session = Session::default();
-    let found = json(&session.add("run.csv", b"time_s,a,b\n0,1,x\n1,2,y\n".to_vec(), "{}").expect("a table"));
+    let found =
+        json(&session.add("run.csv", b"time_s,a,b\n0,1,x\n1,2,y\n".to_vec(), "{}", None, false).expect("a table"));
     assert!(found["problem"].is_string() && found["record"].is_null(), "{found}");
     assert!(matches!(session.diagnose("{}", &unwatched), Err(SessionError::Order { .. })));
 }
