@@ -133,12 +133,18 @@ fn documents(built: &Path) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-/// The program for a platform, without paths of this machine in it.
-fn compiled(target: &str, build: &Path) -> Result<PathBuf> {
+/// Flags of the compiler that leave no path of this machine in what it compiles.
+///
+/// - `build`: the folder that is compiled into
+pub(crate) fn without_paths(build: &Path) -> Result<[String; 3]> {
     let home = std::env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(std::env::home_dir()?.join(".cargo")));
     let home = home.context("cargo has no home")?;
-    let flags = [(root()?, "twinlag"), (&home, "cargo"), (build, "build")]
-        .map(|(path, name)| format!("--remap-path-prefix={}={name}", path.display()));
+    Ok([(root()?, "twinlag"), (&home, "cargo"), (build, "build")]
+        .map(|(path, name)| format!("--remap-path-prefix={}={name}", path.display())))
+}
+
+/// The program for a platform, without paths of this machine in it.
+fn compiled(target: &str, build: &Path) -> Result<PathBuf> {
     let status = Command::new("cargo")
         .args([
             "build",
@@ -154,7 +160,7 @@ fn compiled(target: &str, build: &Path) -> Result<PathBuf> {
             "--target-dir",
         ])
         .arg(build)
-        .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
+        .env("CARGO_ENCODED_RUSTFLAGS", without_paths(build)?.join("\u{1f}"))
         .env("CARGO_INCREMENTAL", "0")
         .current_dir(root()?)
         .status()

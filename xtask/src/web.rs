@@ -16,12 +16,13 @@ use flate2::write::GzEncoder;
 use lzma_rust2::{LzmaOptions, LzmaWriter};
 use twinlag_report::{Axis, Chart, Document, Figure, Series, policy_hash};
 
+use crate::dist::without_paths;
 use crate::report::{browser, built, into_book, step, target_dir};
 use crate::root;
 
 pub(crate) const TARGET: &str = "wasm32-unknown-unknown";
 /// Several numbers at once, which browsers have been able to since 2023, and the stack of a thread of the program.
-const FLAGS: &str = "-Ctarget-feature=+simd128 -Clink-arg=-zstack-size=8388608";
+const FLAGS: [&str; 2] = ["-Ctarget-feature=+simd128", "-Clink-arg=-zstack-size=8388608"];
 const PARTS: [&Part; 2] = [&SESSION, &UNPACKER];
 const SESSION: Part = Part { package: "twinlag-web", global: "wasm_bindgen" };
 const UNPACKER: Part = Part { package: "twinlag-unpack", global: "unpacker" };
@@ -95,7 +96,9 @@ fn bound(work: &Path) -> Result<PathBuf> {
     let mut build = vec!["build", "--profile", "web", "--target", TARGET];
     build.extend(PARTS.iter().flat_map(|part| ["--package", part.package]));
     // In place of the flags of `.cargo/config.toml`, which are those of the facade alone.
-    let built = Command::new("cargo").args(&build).env("RUSTFLAGS", FLAGS).current_dir(root).status()?;
+    let flags =
+        FLAGS.map(str::to_owned).into_iter().chain(without_paths(&target_dir()?)?).collect::<Vec<_>>().join("\u{1f}");
+    let built = Command::new("cargo").args(&build).env("CARGO_ENCODED_RUSTFLAGS", flags).current_dir(root).status()?;
     ensure!(built.success(), "cargo {} ended with {built}", build.join(" "));
     let version = locked_version(&fs::read_to_string(root.join("Cargo.lock"))?)?;
     let tools = work.join("tools");
