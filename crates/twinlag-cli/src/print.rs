@@ -62,7 +62,6 @@ pub(crate) fn notes_in_words(record: &Record) -> impl Iterator<Item = String> {
         let option = match note {
             Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
             Note::TimeByStamps { .. } => " (options --time-unit, --time)".to_owned(),
-            Note::TimeQuestion { unit, .. } => format!(" (option --time-unit {unit})"),
             Note::FlowUnused { number, .. } => format!(" (option --flow {number})"),
             _ => String::new(),
         };

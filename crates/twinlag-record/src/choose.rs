@@ -4,17 +4,18 @@
 use std::ops::RangeInclusive;
 
 use crate::RecordError;
+use crate::beside::counter_beside;
 use crate::clock;
 use crate::column::{Column, Kind};
 use crate::error::Candidates;
 use crate::names::{
     OTHER_QUANTITIES, SURROUNDINGS, TEMPERATURE, counts_rows, first_word, has, is_apart, is_called_temperature,
-    is_index, is_temperature, is_time, is_velocity,
+    is_counter, is_index, is_time, is_velocity,
 };
 use crate::note::Note;
 use crate::selection::{ColumnRef, Selection, Setting};
 use crate::table::Table;
-use crate::time_axis::{TimeColumns, counter_beside};
+use crate::time_axis::{TimeColumns, unit_of};
 use crate::unit::Unit;
 
 /// The chosen columns, from 0.
@@ -126,10 +127,21 @@ impl Table {
         let time = chosen.time.map(|time| match time {
             TimeColumns::One(index) | TimeColumns::DateAndTime { date: index, .. } => column(index),
         });
+        // The unit that is nowhere written in the file.
+        let time_unit = match chosen.time {
+            Some(TimeColumns::One(index))
+                if columns[index].kind() == Kind::Number && columns[index].stated_time_unit().is_none() =>
+            {
+                let unit = unit_of(self, index, selection.time_unit.as_ref(), &mut Vec::new());
+                unit.ok().map(|(symbol, seconds)| Unit::Time { symbol, seconds })
+            }
+            _ => None,
+        };
         let [t1, t2] = chosen.channels.map(|index| Some(column(index)));
         let reference = chosen.reference.map(column);
         Ok(Selection {
             time,
+            time_unit: selection.time_unit.clone().or(time_unit),
             t1,
             t2,
             reference,
@@ -145,28 +157,30 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let free = |index: &usize| !taken.contains(index);
     let rises =
         |column: &Column| column.kind() == Kind::Number && column.raw().windows(2).all(|pair| pair[1] > pair[0]);
+    let length_s = |column: &Column| match column.stated_time_unit() {
+        Some(Unit::Time { seconds, .. }) if column.kind() == Kind::Number => seconds,
+        _ => f64::INFINITY,
+    };
+    // A date has parts that are called so as well, which begin anew.
+    let are_parts = columns.iter().filter(|column| length_s(column).is_finite()).count() > 1;
     let is_called_by_unit = |column: &Column| {
-        let length_s = Unit::of_time_named(column.name()).map(|(_, seconds)| seconds);
-        // A date has parts that are called so as well, which begin anew.
-        length_s.is_some_and(|length_s| length_s <= LONGEST_NAMING_UNIT_S) && rises(column)
+        let is_since = column.name().contains(" since ") && length_s(column).is_finite();
+        (length_s(column) <= LONGEST_NAMING_UNIT_S || is_since) && (!are_parts || rises(column))
     };
     let open = || (0..columns.len()).filter(free);
     let named = open().find(|&index| is_time(&columns[index]));
     named.or_else(|| open().find(|&index| is_called_by_unit(&columns[index]))).or_else(|| {
-        // Without a telling name: the first column, if it rises from row to row and is not a row
-        // number, by its name or as it counts.
-        let first = columns.first().filter(|_| free(&0))?;
-        let is_index = is_index(first) || counts_rows(first);
-        let open = *first.unit() == Unit::Unstated && !is_temperature(first) && !is_index && !is_apart(first, columns);
-        (rises(first) && open).then_some(0)
+        // Without any name: the first column, if it rises from row to row and does not count the rows.
+        let first = columns.first().filter(|first| free(&0) && first.name().is_empty())?;
+        (rises(first) && *first.unit() == Unit::Unstated && !counts_rows(first)).then_some(0)
     })
 }
 
-/// The milliseconds or microseconds that a logger counts beside a column of stamps.
+/// The time that a logger counts beside a column of stamps, in any unit.
 fn own_clock(table: &Table, stamps: usize, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
     let mut others = (0..columns.len()).filter(|index| columns[stamps].kind() == Kind::Stamp && !taken.contains(index));
-    others.find(|&index| counter_beside(table, index, stamps).is_some_and(|counter| counter.seconds < 1.0))
+    others.find(|&index| counter_beside(table, index, stamps).is_some())
 }
 
 /// A date without time of day belongs to a time of day without date beside it.
@@ -226,7 +240,7 @@ fn candidates(columns: &[Column], free: &[usize], kinds: &[Kind]) -> Vec<usize> 
     let has_names = columns.iter().any(|column| !column.name().is_empty());
     let may_be = |column: &Column| {
         let named = is_called_temperature(column) && !is_apart(column, columns) && !is_index(column);
-        kinds.contains(&column.kind()) && (named || !has_names)
+        kinds.contains(&column.kind()) && if has_names { named } else { !is_counter(column) }
     };
     free.iter().copied().filter(|&index| may_be(&columns[index])).collect()
 }
@@ -287,7 +301,8 @@ fn unclear(
         example.extend(likely.next().map(|index| (setting, index + 1)));
     }
     let chosen = named.into_iter().flatten().next().map(|index| table.title(index));
-    let why = Candidates { chosen, found: titles(&|_| true), surroundings: titles(&is_doubtful), example };
+    let are_named = columns.iter().any(|column| !column.name().is_empty());
+    let why = Candidates { chosen, are_named, found: titles(&|_| true), surroundings: titles(&is_doubtful), example };
     RecordError::ChannelsUnclear { file, candidates: Box::new(why), columns: table.listing() }
 }
 

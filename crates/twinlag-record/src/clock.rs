@@ -19,6 +19,15 @@ pub(crate) struct Stamp {
     pub(crate) time_ns: Option<i64>,
     /// East of Greenwich.
     pub(crate) offset_s: Option<i64>,
+    /// Whether the time has two parts, which were taken to be hours and minutes.
+    pub(crate) is_short: bool,
+}
+
+impl Stamp {
+    /// Takes the two parts of a time to be minutes and seconds.
+    pub(crate) fn take_as_minutes(&mut self) {
+        self.time_ns = self.time_ns.map(|time_ns| time_ns / 60);
+    }
 }
 
 const NS: i64 = 1_000_000_000;
@@ -125,7 +134,8 @@ fn parse_time(text: &str) -> Option<Stamp> {
         }
     }
     let time_ns = ((hours * 60 + minutes) * 60 + seconds) * NS + nanos;
-    Some(Stamp { day: None, time_ns: Some(time_ns), offset_s: parse_zone(zone)? })
+    let is_short = c.is_none() && fraction.is_empty();
+    Some(Stamp { day: None, time_ns: Some(time_ns), offset_s: parse_zone(zone)?, is_short })
 }
 
 /// `Z`, `UTC`, `+01:00`, `+0100`, `+01`; the inner `None` is no zone.

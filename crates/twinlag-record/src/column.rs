@@ -83,6 +83,15 @@ impl Column {
         &self.unit
     }
 
+    /// The unit of time in which its header says that it counts, behind its name or within it, as in `elapsedMillis`.
+    pub(crate) fn stated_time_unit(&self) -> Option<Unit> {
+        match self.unit {
+            Unit::Time { .. } => Some(self.unit.clone()),
+            Unit::Unstated => Unit::of_time_named(&self.name),
+            _ => None,
+        }
+    }
+
     /// What the cells are for the most part.
     pub fn kind(&self) -> Kind {
         self.kind

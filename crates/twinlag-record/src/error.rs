@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::form::Program;
 use crate::selection::Setting;
-use crate::wording::{Counted, plain};
+use crate::wording::{Counted, brief, plain, three};
 
 /// Where in the input something is: a line of a file, or a sample of a vector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,9 @@ impl fmt::Display for Place {
 pub struct Candidates {
     /// The one that the caller chose.
     pub chosen: Option<String>,
-    /// Those with the name or the unit of a temperature.
+    /// Whether columns have names at all.
+    pub are_named: bool,
+    /// Those with the name or the unit of a temperature; without names, those whose numbers may be temperatures.
     pub found: Vec<String>,
     /// Those of them that may be of the surroundings.
     pub surroundings: Vec<String>,
@@ -56,6 +58,7 @@ impl fmt::Display for Candidates {
         }
         let list = self.found.join(", ");
         match self.found.len() {
+            count if !self.are_named => write!(f, "{count} columns without names may be sensors ({list})")?,
             0 => write!(f, "no column has the name or the unit of a temperature")?,
             1 => write!(f, "only column {list} has the name or the unit of a temperature")?,
             count => write!(f, "{count} columns have the name or the unit of a temperature ({list})")?,
@@ -203,11 +206,24 @@ pub enum RecordError {
          which; write dates as YYYY-MM-DD"
     )]
     AmbiguousDate { file: String, at: Place, column: String, cell: String },
+    #[error(
+        "{file}: column {column}: '{cell}' may be hours and minutes or minutes and seconds; choose the unit of its first part, h or min, \
+         or write it in the header, for example 'time (mm:ss)'"
+    )]
+    ClockUnclear { file: String, column: String, cell: String },
+    #[error("{file}: column {column} holds times of a clock, which need no unit; leave the unit of time out")]
+    NeedsNoUnit { file: String, column: String },
+    #[error(
+        "{file}: columns {one} and {other} contradict each other: from the first row to the last {one_s} s pass by the one and {other_s} s by \
+         the other; choose the right one as the time",
+        one_s = three(*one_s), other_s = three(*other_s)
+    )]
+    TimesDisagree { file: String, one: String, one_s: f64, other: String, other_s: f64 },
     #[error("{file}: {at}, column {column}: the time is missing or not finite; mend or remove the row")]
     MissingTime { file: String, at: Place, column: String },
     #[error(
         "{file}: {at}: time must increase from row to row, but '{now}' follows '{before}'; sort the rows and remove \
-         repeated ones, or, if several samples share one coarse stamp, give the sample period in seconds"
+         repeated ones; of a log that begins anew here, make two records; if several samples share one coarse stamp, give the sample period in seconds"
     )]
     TimeNotIncreasing { file: String, at: Place, before: String, now: String },
     #[error(
@@ -221,9 +237,9 @@ pub enum RecordError {
     )]
     NotATimeUnit { file: String, column: String, unit: String },
     #[error(
-        "{file}: column {column} names no unit of time, and its steps of {shown} do not show which it is; choose the unit, or write \
-         it in the header, for example 'time [ms]'",
-        shown = plain(*step)
+        "{file}: column {column} names no unit of time, and its steps of {shown} do not show which it is: they may be seconds, another \
+         unit, or rows; choose the unit, or write it in the header, for example 'time [ms]'; for a count of rows give the sample period",
+        shown = brief(*step)
     )]
     TimeUnitUnclear { file: String, column: String, step: f64 },
     #[error(
@@ -283,7 +299,9 @@ impl RecordError {
             Self::ConstantPosition { .. } => &[Setting::Position],
             Self::FewFlows { .. } | Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
-            Self::NotATimeUnit { .. } | Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit],
+            Self::NotATimeUnit { .. } | Self::ClockUnclear { .. } | Self::NeedsNoUnit { .. } => &[Setting::TimeUnit],
+            Self::TimesDisagree { .. } => &[Setting::Time],
+            Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit, Setting::Period],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],
             Self::BadPeriod { .. } | Self::TimeNotIncreasing { .. } => &[Setting::Period],
             _ => &[],

@@ -34,6 +34,7 @@
 //! # Ok::<(), twinlag_record::RecordError>(())
 //! ```
 
+mod beside;
 mod cells;
 mod choose;
 mod clock;
@@ -65,10 +66,13 @@ mod sea_bird;
 mod selection;
 mod serial;
 mod sign;
+mod stamps;
 mod table;
 mod time_axis;
 mod unit;
 mod wording;
+mod words;
+mod wrap;
 mod write;
 
 pub use choose::SAMPLE_PERIODS_S;

@@ -3,8 +3,9 @@
 
 use crate::column::{Column, Kind};
 use crate::unit::Unit;
+use crate::words::{apart, words};
 
-const TIME: [&str; 21] = [
+const TIME: [&str; 27] = [
     "time",
     "zeit",
     "zeitpunkt",
@@ -23,6 +24,12 @@ const TIME: [&str; 21] = [
     "systime",
     "millis",
     "epoch",
+    "laufzeit",
+    "messzeit",
+    "duration",
+    "dauer",
+    "tiempo",
+    "tempo",
     "時刻",
     "時間",
     "日時",
@@ -133,6 +140,9 @@ pub(crate) const OTHER_QUANTITIES: [&str; 40] = [
     "error",
 ];
 
+/// Beyond all temperatures, in °C as in °F.
+const MAX_TEMPERATURE: f64 = 10_000.0;
+
 /// Words for a velocity.
 const VELOCITY: [&str; 8] =
     ["flow", "velocity", "speed", "airspeed", "windspeed", "wind", "geschwindigkeit", "windgeschwindigkeit"];
@@ -152,10 +162,6 @@ pub(crate) fn is_velocity(column: &Column) -> bool {
     has_velocity_unit || (*column.unit() == Unit::Unstated && is_called())
 }
 
-fn words(text: &str) -> impl Iterator<Item = String> {
-    text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).map(str::to_lowercase)
-}
-
 /// Whether a word of the name is in the list, with or without a number behind it.
 pub(crate) fn has(column: &Column, list: &[&str]) -> bool {
     words(column.label()).any(|word| {
@@ -173,31 +179,44 @@ pub(crate) fn counts_rows(column: &Column) -> bool {
         && raw.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
 }
 
+/// Whether no temperature goes as its numbers do: they rise by one from row to row, or are beyond all temperatures.
+pub(crate) fn is_counter(column: &Column) -> bool {
+    let raw = column.raw();
+    let rises_by_one = raw.len() > 1 && raw.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+    rises_by_one || raw.iter().any(|value| *value > MAX_TEMPERATURE)
+}
+
 pub(crate) fn is_index(column: &Column) -> bool {
     has(column, &INDEX) && !column.unit().is_temperature() && !matches!(column.unit(), Unit::Time { .. })
 }
 
 pub(crate) fn is_time(column: &Column) -> bool {
-    let named = has(column, &TIME) || column.label() == "t";
+    let named = has(column, &TIME) || column.label() == "t" || is_written_together(column);
     match column.kind() {
         Kind::Stamp => true,
         Kind::Number => {
             !column.unit().is_temperature()
                 && !has(column, &["constant"])
-                && (named || matches!(column.unit(), Unit::Time { .. }) && !column.label().starts_with('T'))
+                && (named || matches!(column.unit(), Unit::Time { .. }) && may_be_time(column.label()))
         }
         _ => false,
     }
+}
+
+/// Whether a word of time is set apart by a capital alone, as in `elapsedHours`, in a column of no other unit.
+fn is_written_together(column: &Column) -> bool {
+    !matches!(column.unit(), Unit::Other(_)) && words(&apart(column.label())).any(|word| TIME.contains(&&*word))
+}
+
+/// Whether a name goes with a unit of time: not `T_min`, which is the least temperature, but `Temps [s]`, which is French.
+fn may_be_time(label: &str) -> bool {
+    !label.starts_with('T') || label.eq_ignore_ascii_case("temps")
 }
 
 /// Whether name and unit, whatever the cells hold, are those of a temperature.
 pub(crate) fn is_called_temperature(column: &Column) -> bool {
     !has(column, &QUALITY)
         && (column.unit().is_temperature() || (*column.unit() == Unit::Unstated && has(column, &TEMPERATURE)))
-}
-
-pub(crate) fn is_temperature(column: &Column) -> bool {
-    column.kind() == Kind::Number && is_called_temperature(column)
 }
 
 /// Whether it is no sensor by its name: a reference, a setpoint, a computed temperature, the one column of the gas.

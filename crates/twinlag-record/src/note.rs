@@ -104,11 +104,11 @@ pub enum Note {
         /// From row to row.
         step_s: f64,
     },
-    /// A time column without a unit counts what passes by the stamps of another column.
+    /// A time column without a unit counts what passes by the clock of another column.
     TimeByStamps {
         /// The column.
         column: String,
-        /// The column of stamps.
+        /// The other column: of stamps, or of a counter with its unit.
         stamps: String,
         /// Its unit.
         unit: &'static str,
@@ -117,17 +117,21 @@ pub enum Note {
         /// From row to row.
         step_s: f64,
     },
-    /// A time column without a unit was taken to be in seconds, and might as well count something
-    /// else.
-    TimeQuestion {
+    /// Which of day and month comes first in dates was found from how closely rows follow each other.
+    DateOrder {
         /// The column.
         column: String,
-        /// The other unit.
-        unit: &'static str,
-        /// What it would count.
-        name: &'static str,
-        /// From row to row, if it does.
-        step_s: f64,
+        /// Whether it is the day.
+        is_day_first: bool,
+    },
+    /// A counter begins anew at a power of two, and was counted on.
+    Wrapped {
+        /// The column.
+        column: String,
+        /// The power.
+        bits: u32,
+        /// How often it begins anew.
+        times: usize,
     },
     /// Time was counted from the row number and a period.
     PeriodGiven {
@@ -258,17 +262,9 @@ impl Note {
                 write!(f, "If that is wrong, choose its unit, or write it in the header, as 'time [s]'")
             }
             Self::TimeByStamps { column, stamps, name, step_s, .. } => {
-                write!(f, "column {column} names no unit; by the stamps of column {stamps} it counts {name}, ")?;
+                write!(f, "column {column} names no unit; by the clock of column {stamps} it counts {name}, ")?;
                 write!(f, "{} s from row to row. ", three(*step_s))?;
                 write!(f, "If that is wrong, choose its unit, or another column as the time")
-            }
-            Self::TimeQuestion { column, unit, name, step_s } => {
-                write!(
-                    f,
-                    "is column {column} really in s? If it counts {name}, rows are {} s apart: ",
-                    three(*step_s)
-                )?;
-                write!(f, "then choose its unit, or write it in the header, as 'time [{unit}]'")
             }
             _ => Ok(()),
         }
@@ -293,6 +289,14 @@ impl fmt::Display for Note {
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
             Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
             Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
+            Self::DateOrder { column, is_day_first } => {
+                let first = if *is_day_first { "day" } else { "month" };
+                write!(f, "dates of column {column} have the {first} first, since rows follow each other closely then")
+            }
+            Self::Wrapped { column, bits, times } => {
+                let times = Counted(*times, "time");
+                write!(f, "column {column} is a counter of {bits} bits, which begins anew {times} and was counted on")
+            }
             Self::PeriodGiven { period_s, is_of_file } => {
                 let by = if *is_of_file { "as its header says" } else { "as given" };
                 write!(f, "time counted from the row number, {period_s} s per row {by}; no time column was used")

@@ -8,6 +8,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::beside::expect_agreement;
 use crate::choose::{Chosen, choose};
 use crate::column::Column;
 use crate::note::Note;
@@ -160,7 +161,9 @@ impl Record {
     pub fn from_owned(mut table: Table, selection: &Selection) -> Result<Self, RecordError> {
         let mut notes = Vec::new();
         let chosen = choose(&table, selection, &mut notes)?;
-        table.keep_values_of(&chosen.columns());
+        if selection.time.is_none() {
+            expect_agreement(&table, &chosen, selection.time_unit.as_ref())?;
+        }
         let (time_s, clock) = match (chosen.time, selection.period_s) {
             (Some(columns), _) => {
                 let TimeAxis { time_s, clock } =
@@ -175,6 +178,8 @@ impl Record {
                 (time_s, None)
             }
         };
+        // Clocks beside the time have shown what they can.
+        table.keep_values_of(&chosen.columns());
         let mut temperatures = Vec::new();
         let indices = chosen.channels.into_iter().chain(chosen.reference);
         for index in indices.clone() {

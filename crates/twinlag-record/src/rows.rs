@@ -73,7 +73,7 @@ impl RowReader {
         let column = |index: usize| &table.columns()[index];
         let time = match chosen.time {
             Some(TimeColumns::One(index)) if column(index).kind() == Kind::Number => {
-                let unit_s = time_axis::unit_s(table, index, selection.time_unit.as_ref(), &mut Vec::new())?;
+                let unit_s = time_axis::unit_of(table, index, selection.time_unit.as_ref(), &mut Vec::new())?.1;
                 let first = column(index).raw().first().copied().unwrap_or(0.0);
                 Some(Time { index, first, unit_s })
             }

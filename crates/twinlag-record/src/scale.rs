@@ -1,9 +1,10 @@
 //! In which unit a column of time counts, where its header names none.
 //!
-//! Seconds are assumed unless the numbers cannot be seconds: instants of today in milliseconds, microseconds or nanoseconds since 1970, and
-//! serial days as spreadsheets and MATLAB count them. Recognised is what fits by its size *and* by its step. Where two readings fit, seconds
-//! stay, with a question; where none fits, or only counters of which more than one is possible, the column is refused. A factor of 1000 in
-//! time is a factor of 1000 in every time constant: it must not be wrong in silence.
+//! A factor of 1000 in time is a factor of 1000 in every time constant, so that nothing is assumed where it may be wrong. Recognised are, by
+//! size *and* step, instants of today in seconds, milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and
+//! MATLAB count them. Other numbers are seconds where they rise by less than one: neither milliseconds nor rows are counted in fractions.
+//! Steps of one and more may be those of rows, milliseconds, minutes or seconds, and steps that are no decimals in seconds but whole seconds
+//! in minutes, hours or days may be these: such a column is refused.
 
 use crate::sampling::{self, Clock};
 use crate::selection::SamplingChoice;
@@ -11,13 +12,11 @@ use crate::selection::SamplingChoice;
 /// What a column without a unit counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Reading {
-    /// Seconds, or so it must be assumed.
+    /// Seconds.
     Seconds,
-    /// Seconds, as long as nobody says otherwise; as well it might be this.
-    Question(Counter),
     /// This, by size and step.
     Recognised(Counter),
-    /// No reading fits, or several counters do.
+    /// More than one thing, or nothing that is known.
     Unclear {
         /// From stamp to stamp, in the unit that is sought.
         step: f64,
@@ -64,12 +63,19 @@ const LONGEST_PERIOD_S: f64 = 3600.0;
 const MINUTE_S: f64 = 60.0;
 /// How far, as a fraction, a step may be from a round number: clocks are off by 1e-4 at most.
 const OFF: f64 = 2e-4;
+/// Periods that loggers offer, s.
+const USUAL_PERIODS_S: [f64; 14] =
+    [1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 900.0, 1800.0, 3600.0];
+/// The shortest step of numbers without a unit that may be those of rows, or of milliseconds.
+const COUNTED_STEP: f64 = 1.0;
 /// The longest step of numbers that may be those of rows, which rise by one.
 const ROW_STEP: f64 = 1.5;
+/// Digits of a step that was chosen in seconds.
+const STEP_DIGITS: i32 = 3;
 /// How far, as a fraction, the clock of a board may be off: the resonator of a cheap one is by half of this.
 const CLOCK_ERROR: f64 = 0.01;
-/// How far, as a fraction, a counter may be from what passes by stamps, however coarse these are. Units are a factor of 1000 apart.
-const MAX_CLOCK_ERROR: f64 = 0.1;
+/// How far, as a fraction, a counter may be from what passes by a clock, however coarse that is. Units are a factor of 60 and more apart.
+pub(crate) const MAX_CLOCK_ERROR: f64 = 0.1;
 
 /// Judges the numbers of a column, all of them finite.
 pub(crate) fn judge(values: &[f64]) -> Reading {
@@ -101,8 +107,16 @@ pub(crate) fn judge(values: &[f64]) -> Reading {
         return of_days(step, Counter { symbol: "d", seconds: DAY_S, name, step_s: step * DAY_S });
     }
     // A program that waits for a minute between readings takes a second more for them.
-    let is_possible = is_loggers_period(step) || is_epoch_s && step <= LONGEST_PERIOD_S;
-    of_counter(step, are_whole, is_possible)
+    if is_epoch_s && step <= LONGEST_PERIOD_S {
+        return Reading::Seconds;
+    }
+    let mean = (last - first) / steps.len() as f64;
+    let is_counted = step > COUNTED_STEP * (1.0 - OFF);
+    if is_counted || [step, mean].into_iter().any(is_of_longer_unit) {
+        Reading::Unclear { step }
+    } else {
+        Reading::Seconds
+    }
 }
 
 /// A number of the size of today's serial days with a fraction: days, or seconds of a day or of an
@@ -117,32 +131,29 @@ fn of_days(step: f64, days: Counter) -> Reading {
     match (as_seconds, as_days) {
         (false, true) => Reading::Recognised(days),
         (false, false) if step < SHORTEST_STEP => Reading::Recognised(days),
-        (true, true) => Reading::Question(days),
-        (false, false) if !is_slow => Reading::Question(days),
-        _ => Reading::Seconds,
+        (true, false) => Reading::Seconds,
+        (false, false) if is_slow => Reading::Seconds,
+        _ => Reading::Unclear { step },
     }
 }
 
-/// Whole numbers with steps of two and more may be those of a counter of milliseconds. Where seconds are not possible, microseconds are as
-/// well.
-fn of_counter(step: f64, are_whole: bool, is_possible: bool) -> Reading {
-    if !are_whole && step > DAY_S && !is_whole(step / DAY_S) || are_whole && !is_possible {
-        return Reading::Unclear { step };
-    }
-    let counter = Counter { symbol: "ms", seconds: 1e-3, name: "milliseconds", step_s: step * 1e-3 };
-    if are_whole && step > ROW_STEP { Reading::Question(counter) } else { Reading::Seconds }
+/// Whether a step is no decimal, and a usual period where it is of minutes, hours or days: a sixtieth may be a second in minutes.
+fn is_of_longer_unit(step: f64) -> bool {
+    let is_period = |unit_s: f64| USUAL_PERIODS_S.iter().any(|period_s| (step * unit_s / period_s - 1.0).abs() <= OFF);
+    !has_digits(step, STEP_DIGITS) && [60.0, 3600.0, DAY_S].into_iter().any(is_period)
 }
 
-/// The unit of a counter that rises by `rise` while `duration_s` passes by stamps: seconds, milliseconds or microseconds. `None` of any
-/// other rise, and of numbers that may be those of rows.
+/// The unit of a counter that rises by `rise` while `duration_s` passes by a clock: seconds, milliseconds or microseconds. `None` of any
+/// other rise, and of whole numbers that may be those of rows.
 ///
 /// - `step`: from number to number, the median
-/// - `resolution_s`: how far stamps may be off
-pub(crate) fn counter_of(rise: f64, step: f64, duration_s: f64, resolution_s: f64) -> Option<Counter> {
+/// - `are_whole`: whether all numbers are whole
+/// - `resolution_s`: how far the clock may be off
+pub(crate) fn counter_of(rise: f64, step: f64, are_whole: bool, duration_s: f64, resolution_s: f64) -> Option<Counter> {
     let tolerance_s = (CLOCK_ERROR * duration_s + resolution_s).min(MAX_CLOCK_ERROR * duration_s);
     let units = [("s", 1.0, "seconds"), ("ms", 1e-3, "milliseconds"), ("us", 1e-6, "microseconds")];
     let is_unit = |(_, seconds, _): &(&str, f64, &str)| (rise * seconds - duration_s).abs() <= tolerance_s;
-    let (symbol, seconds, name) = units.into_iter().find(is_unit).filter(|_| step > ROW_STEP)?;
+    let (symbol, seconds, name) = units.into_iter().find(is_unit).filter(|_| step > ROW_STEP || !are_whole)?;
     Some(Counter { symbol, seconds, name, step_s: step * seconds })
 }
 
@@ -159,8 +170,13 @@ fn is_whole(ratio: f64) -> bool {
 
 /// A number of two significant digits.
 fn is_round(value: f64) -> bool {
-    let two_digits = value / 10_f64.powf(value.log10().floor() - 1.0);
-    (two_digits - two_digits.round()).abs() <= OFF * two_digits
+    has_digits(value, 2)
+}
+
+/// Whether a number has no more than so many significant digits.
+fn has_digits(value: f64, count: i32) -> bool {
+    let whole = value / 10_f64.powi(value.log10().floor() as i32 + 1 - count);
+    (whole - whole.round()).abs() <= OFF * whole
 }
 
 fn is_power_of_two(value: f64) -> bool {
@@ -181,8 +197,6 @@ mod tests {
     fn symbol(reading: Reading) -> &'static str {
         match reading {
             Reading::Seconds => "s",
-            Reading::Question(Counter { symbol: "ms", .. }) => "s, or ms",
-            Reading::Question(_) => "s, or d",
             Reading::Recognised(counter) => counter.symbol,
             Reading::Unclear { .. } => "?",
         }
@@ -239,40 +253,50 @@ mod tests {
         }
     }
 
-    /// 24 Hz is a step of an hour in days, 96 Hz one of a quarter of an hour: nobody knows.
     #[test]
-    fn where_two_readings_fit_seconds_stay_with_a_question() {
+    fn numbers_that_may_count_another_unit_are_unclear() {
         for (first, step, want) in [
-            (45_296.5, 1.0 / 24.0, "s, or d"),
-            (45_296.5, 1.0 / 96.0, "s, or d"),
+            // 24 Hz is a step of an hour in days, 96 Hz one of a quarter of an hour.
+            (45_296.5, 1.0 / 24.0, "?"),
+            (45_296.5, 1.0 / 96.0, "?"),
             // 10.03 s in days is no round number, but neither is 8614 Hz.
-            (45_296.5, 10.03 / DAY_S, "s, or d"),
-            (0.0, 10.0, "s, or ms"),
-            (123.0, 2.0, "s, or ms"),
-            (0.0, 75.0, "?"),
-            (0.0, 90.0, "s, or ms"),
-            (0.0, 120.0, "s, or ms"),
-            // A second more than a minute, in seconds since 1970.
-            (1_769_853_600.0, 61.0, "s, or ms"),
-            // No logger in seconds; milliseconds at 2 Hz, or microseconds at 2 kHz.
+            (45_296.5, 10.03 / DAY_S, "?"),
+            // Rows, milliseconds, minutes or seconds.
+            (0.0, 1.0, "?"),
+            (0.5, 1.0, "?"),
+            (0.0, 10.0, "?"),
+            (123.0, 2.0, "?"),
+            (0.0, 60.0, "?"),
             (0.0, 500.0, "?"),
-            (0.0, 1.0, "s"),
-            (0.0, 0.5, "s"),
             (0.0, 1e6, "?"),
-            (0.0, DAY_S, "s, or ms"),
+            (0.0, 16.67, "?"),
+            // A second in minutes and in hours, ten seconds in days.
+            (0.0, 1.0 / 60.0, "?"),
+            (0.0, 1.0 / 3600.0, "?"),
+            (0.0, 10.0 / DAY_S, "?"),
+            (0.0, 0.5, "s"),
+            (0.0, 0.25, "s"),
+            (0.0, 0.1, "s"),
+            (3.2, 1.0 / 50.0, "s"),
+            (0.0, 1.0 / 128.0, "s"),
+            (0.0, 1e-3, "s"),
+            // A second more than a minute, in seconds since 1970.
+            (1_769_853_600.0, 61.0, "s"),
         ] {
             let got = judge(&stamps(first, step));
             assert_eq!(symbol(got), want, "{step} from {first}: {got:?}");
         }
-        // Whole milliseconds that jitter by one.
+        // Whole milliseconds that jitter by one; seconds in minutes of two decimals.
         let jitter: Vec<f64> = (0..ROWS).map(|k| (100 * k + k % 3) as f64).collect();
         assert_eq!(symbol(judge(&jitter)), "?");
+        let minutes: Vec<f64> = stamps(0.0, 2.0 / 60.0).iter().map(|min| (min * 100.0).round() / 100.0).collect();
+        assert_eq!(symbol(judge(&minutes)), "?");
     }
 
     /// The clock of a board may be off by 0.5 %. One that ticks 1024 times a second counts no milliseconds.
     #[test]
     fn a_counter_beside_stamps_has_the_unit_that_passes() {
-        let unit = |rise: f64| counter_of(rise, 100.0, 20.0, 0.1).map(|counter| counter.symbol);
+        let unit = |rise: f64| counter_of(rise, 100.0, true, 20.0, 0.1).map(|counter| counter.symbol);
         assert_eq!(unit(20.1), Some("s"));
         assert_eq!(unit(20_100.0), Some("ms"));
         assert_eq!(unit(20_100_000.0), Some("us"));
@@ -280,9 +304,11 @@ mod tests {
             assert_eq!(unit(rise), None, "{rise}");
         }
         // Whole seconds may be off by one, but not by more than a tenth in all.
-        assert_eq!(counter_of(20_900.0, 100.0, 20.0, 1.0).map(|counter| counter.symbol), Some("ms"));
-        assert_eq!(counter_of(2_400.0, 100.0, 2.0, 1.0), None);
+        assert_eq!(counter_of(20_900.0, 100.0, true, 20.0, 1.0).map(|counter| counter.symbol), Some("ms"));
+        assert_eq!(counter_of(2_400.0, 100.0, true, 2.0, 1.0), None);
         // Rows of a logger of 1 kHz.
-        assert_eq!(counter_of(20_000.0, 1.0, 20.0, 0.1), None);
+        assert_eq!(counter_of(20_000.0, 1.0, true, 20.0, 0.1), None);
+        // Seconds of a sketch that divides its milliseconds.
+        assert_eq!(counter_of(20.1, 0.1, false, 20.0, 0.1).map(|counter| counter.symbol), Some("s"));
     }
 }

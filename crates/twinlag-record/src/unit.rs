@@ -4,6 +4,7 @@
 use std::fmt;
 
 use crate::description::is_description;
+use crate::words::{apart, words};
 
 /// The unit of a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,12 +51,19 @@ impl Unit {
         Self::known(unit)
     }
 
-    /// The length in seconds of the unit of time that the name of a column is, as `ms`, if it is one.
-    pub(crate) fn of_time_named(name: &str) -> Option<(&'static str, f64)> {
-        match Self::known(name.trim()) {
-            Some(Self::Time { symbol, seconds }) => Some((symbol, seconds)),
-            _ => None,
+    /// The unit of time that is the name of a column, as `ms`, or the only one among its words, as in `elapsedMillis`, `time.ms` and
+    /// `milliseconds since boot`.
+    pub(crate) fn of_time_named(name: &str) -> Option<Self> {
+        let of_time = |text: &str| Self::known(text).filter(|unit| matches!(unit, Self::Time { .. }));
+        if let Some(unit) = of_time(name.trim()) {
+            return Some(unit);
         }
+        // Single letters stand for much, and a day or a minute may be that of a date.
+        let says = |word: &String| word.len() > 1 && !PARTS_OF_DATES.contains(&&**word);
+        let spaced = apart(name);
+        let mut units = words(&spaced).filter(says).filter_map(|word| of_time(&word));
+        let unit = units.next()?;
+        units.all(|other| other == unit).then_some(unit)
     }
 
     fn known(text: &str) -> Option<Self> {
@@ -63,12 +71,16 @@ impl Unit {
         // Case tells nothing but `mS` and `MS`, which no logger writes for a time.
         let lower = text.to_lowercase();
         match lower.as_str() {
-            "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => return time("s", 1.0),
-            "ms" | "msec" | "millisecond" | "milliseconds" | "millis" => return time("ms", 1e-3),
-            "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" | "micros" => return time("us", 1e-6),
-            "ns" | "nsec" | "nanosecond" | "nanoseconds" | "nanos" => return time("ns", 1e-9),
-            "min" | "mins" | "minute" | "minutes" | "minuten" => return time("min", 60.0),
-            "h" | "hr" | "hrs" | "hour" | "hours" | "std" | "stunden" => return time("h", 3600.0),
+            "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunde" | "sekunden" | "secondes" | "segundos" => {
+                return time("s", 1.0);
+            }
+            "ms" | "msec" | "msecs" | "msek" | "millisec" | "millisecs" | "millisecond" | "milliseconds" | "millis"
+            | "millisekunden" => return time("ms", 1e-3),
+            "us" | "µs" | "μs" | "usec" | "usecs" | "microsec" | "microsecs" | "microsecond" | "microseconds"
+            | "micros" | "mikrosekunden" => return time("us", 1e-6),
+            "ns" | "nsec" | "nsecs" | "nanosecond" | "nanoseconds" | "nanos" => return time("ns", 1e-9),
+            "min" | "mins" | "minute" | "minutes" | "minuten" | "minutos" => return time("min", 60.0),
+            "h" | "hr" | "hrs" | "hour" | "hours" | "std" | "stunden" | "heures" | "horas" => return time("h", 3600.0),
             "d" | "day" | "days" | "tage" => return time("d", 86_400.0),
             _ => {}
         }
@@ -138,7 +150,9 @@ impl Unit {
                 Some((before, "deg" | "Deg" | "°")) => (before.trim(), unit),
                 _ => (name, unit),
             };
-            if name.is_empty() || unit.is_empty() || is_type_next(name) {
+            // The day of `time of day` is no unit.
+            let is_part_of_date = separator == " " && PARTS_OF_DATES.contains(&&*unit.to_lowercase());
+            if name.is_empty() || unit.is_empty() || is_type_next(name) || is_part_of_date {
                 continue;
             }
             if let Some(known) = Self::known(unit) {
@@ -181,6 +195,9 @@ impl Unit {
         }
     }
 }
+
+/// Parts of a date or of a time of day, which are units of time as well.
+const PARTS_OF_DATES: [&str; 5] = ["second", "minute", "hour", "day", "sekunde"];
 
 /// Whether the letter that follows is a type of thermocouple: `TC1 type K`, in which K is no kelvin.
 fn is_type_next(before: &str) -> bool {

@@ -47,7 +47,7 @@ fn columns_from_memory_make_the_record_that_their_text_makes() {
 fn nan_and_infinity_are_missing() {
     let mut values: Vec<f64> = (0..ROWS).map(|k| 20.0 + k as f64).collect();
     (values[5], values[6]) = (f64::NAN, f64::INFINITY);
-    let table = table([ramp("t", 0.0, 1.0), NamedColumn::numbers("T1", values), ramp("T2", 20.0, 0.5)]);
+    let table = table([ramp("t_s", 0.0, 1.0), NamedColumn::numbers("T1", values), ramp("T2", 20.0, 0.5)]);
     assert_eq!(table.columns()[1].missing(), 2);
     let record = Record::from_table(&table, &Selection::default()).expect("a record");
     assert_eq!(record.missing, 2);
@@ -122,7 +122,7 @@ fn no_column_and_no_row_are_refused() {
 
 #[test]
 fn two_columns_of_one_name_are_chosen_by_number_alone() {
-    let table = table([ramp("t", 0.0, 1.0), ramp("T", 20.0, 1.0), ramp("T", 20.0, 0.5)]);
+    let table = table([ramp("t_s", 0.0, 1.0), ramp("T", 20.0, 1.0), ramp("T", 20.0, 0.5)]);
     let name = Selection { t1: Some(ColumnRef::Name("T".to_owned())), ..Selection::default() };
     let error = Record::from_table(&table, &name).expect_err("two of them");
     assert!(matches!(&error, RecordError::AmbiguousName { numbers, .. } if *numbers == [2, 3]), "{error}");
@@ -275,22 +275,49 @@ fn a_stated_unit_of_time_decides() {
     assert!(matches!(&error, RecordError::NotATimeUnit { unit, .. } if unit == "K"), "{error}");
 }
 
-/// As before, and with a question where the numbers may count something else.
+/// What may be seconds or something else is refused, however likely seconds are.
 #[test]
-fn numbers_that_may_be_seconds_stay_seconds_and_are_asked_about() {
-    for (first, step, unit) in [(0.0, 10.0, "[ms]"), (45_296.5, 1.0 / 24.0, "[d]")] {
-        let got = timed("time", first, step).expect("a record");
-        assert!((got.time_s[1] - step).abs() < 1e-11, "{}", got.time_s[1]); // as doubles near 45 296 are
-        let note = note_of(&got, "really in s?");
-        assert!(note.contains(unit) && note.contains("choose its unit"), "{note}");
-    }
-    for (first, step) in [(0.0, 1.0), (0.0, 0.01), (45_296.5, 0.01), (1_769_853_600.0, 10.0)] {
-        let got = timed("time", first, step).expect("a record");
-        assert_eq!(note_of(&got, "really in s?"), "", "{first}, {step}");
-    }
-    for (first, step) in [(0.0, 1e6), (1.8e12, 1e6)] {
+fn numbers_that_may_count_something_else_are_refused() {
+    for (first, step) in [(0.0, 10.0), (0.0, 1.0), (45_296.5, 1.0 / 24.0), (0.0, 1e6), (1.8e12, 1e6), (0.0, 1.0 / 60.0)]
+    {
         let error = timed("time", first, step).expect_err("no clock").to_string();
-        assert!(error.contains("steps of 1000000") && error.contains("choose the unit"), "{error}");
+        for part in ["steps of", "do not show which it is", "choose the unit", "sample period"] {
+            assert!(error.contains(part), "{first}, {step}: {error}");
+        }
+    }
+    for (first, step) in [(0.0, 0.5), (0.0, 0.01), (45_296.5, 0.01), (1_769_853_600.0, 10.0)] {
+        assert!((timed("time", first, step).expect("seconds").time_s[1] - step).abs() < 1e-6, "{first}, {step}");
+    }
+}
+
+/// The unit stands somewhere in the name.
+#[test]
+fn a_unit_within_the_name_of_the_time_is_that_of_its_numbers() {
+    for (name, want_s) in [
+        ("elapsedMillis", 0.01),
+        ("timeMs", 0.01),
+        ("ZeitMS", 0.01),
+        ("time.ms", 0.01),
+        ("Time:ms", 0.01),
+        ("milliseconds since boot", 0.01),
+        ("Zeitstempel in Millisekunden", 0.01),
+        ("Zeit mSek", 0.01),
+        ("System.millis()", 0.01),
+        ("Laufzeit (Millisekunden)", 0.01),
+        ("Time [Millisec]", 0.01),
+        ("elapsedMicros", 1e-5),
+        ("Time min.", 600.0),
+        ("elapsedHours", 36_000.0),
+        ("Zeit Std.", 36_000.0),
+        ("days since start", 864_000.0),
+        ("Temps (s)", 10.0),
+        ("Tiempo (min)", 600.0),
+    ] {
+        let got = timed(name, 0.0, 10.0).expect("a record");
+        assert!((got.time_s[1] - want_s).abs() <= 1e-12 * want_s, "{name}: {}", got.time_s[1]);
+    }
+    for name in ["time of day", "second time", "elapsed ms or us"] {
+        timed(name, 0.0, 10.0).expect_err("no unit, or two");
     }
 }
 

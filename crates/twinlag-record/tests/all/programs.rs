@@ -222,9 +222,19 @@ fn a_sketch_that_sends_its_own_milliseconds_has_its_own_time() {
     let got = record(&text);
     assert_is_the_rig(&got, 1e-12);
     assert!(got.notes.iter().any(|note| matches!(note, Note::TimeByStamps { unit: "ms", .. })), "{:?}", got.notes);
-    // A row number is no clock, though a fast logger writes 1000 rows a second.
-    let rows = body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t / 500.0), 17.0 + 2.0 * t));
-    assert_says(&refusal(&rows), &["3 columns have the name or the unit of a temperature"]);
+    // So have one that sends seconds, and one whose counter of 32 bits begins anew.
+    for own in
+        [|t: f64| format!("{:.3}", 41.23 + t), |t: f64| ((4_294_966_296.0 + 1e3 * t) % 4_294_967_296.0).to_string()]
+    {
+        let got = record(&body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t), own(t))));
+        assert_is_the_rig(&got, 1e-12);
+    }
+    // A row number is neither a clock, though a fast logger writes 1000 rows a second, nor a sensor.
+    let got = record(&body(|t, a, b| format!("{} -> {},{a},{b}", arrival(t / 500.0), 17.0 + 2.0 * t)));
+    assert_eq!(got.channels, ["T1", "T2"]);
+    assert!((got.time_s[1] - 0.001).abs() < 0.006, "{:?}", got.time_s);
+    let three = body(|t, a, b| format!("{} -> {a},{b},{}", arrival(t), 20.0 + a.sin()));
+    assert_says(&refusal(&three), &["3 columns without names may be sensors (1, 2, 3)"]);
     // A log that begins within a line lacks the milliseconds of this one: the times of arrival are there.
     let (first, rest) = text.split_once('\n').expect("several rows");
     let got = record(&format!("{}\n{rest}", &first[..first.rfind(',').expect("three cells")]));
@@ -232,15 +242,17 @@ fn a_sketch_that_sends_its_own_milliseconds_has_its_own_time() {
     assert!((got.time_s[1] - 0.5).abs() < 0.006, "{:?}", got.time_s);
 }
 
-/// Milliseconds whose unit no stamp shows are asked about. Failed: a column of stamps that is not used had lost the numbers it was asked for.
+/// Failed: a column of stamps that is not used had lost the numbers it was asked for.
 #[test]
 fn stamps_that_are_missing_in_most_rows_show_no_unit() {
     let row = |k: u32, t: f64, a: f64, b: f64| {
         let stamp = if k.is_multiple_of(5) { format!("2026-01-31 12:00:{t:02.0}") } else { String::new() };
         format!("{:.0},{stamp},{a},{b}", 1000.0 + 20.0 * t)
     };
-    let got = record(&rows("time,gps,T1,T2", row));
-    assert!(got.notes.iter().any(|note| matches!(note, Note::TimeQuestion { unit: "ms", .. })), "{:?}", got.notes);
+    assert_says(
+        &refusal(&rows("time,gps,T1,T2", row)),
+        &["'time' names no unit of time", "steps of 10 do not show which"],
+    );
 }
 
 /// Whole seconds of a slow logger, which could be milliseconds of a fast one.

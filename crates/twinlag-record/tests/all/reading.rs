@@ -280,8 +280,30 @@ fn a_column_that_counts_rows_is_no_time_without_a_name() {
             assert_is_the_rig(&record(&beside), 0.0);
         }
     }
-    let named = rows("time,T1,T2", |k, _, a, b| format!("{k},{a},{b}"));
+    let named = rows("time_s,T1,T2", |k, _, a, b| format!("{k},{a},{b}"));
     assert_eq!(record(&named).time_s[3], 3.0);
+}
+
+/// Rows of one day that follow each other: whichever of day and month comes first.
+#[test]
+fn dates_are_read_in_the_order_in_which_rows_follow_each_other() {
+    let month_first = record(&rows("time,T1,T2", |k, _, a, b| format!("03/{:02}/2026 10:00:00,{a},{b}", k + 1)));
+    let day_first = record(&rows("time,T1,T2", |k, _, a, b| format!("{:02}/03/2026 10:00:00,{a},{b}", k + 1)));
+    for (got, first) in [(month_first, "month"), (day_first, "day")] {
+        assert!((got.time_s[1] - 86_400.0).abs() < 1e-6);
+        assert!(notes(&got).contains(&format!("have the {first} first")), "{}", notes(&got));
+    }
+}
+
+/// `millis()` of a board that has run for 49.7 days.
+#[test]
+fn a_counter_of_a_board_is_counted_on_where_it_begins_anew() {
+    let wrapped = rows("millis,T1,T2", |k, _, a, b| {
+        format!("{},{a},{b}", (4_294_967_296_u64 - 1700 + 500 * u64::from(k)) % 4_294_967_296)
+    });
+    let got = record(&wrapped);
+    assert_is_the_rig(&got, 1e-12);
+    assert!(notes(&got).contains("a counter of 32 bits, which begins anew 1 time"), "{}", notes(&got));
 }
 
 #[test]

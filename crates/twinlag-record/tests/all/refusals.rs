@@ -1,7 +1,7 @@
 //! What cannot be read in one way only is refused, with place and remedy.
 
 use crate::common::{FILE, assert_says, plain, record, record_with, refusal, refusal_with, rows};
-use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table};
+use twinlag_record::{Channels, ColumnRef, Record, SamplingChoice, Selection, Table, Unit};
 
 #[expect(clippy::unnecessary_wraps, reason = "as the fields of a selection are")]
 fn pick(text: &str) -> Option<ColumnRef> {
@@ -61,8 +61,51 @@ fn a_line_with_a_wrong_number_of_cells_is_refused() {
 
 #[test]
 fn an_ambiguous_date_is_refused() {
-    let text = rows("time,T1,T2", |k, _, a, b| format!("03/{:02}/2026 10:00:00,{a},{b}", k + 1));
-    assert_says(&refusal(&text), &["line 2", "1 'time'", "'03/01/2026 10:00:00'", "YYYY-MM-DD"]);
+    let text = rows("time,T1,T2", |k, _, a, b| format!("{:02}/{:02}/2026 10:00:00,{a},{b}", k + 1, k + 2));
+    assert_says(&refusal(&text), &["line 2", "1 'time'", "'01/02/2026 10:00:00'", "YYYY-MM-DD"]);
+}
+
+#[test]
+fn clocks_of_two_parts_say_what_they_are() {
+    let at = |k: u32| format!("{:02}:{:02}", k / 2, 30 * (k % 2));
+    let text = |header: &str| rows(header, |k, _, a, b| format!("{},{a},{b}", at(k)));
+    assert_says(
+        &refusal(&text("time,T1,T2")),
+        &["'00:00' may be hours and minutes or minutes and seconds", "h or min"],
+    );
+    for (header, period_s) in [("time (mm:ss),T1,T2", 30.0), ("time (hh:mm),T1,T2", 1800.0)] {
+        assert!((record(&text(header)).time_s[1] - period_s).abs() < 1e-9, "{header}");
+    }
+    for (unit, period_s) in [("min", 30.0), ("h", 1800.0)] {
+        let chosen = Selection { time_unit: Some(Unit::parse(unit)), ..Selection::default() };
+        let got = record_with(text("time,T1,T2").as_bytes(), &chosen).expect("it is said");
+        assert!((got.time_s[1] - period_s).abs() < 1e-9, "{unit}");
+    }
+    // Minutes that become hours, and minutes of days that are named.
+    let long = |k: u32| if k < 6 { format!("59:{:02}", 30 + 5 * k) } else { format!("1:00:{:02}", 5 * (k - 6)) };
+    let got = record(&rows("time,T1,T2", |k, _, a, b| format!("{},{a},{b}", long(k))));
+    assert!((got.time_s[6] - 30.0).abs() < 1e-9, "{:?}", got.time_s);
+    let dated = record(&rows("time,T1,T2", |k, _, a, b| format!("2026-01-31 {},{a},{b}", at(k))));
+    assert!((dated.time_s[1] - 1800.0).abs() < 1e-9, "{:?}", dated.time_s);
+    let whole = rows("time,T1,T2", |k, _, a, b| format!("10:00:{:02},{a},{b}", 5 * k));
+    let chosen = Selection { time_unit: Some(Unit::parse("ms")), ..Selection::default() };
+    let error = record_with(whole.as_bytes(), &chosen).expect_err("a clock has no unit");
+    assert_says(&error.to_string(), &["'time' holds times of a clock, which need no unit"]);
+}
+
+/// A factor of 1000 between two columns, of which the one that would be taken is wrong as well as not.
+#[test]
+fn clocks_that_contradict_each_other_are_refused_unless_one_is_chosen() {
+    let text = rows("time_s,elapsed_ms,T1,T2", |_, t, a, b| format!("{t},{t},{a},{b}"));
+    assert_says(&refusal(&text), &["columns 1 'time_s' and 2 'elapsed_ms' contradict", "4.5 s", "0.0045 s", "choose"]);
+    let chosen = Selection { time: Some(ColumnRef::Number(2)), ..Selection::default() };
+    assert!((record_with(text.as_bytes(), &chosen).expect("it is said").time_s[1] - 5e-4).abs() < 1e-12);
+    let stamps = rows("time_min,clock,T1,T2", |k, t, a, b| format!("{t},12:{:02}:{:02},{a},{b}", k / 2, 30 * (k % 2)));
+    assert!((record(&stamps).time_s[1] - 30.0).abs() < 1e-9);
+    assert_says(&refusal(&stamps.replace("time_min", "time_s")), &["contradict each other", "4.5 s", "270 s"]);
+    // One that names no unit has the other's.
+    let shown = record(&rows("time,elapsed_ms,T1,T2", |k, _, a, b| format!("{0},{0},{a},{b}", 5 * k)));
+    assert!((shown.time_s[1] - 0.005).abs() < 1e-12, "{:?}", shown.time_s);
 }
 
 #[test]
