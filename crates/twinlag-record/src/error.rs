@@ -197,6 +197,11 @@ pub enum RecordError {
         shown = plain(*period_s)
     )]
     BadPeriod { file: String, period_s: f64 },
+    #[error(
+        "{file}: rows are {period} s apart, and no logger is faster than a nanosecond or slower than a year; is the unit of time right?",
+        period = plain(*period_s)
+    )]
+    NoPeriod { file: String, period_s: f64 },
     #[error("{file}: both a time column ({column}) and a sample period ({period_s} s) were given; give one of them")]
     TimeAndPeriod { file: String, column: String, period_s: f64 },
     #[error("{file}: {at}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
@@ -299,7 +304,10 @@ impl RecordError {
             Self::ConstantPosition { .. } => &[Setting::Position],
             Self::FewFlows { .. } | Self::FlowAndPosition { .. } => &[Setting::Flow, Setting::Position],
             Self::ChannelsUnclear { .. } => &[Setting::T1, Setting::T2],
-            Self::NotATimeUnit { .. } | Self::ClockUnclear { .. } | Self::NeedsNoUnit { .. } => &[Setting::TimeUnit],
+            Self::NotATimeUnit { .. }
+            | Self::NoPeriod { .. }
+            | Self::ClockUnclear { .. }
+            | Self::NeedsNoUnit { .. } => &[Setting::TimeUnit],
             Self::TimesDisagree { .. } => &[Setting::Time],
             Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit, Setting::Period],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],

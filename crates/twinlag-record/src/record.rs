@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::beside::expect_agreement;
-use crate::choose::{Chosen, choose};
+use crate::choose::{Chosen, SAMPLE_PERIODS_S, choose};
 use crate::column::Column;
 use crate::note::Note;
 use crate::row_lines::RowLines;
@@ -302,6 +302,9 @@ impl Record {
             }
         }
         let sampling = sampling::judge(&time_s, clock, choice);
+        if !SAMPLE_PERIODS_S.contains(&sampling.period_s) {
+            return Err(RecordError::NoPeriod { file: file(), period_s: sampling.period_s });
+        }
         let runs: Vec<_> = sampling::runs(&time_s, sampling.gap_s()).collect();
         note_gaps(&time_s, &runs, origin, &mut notes);
         let segments = whole_parts(&runs, is_whole, &mut notes);

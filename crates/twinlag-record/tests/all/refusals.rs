@@ -109,6 +109,15 @@ fn clocks_that_contradict_each_other_are_refused_unless_one_is_chosen() {
 }
 
 #[test]
+fn steps_of_no_logger_are_refused() {
+    for step in ["1e300", "1e-300"] {
+        let text =
+            rows("time [s],T1,T2", |k, _, a, b| format!("{},{a},{b}", step.replacen('1', &(k + 1).to_string(), 1)));
+        assert_says(&refusal(&text), &[step, "no logger", "unit of time"]);
+    }
+}
+
+#[test]
 fn a_broken_stamp_is_refused() {
     let text = rows("time,T1,T2", |k, t, a, b| format!("10:00:{:04.1},{a},{b}", t + f64::from(k / 7) * 60.0));
     assert_says(&refusal(&text), &["line 9", "1 'time'", "10:00:63.5", "remove"]);
