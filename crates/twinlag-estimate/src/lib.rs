@@ -67,7 +67,6 @@ mod whitened;
 pub use determined::{MAX_LOG_STANDARD_ERROR, spans_too_much};
 pub use error::EstimateError;
 pub use estimate::Estimate;
-pub use hold::other_hold;
 pub use intervals::TauIntervals;
 pub use known::Known;
 pub use levels::{MIN_DEGREES_OF_FREEDOM_AT_REST, NoiseLevels};

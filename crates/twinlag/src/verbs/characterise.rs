@@ -16,7 +16,7 @@ use twinlag_cross_relation::{CostError, Parameter, Readings, ResidualTest, Score
 use twinlag_diagnose::{Grade, Policy, Reason, Remark, is_single_tone};
 use twinlag_estimate::{
     ENERGY_THAT_OUTWEIGHS_NOISE, EstimateError, Estimator, Hold, Intervals, NoiseColour, NoiseKnowledge, RunAtRest,
-    Solved, Task, WhitenedFit, other_hold,
+    Solved, Task, WhitenedFit,
 };
 use twinlag_optimise::{End, Fit};
 use twinlag_record::{Record, SamplingKind};
@@ -297,21 +297,27 @@ impl Asked<'_> {
     /// How much each time constant would move with the other hold, relative; where the hold is to be found, and the other one is
     /// clearly the more probable, `fit` is the estimate with that.
     fn settle_hold<const P: usize>(&self, fit: &mut WhitenedFit<'_, P>) -> Result<Option<[f64; 2]>, Error> {
-        if self.options.estimator != Estimator::Whitened || fit.readings().even_period_s().is_none() {
+        if self.options.estimator != Estimator::Whitened {
             return Ok(None);
         }
-        let hold = other_hold(fit.task().hold);
+        let hold = fit.other_hold();
         let other = fit.with_hold(hold)?;
         let is_usable = other.fit().end.is_usable();
         let both_usable = is_usable && fit.fit().end.is_usable();
         let mut moved = [0, 1].map(|i| other.theta()[i] / fit.theta()[i] - 1.0);
+        let is_even = fit.readings().even_period_s().is_some();
+        if !is_even && let Some(straight) = fit.moved_by_straight_lines()? {
+            moved = straight;
+        }
         let is_more_probable = other.probability_beside(fit) > CLEAR_PROBABILITY;
         let alone_is_accepted = || -> Result<bool, Error> {
             let rejected =
                 |fit: &WhitenedFit<'_, P>| Ok::<_, Error>(fit.is_rejected_by(&self.tests(fit, &fit.theta())?));
             Ok(rejected(fit)? && !rejected(&other)?)
         };
-        if self.options.hold == Hold::Auto && is_usable && (is_more_probable || alone_is_accepted()?) {
+        // Of uneven steps the other one stands for a straight line, and is no answer.
+        let may_change = self.options.hold == Hold::Auto && is_even;
+        if may_change && is_usable && (is_more_probable || alone_is_accepted()?) {
             *fit = WhitenedFit::find(&Task { hold, ..fit.task().clone() })?;
             moved = moved.map(|moved| (1.0 + moved).recip() - 1.0);
         }

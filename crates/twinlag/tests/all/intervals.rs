@@ -4,8 +4,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::common::record;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
 use twinlag::estimate::{Bootstrap, IntervalBasis};
-use twinlag::record::Record;
+use twinlag::record::{Channels, Record, SamplingChoice, SamplingKind};
 use twinlag::{Hold, IntervalMethod, Intervals, Options, Status, characterise, characterise_watched};
 
 const TRUTH_S: [f64; 2] = [0.0238, 0.1168];
@@ -125,4 +128,52 @@ fn a_bootstrap_does_not_take_noise_for_gas() {
         (0..2).for_each(|i| ratio[i] += boot[i] / auto[i] / 8.0);
     }
     assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.15), "bootstrap over standard errors: {ratio:?}");
+}
+
+/// Stamps that jitter by 3 % of the period, as those of a program that waits between readings. The gas is a sum of tones, so that what a
+/// sensor of one lag reads at any instant is known in closed form. Of 24 intervals of 95 % that hold the truth three and more miss it
+/// with a probability of 0.12, five and more with 0.006. Failed: of 24 intervals around the zero-order hold alone 21 missed it.
+#[test]
+fn an_interval_of_uneven_stamps_reaches_to_the_other_hold() {
+    const PERIOD_S: f64 = 0.1;
+    const TAU_S: [f64; 2] = [0.3, 0.8];
+    let mut missed = 0;
+    for seed in 0..12 {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let tones: Vec<[f64; 3]> = (0..60)
+            .map(|_| {
+                let hz: f64 = random.random_range(0.01..1.5);
+                [hz, 1.5 / (1.0 + hz), random.random_range(0.0..std::f64::consts::TAU)]
+            })
+            .collect();
+        let time_s: Vec<f64> =
+            (0..1200).map(|k| PERIOD_S * (f64::from(k) + random.random_range(-0.05..0.05))).collect();
+        let [t1_c, t2_c] = TAU_S.map(|tau_s| {
+            let reads = |at_s: &f64| {
+                let tone = |[hz, size_k, phase]: &[f64; 3]| {
+                    let turn = std::f64::consts::TAU * hz;
+                    size_k / (turn * tau_s).hypot(1.0) * (turn * at_s + phase - (turn * tau_s).atan()).sin()
+                };
+                let noise: f64 = random.sample(StandardNormal);
+                60.0 + tones.iter().map(tone).sum::<f64>() + 0.05 * noise
+            };
+            time_s.iter().map(reads).collect()
+        });
+        let names = ["T1", "T2"].map(str::to_owned);
+        let channels = Channels { source: "tones".into(), names, time_s, t1_c, t2_c, reference_c: None };
+        let record = Record::from_channels(channels, SamplingChoice::Auto).expect("a record");
+        assert_eq!(record.sampling.kind, SamplingKind::Irregular);
+        let answer = characterise(&record, &Options::default()).expect("a sound question");
+        assert!(answer.hold_sensitivity.is_some());
+        missed += answer
+            .sensors
+            .iter()
+            .zip(TAU_S)
+            .filter(|(sensor, truth_s)| {
+                let [low, high] = sensor.interval_95_s.expect("an answer");
+                !(low..=high).contains(truth_s)
+            })
+            .count();
+    }
+    assert!(missed <= 4, "{missed} of 24");
 }

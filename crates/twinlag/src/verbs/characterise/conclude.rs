@@ -3,7 +3,7 @@
 
 use twinlag_cross_relation::{ResidualTest, ScoreVariance};
 use twinlag_diagnose::Reason;
-use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit, other_hold};
+use twinlag_estimate::{Estimator, Hold, Intervals, NoiseLevels, Ridge, Solved, TauIntervals, WhitenedFit};
 use twinlag_optimise::{End, Fit};
 
 use super::{Asked, bootstrap};
@@ -155,10 +155,10 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let Some(index) = index.filter(|_| self.is_whitened()) else { return Ok(None) };
         let middle = if self.judged.is_rejected { ScoreVariance::ResidualSpectrum } else { ScoreVariance::WhiteNoise };
         let found = self.fit.ridge(index, middle)?;
-        if self.asked.options.hold != Hold::Auto || self.fit.readings().even_period_s().is_none() {
+        if self.asked.options.hold != Hold::Auto {
             return Ok(found.map(|ridge| (index, ridge)));
         }
-        let other = self.fit.with_hold(other_hold(self.fit.task().hold))?.ridge(index, middle)?;
+        let other = self.fit.with_hold(self.fit.other_hold())?.ridge(index, middle)?;
         let union = match (found, other) {
             (Some(a), Some(b)) => Some(a.with(&b)),
             (a, _) => a,
