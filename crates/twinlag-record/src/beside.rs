@@ -52,6 +52,11 @@ impl Shown {
     }
 }
 
+/// Whether the stamps of a column are there in each row, and rise from one to the next.
+pub(crate) fn stamps_rise(table: &Table, index: usize) -> bool {
+    Shown::by(table, index).is_some_and(|shown| shown.time_s.windows(2).all(|pair| pair[1] > pair[0]))
+}
+
 /// What a column counts by a clock beside it, and the column of that; `None` where none shows it.
 pub(crate) fn shown_beside(table: &Table, index: usize) -> Option<(usize, Counter)> {
     let mut others = (0..table.columns().len()).filter(|other| *other != index);

@@ -4,7 +4,7 @@
 use std::ops::RangeInclusive;
 
 use crate::RecordError;
-use crate::beside::counter_beside;
+use crate::beside::{counter_beside, stamps_rise};
 use crate::clock;
 use crate::column::{Column, Kind};
 use crate::error::Candidates;
@@ -155,8 +155,6 @@ impl Table {
 fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
     let free = |index: &usize| !taken.contains(index);
-    let rises =
-        |column: &Column| column.kind() == Kind::Number && column.raw().windows(2).all(|pair| pair[1] > pair[0]);
     let length_s = |column: &Column| match column.stated_time_unit() {
         Some(Unit::Time { seconds, .. }) if column.kind() == Kind::Number => seconds,
         _ => f64::INFINITY,
@@ -176,11 +174,24 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     })
 }
 
-/// The time that a logger counts beside a column of stamps, in any unit.
+/// The time that a logger counts beside a column of stamps: in any unit where the header names none, and where it does if these do not rise
+/// from row to row.
 fn own_clock(table: &Table, stamps: usize, taken: &[usize]) -> Option<usize> {
     let columns = table.columns();
-    let mut others = (0..columns.len()).filter(|index| columns[stamps].kind() == Kind::Stamp && !taken.contains(index));
-    others.find(|&index| counter_beside(table, index, stamps).is_some())
+    if columns[stamps].kind() != Kind::Stamp {
+        return None;
+    }
+    let others = || (0..columns.len()).filter(|index| *index != stamps && !taken.contains(index));
+    let counter = others().find(|&index| counter_beside(table, index, stamps).is_some());
+    counter.or_else(|| {
+        let mut clocks = others().filter(|&index| is_time(&columns[index]) && rises(&columns[index]));
+        clocks.find(|&index| columns[index].stated_time_unit().is_some() && !stamps_rise(table, stamps))
+    })
+}
+
+/// Whether the numbers of a column rise from row to row.
+fn rises(column: &Column) -> bool {
+    column.kind() == Kind::Number && column.raw().windows(2).all(|pair| pair[1] > pair[0])
 }
 
 /// A date without time of day belongs to a time of day without date beside it.

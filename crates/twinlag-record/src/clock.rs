@@ -96,13 +96,19 @@ fn digits<T: std::str::FromStr>(text: &str) -> Option<T> {
     text.parse().ok()
 }
 
-/// `h:mm[:ss[.f]]`, or `mm:ss.f`; then perhaps AM or PM; then perhaps a zone.
+/// `h:mm[:ss[.f]]`, `h:mm:ss:fff`, or `mm:ss.f`; then perhaps AM or PM; then perhaps a zone.
 fn parse_time(text: &str) -> Option<Stamp> {
     let end = text.find(|c: char| !(c.is_ascii_digit() || ":.,".contains(c))).unwrap_or(text.len());
     let (clock, rest) = (&text[..end], text[end..].trim());
     let (whole, fraction) = match clock.find(['.', ',']) {
         Some(point) => (&clock[..point], &clock[point + 1..]),
-        None => (clock, ""),
+        // Milliseconds behind another colon, as some programs of cameras and oscilloscopes write them.
+        None => match clock.rsplit_once(':') {
+            Some((whole, milliseconds)) if milliseconds.len() == 3 && whole.matches(':').count() == 2 => {
+                (whole, milliseconds)
+            }
+            _ => (clock, ""),
+        },
     };
     let mut nanos = 0;
     let mut unit = NS;
@@ -197,6 +203,7 @@ mod tests {
             "31.01.26 22:00:05.250",
             "31-Jan-2026 22:00:05.25",
             "2026-01-31 10:00:05.25 PM",
+            "2026-01-31 22:00:05:250",
             "2026-01-31T23:00:05.25+01:00",
             "2026-01-31T23:00:05.25+0100",
         ] {

@@ -155,7 +155,7 @@ pub enum RecordError {
          choose another column, by name or number"
     )]
     TextColumn { file: String, at: Place, column: String, cell: String },
-    #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number, for example 2")]
+    #[error("{file}: no column '{wanted}'; the columns are {columns}; choose by name or number")]
     UnknownColumn { file: String, wanted: String, columns: String },
     #[error(
         "{file}: {at}, column {column}: expected a positive flow velocity or density, found {value}; use no flow, or mend the cell \

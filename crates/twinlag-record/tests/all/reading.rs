@@ -295,6 +295,13 @@ fn dates_are_read_in_the_order_in_which_rows_follow_each_other() {
     }
 }
 
+/// Failed: whole seconds of a program of which several rows have the same, beside the time that the logger counts itself.
+#[test]
+fn stamps_that_repeat_leave_the_time_to_the_column_with_a_unit() {
+    let text = rows("stamp,elapsed_s,T1,T2", |_, t, a, b| format!("2026-01-31 12:00:{:02.0},{t},{a},{b}", t.floor()));
+    assert_is_the_rig(&record(&text), 0.0);
+}
+
 /// `millis()` of a board that has run for 49.7 days.
 #[test]
 fn a_counter_of_a_board_is_counted_on_where_it_begins_anew() {
