@@ -42,6 +42,7 @@ pub(crate) fn reader_option(setting: ReaderSetting) -> Option<&'static str> {
         ReaderSetting::Flow => "--flow",
         ReaderSetting::Position => "--position",
         ReaderSetting::Period => "--period",
+        ReaderSetting::Sampling => "--sampling",
         _ => return None,
     })
 }

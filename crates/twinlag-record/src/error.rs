@@ -202,6 +202,12 @@ pub enum RecordError {
         period = plain(*period_s)
     )]
     NoPeriod { file: String, period_s: f64 },
+    #[error(
+        "{file}: rows come in bursts of {rows}, as if a logger had sent what it had kept and these were times of arrival; give the sample period, \
+         {period} s on average, or say that stamps are right as they stand",
+        period = three(*period_s)
+    )]
+    Bursts { file: String, rows: usize, period_s: f64 },
     #[error("{file}: both a time column ({column}) and a sample period ({period_s} s) were given; give one of them")]
     TimeAndPeriod { file: String, column: String, period_s: f64 },
     #[error("{file}: {at}, column {column}: expected {expected}, found '{cell}'; mend or remove the line")]
@@ -309,6 +315,7 @@ impl RecordError {
             | Self::ClockUnclear { .. }
             | Self::NeedsNoUnit { .. } => &[Setting::TimeUnit],
             Self::TimesDisagree { .. } => &[Setting::Time],
+            Self::Bursts { .. } => &[Setting::Period, Setting::Sampling],
             Self::TimeUnitUnclear { .. } => &[Setting::TimeUnit, Setting::Period],
             Self::NoTime { .. } | Self::TimeAndPeriod { .. } => &[Setting::Time, Setting::Period],
             Self::BadPeriod { .. } | Self::TimeNotIncreasing { .. } => &[Setting::Period],

@@ -13,7 +13,7 @@ use crate::choose::{Chosen, SAMPLE_PERIODS_S, choose};
 use crate::column::Column;
 use crate::note::Note;
 use crate::row_lines::RowLines;
-use crate::sampling::{self, Clock, Sampling, SamplingKind};
+use crate::sampling::{self, Bursts, Clock, Sampling, SamplingKind, bursts};
 use crate::selection::{SamplingChoice, Selection};
 use crate::table::{Table, shortened};
 use crate::time_axis::{self, TimeAxis};
@@ -306,6 +306,9 @@ impl Record {
             return Err(RecordError::NoPeriod { file: file(), period_s: sampling.period_s });
         }
         let runs: Vec<_> = sampling::runs(&time_s, sampling.gap_s()).collect();
+        if let Some(Bursts { rows, period_s }) = bursts(&time_s, &runs).filter(|_| choice == SamplingChoice::Auto) {
+            return Err(RecordError::Bursts { file: file(), rows, period_s });
+        }
         note_gaps(&time_s, &runs, origin, &mut notes);
         let segments = whole_parts(&runs, is_whole, &mut notes);
         let usable = segments.iter().map(Range::len).sum();

@@ -11,6 +11,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::selection::SamplingChoice;
 
+/// Bursts that show that a record comes in them; chosen: as many gaps that leave rows of one number between them are no chance.
+const MIN_BURSTS: usize = 10;
+/// The most rows of a burst that may be those of a buffer; chosen.
+const MAX_BURST_ROWS: usize = 64;
+/// How many of the bursts have the same number of rows, at least; chosen: lines are lost.
+const MIN_BURST_SHARE: f64 = 0.8;
+
 /// What the stamps are taken to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
@@ -242,6 +249,30 @@ pub(crate) fn runs(time_s: &[f64], limit_s: f64) -> impl Iterator<Item = Range<u
         let ends = end == time_s.len() || time_s[end] - time_s[end - 1] > limit_s;
         ends.then(|| std::mem::replace(&mut start, end)..end)
     })
+}
+
+/// Rows that come in bursts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Bursts {
+    /// Rows of each.
+    pub(crate) rows: usize,
+    /// From the beginning of one to that of the next, divided by its rows.
+    pub(crate) period_s: f64,
+}
+
+/// Whether a record comes in bursts: as of a logger that sends what it has kept, with the time of arrival. They are too short to be those of
+/// a campaign that measures for a while and waits.
+///
+/// - `runs`: the stretches without a gap
+pub(crate) fn bursts(time_s: &[f64], runs: &[Range<usize>]) -> Option<Bursts> {
+    // The first and the last one may be cut.
+    let whole = runs.get(1..runs.len().saturating_sub(1))?;
+    let (first, last) = (whole.first()?, whole.last()?);
+    let rows = first.len();
+    let share = whole.iter().filter(|run| run.len() == rows).count() as f64 / whole.len() as f64;
+    let is_burst = whole.len() >= MIN_BURSTS && (2..=MAX_BURST_ROWS).contains(&rows) && share >= MIN_BURST_SHARE;
+    let period_s = (time_s[last.start] - time_s[first.start]) / (last.start - first.start) as f64;
+    is_burst.then_some(Bursts { rows, period_s })
 }
 
 struct Line {

@@ -183,6 +183,8 @@ pub enum Setting {
     Position,
     /// [`Selection::period_s`].
     Period,
+    /// [`Selection::sampling`].
+    Sampling,
 }
 
 impl Setting {

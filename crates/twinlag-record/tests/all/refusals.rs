@@ -108,6 +108,19 @@ fn clocks_that_contradict_each_other_are_refused_unless_one_is_chosen() {
     assert!((shown.time_s[1] - 0.005).abs() < 1e-12, "{:?}", shown.time_s);
 }
 
+/// Ten rows in 27 ms, each second. Failed: a time constant of 0.3 s was 0.0089 s, `go`.
+#[test]
+fn times_of_arrival_in_bursts_are_refused() {
+    let row = |k: u32| {
+        let (a, b) = ((f64::from(k) * 0.3).sin(), (f64::from(k) * 0.3 - 0.5).sin());
+        format!("12:{:02}:{:02}.{:03} -> {a:.3},{b:.3}\n", k / 600, k / 10 % 60, 3 * (k % 10))
+    };
+    let text: String = (0..400).map(row).collect();
+    assert_says(&refusal(&text), &["bursts of 10", "sample period, 0.1 s on average", "as they stand"]);
+    let stamped = Selection { sampling: SamplingChoice::AsStamped, ..Selection::default() };
+    assert_eq!(record_with(text.as_bytes(), &stamped).expect("it is said").segments.len(), 40);
+}
+
 #[test]
 fn steps_of_no_logger_are_refused() {
     for step in ["1e300", "1e-300"] {
