@@ -67,10 +67,7 @@ pub(crate) fn run(Python { python, debug, measure }: &Python) -> Result<()> {
     }
     user.install(&[&format!("{}[test]", wheel.display())])?;
     let program = target_dir()?.join(if *debug { "debug/twinlag" } else { "release/twinlag" });
-    step(
-        "the program of the same sources",
-        Command::new("cargo").arg("build").args(release).args(["--package", "twinlag-cli"]).current_dir(root()?),
-    )?;
+    step("the program of the same sources", Command::new("cargo").arg("build").args(release).current_dir(root()?))?;
     // The tests in a folder in which the sources of the package are not: what is tried is what was installed.
     let tests = package.join("tests");
     step(

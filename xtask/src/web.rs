@@ -245,6 +245,7 @@ fn driven(web: &Web, page: &Path, work: &Path) -> Result<()> {
 fn packed(bytes: &[u8]) -> Result<Vec<u8>> {
     let mut options = LzmaOptions::with_preset(9);
     options.dict_size = u32::try_from(bytes.len())?;
+    options.nice_len = 273; // the longest match that there is
     // Instructions of WebAssembly begin at any byte.
     options.pb = 0;
     let mut writer = LzmaWriter::new_use_header(Vec::new(), &options, Some(bytes.len() as u64))?;
