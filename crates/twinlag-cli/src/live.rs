@@ -38,7 +38,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     let table = lines.start(rows)?;
     let record = Record::from_table(&table, &selection)?;
     print::notes(&record, console);
-    let reader = RowReader::after(&table, &selection)?;
+    let mut reader = RowReader::after(&table, &selection)?;
     let mut live = Live::start(&record, &options)?;
     let starts = [0, 1].map(|i| live.start.sensors[i].judgement.grade);
     let code = grades::exit_code(&starts, &[], false, command.input.method.strict);

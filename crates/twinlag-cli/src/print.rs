@@ -61,7 +61,7 @@ pub(crate) fn notes_in_words(record: &Record) -> impl Iterator<Item = String> {
     record.notes.iter().map(|note| {
         let option = match note {
             Note::TimeRecognised { .. } => " (option --time-unit s)".to_owned(),
-            Note::TimeByStamps { .. } => " (options --time-unit, --time)".to_owned(),
+            Note::TimeByClock { .. } => " (options --time-unit, --time)".to_owned(),
             Note::FlowUnused { number, .. } => format!(" (option --flow {number})"),
             _ => String::new(),
         };

@@ -36,7 +36,7 @@ impl Base {
         match &series.values {
             Values::Numbers(values) => {
                 let column = NamedColumn::numbers(series.name.as_str(), []).with_unit(series.unit.as_str());
-                // Without a unit a time is in seconds, as it is in a record.
+                // Formats with groups state their units; a time without one is in seconds.
                 let unit_s = column.time_unit_s().unwrap_or(1.0);
                 let time_s = values.iter().map(|value| value * unit_s).collect();
                 Ok(Self { time_s, start_ns: group.start_ns })

@@ -43,7 +43,10 @@ def test_progress_is_reported_and_may_stop_the_work(calibrated) -> None:
 def test_ctrl_c_stops_a_diagnosis() -> None:
     script = textwrap.dedent(
         """
+        import signal
         import twinlag as tl
+        # A process that was begun in the background ignores Ctrl-C.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         rig = tl.EXAMPLE_RIG.replace("samples = 2500", "samples = 200000")
         record = tl.simulate(rig)
         try:

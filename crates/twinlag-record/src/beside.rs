@@ -2,20 +2,23 @@
 
 use crate::RecordError;
 use crate::choose::Chosen;
-use crate::column::Kind;
-use crate::names::{is_called_temperature, is_index, is_velocity};
+use crate::column::{Column, Kind};
+use crate::names::{OTHER_QUANTITIES, has, is_called_temperature, is_index, is_time_by_name, is_velocity};
+use crate::note::Note;
 use crate::sampling;
 use crate::scale::{self, Counter, MAX_CLOCK_ERROR};
 use crate::stamps::{self, elapsed, settle_short};
 use crate::table::Table;
 use crate::time_axis::{TimeColumns, of_stamps, unit_of};
 use crate::unit::Unit;
-use crate::wrap::unwrapped;
+use crate::wrap::counted_on;
 
 /// How late a line may arrive that a logger sends, s: a tenth of a second where a computer is busy.
 const MAX_DELAY_S: f64 = 0.1;
+/// The fewest rows from one beginning of a counter to the next; chosen, below the 655 rows of 100 ms in 16 bits.
+const MIN_ROWS_OF_TURN: usize = 50;
 
-/// The time of each row by a column whose unit is known, s; not a number where the column is empty.
+/// The time of each row by a column whose unit is known, s.
 struct Shown {
     time_s: Vec<f64>,
     /// How far it may be off.
@@ -23,7 +26,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// `None` of a column that shows no time, or one that does not pass.
+    /// `None` of a column that shows no time, one that lacks it in some rows, and one that does not pass.
     fn by(table: &Table, index: usize) -> Option<Self> {
         let column = &table.columns()[index];
         let time_s = match column.kind() {
@@ -35,21 +38,31 @@ impl Shown {
                 }
                 elapsed(table, index, &stamps, &mut Vec::new()).ok()?
             }
-            Kind::Number if !is_called_temperature(column) && !is_index(column) && !is_velocity(column) => {
+            Kind::Number if is_clock(column) => {
                 let Some(Unit::Time { seconds, .. }) = column.stated_time_unit() else { return None };
-                column.raw().iter().map(|value| value * seconds).collect()
+                let raw = column.raw();
+                if !raw.windows(2).all(|pair| pair[1] >= pair[0]) || raw.last().is_none_or(|last| last.is_infinite()) {
+                    return None;
+                }
+                raw.iter().map(|value| value * seconds).collect()
             }
             _ => return None,
         };
-        let rises = time_s.windows(2).all(|pair| pair[1] >= pair[0]);
-        let resolution_s = if time_s.iter().all(|time_s| time_s.fract() == 0.0) { 1.0 } else { MAX_DELAY_S };
-        (rises && time_s.first() < time_s.last()).then_some(Self { time_s, resolution_s })
+        let steps = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let resolution_s = steps().filter(|step_s| *step_s > 0.0).fold(f64::INFINITY, f64::min).max(MAX_DELAY_S);
+        (steps().all(|step_s| step_s >= 0.0) && time_s.first() < time_s.last()).then_some(Self { time_s, resolution_s })
     }
 
     /// From one row to another, s.
     fn between(&self, first: usize, last: usize) -> f64 {
         self.time_s[last] - self.time_s[first]
     }
+}
+
+/// Whether a column of numbers is called a time, and by its unit no duration of something: neither `exposure_ms` nor `U_m_s`.
+fn is_clock(column: &Column) -> bool {
+    let is_called = is_time_by_name(column) || Unit::of_time_named(column.name()).is_some();
+    is_called && !is_called_temperature(column) && !is_index(column) && !is_velocity(column)
 }
 
 /// Whether the stamps of a column are there in each row, and rise from one to the next.
@@ -63,17 +76,19 @@ pub(crate) fn shown_beside(table: &Table, index: usize) -> Option<(usize, Counte
     others.find_map(|other| Some((other, counter_beside(table, index, other)?)))
 }
 
-/// The unit in which a column counts what passes by the clock of another one. `None` if it names a unit, does not rise, rises otherwise, or
-/// counts rows. Numbers may be missing.
+/// The unit in which a column counts what passes by the clock of another one. `None` of a column that names a unit or another quantity, of
+/// one that falls or counts rows, and where none of the units fits. Numbers may be missing.
 pub(crate) fn counter_beside(table: &Table, index: usize, clock: usize) -> Option<Counter> {
     let column = &table.columns()[index];
-    let is_other = *column.unit() != Unit::Unstated || column.stated_time_unit().is_some();
-    if column.kind() != Kind::Number || is_other || is_called_temperature(column) || is_index(column) {
+    let is_stated = *column.unit() != Unit::Unstated || column.stated_time_unit().is_some();
+    let is_other =
+        is_called_temperature(column) || is_index(column) || has(column, &OTHER_QUANTITIES) || is_velocity(column);
+    if column.kind() != Kind::Number || is_stated || is_other || falls_often(column.raw()) {
         return None;
     }
     let rows: Vec<usize> = (0..column.raw().len()).filter(|row| column.raw()[*row].is_finite()).collect();
     let values: Vec<f64> = rows.iter().map(|row| column.raw()[*row]).collect();
-    let values = unwrapped(&values).map_or(values, |(values, _)| values);
+    let values = counted_on(&values);
     let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
     if steps.is_empty() || steps.iter().any(|step| *step <= 0.0) {
         return None;
@@ -85,18 +100,28 @@ pub(crate) fn counter_beside(table: &Table, index: usize, clock: usize) -> Optio
     scale::counter_of(rise, sampling::median(&steps), are_whole, shown.between(first, last), shown.resolution_s)
 }
 
-/// Refuses a time that was guessed where a clock beside it shows another one.
+/// Whether numbers fall more often than those of a counter that begins anew.
+fn falls_often(values: &[f64]) -> bool {
+    let falls = values.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    falls > 1 + values.len() / MIN_ROWS_OF_TURN
+}
+
+/// Refuses a time that was guessed where a clock beside it shows another one, in the ratio of two units; notes where one differs otherwise.
 ///
 /// - `unit`: the unit that the caller chose
 ///
 /// # Errors
 /// [`RecordError::TimesDisagree`], and those of reading the time.
-pub(crate) fn expect_agreement(table: &Table, chosen: &Chosen, unit: Option<&Unit>) -> Result<(), RecordError> {
+pub(crate) fn expect_agreement(
+    table: &Table,
+    chosen: &Chosen,
+    unit: Option<&Unit>,
+    notes: &mut Vec<Note>,
+) -> Result<(), RecordError> {
     let Some(time) = chosen.time else { return Ok(()) };
     let taken = chosen.columns();
-    let others: Vec<usize> = (0..table.columns().len()).filter(|index| !taken.contains(index)).collect();
-    let clocks: Vec<(usize, Shown)> =
-        others.into_iter().filter_map(|index| Some((index, Shown::by(table, index)?))).collect();
+    let others = (0..table.columns().len()).filter(|index| !taken.contains(index));
+    let clocks: Vec<(usize, Shown)> = others.filter_map(|index| Some((index, Shown::by(table, index)?))).collect();
     if clocks.is_empty() {
         return Ok(());
     }
@@ -106,8 +131,11 @@ pub(crate) fn expect_agreement(table: &Table, chosen: &Chosen, unit: Option<&Uni
     };
     let passed_s = match time {
         TimeColumns::One(index) if table.columns()[index].kind() != Kind::Stamp => {
-            let (values, unit_s) = (table.numbers(index)?, unit_of(table, index, unit, &mut Vec::new())?.1);
-            let values = unwrapped(values).map_or_else(|| values.to_vec(), |(values, _)| values);
+            let (values, unit_s) = (counted_on(table.numbers(index)?), unit_of(table, index, unit, &mut Vec::new())?.1);
+            // Where it does not rise, its place says more.
+            if !values.windows(2).all(|pair| pair[1] > pair[0]) {
+                return Ok(());
+            }
             values.first().zip(values.last()).map_or(0.0, |(first, last)| (last - first) * unit_s)
         }
         time => of_stamps(table, time, unit, &mut Vec::new())?.last().copied().unwrap_or(0.0),
@@ -115,16 +143,22 @@ pub(crate) fn expect_agreement(table: &Table, chosen: &Chosen, unit: Option<&Uni
     for (other, shown) in clocks {
         let other_s = shown.between(0, table.rows() - 1);
         let tolerance_s = MAX_CLOCK_ERROR * passed_s.max(other_s) + 2.0 * shown.resolution_s;
-        if (passed_s - other_s).abs() > tolerance_s {
-            let [one, other] = [index, other].map(|index| table.title(index));
-            return Err(RecordError::TimesDisagree {
-                file: table.source().to_owned(),
-                one,
-                one_s: passed_s,
-                other,
-                other_s,
-            });
+        if (passed_s - other_s).abs() <= tolerance_s {
+            continue;
         }
+        let [one, other] = [index, other].map(|index| table.title(index));
+        if is_ratio_of_units(passed_s / other_s) {
+            let file = table.source().to_owned();
+            return Err(RecordError::TimesDisagree { file, one, one_s: passed_s, other, other_s });
+        }
+        notes.push(Note::ClocksDiffer { column: one, passed_s, other, other_s });
     }
     Ok(())
+}
+
+/// Whether two clocks differ as if one were read in the unit of the other.
+fn is_ratio_of_units(ratio: f64) -> bool {
+    const UNITS_S: [f64; 7] = [1e-9, 1e-6, 1e-3, 1.0, 60.0, 3600.0, 86_400.0];
+    let mut ratios = UNITS_S.iter().flat_map(|one| UNITS_S.map(|other| one / other)).filter(|units| *units != 1.0);
+    ratios.any(|units| (ratio / units - 1.0).abs() <= MAX_CLOCK_ERROR)
 }

@@ -163,7 +163,10 @@ fn guess_time(table: &Table, taken: &[usize]) -> Option<usize> {
     let are_parts = columns.iter().filter(|column| length_s(column).is_finite()).count() > 1;
     let is_called_by_unit = |column: &Column| {
         let is_since = column.name().contains(" since ") && length_s(column).is_finite();
-        (length_s(column) <= LONGEST_NAMING_UNIT_S || is_since) && (!are_parts || rises(column))
+        let is_called = (length_s(column) <= LONGEST_NAMING_UNIT_S || is_since) && !is_called_temperature(column);
+        // What is nothing but milliseconds is the time also where a row is amiss, which is refused with its place.
+        let is_alone = !are_parts && length_s(column) < LONGEST_NAMING_UNIT_S && Unit::parse(column.name()).is_time();
+        is_called && (is_alone || rises(column))
     };
     let open = || (0..columns.len()).filter(free);
     let named = open().find(|&index| is_time(&columns[index]));
@@ -182,7 +185,8 @@ fn own_clock(table: &Table, stamps: usize, taken: &[usize]) -> Option<usize> {
         return None;
     }
     let others = || (0..columns.len()).filter(|index| *index != stamps && !taken.contains(index));
-    let counter = others().find(|&index| counter_beside(table, index, stamps).is_some());
+    let may_be = |index: usize| columns[index].name().is_empty() || is_time(&columns[index]);
+    let counter = others().find(|&index| may_be(index) && counter_beside(table, index, stamps).is_some());
     counter.or_else(|| {
         let mut clocks = others().filter(|&index| is_time(&columns[index]) && rises(&columns[index]));
         clocks.find(|&index| columns[index].stated_time_unit().is_some() && !stamps_rise(table, stamps))

@@ -140,7 +140,7 @@ fn parse_time(text: &str) -> Option<Stamp> {
         }
     }
     let time_ns = ((hours * 60 + minutes) * 60 + seconds) * NS + nanos;
-    let is_short = c.is_none() && fraction.is_empty();
+    let is_short = c.is_none() && fraction.is_empty() && rest.is_empty();
     Some(Stamp { day: None, time_ns: Some(time_ns), offset_s: parse_zone(zone)?, is_short })
 }
 

@@ -58,6 +58,8 @@ impl fmt::Display for Candidates {
         }
         let list = self.found.join(", ");
         match self.found.len() {
+            0 if !self.are_named => write!(f, "no column without a name may be a sensor")?,
+            1 if !self.are_named => write!(f, "only column {list}, without a name, may be a sensor")?,
             count if !self.are_named => write!(f, "{count} columns without names may be sensors ({list})")?,
             0 => write!(f, "no column has the name or the unit of a temperature")?,
             1 => write!(f, "only column {list} has the name or the unit of a temperature")?,

@@ -79,10 +79,10 @@ impl NamedColumn {
         names::is_time(&self.head())
     }
 
-    /// The unit of a time in seconds; `None` if it is no unit of time.
+    /// The unit of a time in seconds, stated or within the name; `None` if there is none.
     pub fn time_unit_s(&self) -> Option<f64> {
-        match self.head().unit() {
-            Unit::Time { seconds, .. } => Some(*seconds),
+        match self.head().stated_time_unit() {
+            Some(Unit::Time { seconds, .. }) => Some(seconds),
             _ => None,
         }
     }

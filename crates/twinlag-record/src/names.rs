@@ -141,7 +141,7 @@ pub(crate) const OTHER_QUANTITIES: [&str; 40] = [
 ];
 
 /// Beyond all temperatures, in °C as in °F.
-const MAX_TEMPERATURE: f64 = 10_000.0;
+const NO_TEMPERATURE: f64 = 10_000.0;
 
 /// Words for a velocity.
 const VELOCITY: [&str; 8] =
@@ -179,19 +179,25 @@ pub(crate) fn counts_rows(column: &Column) -> bool {
         && raw.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
 }
 
-/// Whether no temperature goes as its numbers do: they rise by one from row to row, or are beyond all temperatures.
+/// Whether no temperature goes as its numbers do: they rise by one from row to row, or most of them are beyond all temperatures.
 pub(crate) fn is_counter(column: &Column) -> bool {
     let raw = column.raw();
     let rises_by_one = raw.len() > 1 && raw.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
-    rises_by_one || raw.iter().any(|value| *value > MAX_TEMPERATURE)
+    let beyond = raw.iter().filter(|value| **value > NO_TEMPERATURE).count();
+    rises_by_one || 2 * beyond > raw.len()
 }
 
 pub(crate) fn is_index(column: &Column) -> bool {
     has(column, &INDEX) && !column.unit().is_temperature() && !matches!(column.unit(), Unit::Time { .. })
 }
 
+/// Whether a word of the name is one for time.
+pub(crate) fn is_time_by_name(column: &Column) -> bool {
+    has(column, &TIME) || column.label() == "t" || is_written_together(column)
+}
+
 pub(crate) fn is_time(column: &Column) -> bool {
-    let named = has(column, &TIME) || column.label() == "t" || is_written_together(column);
+    let named = is_time_by_name(column);
     match column.kind() {
         Kind::Stamp => true,
         Kind::Number => {

@@ -105,17 +105,28 @@ pub enum Note {
         step_s: f64,
     },
     /// A time column without a unit counts what passes by the clock of another column.
-    TimeByStamps {
+    TimeByClock {
         /// The column.
         column: String,
         /// The other column: of stamps, or of a counter with its unit.
-        stamps: String,
+        clock: String,
         /// Its unit.
         unit: &'static str,
         /// What it counts.
         name: &'static str,
         /// From row to row.
         step_s: f64,
+    },
+    /// Another clock of the file shows another time, and not by a factor of units.
+    ClocksDiffer {
+        /// The column that was taken as the time.
+        column: String,
+        /// What passes by it from the first row to the last, s.
+        passed_s: f64,
+        /// The other column.
+        other: String,
+        /// What passes by that, s.
+        other_s: f64,
     },
     /// Which of day and month comes first in dates was found from how closely rows follow each other.
     DateOrder {
@@ -261,8 +272,8 @@ impl Note {
                 write!(f, "{} s from row to row, and were converted from {unit} to s. ", three(*step_s))?;
                 write!(f, "If that is wrong, choose its unit, or write it in the header, as 'time [s]'")
             }
-            Self::TimeByStamps { column, stamps, name, step_s, .. } => {
-                write!(f, "column {column} names no unit; by the clock of column {stamps} it counts {name}, ")?;
+            Self::TimeByClock { column, clock, name, step_s, .. } => {
+                write!(f, "column {column} names no unit; by the clock of column {clock} it counts {name}, ")?;
                 write!(f, "{} s from row to row. ", three(*step_s))?;
                 write!(f, "If that is wrong, choose its unit, or another column as the time")
             }
@@ -289,6 +300,14 @@ impl fmt::Display for Note {
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
             Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
             Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
+            Self::ClocksDiffer { column, passed_s, other, other_s } => {
+                let [passed_s, other_s] = [passed_s, other_s].map(|s| three(*s));
+                write!(
+                    f,
+                    "from the first row to the last {passed_s} s pass by column {column}, which is the time, and {other_s} s by "
+                )?;
+                write!(f, "column {other}")
+            }
             Self::DateOrder { column, is_day_first } => {
                 let first = if *is_day_first { "day" } else { "month" };
                 write!(f, "dates of column {column} have the {first} first, since rows follow each other closely then")

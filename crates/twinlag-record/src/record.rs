@@ -162,7 +162,7 @@ impl Record {
         let mut notes = Vec::new();
         let chosen = choose(&table, selection, &mut notes)?;
         if selection.time.is_none() {
-            expect_agreement(&table, &chosen, selection.time_unit.as_ref())?;
+            expect_agreement(&table, &chosen, selection.time_unit.as_ref(), &mut notes)?;
         }
         let (time_s, clock) = match (chosen.time, selection.period_s) {
             (Some(columns), _) => {

@@ -11,12 +11,13 @@ use crate::sign::{Decimal, Delimiter};
 use crate::table::{Table, Text, shortened};
 use crate::time_axis::{self, TimeColumns, seconds};
 use crate::unit::Unit;
+use crate::wrap::CountingOn;
 use crate::{Place, RecordError};
 
 /// One row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time since the first row of the table, s; `None` where the time column holds no plain
+    /// Time since the first row of the table, s, counted on where a counter of 16 or 32 bits begins anew; `None` where the time column holds no plain
     /// numbers, or there is none.
     pub time_s: Option<f64>,
     /// Both temperatures, °C; `None` for one that is missing.
@@ -38,6 +39,7 @@ struct Time {
     index: usize,
     first: f64,
     unit_s: f64,
+    counting: CountingOn,
 }
 
 #[derive(Clone, Debug)]
@@ -55,7 +57,7 @@ impl RowReader {
     ///
     /// let start = "time_ms;T1_K;T2_K\n1000;293,15;293,15\n1010;294,15;293,40\n1020;294,65;293,65\n";
     /// let table = Table::read(start.as_bytes(), "logger")?;
-    /// let rows = RowReader::after(&table, &Selection::default())?;
+    /// let mut rows = RowReader::after(&table, &Selection::default())?;
     /// // Semicolons, decimal commas, milliseconds and kelvin are those of the first lines.
     /// let row = rows.read("1030;295,15;---\n", 5)?.expect("not a comment");
     /// assert_eq!(row.time_s, Some(0.03));
@@ -75,7 +77,7 @@ impl RowReader {
             Some(TimeColumns::One(index)) if column(index).kind() == Kind::Number => {
                 let unit_s = time_axis::unit_of(table, index, selection.time_unit.as_ref(), &mut Vec::new())?.1;
                 let first = column(index).raw().first().copied().unwrap_or(0.0);
-                Some(Time { index, first, unit_s })
+                Some(Time { index, first, unit_s, counting: CountingOn::behind(column(index).raw()) })
             }
             _ => None,
         };
@@ -94,7 +96,7 @@ impl RowReader {
     /// [`RecordError::CellCount`], [`RecordError::OpenQuote`], [`RecordError::NotANumber`],
     /// [`RecordError::OutOfRange`]: what the row says is not known then, those after it can still
     /// be read.
-    pub fn read(&self, line: &str, number: usize) -> Result<Option<Row>, RecordError> {
+    pub fn read(&mut self, line: &str, number: usize) -> Result<Option<Row>, RecordError> {
         let line = line.trim_end_matches(['\n', '\r']);
         let (form, decimal) = (&self.text.form, self.text.decimal);
         let line = &*form.unwrap(line);
@@ -129,8 +131,11 @@ impl RowReader {
             }
         };
         let reading_c = [reading(&self.channels[0])?, reading(&self.channels[1])?];
-        let time_s = self.time.as_ref().and_then(|time| match number::read(&cells[time.index], decimal) {
-            Value::Number(value) => Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite()),
+        let time_s = self.time.as_mut().and_then(|time| match number::read(&cells[time.index], decimal) {
+            Value::Number(value) => {
+                let value = time.counting.next(value);
+                Some(seconds(value - time.first, time.unit_s)).filter(|t| t.is_finite())
+            }
             Value::Missing | Value::Other => None,
         });
         Ok(Some(Row { time_s, reading_c }))

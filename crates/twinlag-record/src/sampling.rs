@@ -17,6 +17,8 @@ const MIN_BURSTS: usize = 10;
 const MAX_BURST_ROWS: usize = 64;
 /// How many of the bursts have the same number of rows, at least; chosen: lines are lost.
 const MIN_BURST_SHARE: f64 = 0.8;
+/// How much of the time bursts take, at most; chosen.
+const MAX_BURST_SHARE_OF_TIME: f64 = 0.5;
 
 /// What the stamps are taken to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -268,10 +270,16 @@ pub(crate) fn bursts(time_s: &[f64], runs: &[Range<usize>]) -> Option<Bursts> {
     // The first and the last one may be cut.
     let whole = runs.get(1..runs.len().saturating_sub(1))?;
     let (first, last) = (whole.first()?, whole.last()?);
-    let rows = first.len();
+    let mut lengths: Vec<f64> = whole.iter().map(|run| run.len() as f64).collect();
+    lengths.sort_by(f64::total_cmp);
+    let rows = lengths[lengths.len() / 2] as usize;
     let share = whole.iter().filter(|run| run.len() == rows).count() as f64 / whole.len() as f64;
-    let is_burst = whole.len() >= MIN_BURSTS && (2..=MAX_BURST_ROWS).contains(&rows) && share >= MIN_BURST_SHARE;
-    let period_s = (time_s[last.start] - time_s[first.start]) / (last.start - first.start) as f64;
+    // A logger that loses a row now and then measures for most of the time.
+    let observed_s: f64 = whole.iter().map(|run| time_s[run.end - 1] - time_s[run.start]).sum();
+    let is_brief = observed_s < MAX_BURST_SHARE_OF_TIME * (time_s[last.start] - time_s[first.start]);
+    let is_burst =
+        is_brief && whole.len() >= MIN_BURSTS && (2..=MAX_BURST_ROWS).contains(&rows) && share >= MIN_BURST_SHARE;
+    let period_s = (time_s[last.start] - time_s[first.start]) / ((whole.len() - 1) * rows) as f64;
     is_burst.then_some(Bursts { rows, period_s })
 }
 

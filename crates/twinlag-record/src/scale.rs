@@ -81,7 +81,7 @@ pub(crate) const MAX_CLOCK_ERROR: f64 = 0.1;
 pub(crate) fn judge(values: &[f64]) -> Reading {
     let (Some(&first), Some(&last)) = (values.first(), values.last()) else { return Reading::Seconds };
     // Stamps that do not rise are refused later on, with their place.
-    if values.len() < 2 || values.windows(2).any(|pair| pair[1] <= pair[0]) {
+    if values.len() < 2 || !values.windows(2).all(|pair| pair[1] > pair[0]) {
         return Reading::Seconds;
     }
     let is_within = |range: [f64; 2]| range[0] <= first && last <= range[1];
@@ -97,7 +97,8 @@ pub(crate) fn judge(values: &[f64]) -> Reading {
         }
     }
     let is_epoch_s = is_within(EPOCH_S);
-    if is_epoch_s && is_loggers_period(step) {
+    // A program that waits for a minute between readings takes a second more for them.
+    if is_epoch_s && (is_loggers_period(step) || step <= LONGEST_PERIOD_S) {
         return Reading::Seconds;
     }
     if let Some((_, name)) = DAY_COUNTS.into_iter().find(|(range, _)| is_within(*range) && !are_whole) {
@@ -105,10 +106,6 @@ pub(crate) fn judge(values: &[f64]) -> Reading {
         let relative: Vec<f64> = values.iter().map(|value| value - first).collect();
         let step = sampling::judge(&relative, Some(Clock { unit_s: 1.0, first }), SamplingChoice::Auto).period_s;
         return of_days(step, Counter { symbol: "d", seconds: DAY_S, name, step_s: step * DAY_S });
-    }
-    // A program that waits for a minute between readings takes a second more for them.
-    if is_epoch_s && step <= LONGEST_PERIOD_S {
-        return Reading::Seconds;
     }
     let mean = (last - first) / steps.len() as f64;
     let is_counted = step > COUNTED_STEP * (1.0 - OFF);

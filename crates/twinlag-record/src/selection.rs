@@ -142,6 +142,9 @@ impl Selection {
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         let is_timed = self.time.is_some() || self.period_s.is_some();
+        // The unit is that of a column.
+        let is_same_time = !is_timed || self.time == other.time;
+        let time_unit = self.time_unit.or(other.time_unit.filter(|_| is_same_time));
         let (time, period_s) = if is_timed { (self.time, self.period_s) } else { (other.time, other.period_s) };
         let (flow, position) = if self.flow.is_some() || self.position.is_some() {
             (self.flow, self.position)
@@ -151,7 +154,7 @@ impl Selection {
         let sampling = if is_auto(&self.sampling) { other.sampling } else { self.sampling };
         Self {
             time,
-            time_unit: self.time_unit.or(other.time_unit),
+            time_unit,
             t1: self.t1.or(other.t1),
             t2: self.t2.or(other.t2),
             reference: self.reference.or(other.reference),
@@ -206,6 +209,10 @@ mod tests {
             flow: column("u"),
             ..Selection::default()
         };
+        let in_ms = Selection { time_unit: Some(Unit::parse("ms")), ..profile.clone() };
+        let other_time = Selection { time: column("elapsed"), ..Selection::default() };
+        assert_eq!(Selection::default().or(in_ms.clone()).time_unit, in_ms.time_unit);
+        assert_eq!((other_time.clone().or(in_ms).time_unit, other_time.time_unit), (None, None));
         let said = Selection { t2: column("c"), period_s: Some(0.5), position: column("z"), ..Selection::default() };
         let want = Selection { t1: column("a"), ..said.clone() };
         assert_eq!(said.or(profile.clone()), want);

@@ -1,11 +1,13 @@
 //! From a column of dates and times of day to seconds since its first row.
 
 use crate::RecordError;
-use crate::clock::{self, DAY_NS, Day, Stamp};
+use crate::clock::{self, Day, Stamp};
 use crate::note::Note;
 use crate::table::Table;
 use crate::unit::Unit;
 use crate::wording::plain;
+
+const DAY_NS: i128 = clock::DAY_NS as i128;
 
 /// How many times as long the longest step has to be in the other order of day and month; chosen: a day is a thirtieth of a month.
 const CLOSER: i128 = 10;
@@ -86,26 +88,24 @@ impl Instants {
     /// The error is the row of a date that is none in this order.
     fn of(stamps: &[Stamp], order: Order) -> Result<Self, usize> {
         let mut instants = Self { nanos: Vec::with_capacity(stamps.len()), midnights: 0 };
-        let mut before_ns = i64::MIN;
+        let mut before_ns: Option<i128> = None;
         for (row, stamp) in stamps.iter().enumerate() {
-            let mut time_ns = stamp.time_ns.unwrap_or(0);
+            let mut time_ns = i128::from(stamp.time_ns.unwrap_or(0));
             let day = match stamp.day {
                 Some(day) => day_in(day, order).ok_or(row)?,
                 None => {
                     // Back by more than half a day: past midnight. By less: a mistake, found when the order is checked.
-                    time_ns += instants.midnights as i64 * DAY_NS;
-                    if before_ns != i64::MIN && time_ns < before_ns - DAY_NS / 2 {
+                    time_ns += instants.midnights as i128 * DAY_NS;
+                    if before_ns.is_some_and(|before_ns| time_ns < before_ns - DAY_NS / 2) {
                         instants.midnights += 1;
                         time_ns += DAY_NS;
                     }
-                    before_ns = time_ns;
+                    before_ns = Some(time_ns);
                     0
                 }
             };
-            instants.nanos.push(
-                i128::from(day) * i128::from(DAY_NS) + i128::from(time_ns)
-                    - i128::from(stamp.offset_s.unwrap_or(0)) * 1_000_000_000,
-            );
+            let offset_ns = i128::from(stamp.offset_s.unwrap_or(0)) * 1_000_000_000;
+            instants.nanos.push(i128::from(day) * DAY_NS + time_ns - offset_ns);
         }
         Ok(instants)
     }
@@ -196,8 +196,8 @@ pub(crate) fn settle_short(
         Some(Unit::Time { symbol: "min", .. }) => true,
         Some(Unit::Time { symbol: "h", .. }) => false,
         Some(_) => return Err(RecordError::NeedsNoUnit { file, column }),
-        None if name.contains("mm:ss") => true,
-        None if name.contains("hh:mm") => false,
+        None if name.contains("mm:ss") && !name.contains("h:mm") => true,
+        None if name.contains("hh:mm") && !name.contains("mm:ss") => false,
         None if !are_all_short => !rises(stamps),
         None => {
             let cell = table.columns()[index].text(first).unwrap_or("").to_owned();

@@ -9,7 +9,7 @@ use crate::scale::{self, Counter, Reading};
 use crate::stamps::{self, elapsed, settle_short};
 use crate::table::Table;
 use crate::unit::Unit;
-use crate::wrap::unwrapped;
+use crate::wrap::{counted_on, unwrapped};
 
 /// Seconds since the first row, and the clock that the stamps were printed from.
 pub(crate) struct TimeAxis {
@@ -127,12 +127,11 @@ pub(crate) fn unit_of(
         }
         Unit::Unstated => {
             if let Some((other, Counter { symbol, seconds, name, step_s })) = shown_beside(table, index) {
-                let stamps = table.title(other);
-                notes.push(Note::TimeByStamps { column: column(), stamps, unit: symbol, name, step_s });
+                let clock = table.title(other);
+                notes.push(Note::TimeByClock { column: column(), clock, unit: symbol, name, step_s });
                 return Ok((symbol, seconds));
             }
-            let values = table.columns()[index].raw();
-            match scale::judge(unwrapped(values).as_ref().map_or(values, |(values, _)| values)) {
+            match scale::judge(&counted_on(table.columns()[index].raw())) {
                 Reading::Recognised(Counter { symbol, seconds, name, step_s }) => {
                     notes.push(Note::TimeRecognised { column: column(), unit: symbol, name, step_s });
                     Ok((symbol, seconds))

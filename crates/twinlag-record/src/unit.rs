@@ -54,7 +54,7 @@ impl Unit {
     /// The unit of time that is the name of a column, as `ms`, or the only one among its words, as in `elapsedMillis`, `time.ms` and
     /// `milliseconds since boot`.
     pub(crate) fn of_time_named(name: &str) -> Option<Self> {
-        let of_time = |text: &str| Self::known(text).filter(|unit| matches!(unit, Self::Time { .. }));
+        let of_time = |text: &str| Self::known(text).filter(Self::is_time);
         if let Some(unit) = of_time(name.trim()) {
             return Some(unit);
         }
@@ -167,6 +167,11 @@ impl Unit {
         let unit =
             Some(header).filter(is_plural).and_then(Self::known).filter(|unit| matches!(unit, Self::Time { .. }));
         (header.to_owned(), unit.unwrap_or(Self::Unstated))
+    }
+
+    /// Whether it is a unit of time.
+    pub(crate) fn is_time(&self) -> bool {
+        matches!(self, Self::Time { .. })
     }
 
     /// Whether it is a unit of temperature.

@@ -284,7 +284,7 @@ fn a_column_that_counts_rows_is_no_time_without_a_name() {
     assert_eq!(record(&named).time_s[3], 3.0);
 }
 
-/// Rows of one day that follow each other: whichever of day and month comes first.
+/// Rows a day apart, whichever of day and month comes first.
 #[test]
 fn dates_are_read_in_the_order_in_which_rows_follow_each_other() {
     let month_first = record(&rows("time,T1,T2", |k, _, a, b| format!("03/{:02}/2026 10:00:00,{a},{b}", k + 1)));
@@ -300,6 +300,56 @@ fn dates_are_read_in_the_order_in_which_rows_follow_each_other() {
 fn stamps_that_repeat_leave_the_time_to_the_column_with_a_unit() {
     let text = rows("stamp,elapsed_s,T1,T2", |_, t, a, b| format!("2026-01-31 12:00:{:02.0},{t},{a},{b}", t.floor()));
     assert_is_the_rig(&record(&text), 0.0);
+}
+
+/// Clocks that differ as they may: a coarse one, one that counts something else, one that was moved, and a lag that grows.
+#[test]
+fn a_clock_that_differs_otherwise_than_by_a_unit_refuses_nothing() {
+    let beside = |header: &str, cell: &dyn Fn(f64) -> String| {
+        let text: String = (0..200)
+            .map(|k| f64::from(k) * 0.5)
+            .map(|t| format!("{t},{},{:.3},{:.3}\n", cell(t), 20.0 + (0.3 * t).sin(), 20.0 + (0.3 * t - 0.2).sin()))
+            .collect();
+        record(&format!("{header},T1,T2\n{text}"))
+    };
+    for (header, cell) in [
+        (
+            "time_s,saved",
+            &(|t: f64| format!("2026-01-31 10:{:02.0}", 30.0 + (t / 60.0).floor())) as &dyn Fn(f64) -> String,
+        ),
+        ("time_s,runtime_min", &|t| (t / 60.0).floor().to_string()),
+        ("time_s,on_time_h", &|t| ((t / 360.0).floor() / 10.0).to_string()),
+        ("time_s,exposure_ms", &|t| (5.0 + t / 40.0).to_string()),
+        ("time_s,heater_on_s", &|t| (t / 3.0).to_string()),
+        ("time_s,date", &|_| "2026-01-31".to_owned()),
+        ("time_s,remaining_time_s", &|t| (99.5 - t).to_string()),
+        ("elapsed_s,clock", &|t| {
+            format!("{:02}:{:02}:{:04.1}", if t < 50.0 { 2 } else { 3 }, (t / 60.0) as u32, t % 60.0)
+        }),
+        ("time_s,elapsed_ms", &|t| if t > 99.0 { "1e999".to_owned() } else { (1e3 * t).to_string() }),
+    ] {
+        let got = beside(header, cell);
+        assert!((got.time_s[1] - 0.5).abs() < 1e-12, "{header}: {:?}", got.time_s[1]);
+    }
+}
+
+/// Failed: the depth of a cast at 1 m/s was the time, before its stamps.
+#[test]
+fn another_quantity_is_no_clock() {
+    for name in ["depth", "position", "angle", "wind"] {
+        let text =
+            rows(&format!("stamp,{name},T1,T2"), |_, t, a, b| format!("2026-01-31 12:00:{t:04.1},{},{a},{b}", t + 3.0));
+        assert_is_the_rig(&record(&text), 1e-9);
+    }
+}
+
+/// A time of day with its half of the day or its zone has hours and minutes.
+#[test]
+fn half_days_and_zones_show_hours() {
+    for end in [" AM", "Z", "+01:00"] {
+        let got = record(&rows("time,T1,T2", |k, _, a, b| format!("9:{:02}{end},{a},{b}", k)));
+        assert!((got.time_s[1] - 60.0).abs() < 1e-9, "{end}");
+    }
 }
 
 /// `millis()` of a board that has run for 49.7 days.

@@ -87,13 +87,14 @@ fn clocks_of_two_parts_say_what_they_are() {
     assert!((got.time_s[6] - 30.0).abs() < 1e-9, "{:?}", got.time_s);
     let dated = record(&rows("time,T1,T2", |k, _, a, b| format!("2026-01-31 {},{a},{b}", at(k))));
     assert!((dated.time_s[1] - 1800.0).abs() < 1e-9, "{:?}", dated.time_s);
+    assert_says(&refusal(&text("time (hh:mm:ss),T1,T2")), &["may be hours and minutes or minutes and seconds"]);
     let whole = rows("time,T1,T2", |k, _, a, b| format!("10:00:{:02},{a},{b}", 5 * k));
     let chosen = Selection { time_unit: Some(Unit::parse("ms")), ..Selection::default() };
     let error = record_with(whole.as_bytes(), &chosen).expect_err("a clock has no unit");
     assert_says(&error.to_string(), &["'time' holds times of a clock, which need no unit"]);
 }
 
-/// A factor of 1000 between two columns, of which the one that would be taken is wrong as well as not.
+/// Two columns that differ by a factor of 1000: nothing shows which of them is wrong.
 #[test]
 fn clocks_that_contradict_each_other_are_refused_unless_one_is_chosen() {
     let text = rows("time_s,elapsed_ms,T1,T2", |_, t, a, b| format!("{t},{t},{a},{b}"));
@@ -115,10 +116,58 @@ fn times_of_arrival_in_bursts_are_refused() {
         let (a, b) = ((f64::from(k) * 0.3).sin(), (f64::from(k) * 0.3 - 0.5).sin());
         format!("12:{:02}:{:02}.{:03} -> {a:.3},{b:.3}\n", k / 600, k / 10 % 60, 3 * (k % 10))
     };
-    let text: String = (0..400).map(row).collect();
+    // Some lines are lost, one of the first burst.
+    let text: String = (0..400).filter(|k| ![3, 12, 207, 344].contains(k)).map(row).collect();
     assert_says(&refusal(&text), &["bursts of 10", "sample period, 0.1 s on average", "as they stand"]);
     let stamped = Selection { sampling: SamplingChoice::AsStamped, ..Selection::default() };
     assert_eq!(record_with(text.as_bytes(), &stamped).expect("it is said").segments.len(), 40);
+}
+
+/// Failed: a logger of 1 Hz that loses a row a minute was said to send bursts of 59.
+#[test]
+fn a_lost_row_now_and_then_makes_no_burst() {
+    let text: String = (0..1200)
+        .filter(|k| k % 60 != 17)
+        .map(|k| f64::from(k))
+        .map(|t| format!("{t},{:.3},{:.3}\n", (0.1 * t).sin(), (0.1 * t - 0.2).sin()))
+        .collect();
+    assert!((record(&format!("time_s,T1,T2\n{text}")).sampling.period_s - 1.0).abs() < 1e-9);
+}
+
+/// Failed: one reading of a broken wire, and humidity was a sensor.
+#[test]
+fn a_broken_reading_does_not_make_two_other_columns_the_sensors() {
+    let text: String = (0..40)
+        .map(|k| {
+            let t = f64::from(k) * 0.5;
+            let first = if k == 7 { 32_767.0 } else { 20.0 + t.sin() };
+            format!("{t},{first:.3},{:.3},{:.3}\n", 20.0 + (t - 0.3).sin(), 40.0 + (0.1 * t).cos())
+        })
+        .collect();
+    assert_says(&refusal(&text), &["3 columns without names may be sensors"]);
+}
+
+/// Failed: a panic, since the steps of such a column are no numbers.
+#[test]
+fn a_time_without_a_number_is_refused_at_its_line() {
+    for text in ["time,T1,T2\n5,20,21\n,20.5,21\n5,21,21\n", "time,T1,T2\n5,20,21\nnan,20.5,21\n5,21,21\n"] {
+        assert_says(&refusal(text), &["line 3", "the time is missing"]);
+    }
+    let restarted =
+        rows("time_s,clock,T1,T2", |k, t, a, b| format!("{},12:00:{:04.1},{a},{b}", f64::from(k % 6) / 2.0, t));
+    assert_says(&refusal(&restarted), &["line 8", "make two records"]);
+}
+
+/// Two sensors upstream and downstream, and a part of a second.
+#[test]
+fn a_unit_within_the_name_of_a_sensor_makes_it_no_time() {
+    let channels = |header: &str| {
+        let period = Selection { period_s: Some(0.1), ..Selection::default() };
+        let text = rows(header, |_, _, a, b| format!("{},{}", a.sin(), b.cos()));
+        record_with(text.as_bytes(), &period).expect("two columns").channels
+    };
+    assert_eq!(channels("first,second"), ["first", "second"]);
+    assert_eq!(channels("us_temp,ds_temp"), ["us_temp", "ds_temp"]);
 }
 
 #[test]

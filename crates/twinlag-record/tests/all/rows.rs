@@ -30,8 +30,8 @@ fn lines_are_read_as_the_first_ones_were() {
 
 #[test]
 fn bad_lines_are_named() {
-    let reader = reader();
-    let error = |line: &str| reader.read(line, 7).expect_err("a bad line");
+    let mut reader = reader();
+    let mut error = |line: &str| reader.read(line, 7).expect_err("a bad line");
     assert!(matches!(error("104;21,0"), RecordError::CellCount { line: 7, expected: 4, found: 2, .. }));
     assert!(matches!(error("104;warm;c;293,65"), RecordError::NotANumber { at: Place::Line(7), .. }));
     assert!(matches!(error("104;21,0;c;-5,0"), RecordError::OutOfRange { .. }));
@@ -44,7 +44,7 @@ fn bad_lines_are_named() {
 fn the_unit_of_time_is_that_of_the_first_lines() {
     let start = "time,T1,T2\n1769853600000,20,20\n1769853600010,20,20\n1769853600020,20,20\n";
     let table = Table::read(start.as_bytes(), "pipe").expect("a table");
-    let reader = RowReader::after(&table, &Selection::default()).expect("clear columns");
+    let mut reader = RowReader::after(&table, &Selection::default()).expect("clear columns");
     let row = reader.read("1769853600030,21,20\n", 5).expect("a good line").expect("a row");
     assert_eq!(row.time_s, Some(0.03));
     let seconds = Selection { time_unit: Some(Unit::parse("s")), ..Selection::default() };
