@@ -51,12 +51,13 @@ pub(crate) fn run(tested: bool, full: bool) -> Result<()> {
 
 /// The package for Python, the reports, and the page for a browser, each where what it takes is there.
 fn package_and_pages() -> Result<()> {
-    if starts(python::PYTHON) {
+    if starts(python::PYTHON, &["-m", "venv", "--help"]) {
         python::run(&python::Python::default())?;
     } else {
         println!("== SKIPPED: the package for Python; it takes a Python with `venv`");
     }
-    let has_browser = starts("node") && starts("npm") && report::browser(None).is_ok();
+    let has_version = |program: &str| starts(program, &["--version"]);
+    let has_browser = has_version("node") && has_version("npm") && report::browser(None).is_ok();
     if has_browser {
         report::run(&report::Report::default())?;
     } else {
@@ -73,8 +74,8 @@ fn package_and_pages() -> Result<()> {
 }
 
 /// Whether a program is there.
-fn starts(program: &str) -> bool {
-    Command::new(program).arg("--version").output().is_ok_and(|said| said.status.success())
+fn starts(program: &str, arguments: &[&str]) -> bool {
+    Command::new(program).args(arguments).output().is_ok_and(|said| said.status.success())
 }
 
 /// Each optional feature, and what is built apart, one by one: there are so few that they are listed here.

@@ -13,6 +13,7 @@ const [pagePath, records, screenshots, browserPath, program] = process.argv.slic
 const RELATIVE = 1e-9;
 const DESK = { width: 1280, height: 900, scheme: "light" };
 const PHONE = { width: 400, height: 800, scheme: "light" };
+// Of a million rows, which a reader may ask for by --rows.
 const DIAGNOSED_MS = 3_600_000;
 
 await withBrowser(browserPath, async (context) => {

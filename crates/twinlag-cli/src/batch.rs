@@ -233,6 +233,7 @@ fn start(command: &Batch, place: &mut Place, console: Console) -> Result<u8, Fai
         _ => Begin::Create,
     };
     let gas_files = question.gas_files(&files)?;
+    // The units have the paths.
     drop(files);
     // A part that was removed leaves the gas temperatures of its records behind.
     let is_resumed = command.course.resume && (journal_path.exists() || is_divided);

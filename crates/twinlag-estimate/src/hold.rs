@@ -9,14 +9,14 @@ use crate::fitting::polish;
 use crate::task::Task;
 use crate::whitened::WhitenedFit;
 
-/// How uneven steps may be to be taken for even ones in a comparison of two holds: rms, of their mean; chosen, well below a lost sample in
-/// each two.
+/// How far steps may be from their mean, rms, as a fraction of it, to be taken for even ones in a comparison of two holds; chosen: clocks of
+/// programs jitter by some per cent, and a record that lost every other sample is at 0.5.
 const MAX_JITTER: f64 = 0.25;
 
 impl<const P: usize> WhitenedFit<'_, P> {
     /// The hold to compare with: a straight line between samples, or none where that is the one there is. Between samples that are not
     /// even the bilinear rule stands for the straight line: like this it undoes the `(Ts/τ)²/12` by which a zero-order hold takes the time
-    /// constants of a smooth gas for shorter.
+    /// constants of a smooth gas for shorter (the theory chapter of the book, on the bilinear rule).
     pub fn other_hold(&self) -> Discretisation {
         match (self.task.hold, self.readings().even_period_s()) {
             (Discretisation::FirstOrderHold, Some(_)) => Discretisation::ZeroOrderHold,
@@ -28,23 +28,20 @@ impl<const P: usize> WhitenedFit<'_, P> {
 
     /// How much straight lines between samples in place of the zero-order hold would move both time constants of a record whose samples are
     /// nearly even, relative. Straight lines take even samples: the same readings are fitted with either hold as though they were even, so
-    /// that what is wrong with that is in both. `None` of other records, and where a fit does not end.
+    /// that what is wrong with that is in both. `None` of even records and more uneven ones, and where a fit does not end.
     ///
     /// # Errors
     /// Those of [`WhitenedFit::find`].
     pub fn moved_by_straight_lines(&self) -> Result<Option<[f64; 2]>, EstimateError> {
         let readings = self.readings();
         let period_s = readings.mean_step_s();
-        let uneven = |step_s: &f64| (step_s / period_s - 1.0).powi(2);
-        let steps = || {
-            readings.segments().iter().filter_map(|segment| match segment.steps() {
-                Steps::Uneven(steps_s) => Some(steps_s),
-                Steps::Even(_) => None,
-            })
-        };
-        let count: usize = steps().map(Vec::len).sum();
-        let jitter = (steps().flatten().map(uneven).sum::<f64>() / count as f64).sqrt();
-        if self.task.hold != Discretisation::ZeroOrderHold || !(jitter <= MAX_JITTER) {
+        let mut squares = Vec::new();
+        for segment in readings.segments() {
+            let Steps::Uneven(steps_s) = segment.steps() else { return Ok(None) };
+            squares.extend(steps_s.iter().map(|step_s| (step_s / period_s - 1.0).powi(2)));
+        }
+        let jitter = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        if self.task.hold != Discretisation::ZeroOrderHold || jitter > MAX_JITTER {
             return Ok(None);
         }
         let even =

@@ -111,7 +111,7 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
 }
 
 impl Table {
-    /// The selection with what it leaves open: the columns that are guessed. Each is named as in the header, or numbered where its name
+    /// The selection with what it leaves open: the columns that are guessed, and the unit of time that no header states. Each column is named as in the header, or numbered where its name
     /// is empty or that of another column too.
     ///
     /// # Errors

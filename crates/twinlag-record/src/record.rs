@@ -246,7 +246,8 @@ impl Record {
     /// # Errors
     /// [`RecordError::LengthMismatch`], [`RecordError::MissingTime`],
     /// [`RecordError::TimeNotIncreasing`], [`RecordError::OutOfRange`], [`RecordError::NoValues`],
-    /// [`RecordError::TooShort`], [`RecordError::Constant`], [`RecordError::Identical`].
+    /// [`RecordError::TooShort`], [`RecordError::Constant`], [`RecordError::Identical`], [`RecordError::NoPeriod`],
+    /// [`RecordError::Bursts`].
     pub fn from_channels(channels: Channels, sampling: SamplingChoice) -> Result<Self, RecordError> {
         let file = channels.source.clone();
         let names = [&channels.names[0], &channels.names[1], "reference"].map(str::to_owned);

@@ -92,7 +92,8 @@ pub struct Selection {
     /// The time column.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<ColumnRef>,
-    /// The unit of a time column of numbers, [`Unit::Time`]; it goes before the one in the header.
+    /// The unit of a time column of numbers, [`Unit::Time`], which goes before the one in the header; of a clock with two parts, `10:30`, that
+    /// of the first.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "write_unit", deserialize_with = "read_unit")]
     #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub time_unit: Option<Unit>,

@@ -5,6 +5,7 @@
   let files = [];                       // name and bytes of each
   let chosen = {};                      // what the user has said of columns and time; the rest is guessed
   let grouping = {};                    // and of groups of channels: a group's name, or that they are joined
+  let groups;                           // of the first file, once they are read
   let generation = 0;                   // a reply to an older question is out of date
   let worker, started, isWorking = false;
   const waiting = new Map();            // requests that are not answered, by number
@@ -90,13 +91,19 @@
       const read = await Promise.all(taken.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
       if (mine !== generation) return;
       files = read;
-      chosen = {};
+      forget();
       grouping = {};
-      for (const id of ["known", "period", "time-unit"]) byId(id).value = "";
+      groups = undefined;
+      byId("known").value = "";
       await readFiles();
     } catch (error) {
       if (mine === generation) warn(`What was dropped cannot be read (${error.message}): drop files, not folders.`);
     }
+  }
+
+  function forget() {
+    chosen = {};
+    for (const id of ["period", "time-unit"]) byId(id).value = "";
   }
 
   // Reads all files anew, with what is chosen.
@@ -108,7 +115,8 @@
     say("");
     try {
       await started;
-      const { groups, found } = await ask("read", { files, selection: JSON.stringify(chosen), join: false, ...grouping });
+      groups ??= await ask("groups", { file: files[0] });
+      const found = await ask("read", { files, selection: JSON.stringify(chosen), join: false, ...grouping });
       if (mine !== generation) return;
       byId("read").replaceChildren(...found.map(about));
       offer(groups);
@@ -304,8 +312,8 @@
     byId(role).addEventListener("change", ({ target }) => choose(role, target.value ? JSON.parse(target.value) : undefined));
   byId("group").addEventListener("change", ({ target }) => {
     grouping = JSON.parse(target.value);
-    // Another group has columns of its own.
-    Object.keys(columnRoles).forEach((role) => delete chosen[role]);
+    // Another group has columns and a clock of its own.
+    forget();
     readFiles();
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));

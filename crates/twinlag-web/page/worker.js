@@ -24,16 +24,14 @@ const answers = {
     page = new wasm_bindgen.Page();
   },
   example: () => wasm_bindgen.Page.example(),
-  // A new session with these files; the groups of the first, and what is in each of them.
+  groups: ({ file: { name, bytes } }) =>
+    orRefusal(() => JSON.parse(wasm_bindgen.Page.groups(name, new Uint8Array(bytes))), () => []),
+  // A new session with these files; what is in each of them.
   read: ({ files, selection, group, join }) => {
     page.free();
     page = new wasm_bindgen.Page();
     const read = ({ name, bytes }) => ({ name, inspection: JSON.parse(page.add(name, new Uint8Array(bytes), selection, group, join)) });
-    const groups = ({ name, bytes }) => JSON.parse(wasm_bindgen.Page.groups(name, new Uint8Array(bytes)));
-    return {
-      groups: orRefusal(() => groups(files[0]), () => []),
-      found: files.map((file) => orRefusal(() => read(file), (problem) => ({ name: file.name, problem }))),
-    };
+    return files.map((file) => orRefusal(() => read(file), (problem) => ({ name: file.name, problem })));
   },
   diagnose: ({ options, madeAt }) => ({
     json: page.diagnose(options), report: page.report(madeAt), model: page.model(),

@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let (table, selection) = (Table::read(start.as_bytes(), "the logger")?, Selection::default());
     let record = Record::from_table(&table, &selection)?;
-    let reader = RowReader::after(&table, &selection)?;
+    let mut reader = RowReader::after(&table, &selection)?;
     let mut live = Live::start(&record, &LiveOptions::default())?;
     for k in 0..record.len() {
         live.push(Some(record.time_s[k]), [Some(record.t1_c[k]), Some(record.t2_c[k])]);

@@ -241,8 +241,8 @@ pub struct Characterisation {
     pub optimiser: String,
     /// How the gas was assumed to move between samples.
     pub hold: String,
-    /// How much each time constant moves, relative, if the gas is taken to do the other thing
-    /// between samples; `None` where this was not tried.
+    /// How much each time constant moves, relative, if the gas is taken to do the other thing between samples: with uneven samples, to go
+    /// in straight lines; `None` where this was not tried.
     pub hold_sensitivity: Option<[f64; 2]>,
     /// Sensors 1 and 2.
     pub sensors: [SensorEstimate; 2],

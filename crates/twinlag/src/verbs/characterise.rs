@@ -294,21 +294,22 @@ impl Asked<'_> {
         Ok(fit.residual_tests(theta, is_minimum)?)
     }
 
-    /// How much each time constant would move with the other hold, relative; where the hold is to be found, and the other one is
-    /// clearly the more probable, `fit` is the estimate with that.
+    /// How much each time constant would move with the other hold, relative: of even samples straight lines or none, of uneven ones what
+    /// stands for straight lines. Where the hold of even samples is to be found, and the other one is clearly the more probable, `fit` is the
+    /// estimate with that.
     fn settle_hold<const P: usize>(&self, fit: &mut WhitenedFit<'_, P>) -> Result<Option<[f64; 2]>, Error> {
         if self.options.estimator != Estimator::Whitened {
             return Ok(None);
+        }
+        let is_even = fit.readings().even_period_s().is_some();
+        if !is_even && let Some(moved) = fit.moved_by_straight_lines()? {
+            return Ok(fit.fit().end.is_usable().then_some(moved));
         }
         let hold = fit.other_hold();
         let other = fit.with_hold(hold)?;
         let is_usable = other.fit().end.is_usable();
         let both_usable = is_usable && fit.fit().end.is_usable();
         let mut moved = [0, 1].map(|i| other.theta()[i] / fit.theta()[i] - 1.0);
-        let is_even = fit.readings().even_period_s().is_some();
-        if !is_even && let Some(straight) = fit.moved_by_straight_lines()? {
-            moved = straight;
-        }
         let is_more_probable = other.probability_beside(fit) > CLEAR_PROBABILITY;
         let alone_is_accepted = || -> Result<bool, Error> {
             let rejected =
