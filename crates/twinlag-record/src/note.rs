@@ -243,6 +243,31 @@ pub enum Note {
 }
 
 impl Note {
+    /// Writes a note on clocks.
+    fn write_clock(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
+            Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
+            Self::ClocksDiffer { column, passed_s, other, other_s } => {
+                let [passed_s, other_s] = [passed_s, other_s].map(|s| three(*s));
+                write!(
+                    f,
+                    "from the first row to the last {passed_s} s pass by column {column}, which is the time, and {other_s} s by "
+                )?;
+                write!(f, "column {other}")
+            }
+            Self::DateOrder { column, is_day_first } => {
+                let first = if *is_day_first { "day" } else { "month" };
+                write!(f, "dates of column {column} have the {first} first, since rows follow each other closely then")
+            }
+            Self::Wrapped { column, bits, times } => {
+                let times = Counted(*times, "time");
+                write!(f, "column {column} is a counter of {bits} bits, which begins anew {times} and was counted on")
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// What was made of units; nothing for any other note.
     fn write_units(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -298,23 +323,8 @@ impl fmt::Display for Note {
             Self::Read { how } => write!(f, "{how}"),
             Self::Guessed { role, column } => write!(f, "{role} guessed to be column {column}"),
             Self::DateAndTime { date, time } => write!(f, "time put together from columns {date} and {time}"),
-            Self::Midnight { times: 1 } => write!(f, "time of day passed midnight once and was continued"),
-            Self::Midnight { times } => write!(f, "time of day passed midnight {times} times and was continued"),
-            Self::ClocksDiffer { column, passed_s, other, other_s } => {
-                let [passed_s, other_s] = [passed_s, other_s].map(|s| three(*s));
-                write!(
-                    f,
-                    "from the first row to the last {passed_s} s pass by column {column}, which is the time, and {other_s} s by "
-                )?;
-                write!(f, "column {other}")
-            }
-            Self::DateOrder { column, is_day_first } => {
-                let first = if *is_day_first { "day" } else { "month" };
-                write!(f, "dates of column {column} have the {first} first, since rows follow each other closely then")
-            }
-            Self::Wrapped { column, bits, times } => {
-                let times = Counted(*times, "time");
-                write!(f, "column {column} is a counter of {bits} bits, which begins anew {times} and was counted on")
+            Self::Midnight { .. } | Self::DateOrder { .. } | Self::Wrapped { .. } | Self::ClocksDiffer { .. } => {
+                self.write_clock(f)
             }
             Self::PeriodGiven { period_s, is_of_file } => {
                 let by = if *is_of_file { "as its header says" } else { "as given" };

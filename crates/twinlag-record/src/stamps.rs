@@ -91,18 +91,17 @@ impl Instants {
         let mut before_ns: Option<i128> = None;
         for (row, stamp) in stamps.iter().enumerate() {
             let mut time_ns = i128::from(stamp.time_ns.unwrap_or(0));
-            let day = match stamp.day {
-                Some(day) => day_in(day, order).ok_or(row)?,
-                None => {
-                    // Back by more than half a day: past midnight. By less: a mistake, found when the order is checked.
-                    time_ns += instants.midnights as i128 * DAY_NS;
-                    if before_ns.is_some_and(|before_ns| time_ns < before_ns - DAY_NS / 2) {
-                        instants.midnights += 1;
-                        time_ns += DAY_NS;
-                    }
-                    before_ns = Some(time_ns);
-                    0
+            let day = if let Some(day) = stamp.day {
+                day_in(day, order).ok_or(row)?
+            } else {
+                // Back by more than half a day: past midnight. By less: a mistake, found when the order is checked.
+                time_ns += instants.midnights as i128 * DAY_NS;
+                if before_ns.is_some_and(|before_ns| time_ns < before_ns - DAY_NS / 2) {
+                    instants.midnights += 1;
+                    time_ns += DAY_NS;
                 }
+                before_ns = Some(time_ns);
+                0
             };
             let offset_ns = i128::from(stamp.offset_s.unwrap_or(0)) * 1_000_000_000;
             instants.nanos.push(i128::from(day) * DAY_NS + time_ns - offset_ns);

@@ -306,10 +306,11 @@ fn stamps_that_repeat_leave_the_time_to_the_column_with_a_unit() {
 #[test]
 fn a_clock_that_differs_otherwise_than_by_a_unit_refuses_nothing() {
     let beside = |header: &str, cell: &dyn Fn(f64) -> String| {
-        let text: String = (0..200)
+        let text = (0..200)
             .map(|k| f64::from(k) * 0.5)
             .map(|t| format!("{t},{},{:.3},{:.3}\n", cell(t), 20.0 + (0.3 * t).sin(), 20.0 + (0.3 * t - 0.2).sin()))
-            .collect();
+            .collect::<Vec<_>>()
+            .concat();
         record(&format!("{header},T1,T2\n{text}"))
     };
     for (header, cell) in [
@@ -347,7 +348,7 @@ fn another_quantity_is_no_clock() {
 #[test]
 fn half_days_and_zones_show_hours() {
     for end in [" AM", "Z", "+01:00"] {
-        let got = record(&rows("time,T1,T2", |k, _, a, b| format!("9:{:02}{end},{a},{b}", k)));
+        let got = record(&rows("time,T1,T2", |k, _, a, b| format!("9:{k:02}{end},{a},{b}")));
         assert!((got.time_s[1] - 60.0).abs() < 1e-9, "{end}");
     }
 }

@@ -117,7 +117,7 @@ fn times_of_arrival_in_bursts_are_refused() {
         format!("12:{:02}:{:02}.{:03} -> {a:.3},{b:.3}\n", k / 600, k / 10 % 60, 3 * (k % 10))
     };
     // Some lines are lost, one of the first burst.
-    let text: String = (0..400).filter(|k| ![3, 12, 207, 344].contains(k)).map(row).collect();
+    let text = (0..400).filter(|k| ![3, 12, 207, 344].contains(k)).map(row).collect::<Vec<_>>().concat();
     assert_says(&refusal(&text), &["bursts of 10", "sample period, 0.1 s on average", "as they stand"]);
     let stamped = Selection { sampling: SamplingChoice::AsStamped, ..Selection::default() };
     assert_eq!(record_with(text.as_bytes(), &stamped).expect("it is said").segments.len(), 40);
@@ -126,24 +126,26 @@ fn times_of_arrival_in_bursts_are_refused() {
 /// Failed: a logger of 1 Hz that loses a row a minute was said to send bursts of 59.
 #[test]
 fn a_lost_row_now_and_then_makes_no_burst() {
-    let text: String = (0..1200)
+    let text = (0..1200)
         .filter(|k| k % 60 != 17)
-        .map(|k| f64::from(k))
+        .map(f64::from)
         .map(|t| format!("{t},{:.3},{:.3}\n", (0.1 * t).sin(), (0.1 * t - 0.2).sin()))
-        .collect();
+        .collect::<Vec<_>>()
+        .concat();
     assert!((record(&format!("time_s,T1,T2\n{text}")).sampling.period_s - 1.0).abs() < 1e-9);
 }
 
 /// Failed: one reading of a broken wire, and humidity was a sensor.
 #[test]
 fn a_broken_reading_does_not_make_two_other_columns_the_sensors() {
-    let text: String = (0..40)
+    let text = (0..40)
         .map(|k| {
             let t = f64::from(k) * 0.5;
             let first = if k == 7 { 32_767.0 } else { 20.0 + t.sin() };
             format!("{t},{first:.3},{:.3},{:.3}\n", 20.0 + (t - 0.3).sin(), 40.0 + (0.1 * t).cos())
         })
-        .collect();
+        .collect::<Vec<_>>()
+        .concat();
     assert_says(&refusal(&text), &["3 columns without names may be sensors"]);
 }
 
