@@ -115,7 +115,9 @@
     say("");
     try {
       await started;
-      groups ??= await ask("groups", { file: files[0] });
+      const known = groups ?? await ask("groups", { file: files[0] });
+      if (mine !== generation) return;
+      groups = known;
       const found = await ask("read", { files, selection: JSON.stringify(chosen), join: false, ...grouping });
       if (mine !== generation) return;
       byId("read").replaceChildren(...found.map(about));
