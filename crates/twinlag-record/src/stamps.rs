@@ -85,7 +85,7 @@ struct Instants {
 }
 
 impl Instants {
-    /// The error is the row of a date that is none in this order.
+    /// The error is the row of a date that does not exist in this order.
     fn of(stamps: &[Stamp], order: Order) -> Result<Self, usize> {
         let mut instants = Self { nanos: Vec::with_capacity(stamps.len()), midnights: 0 };
         let mut before_ns: Option<i128> = None;
