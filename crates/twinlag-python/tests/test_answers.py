@@ -115,6 +115,12 @@ def test_tracks_and_live(rig) -> None:
     assert all(row.gas_std_k > 0 for row in rows) and rows[10].time_s == rig.time_s[10]
     assert live.push(450.0, float("nan")) is not None
     assert live.push(450.0, 450.0, time_s=-1.0) is None
+    for t1, time_s in [(1e9, None), (-500.0, None), (float("inf"), None), (450.0, float("nan"))]:
+        with pytest.raises(tl.RecordError, match="absolute zero|an instant"):
+            live.push(t1, 450.0, time_s)
+    assert live.push(450.0, 450.0).gas_std_k < 100.0
+    with pytest.raises(ValueError, match="change_per_root_s"):
+        tl.Live(rig, change_per_root_s=-1.0)
     with pytest.raises(tl.RecordError):
         tl.Live(tl.simulate(tl.EXAMPLE_RIG.replace("samples = 2500", "samples = 30")))
 

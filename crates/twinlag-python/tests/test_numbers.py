@@ -68,8 +68,16 @@ def test_options_that_cannot_be_are_refused(rig: tl.Record) -> None:
         tl.characterise(rig, free=["slope"])
     with pytest.raises(ValueError, match="estimator|variant"):
         tl.characterise(rig, estimator="oracle")
-    with pytest.raises(TypeError):
-        tl.characterise(rig, nonsense=1)
+    with pytest.raises(TypeError, match="no option 'nkown'; did you mean 'known'?"):
+        tl.characterise(rig, nkown=1)
+    for wrong in [{1: 0.05}, ["T1"], {"T1": True}]:
+        with pytest.raises(TypeError, match="known"):
+            tl.characterise(rig, known=wrong)
+    for levels in [0.05, (0.1, 0.1, 0.1)]:
+        with pytest.raises(ValueError, match="levels of both sensors"):
+            tl.characterise(rig, noise_std_k=levels)
+    with pytest.raises(ValueError, match="one of them twice"):
+        tl.characterise([rig, rig])
     with pytest.raises(TypeError, match="twinlag.Record"):
         tl.characterise([1, 2, 3])
     with pytest.raises(ValueError, match="effect|variant|expected"):

@@ -112,6 +112,17 @@ def test_frames(arrays) -> None:
     assert tl.Record.from_frame(plain, t1="c", t2="a").channels == ("c", "a")
     with pytest.raises(tl.RecordError, match="which columns are the two sensors"):
         tl.Record.from_frame(plain)
+    # Units in a level of their own: failed, 273.15 K too high.
+    levels = pd.DataFrame({("time", "ms"): 1e3 * time_s, ("fine", "K"): t1 + 273.15, ("coarse", "K"): t2 + 273.15})
+    record = tl.Record.from_frame(levels)
+    assert record.channels == ("fine", "coarse") and np.max(np.abs(record.t1_c - t1)) < 1e-9
+    assert record.sample_period_s == pytest.approx(0.002, rel=1e-9)
+    whole = pd.DataFrame({"time": 2 * np.arange(len(t1)), "fine": t1, "coarse": t2})
+    with pytest.raises(tl.RecordError, match="names no unit of time"):
+        tl.Record.from_frame(whole)
+    assert tl.Record.from_frame(whole, time_unit="ms").sample_period_s == pytest.approx(0.002, rel=1e-9)
+    with pytest.raises(tl.RecordError, match="twice"):
+        tl.Record(time_s, t1, t2, names=("a", "a"))
     back = tl.Record.from_frame(plain, t1="a", t2="b").to_frame()
     assert np.array_equal(back["a"], t1) and np.array_equal(back.index, time_s)
 

@@ -7,11 +7,24 @@ from typing import Any, NamedTuple
 
 from twinlag import _core
 from twinlag._answers import Characterisation
+from twinlag._errors import RecordError
 from twinlag._model import Model
 from twinlag._record import Record
 from twinlag._verbs import _asked, _fields, _one, _options
 
 Band = tuple[float, float]
+
+_RANGE_C = (-273.15, 5000.0)
+"""Between absolute zero and what no sensor survives, as of a record."""
+
+
+def _reading(value: float | None, name: str) -> float | None:
+    if value is None or math.isnan(value):
+        return None
+    low, high = _RANGE_C
+    if not low <= value <= high:
+        raise RecordError(f"{name}: {value!r} °C is not between absolute zero and {high:g} °C; leave such a reading out as None")
+    return float(value)
 
 
 class LiveAnswer(NamedTuple):
@@ -72,6 +85,8 @@ class Live:
         change_per_root_s: float | None = None,
         **options: Any,
     ) -> None:
+        if change_per_root_s is not None and not change_per_root_s >= 0:
+            raise ValueError(f"change_per_root_s: expected a share of zero or more, got {change_per_root_s!r}")
         its_options = _options(_one(start).channels, **options)
         asked = _asked(its_options, model=_fields(model), change_per_root_s=change_per_root_s)
         self._inner = _core.Live(start._inner, asked)
@@ -82,13 +97,27 @@ class Live:
         return Characterisation._of(self._inner.start)  # type: ignore[no-any-return]
 
     def push(self, t1_c: float | None, t2_c: float | None, time_s: float | None = None) -> LiveAnswer | None:
-        """Take a row; a reading that is ``None`` or NaN is missing.
+        """Take a row.
+
+        Parameters
+        ----------
+        t1_c, t2_c : float or None
+            Readings, °C; one that is ``None`` or NaN is missing.
+        time_s : float, optional
+            The instant, s, on the clock of the start; one period after the last row if left out.
 
         Returns
         -------
         LiveAnswer or None
             ``None`` of a row that is not later than the last one, which is left out.
+
+        Raises
+        ------
+        RecordError
+            A reading that is no temperature, or an instant that is none. The row is left out; those after it can still be taken.
         """
-        first, second = (None if c is None or math.isnan(c) else float(c) for c in (t1_c, t2_c))
+        if time_s is not None and not math.isfinite(time_s):
+            raise RecordError(f"time_s: expected an instant, got {time_s!r}")
+        first, second = (_reading(c, name) for c, name in ((t1_c, "t1_c"), (t2_c, "t2_c")))
         now = self._inner.push(first, second, time_s)
         return None if now is None else LiveAnswer(*now)

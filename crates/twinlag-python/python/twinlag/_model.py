@@ -53,7 +53,10 @@ def load_model(path: str | os.PathLike[str]) -> Model:
         It is no such file.
     """
     with open(path, encoding="utf-8") as file:
-        fields = json.load(file)
+        try:
+            fields = json.load(file)
+        except ValueError:
+            fields = None
     if not isinstance(fields, dict) or not str(fields.get("schema", "")).startswith("twinlag.model/"):
         raise ValueError(f"{os.fspath(path)}: expected a model written by `twinlag diagnose --save` or Model.save")
     return Model(fields)

@@ -75,6 +75,8 @@ class Record:
         source: str = "arrays",
     ) -> None:
         first, second = names
+        if first == second:
+            raise RecordError(f"names: expected two names, got {first!r} twice")
         columns: list[Column] = [(first, unit, numbers(t1, first)), (second, unit, numbers(t2, second))]
         selection: dict[str, Any] = {"t1": 1, "t2": 2}
         others = [("reference", reference, unit), ("flow", flow, ""), ("position", position, "m")]
@@ -109,13 +111,32 @@ class Record:
         flow: str | int | None = None,
         position: str | int | None = None,
         period_s: float | None = None,
+        time_unit: str | None = None,
         source: str = "frame",
     ) -> Record:
         """A record of a data frame: pandas, polars, or an xarray dataset of one dimension.
 
         Columns are chosen by name, or by number from 1; those that are left out are guessed from names and units, as of a file, and
-        `notes` says how. An index with a name, and one of instants, is a column; a unit may stand in a name, ``T1 [K]``, or in the
-        attribute ``units`` of a variable of xarray.
+        `notes` says how. An index with a name, and one of instants, is a column; a unit may stand in a name, ``T1 [K]``, in a level of
+        its own below the names, ``("T1", "K")``, or in the attribute ``units`` of a variable of xarray.
+
+        Parameters
+        ----------
+        frame : DataFrame or Dataset
+            The columns, ``(n,)`` each.
+        time, t1, t2, reference, flow, position : str or int, optional
+            Columns by name, or by number from 1. The last three are never guessed.
+        period_s : float, optional
+            Time from row to row, s, in place of a column.
+        time_unit : str, optional
+            Unit of a time column of numbers; it goes before the one in its name.
+        source : str
+            What it is called in messages.
+
+        Raises
+        ------
+        RecordError
+            It cannot be used: what was expected, what came, what to do.
 
         Examples
         --------
@@ -128,8 +149,7 @@ class Record:
         columns = _columns_of(frame)
         chosen = {"time": time, "t1": t1, "t2": t2, "reference": reference, "flow": flow, "position": position}
         selection: dict[str, Any] = {name: column for name, column in chosen.items() if column is not None}
-        if period_s is not None:
-            selection["period_s"] = period_s
+        selection.update({name: value for name, value in {"period_s": period_s, "time_unit": time_unit}.items() if value is not None})
         return cls._of(_core.Record.from_columns(source, columns, json.dumps(selection)))
 
     @property
@@ -273,8 +293,13 @@ def _columns_of(frame: Any) -> list[Column]:
         is_of_time = getattr(getattr(index, "dtype", None), "kind", "") in "mM" or getattr(index, "tz", None) is not None
         if index.name is not None or is_of_time:
             columns.append(_column(index.name if index.name is not None else "time", "", index))
-    columns.extend(_column(name, "", frame[name]) for name in frame.columns)
+    columns.extend(_column(_name(name), "", frame[name]) for name in frame.columns)
     return columns
+
+
+def _name(name: Any) -> str:
+    """A name of one level, or of several: a unit is the last word of both."""
+    return " ".join(str(part) for part in name if str(part)) if isinstance(name, tuple) else str(name)
 
 
 def _columns_of_dataset(dataset: Any) -> list[Column]:

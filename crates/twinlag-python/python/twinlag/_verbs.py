@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import inspect
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,7 +20,24 @@ Value = float | str | tuple[float, float]
 """What is known of a number: the number, the number with its standard deviation, or text with units."""
 
 
-def _options(
+def _options(channels: tuple[str, str], **given: Any) -> dict[str, Any]:
+    """The options in the form of the library.
+
+    Raises
+    ------
+    TypeError
+        One of them is called otherwise.
+    """
+    allowed = inspect.signature(_options_named).parameters
+    for name in given:
+        if name not in allowed:
+            near = difflib.get_close_matches(name, allowed, n=1)
+            meant = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(list(allowed)[1:])}"
+            raise TypeError(f"no option {name!r}; {meant}")
+    return _options_named(channels, **given)
+
+
+def _options_named(
     channels: tuple[str, str],
     *,
     known: Mapping[str, Value] | None = None,
@@ -44,11 +63,13 @@ def _options(
         "free_gain": "gain" in free,
         "free_offset": "offset" in free,
         "second_order": [place in {sensors[name] for name in second_order} for place in (0, 1)],
-        "known": [_known(name, value, channels) for name, value in (known or {}).items()],
+        "known": [_known(name, value, channels) for name, value in _mapping(known).items()],
         "quiet_segments_s": [[float(start), float(end)] for start, end in quiet_s],
         "best_effort": bool(best_effort),
     }
     if noise_std_k is not None:
+        if not isinstance(noise_std_k, (tuple, list)) and not hasattr(noise_std_k, "__len__") or len(noise_std_k) != 2:
+            raise ValueError(f"noise_std_k: expected the levels of both sensors, K, got {noise_std_k!r}")
         options["noise_std_k"] = [float(level) for level in noise_std_k]
     given = {
         "noise_ratio": noise_ratio,
@@ -78,11 +99,21 @@ def _expect(names: tuple[str, ...], allowed: tuple[str, ...], argument: str) -> 
             raise ValueError(f"{argument}: expected {' or '.join(dict.fromkeys(allowed))}, got {name!r}")
 
 
+def _mapping(known: Any) -> Mapping[str, Value]:
+    if known is None:
+        return {}
+    if not isinstance(known, Mapping) or not all(isinstance(name, str) for name in known):
+        raise TypeError(f"known: expected a mapping of names of sensors or parameters, got {known!r}")
+    return known
+
+
 def _known(name: str, value: Value, channels: tuple[str, str]) -> str:
     """A known value as text: `T1.time_constant_s=0.5+-0.05`."""
     for channel, number in zip(channels, ("T1", "T2")):
         if name == channel or name.startswith(channel + "."):
             name = number + name[len(channel) :]
+    if isinstance(value, bool):
+        raise TypeError(f"known: expected a number for {name!r}, got {value!r}")
     if isinstance(value, str):
         return f"{name}={value}"
     if isinstance(value, (tuple, list)):
@@ -95,6 +126,8 @@ def _records(record: Record | Iterable[Record]) -> list[Record]:
     records = [record] if isinstance(record, Record) else list(record)
     if not records or not all(isinstance(record, Record) for record in records):
         raise TypeError("expected a twinlag.Record, or several of one rig; make one by twinlag.read or twinlag.Record")
+    if len({id(record) for record in records}) < len(records):
+        raise ValueError("expected several records, got one of them twice: it would count as independent of itself")
     return records
 
 
@@ -231,6 +264,12 @@ def compensate(
         The sensor that is taken to be right where gain, offset or delay differ.
     without, known, noise_std_k, noise_ratio, quiet_s, best_effort, progress
         As of `diagnose`.
+
+    Returns
+    -------
+    Compensation
+        ``gas_c``, °C, and ``gas_std_k``, K, at each instant of ``time_s``, s from the first row. Rows in long gaps have no gas
+        temperature and no instant there; where none can be given, all three are empty, and ``because`` says why.
 
     Examples
     --------
