@@ -375,8 +375,8 @@ pub(crate) struct Columns {
     /// Time column: its name, or its number counted from 1.
     #[arg(long, value_name = "COL")]
     time: Option<ColumnRef>,
-    /// Unit of a time column of numbers, in place of the one in its header: s, ms, us, ns, min, h or d. Of a clock with two parts, as 10:30, that
-    /// of the first: h or min.
+    /// Unit of a time column of numbers, in place of the one in its header: s, ms, us, ns, min, h or d. Of a clock with two parts, as
+    /// 10:30, that of the first: h or min.
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
     time_unit: Option<Unit>,
     /// First sensor: column name, or number counted from 1.

@@ -59,9 +59,11 @@ impl Shown {
     }
 }
 
-/// Whether a column of numbers is called a time, and by its unit no duration of something: neither `exposure_ms` nor `U_m_s`.
+/// Whether a column of numbers is called a time, as `elapsed_s`, `ms` and `days since start`: a duration of something, as `exposure_ms`, is no
+/// clock, nor is `U_m_s`.
 fn is_clock(column: &Column) -> bool {
-    let is_called = is_time_by_name(column) || Unit::of_time_named(column.name()).is_some();
+    let name = column.name();
+    let is_called = is_time_by_name(column) || Unit::parse(name).is_time() || name.contains(" since ");
     is_called && !is_called_temperature(column) && !is_index(column) && !is_velocity(column)
 }
 

@@ -111,8 +111,8 @@ pub(crate) fn choose(table: &Table, selection: &Selection, notes: &mut Vec<Note>
 }
 
 impl Table {
-    /// The selection with what it leaves open: the columns that are guessed, and the unit of time that no header states. Each column is named as in the header, or numbered where its name
-    /// is empty or that of another column too.
+    /// The selection with what it leaves open: the columns that are guessed, and the unit of time that no header states. Each column is
+    /// named as in the header, or numbered where its name is empty or that of another column too.
     ///
     /// # Errors
     /// As [`crate::Record::from_table`] on columns that cannot be identified.

@@ -17,8 +17,8 @@ use crate::{Place, RecordError};
 /// One row.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Time since the first row of the table, s, counted on where a counter of 16 or 32 bits begins anew; `None` where the time column holds no plain
-    /// numbers, or there is none.
+    /// Time since the first row of the table, s, counted on where a counter of 16 or 32 bits begins anew; `None` where the time column
+    /// holds no plain numbers, or there is none.
     pub time_s: Option<f64>,
     /// Both temperatures, °C; `None` for one that is missing.
     pub reading_c: [Option<f64>; 2],

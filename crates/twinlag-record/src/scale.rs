@@ -1,10 +1,10 @@
 //! In which unit a column of time counts, where its header names none.
 //!
-//! A factor of 1000 in time is a factor of 1000 in every time constant, so that nothing is assumed where it may be wrong. Recognised are, by
-//! size *and* step, instants of today in seconds, milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and
-//! MATLAB count them. Other numbers are seconds where they rise by less than one: neither milliseconds nor rows are counted in fractions.
-//! Steps of one and more may be those of rows, milliseconds, minutes or seconds, and steps that are no decimals in seconds but whole seconds
-//! in minutes, hours or days may be these: such a column is refused.
+//! A factor of 1000 in time is a factor of 1000 in every time constant. Recognised are, by size *and* step, instants of today in seconds,
+//! milliseconds, microseconds or nanoseconds since 1970, and serial days as spreadsheets and MATLAB count them. Other numbers are taken for
+//! seconds where they rise by less than one: rows and milliseconds are hardly ever counted in fractions. Steps of one and more may be those
+//! of rows, milliseconds, minutes or seconds, and steps that are no decimals in seconds but a usual period in minutes, hours or days may be
+//! these: such a column is refused. What stays a guess are steps such as 0.5, which may be half minutes.
 
 use crate::sampling::{self, Clock};
 use crate::selection::SamplingChoice;
@@ -264,6 +264,10 @@ mod tests {
             (0.0, 10.0, "?"),
             (123.0, 2.0, "?"),
             (0.0, 60.0, "?"),
+            (0.0, 75.0, "?"),
+            (0.0, 90.0, "?"),
+            (0.0, 120.0, "?"),
+            (0.0, DAY_S, "?"),
             (0.0, 500.0, "?"),
             (0.0, 1e6, "?"),
             (0.0, 16.67, "?"),

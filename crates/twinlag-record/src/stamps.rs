@@ -182,9 +182,13 @@ pub(crate) fn settle_short(
     stamps: &mut [Stamp],
     chosen: Option<&Unit>,
 ) -> Result<(), RecordError> {
-    let (file, column) = (table.source().to_owned(), table.title(index));
+    let of_column = || (table.source().to_owned(), table.title(index));
+    let needs_no_unit = || {
+        let (file, column) = of_column();
+        Err(RecordError::NeedsNoUnit { file, column })
+    };
     let Some(first) = stamps.iter().position(|stamp| stamp.is_short && stamp.day.is_none()) else {
-        return if chosen.is_none() { Ok(()) } else { Err(RecordError::NeedsNoUnit { file, column }) };
+        return if chosen.is_none() { Ok(()) } else { needs_no_unit() };
     };
     let name = table.columns()[index].name().to_lowercase();
     let are_all_short = stamps.iter().all(|stamp| stamp.is_short);
@@ -194,11 +198,12 @@ pub(crate) fn settle_short(
     let are_minutes = match chosen {
         Some(Unit::Time { symbol: "min", .. }) => true,
         Some(Unit::Time { symbol: "h", .. }) => false,
-        Some(_) => return Err(RecordError::NeedsNoUnit { file, column }),
+        Some(_) => return needs_no_unit(),
         None if name.contains("mm:ss") && !name.contains("h:mm") => true,
         None if name.contains("hh:mm") && !name.contains("mm:ss") => false,
         None if !are_all_short => !rises(stamps),
         None => {
+            let (file, column) = of_column();
             let cell = table.columns()[index].text(first).unwrap_or("").to_owned();
             return Err(RecordError::ClockUnclear { file, column, cell });
         }

@@ -2,11 +2,12 @@
 
 use std::borrow::Cow;
 
+use crate::sampling;
+
 /// Bits of such a counter: `millis()` and `micros()` have 32, short ones 16.
 const BITS: [u32; 2] = [32, 16];
 /// How many of its usual steps a counter may go on by where it begins anew: a row or two may be lost.
 const MAX_STEPS: f64 = 5.0;
-
 /// How much of its range a counter may go on by where it begins anew: one that is read so seldom shows nothing.
 const MAX_SHARE: f64 = 0.125;
 
@@ -80,7 +81,7 @@ impl CountingOn {
 /// The longest step on of a counter that is read as often as these.
 fn longest_step(values: &[f64]) -> f64 {
     let rises: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).filter(|rise| *rise > 0.0).collect();
-    if rises.is_empty() { 0.0 } else { MAX_STEPS * crate::sampling::median(&rises) }
+    if rises.is_empty() { 0.0 } else { MAX_STEPS * sampling::median(&rises) }
 }
 
 /// Whether a counter that begins anew at `turn` goes on from one number to the next.

@@ -1049,4 +1049,9 @@ fn time_in_milliseconds_since_1970_is_recognised_and_a_counter_is_refused() {
         &[&FILE[..], &["--time-unit", "K"]].concat(),
         &["--time-unit", "expected s, ms, us, ns, min, h or d"],
     );
+    // 100 s in seconds, 0.1 s in milliseconds and 0.1 ms in microseconds.
+    let slow = with_times("counter_slow", |s| format!("{}", (5e4 * s).round()));
+    slow.refuses(3, &FILE, &["column 1 'time' names no unit of time", "steps of 100 do not show", "'time [ms]'", unit]);
+    let unclear = with_times("unclear_time", |s| format!("{}", (5e8 * s).round()));
+    unclear.refuses(3, &FILE, &["column 1 'time' names no unit of time", "steps of 1000000", unit]);
 }

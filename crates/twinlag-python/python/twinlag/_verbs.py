@@ -68,7 +68,7 @@ def _options_named(
         "best_effort": bool(best_effort),
     }
     if noise_std_k is not None:
-        if not isinstance(noise_std_k, (tuple, list)) and not hasattr(noise_std_k, "__len__") or len(noise_std_k) != 2:
+        if not hasattr(noise_std_k, "__len__") or len(noise_std_k) != 2:
             raise ValueError(f"noise_std_k: expected the levels of both sensors, K, got {noise_std_k!r}")
         options["noise_std_k"] = [float(level) for level in noise_std_k]
     given = {

@@ -321,6 +321,7 @@ fn a_clock_that_differs_otherwise_than_by_a_unit_refuses_nothing() {
         ("time_s,runtime_min", &|t| (t / 60.0).floor().to_string()),
         ("time_s,on_time_h", &|t| ((t / 360.0).floor() / 10.0).to_string()),
         ("time_s,exposure_ms", &|t| (5.0 + t / 40.0).to_string()),
+        ("time_s,exposure_ms", &|t| (5.0 + t).to_string()),
         ("time_s,heater_on_s", &|t| (t / 3.0).to_string()),
         ("time_s,date", &|_| "2026-01-31".to_owned()),
         ("time_s,remaining_time_s", &|t| (99.5 - t).to_string()),
