@@ -63,7 +63,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
     let source = table.source();
     let mut bad = Bad::default();
     let mut last_s = record.time_s.last().copied().unwrap_or(0.0);
-    let (mut is_beyond, mut is_wider) = (false, false);
+    let mut alarms = Alarms::default();
     while let Some((number, line)) = lines.next()? {
         let (time_s, reading_c) = match reader.read(&line, number) {
             Ok(None) => continue,
@@ -75,8 +75,7 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
         };
         let answer = live.push(time_s, reading_c);
         if answer.is_none() {
-            // To the nanosecond: the last bits are of the conversion to seconds.
-            let [before, now] = [last_s, time_s.unwrap_or(last_s)].map(|s| (s * 1e9).round() / 1e9);
+            let [before, now] = [last_s, time_s.unwrap_or(last_s)].map(to_nanosecond);
             bad.say(
                 &format!(
                     "{source}: line {number}: expected a time shortly after that of the previous row, {before} s from the \
@@ -86,9 +85,38 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
                 console,
             );
         }
-        last_s = answer.map_or(last_s, |now| now.time_s);
-        if let Some(now) = answer.filter(|now| now.is_beyond && !is_beyond) {
-            is_beyond = true;
+        if let Some(now) = &answer {
+            alarms.say(now, last_s, number, console);
+            last_s = now.time_s;
+        }
+        if !out.answer(answer)? || !out.flush()? {
+            return Ok(code);
+        }
+    }
+    bad.sum(console);
+    Ok(code)
+}
+
+/// What has been said of rows that are not as the start was.
+#[derive(Default)]
+struct Alarms {
+    is_beyond: bool,
+    is_wider: bool,
+}
+
+impl Alarms {
+    /// Says what is new: of a pause each time, of the rest once.
+    fn say(&mut self, now: &LiveAnswer, last_s: f64, line: usize, console: Console) {
+        if now.is_resumed {
+            let [before, after] = [last_s, now.time_s].map(to_nanosecond);
+            console.note(|| {
+                format!(
+                    "warning: line {line}: the clock goes on from {after} s after {before} s, as after a pause or where it was set"
+                )
+            });
+        }
+        if now.is_beyond && !self.is_beyond {
+            self.is_beyond = true;
             console.note(|| {
                 format!(
                     "warning: at {} s the time constants may have left the range that is tracked, 0.4 to 2.5 times their \
@@ -97,23 +125,24 @@ pub(crate) fn run(command: &Track, rows: usize, to_stdout: bool, console: Consol
                 )
             });
         }
-        if let Some(now) = answer.filter(|now| now.widened_by > 1.0 && !is_wider) {
-            is_wider = true;
+        if now.widened_by > 1.0 && !self.is_wider {
+            self.is_wider = true;
             console.note(|| {
                 format!(
                     "warning: at {} s the readings deviate from their predictions {:.1} times as far as expected: the gas \
                      or a sensor has changed since the start; while this lasts the bands are widened, and time constants \
                      that are no longer determined are left empty",
-                    print::digits(now.time_s, 6), now.widened_by
+                    print::digits(now.time_s, 6),
+                    now.widened_by
                 )
             });
         }
-        if !out.answer(answer)? || !out.flush()? {
-            return Ok(code);
-        }
     }
-    bad.sum(console);
-    Ok(code)
+}
+
+/// The last bits are of the conversion to seconds.
+fn to_nanosecond(time_s: f64) -> f64 {
+    (time_s * 1e9).round() / 1e9
 }
 
 fn started(live: &Live) -> String {

@@ -185,10 +185,12 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
     let is_bridged = missing > MAX_MISSING_SHARE || is_uneven;
     let (ends, ended) = if is_bridged || ask == Ask::GasQuickly { (0.0, Vec::new()) } else { search.ended(&best) };
     let mut parts = if ends > 0.5 { ended } else { best.parts };
+    let mut score = score;
     if is_bridged {
-        parts.retain(|part| part.noise().is_none());
-        parts = holes::choose(&search, readings, rig, level_c, parts, is_uneven);
-        others.clear();
+        let mut exact = holes::choose(&search, readings, rig, level_c, parts, is_uneven).into_iter();
+        (score, parts) = exact.next().expect("what was found is among them");
+        let alike = |(score, parts)| Fitted { parts, deviance: BINS_PER_ONE * score, cost: 0.0 };
+        others = nearly_as_likely(kinds(&parts), score, exact.map(alike));
     }
     let sigma_parts = search.sigma_points(&parts);
     let all_parts = std::iter::once(&parts[..]).chain(others.iter().map(|o| &o.parts[..]));
@@ -202,7 +204,7 @@ fn learned(readings: &Readings, rig: &Rig, ask: Ask, from: Option<&GasParts>) ->
         prior: prior(&parts),
         sigma_priors: sigma_parts.iter().map(|p| prior(p)).collect(),
         alternatives,
-        noise_factor: parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt)),
+        noise_factor: noise_factor(&parts),
         ends,
         parts: gas_parts,
     })
@@ -264,16 +266,9 @@ impl Search<'_> {
         if !is_settled {
             current = self.improved(current, &mut seen);
         }
-        let mut told = vec![kinds(&current.parts)];
         seen.sort_by(|a, b| a.score().total_cmp(&b.score()));
-        seen.retain(|other| {
-            let kinds = kinds(&other.parts);
-            let is_new = !told.contains(&kinds) && other.score() < current.score() + MAX_ALTERNATIVE_DEFICIT;
-            told.push(kinds);
-            is_new
-        });
-        seen.truncate(MAX_ALTERNATIVES);
-        (current, seen)
+        let others = nearly_as_likely(kinds(&current.parts), current.score(), seen);
+        (current, others)
     }
 
     /// `current` with parts exchanged until that gains nothing. What comes up on the way is added to what was `seen`.
@@ -538,6 +533,24 @@ fn beside(periodogram: &Periodogram, parts: &[Part]) -> Vec<f64> {
 fn likeliest(all: &[Fitted]) -> Fitted {
     let best = all.iter().min_by(|a, b| a.score().total_cmp(&b.score()));
     best.cloned().unwrap_or(Fitted::unknown(Vec::new()))
+}
+
+/// The first of each kind in `sorted` that is not `best` and whose score is not far above that of it.
+fn nearly_as_likely(best: Vec<&'static str>, score: f64, sorted: impl IntoIterator<Item = Fitted>) -> Vec<Fitted> {
+    let mut told = vec![best];
+    let near = sorted.into_iter().take_while(|other| other.score() < score + MAX_ALTERNATIVE_DEFICIT);
+    let new = near.filter(|other| {
+        let kinds = kinds(&other.parts);
+        let is_new = !told.contains(&kinds);
+        told.push(kinds);
+        is_new
+    });
+    new.take(MAX_ALTERNATIVES).collect()
+}
+
+/// What the standard deviations of both channels' noise are multiplied by, of `parts`.
+fn noise_factor(parts: &[Part]) -> [f64; 2] {
+    parts.iter().find_map(Part::noise).map_or([1.0; 2], |factors| factors.map(f64::sqrt))
 }
 
 /// What `parts` are, in the order of the alphabet.

@@ -94,7 +94,7 @@ pub use smooth::{Form, Gas};
 pub use spectrum::power_spectrum;
 pub use stream::{Filtered, Stream};
 #[cfg(feature = "std")]
-pub use tracker::{Tracker, TrackerFn, TrackerState, tracker};
+pub use tracker::{AnyTracker, Tracker, TrackerState, tracker};
 
 /// Readings, filters and what they give may go to any thread, and be read by several.
 #[cfg(feature = "std")]
@@ -113,5 +113,5 @@ const _: () = {
         Sensor,
         Stream<4>,
     )>();
-    is_send_and_sync::<(Tracker<4>, TrackerFn, TrackerState)>();
+    is_send_and_sync::<(Tracker<4>, Box<dyn AnyTracker>, TrackerState)>();
 };

@@ -113,6 +113,20 @@ impl Rig {
     pub const fn new(sensors: [Sensor; 2]) -> Self {
         Self { sensors, delay_s: 0.0, clock: 0, mismatch: None }
     }
+
+    /// This rig with the standard deviation of each sensor's white noise multiplied by a factor.
+    ///
+    /// ```
+    /// use twinlag_compensate::{Rig, Sensor};
+    ///
+    /// let rig = Rig::new([Sensor::new(0.02, 0.1), Sensor::new(0.1, 0.1)]).with_noise_times([2.0, 1.0]);
+    /// assert_eq!(rig.sensors.map(|sensor| sensor.noise_std_k), [0.2, 0.1]);
+    /// ```
+    #[must_use]
+    pub fn with_noise_times(mut self, factors: [f64; 2]) -> Self {
+        self.sensors.iter_mut().zip(factors).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
+        self
+    }
 }
 
 #[cfg(feature = "std")]

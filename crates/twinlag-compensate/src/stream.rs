@@ -120,6 +120,24 @@ impl<const D: usize> Stream<D> {
         Filtered { gas_c: self.gas_c(), variance_k2, normalised_innovation_squared, innovation_variance }
     }
 
+    /// Goes through so many samples without readings, as that many calls of [`Self::push`] without any would; the work grows as the
+    /// logarithm of their number.
+    pub fn skip(&mut self, samples: u64) {
+        if samples == 0 {
+            return;
+        }
+        self.settled = None;
+        let mut left = if core::mem::take(&mut self.is_first) { samples - 1 } else { samples };
+        let mut step = self.step;
+        while left > 0 {
+            if left & 1 == 1 {
+                self.belief.predict(&step);
+            }
+            step = step.twice();
+            left >>= 1;
+        }
+    }
+
     /// Whether its gains no longer change.
     pub fn is_settled(&self) -> bool {
         self.settled.is_some()

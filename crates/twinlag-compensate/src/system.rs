@@ -56,6 +56,14 @@ pub(crate) struct Step<const D: usize> {
     pub(crate) added: SMatrix<f64, D, D>,
 }
 
+impl<const D: usize> Step<D> {
+    /// Two of these steps in one.
+    pub(crate) fn twice(&self) -> Self {
+        let Self { transition, added } = self;
+        Self { transition: transition * transition, added: around(transition, added) + added }
+    }
+}
+
 /// Numbers that the state needs.
 pub(crate) fn states(rig: &Rig, terms: &[Term]) -> usize {
     let sensor = |i: usize| {

@@ -1,5 +1,7 @@
 //! Gas temperature and time constants as readings come in, while the flow changes both sensors.
 
+use std::f64::consts::PI;
+
 use crate::prior::Prior;
 use crate::rig::Rig;
 use crate::stream::Stream;
@@ -72,6 +74,31 @@ impl<const D: usize> Tracker<D> {
         Some(Self { streams, log_factor, chance, next, log_likelihood, leaves })
     }
 
+    /// Goes through so many samples without readings, as that many calls of [`Self::push`] without any would; the work grows as the
+    /// logarithm of their number.
+    ///
+    /// Steps to either neighbour, none of which leave the grid, have the vectors `cos(π j (k + ½)/F)`, `k = 0 … F − 1`, which
+    /// they shrink to `1 − 2 l (1 − cos(π j/F))`, `l` the chance of a step (Feller 1968, XVI.3); a jump leaves nothing but that
+    /// of `j = 0`, which is the same everywhere.
+    pub fn skip(&mut self, samples: u64) {
+        self.streams.iter_mut().for_each(|stream| stream.skip(samples));
+        let count = FACTORS as f64;
+        let wave = |j: usize, k: usize| (PI * j as f64 * (k as f64 + 0.5) / count).cos();
+        let left = |j: usize| {
+            let of_steps = 1.0 - 2.0 * self.leaves * (1.0 - (PI * j as f64 / count).cos());
+            ((1.0 - JUMP_CHANCE_PER_SAMPLE) * of_steps).powf(samples as f64)
+        };
+        let shares = (1..FACTORS).map(|j| {
+            let share: f64 = self.chance.iter().enumerate().map(|(k, chance)| chance * wave(j, k)).sum();
+            (j, left(j) * share)
+        });
+        let shares: Vec<(usize, f64)> = shares.collect();
+        for (k, chance) in self.chance.iter_mut().enumerate() {
+            let of_waves: f64 = shares.iter().map(|(j, share)| share * wave(*j, k)).sum();
+            *chance = ((1.0 + 2.0 * of_waves) / count).max(0.0);
+        }
+    }
+
     /// What is known once the next readings, °C, are; `None` for one that is missing.
     pub fn push(&mut self, reading_c: [Option<f64>; 2]) -> TrackerState {
         let last = FACTORS - 1;
@@ -117,8 +144,24 @@ impl<const D: usize> Tracker<D> {
     }
 }
 
-/// [`Tracker::push`] with as many states as are needed.
-pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send + Sync>;
+/// A [`Tracker`] with as many states as are needed.
+pub trait AnyTracker: Send + Sync {
+    /// What is known once the next readings, °C, are, as of [`Tracker::push`].
+    fn push(&mut self, reading_c: [Option<f64>; 2]) -> TrackerState;
+
+    /// Goes through so many samples without readings, as [`Tracker::skip`] does.
+    fn skip(&mut self, samples: u64);
+}
+
+impl<const D: usize> AnyTracker for Tracker<D> {
+    fn push(&mut self, reading_c: [Option<f64>; 2]) -> TrackerState {
+        Self::push(self, reading_c)
+    }
+
+    fn skip(&mut self, samples: u64) {
+        Self::skip(self, samples);
+    }
+}
 
 /// A [`Tracker`] with a state of the size that `rig` and `prior` need; `None` if they need more
 /// than the largest.
@@ -139,17 +182,16 @@ pub type TrackerFn = Box<dyn FnMut([Option<f64>; 2]) -> TrackerState + Send + Sy
 ///
 /// let rig = Rig::new([Sensor::new(0.024, 0.1), Sensor::new(0.117, 0.1)]);
 /// let prior = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 10.0, corner_hz: 1.0 }] };
-/// let mut push = tracker(&rig, &prior, 0.004, 0.05).expect("few states and no delay");
-/// let states = record.t1_c.iter().zip(&record.t2_c).map(|(t1, t2)| push([Some(*t1), Some(*t2)]));
+/// let mut tracker = tracker(&rig, &prior, 0.004, 0.05).expect("few states and no delay");
+/// let states = record.t1_c.iter().zip(&record.t2_c).map(|(t1, t2)| tracker.push([Some(*t1), Some(*t2)]));
 /// let last = states.last().expect("there are readings");
 /// // Within four standard deviations of its logarithm, which the readings have made narrow.
 /// assert!((last.log_factor - 1.4_f64.ln()).abs() < 4.0 * last.log_variance.sqrt() && last.log_variance < 0.01);
 /// # Ok::<(), twinlag_signal::SignalError>(())
 /// ```
-pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
-    fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<TrackerFn> {
-        let mut tracker = Tracker::<D>::new(rig, prior, period_s, change)?;
-        Some(Box::new(move |reading_c| tracker.push(reading_c)))
+pub fn tracker(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Box<dyn AnyTracker>> {
+    fn of<const D: usize>(rig: &Rig, prior: &Prior, period_s: f64, change: f64) -> Option<Box<dyn AnyTracker>> {
+        Some(Box::new(Tracker::<D>::new(rig, prior, period_s, change)?))
     }
     let sizes = [of::<4>, of::<6>, of::<8>, of::<12>, of::<16>, of::<24>];
     sizes.into_iter().find_map(|of| of(rig, prior, period_s, change))

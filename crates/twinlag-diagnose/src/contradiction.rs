@@ -1,13 +1,13 @@
 //! Whether the record contradicts what was given of the time constants.
 //!
 //! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is fitted without it.
-//! Where two lags then leave only noise, the deviance that what was given costs is a chi-square with as many degrees of freedom as
-//! there are values. Where they leave more, the last model is fitted without it in their place: its effects may be wrong, so numbers
-//! are conditional. Where that leaves more than noise as well, what is missing may account for the deviance. A fit that has
-//! then left behind what was given with a deviation may not be used.
+//! Where two lags then leave only noise, and clearly less than effects with what was given, their numbers allowed for, the deviance
+//! that what was given costs two lags is a chi-square with as many degrees of freedom as there are values. Otherwise the last model is
+//! fitted without it in their place: its effects may be wrong, so numbers are conditional. Where that leaves more than noise as well,
+//! what is missing may account for the deviance. A fit that has then left behind what was given with a deviation may not be used.
 
 use twinlag_model::{
-    ChannelNoise, Effort, Fitted, KnownTimeConstant, ModelFit, Policy, Selection, Settings, summarise,
+    ChannelNoise, Effort, Fitted, KnownTimeConstant, ModelFit, Observations, Policy, Selection, Settings, summarise,
 };
 
 use crate::grade::{Grade, REJECTING_CHI2, Reason};
@@ -58,7 +58,9 @@ impl Contradiction {
             let model = state.base.model.clone().with_noise(levels.std_k);
             let alone = model.clone().knowing_nothing().fit_over_grid(&[], STARTS, observations, selection);
             let held = model.fit(&state.base.theta, observations, selection, Effort::Finish);
-            of(&held, &alone, selection, levels, Grade::NoGo)
+            let lost = lost_by_effects(with_effects, &alone, settings, observations, selection);
+            let are_likelier = lost.is_some_and(|deviance| deviance < CONTRADICTING_DEVIANCES[0]);
+            of(&held, &alone, selection, levels, Grade::NoGo).filter(|_| !are_likelier)
         };
         let levels = &state.prepared.levels;
         two_lags(everything, levels)
@@ -105,6 +107,25 @@ impl Contradiction {
         let Self { what, instead, deviations, .. } = self;
         Some(Remark::Contradicted { what, instead: instead?, deviations })
     }
+}
+
+/// The deviance that effects leave with what was given beyond that of two lags `alone` without it, by Schwarz's criterion: each number
+/// that they have more costs the logarithm of the number of residuals. `None` where no effect was found, and beside a noise, whose
+/// likelihood is not that of the residual alone.
+fn lost_by_effects(
+    with_effects: &Fitted,
+    alone: &Fitted,
+    settings: &Settings,
+    observations: &Observations,
+    selection: &Selection,
+) -> Option<f64> {
+    let Fitted { model, theta, .. } = with_effects;
+    if model.effects.is_empty() || model.noise().is_some() {
+        return None;
+    }
+    let energy = model.clone().with_noise(alone.model.noise_std_k()).energy(theta, observations, selection);
+    let more = theta.len() as f64 - alone.theta.len() as f64 - settings.known.len() as f64;
+    Some((energy - alone.chi2) / alone.mean_energy().max(1.0) + more * alone.count.ln())
 }
 
 /// The time constants that the record gives without what was given, for the reader.

@@ -557,9 +557,10 @@ impl Judgement {
         }
     }
 
-    /// The judgement of what was given beforehand.
-    pub fn given() -> Self {
-        Self { because: "known beforehand".into(), ..Self::of(&[]) }
+    /// The judgement of what was given beforehand, which what speaks against it in `basis` takes away.
+    pub fn of_given(basis: &Basis) -> Self {
+        let known = Self { because: "known beforehand".into(), ..Self::of(&[]) };
+        basis.against_given().fold(known, Self::and)
     }
 
     /// The judgement of a point to which parameters refer: it is of the record as it stands, and no estimate.
@@ -614,6 +615,11 @@ pub struct Basis {
 }
 
 impl Basis {
+    /// What speaks against what was given beforehand.
+    pub(crate) fn against_given(&self) -> impl Iterator<Item = &Reason> {
+        self.reasons.iter().filter(|reason| matches!(reason, Reason::Contradicted { .. }))
+    }
+
     /// The numbers of a fit of which nothing but the residual is known.
     ///
     /// - `excess`: what it leaves over beside noise; `None` where nothing says what the noise is

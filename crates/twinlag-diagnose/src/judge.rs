@@ -97,7 +97,7 @@ impl<'a> Circumstances<'a> {
         let time_constants = [0, 1].map(|i| {
             let is_held = self.known.iter().any(|k| k.sensor == i && k.std_s.is_none());
             if is_held {
-                return Judgement::given();
+                return Judgement::of_given(&basis);
             }
             let between = RecordScatter::of(fit.between.as_ref().and_then(|between| between.parameters[i].as_ref()));
             self.judged(&mut fit.time_constants[i], between, i, &basis)
@@ -121,9 +121,7 @@ impl<'a> Circumstances<'a> {
     ) -> Judgement {
         let Some(value) = number.value_s else {
             // What was given and is wrong may be why.
-            let contradicted =
-                basis.reasons.iter().filter(|reason| matches!(reason, Reason::Contradicted { .. })).cloned();
-            let reasons: Vec<Reason> = contradicted.chain([Reason::NotDetermined]).collect();
+            let reasons: Vec<Reason> = basis.against_given().cloned().chain([Reason::NotDetermined]).collect();
             return Judgement::of(&reasons);
         };
         let most_s = self.policy.longest_given_share * self.span_s;

@@ -235,7 +235,7 @@ pub enum IntervalBasis {
 /// A seeded parametric bootstrap.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Bootstrap {
     /// Simulated records, at least 39.
     pub replicates: usize,

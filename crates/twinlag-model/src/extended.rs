@@ -123,9 +123,7 @@ impl Extended {
         };
         let locals = locals(&plant, &time_s, &temperature_c);
         let readings = Readings::sharing(time_s, temperature_c, missing)?;
-        let mut rig = rig(&plant);
-        let factor = self.observations.noise_factor();
-        rig.sensors.iter_mut().zip(factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
+        let rig = rig(&plant).with_noise_times(self.observations.noise_factor());
         Ok((if let Some(locals) = locals { readings.with_locals(locals)? } else { readings }, rig))
     }
 }

@@ -65,6 +65,8 @@ impl Known {
         effects: &[KnownEffect],
     ) -> Result<Self, ModelError> {
         let mut prepared = Prepared::new(observations, settings)?;
+        // Nothing is searched for that blocks would have to judge.
+        prepared.searched = prepared.everything.clone();
         let mut model = Model::new(&settings.known, prepared.levels.std_k);
         model.is_frozen = true;
         if effects.iter().any(|known| known.effect.about().follows_gas) {

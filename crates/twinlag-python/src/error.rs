@@ -39,7 +39,8 @@ pub(crate) fn of_verb(error: &Error) -> PyErr {
     }
 }
 
-/// Options that the package has written wrongly, or the caller.
-pub(crate) fn of_options(error: &serde_json::Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+/// An option that has a value which it cannot have, with its name.
+pub(crate) fn of_options(error: &serde_path_to_error::Error<serde_json::Error>) -> PyErr {
+    let path = error.path().to_string();
+    PyValueError::new_err(format!("{}: {}", path.strip_prefix("options.").unwrap_or(&path), error.inner()))
 }

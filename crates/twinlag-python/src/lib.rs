@@ -31,4 +31,9 @@ mod _core {
     /// The version of the library.
     #[pymodule_export]
     const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+    /// Both ends of what a temperature can be, °C.
+    #[pymodule_export]
+    const TEMPERATURE_RANGE_C: (f64, f64) =
+        (*twinlag::record::TEMPERATURE_RANGE_C.start(), *twinlag::record::TEMPERATURE_RANGE_C.end());
 }

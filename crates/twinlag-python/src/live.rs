@@ -53,8 +53,8 @@ impl Live {
     }
 
     /// What is known once a row is read: time, gas temperature and its standard deviation, then time constant and band of each
-    /// sensor, whether they may have left the range that is tracked, and what the bands were multiplied by; `None` of a row that is
-    /// not later than the last one.
+    /// sensor, whether they may have left the range that is tracked, what the bands were multiplied by, and whether there was a long pause; `None` of a row that is
+    /// left out.
     #[pyo3(signature = (t1_c, t2_c, time_s = None))]
     #[expect(clippy::type_complexity, reason = "a row, which the package gives its names")]
     fn push(
@@ -62,11 +62,20 @@ impl Live {
         t1_c: Option<f64>,
         t2_c: Option<f64>,
         time_s: Option<f64>,
-    ) -> Option<(f64, f64, f64, (Option<f64>, Option<f64>), (Band, Band), bool, f64)> {
+    ) -> Option<(f64, f64, f64, (Option<f64>, Option<f64>), (Band, Band), bool, f64, bool)> {
         let mut live = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         let now = live.push(time_s, [t1_c, t2_c])?;
         let [first, second] = now.tau_s;
         let [band, other] = now.tau_95_s.map(|band| band.map(|[low, high]| (low, high)));
-        Some((now.time_s, now.gas_c, now.gas_std_k, (first, second), (band, other), now.is_beyond, now.widened_by))
+        Some((
+            now.time_s,
+            now.gas_c,
+            now.gas_std_k,
+            (first, second),
+            (band, other),
+            now.is_beyond,
+            now.widened_by,
+            now.is_resumed,
+        ))
     }
 }

@@ -6,8 +6,10 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 use twinlag::compensation::Form;
 use twinlag::diagnosis::Identifier;
+use twinlag::optimise::Optimiser;
 use twinlag::record::{Channels, Record as Inner, SamplingChoice};
 use twinlag::signal::Rig;
 use twinlag::{CompensateOptions, DiagnoseOptions, Model, Options, TrackOptions};
@@ -35,8 +37,16 @@ struct Asked {
     window_s: Option<f64>,
 }
 
+/// Reads what the package passes. An optimiser that is named alone has its usual numbers.
 pub(crate) fn parsed<T: DeserializeOwned>(json: &str) -> PyResult<T> {
-    serde_json::from_str(json).map_err(|error| of_options(&error))
+    let mut asked: Value = serde_json::from_str(json).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    if let Some(optimiser) = asked.pointer_mut("/options/optimiser")
+        && let Some(name) = optimiser.as_str()
+    {
+        let named = Optimiser::by_name(name).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        *optimiser = serde_json::to_value(named).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    }
+    serde_path_to_error::deserialize(asked).map_err(|error| of_options(&error))
 }
 
 /// The records, shared: what is asked of them outlives the call.

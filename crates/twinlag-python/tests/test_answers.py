@@ -77,6 +77,14 @@ def test_an_answer_survives_pickling_with_its_numbers(diagnosis, rig) -> None:
         again.report("page.html")
     gas = tl.compensate(rig)
     assert np.array_equal(pickle.loads(pickle.dumps(gas)).gas_c, gas.gas_c)
+    assert again.model == diagnosis.model and pickle.loads(pickle.dumps(gas)).model == gas.model
+
+
+def test_the_numbers_of_an_answer_cannot_be_changed(rig) -> None:
+    gas = tl.compensate(rig)
+    for answer in (gas, pickle.loads(pickle.dumps(gas))):
+        with pytest.raises(ValueError, match="read-only"):
+            answer.gas_c[0] = 0.0
 
 
 def test_a_model_goes_to_another_record(diagnosis, calibrated, tmp_path) -> None:
@@ -119,6 +127,9 @@ def test_tracks_and_live(rig) -> None:
         with pytest.raises(tl.RecordError, match="absolute zero|an instant"):
             live.push(t1, 450.0, time_s)
     assert live.push(450.0, 450.0).gas_std_k < 100.0
+    pause_s = 3600.0
+    assert live.push(450.0, 450.0, pause_s) is None
+    assert live.push(450.0, 450.0, pause_s + 0.002).is_resumed and not live.push(450.0, 450.0).is_resumed
     with pytest.raises(ValueError, match="change_per_root_s"):
         tl.Live(rig, change_per_root_s=-1.0)
     with pytest.raises(tl.RecordError):

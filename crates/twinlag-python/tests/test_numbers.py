@@ -63,11 +63,28 @@ def test_known_values_are_those_of_a_sensor_by_its_name(rig: tl.Record) -> None:
             tl.characterise(rig, known=wrong)
 
 
+def test_a_value_that_the_record_contradicts_is_not_given(rig: tl.Record) -> None:
+    for verb in (tl.characterise, tl.diagnose):
+        fine = verb(rig, known={"fine": 0.1}).sensors["fine"]
+        assert (fine.time_constant_s, fine.grade) == (None, "no-go") and "contradicts" in fine.because
+
+
+def test_optimisers_and_a_bootstrap_are_called_by_name(rig: tl.Record) -> None:
+    usual = tl.characterise(rig).sensors["fine"]
+    simplex = tl.characterise(rig, estimator="bias-compensated", optimiser="nelder-mead").to_dict()
+    assert simplex["optimiser"] == "nelder-mead"
+    low, high = tl.characterise(rig, intervals="bootstrap", replicates=39).sensors["fine"].interval
+    assert low < usual.time_constant_s < high
+
+
 def test_options_that_cannot_be_are_refused(rig: tl.Record) -> None:
     with pytest.raises(ValueError, match="free: expected gain or offset, got 'slope'"):
         tl.characterise(rig, free=["slope"])
-    with pytest.raises(ValueError, match="estimator|variant"):
-        tl.characterise(rig, estimator="oracle")
+    for option, expected in {"estimator": "whitened", "optimiser": "nelder-mead", "hold": "bilinear", "intervals": "profile"}.items():
+        with pytest.raises(ValueError, match=f"{option}.*oracle.*{expected}"):
+            tl.characterise(rig, **{option: "oracle"})
+    with pytest.raises(ValueError, match="replicates: of a bootstrap alone"):
+        tl.characterise(rig, replicates=50)
     with pytest.raises(TypeError, match="no option 'nkown'; did you mean 'known'?"):
         tl.characterise(rig, nkown=1)
     for wrong in [{1: 0.05}, ["T1"], {"T1": True}]:

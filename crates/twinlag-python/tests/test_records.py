@@ -127,6 +127,15 @@ def test_frames(arrays) -> None:
     assert np.array_equal(back["a"], t1) and np.array_equal(back.index, time_s)
 
 
+def test_an_index_of_decimals_that_rise_is_the_time(arrays) -> None:
+    pd = pytest.importorskip("pandas")
+    time_s, t1, t2 = arrays
+    plain = tl.Record(time_s, t1, t2)
+    frame = pd.DataFrame({"a_C": t1, "b_C": t2}, index=time_s)
+    record = tl.Record.from_frame(frame, time_unit="s")
+    assert np.array_equal(record.time_s, plain.time_s) and record.channels == ("a", "b")
+
+
 def test_frames_of_polars(arrays) -> None:
     pl = pytest.importorskip("polars")
     time_s, t1, t2 = arrays

@@ -82,7 +82,7 @@ pub use form::Program;
 pub use from_columns::NamedColumn;
 pub use grid::{Grid, Stretch};
 pub use note::Note;
-pub use record::{Channels, Record};
+pub use record::{Channels, Record, TEMPERATURE_RANGE_C};
 pub use rows::{Row, RowReader};
 pub use sampling::{Sampling, SamplingKind};
 pub use selection::{ColumnRef, SamplingChoice, Selection, Setting};

@@ -4,7 +4,7 @@
 //! runs of rows between missing ones and gaps.
 
 use std::io::{Read, Write};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -28,8 +28,8 @@ pub(crate) const MIN_SAMPLES: usize = 8;
 /// Gaps that get a note each.
 const MAX_LISTED_GAPS: usize = 5;
 pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
-/// No thermocouple reaches this; sentinels such as 9999 and 1e37 lie beyond.
-pub(crate) const MAX_TEMPERATURE_C: f64 = 5000.0;
+/// What a temperature can be, °C: from absolute zero to what no thermocouple reaches; sentinels such as 9999 and 1e37 lie beyond.
+pub const TEMPERATURE_RANGE_C: RangeInclusive<f64> = ABSOLUTE_ZERO_C..=5000.0;
 
 /// Below this, in K, a reading calls for a question: colder than any gas but hydrogen and helium boils.
 /// Chosen; a note depends on it and no number.
@@ -451,7 +451,7 @@ fn check_time(time_s: &[f64], origin: &Origin<'_>) -> Result<(), RecordError> {
 }
 
 fn check_range(values_c: &[f64], column: usize, origin: &Origin<'_>) -> Result<(), RecordError> {
-    let is_outside = |value: &f64| *value < ABSOLUTE_ZERO_C || *value > MAX_TEMPERATURE_C;
+    let is_outside = |value: &f64| !value.is_nan() && !TEMPERATURE_RANGE_C.contains(value);
     let Some(row) = values_c.iter().position(is_outside) else { return Ok(()) };
     let cells = origin.table.and_then(|(table, chosen)| {
         let indices = [Some(chosen.channels[0]), Some(chosen.channels[1]), chosen.reference];

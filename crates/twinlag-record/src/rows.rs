@@ -5,7 +5,7 @@ use crate::choose::choose;
 use crate::column::Kind;
 use crate::form::Form;
 use crate::number::{self, Value};
-use crate::record::{ABSOLUTE_ZERO_C, MAX_TEMPERATURE_C};
+use crate::record::TEMPERATURE_RANGE_C;
 use crate::selection::Selection;
 use crate::sign::{Decimal, Delimiter};
 use crate::table::{Table, Text, shortened};
@@ -123,7 +123,7 @@ impl RowReader {
                 }
             };
             match channel.unit.to_celsius(value) {
-                Some(c) if (ABSOLUTE_ZERO_C..=MAX_TEMPERATURE_C).contains(&c) => Ok(Some(c)),
+                Some(c) if TEMPERATURE_RANGE_C.contains(&c) => Ok(Some(c)),
                 _ => {
                     let (at, unit) = (Place::Line(number), channel.unit.symbol());
                     Err(RecordError::OutOfRange { file: file(), at, column, value, cell: None, unit })

@@ -227,14 +227,13 @@ impl<'a> Reconstruction<'a> {
     }
 
     fn rig(&self, theta: &[f64], noise_factor: [f64; 2]) -> Result<(Cow<'_, Readings>, Rig), Error> {
-        let (readings, mut rig) = if theta == self.nominal.theta {
+        let (readings, rig) = if theta == self.nominal.theta {
             (Cow::Borrowed(&self.nominal.readings), self.nominal.rig)
         } else {
             let (readings, rig) = self.model().rig(theta)?;
             (Cow::Owned(readings), rig)
         };
-        rig.sensors.iter_mut().zip(noise_factor).for_each(|(sensor, factor)| sensor.noise_std_k *= factor);
-        Ok((readings, Rig { clock: self.options.trusted, ..rig }))
+        Ok((readings, Rig { clock: self.options.trusted, ..rig }.with_noise_times(noise_factor)))
     }
 
     fn gas(&self, theta: &[f64], motion: &Motion<'_>, noise_factor: [f64; 2]) -> Result<Gas, Error> {

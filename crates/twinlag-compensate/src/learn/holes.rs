@@ -4,10 +4,11 @@
 //! that is smoother than it was. Kalman's filter needs no such lines: what it leads to expect of
 //! each reading gives the likelihood of all of them.
 
+use rayon::prelude::*;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem};
 
-use super::Search;
 use super::part::{self, Part};
+use super::{Search, noise_factor};
 use crate::prior::Prior;
 use crate::readings::Readings;
 use crate::reconstruct::reconstruct;
@@ -19,14 +20,14 @@ use crate::smooth::Form;
 const MAX_EVEN_SAMPLES: usize = 4096;
 const MAX_UNEVEN_SAMPLES: usize = 1024;
 /// Evaluations of it for each candidate.
-const EVALUATIONS_PER_CANDIDATE: u64 = 120;
+const EVALUATIONS_PER_CANDIDATE: u64 = 240;
 /// Edge of the first simplex in the logarithm of each number, and the spread of scores below which a
 /// fit has ended: a tenth of the least gain that counts.
 const SIMPLEX_EDGE_LN: f64 = 0.25;
 const SPREAD_TOLERANCE_LN: f64 = 0.05;
 
-/// The likeliest of `found` and each kind of single part, with fitted numbers, allowing for their
-/// count.
+/// `found` and each kind of single part, their numbers fitted together with the noise of `found`, where that is one of its parts: with
+/// minus twice the logarithm of the probability of the readings, allowing for the count of the numbers. The likeliest is the first.
 pub(super) fn choose(
     search: &Search<'_>,
     readings: &Readings,
@@ -34,16 +35,20 @@ pub(super) fn choose(
     level_c: f64,
     found: Vec<Part>,
     is_uneven: bool,
-) -> Vec<Part> {
+) -> Vec<(f64, Vec<Part>)> {
     let readings = readings.first(if is_uneven { MAX_UNEVEN_SAMPLES } else { MAX_EVEN_SAMPLES });
-    let singles = search.best_of_each_kind().into_iter().map(|part| vec![part]);
-    let candidates = singles.chain([found.clone()]).map(|parts| {
-        let cost = Exact { readings: &readings, rig, level_c, parts: &parts };
-        let (parts, deviance) = cost.fit(search);
-        let score = deviance + search.cost(&parts);
-        (parts, score)
+    let noise: Vec<Part> = found.iter().filter(|part| part.noise().is_some()).cloned().collect();
+    let beside_noise = |part| noise.iter().cloned().chain([part]).collect();
+    let singles: Vec<Vec<Part>> = search.best_of_each_kind().into_iter().map(beside_noise).collect();
+    let mut candidates = singles;
+    candidates.push(found);
+    let fitted = candidates.into_par_iter().map(|parts| {
+        let (parts, deviance) = Exact { readings: &readings, rig, level_c, parts: &parts }.fit(search);
+        (deviance + search.cost(&parts), parts)
     });
-    candidates.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(found, |best| best.0)
+    let mut fitted: Vec<(f64, Vec<Part>)> = fitted.collect();
+    fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    fitted
 }
 
 struct Exact<'a> {
@@ -71,9 +76,9 @@ impl Exact<'_> {
 
 impl Cost for Exact<'_> {
     fn value(&self, x: &[f64]) -> f64 {
-        let terms = part::with(self.parts, x).iter().flat_map(Part::terms).collect();
-        let prior = Prior { level_c: self.level_c, terms };
-        reconstruct(self.readings, self.rig, &prior, Form::Filter)
-            .map_or(f64::INFINITY, |gas| -2.0 * gas.log_likelihood)
+        let parts = part::with(self.parts, x);
+        let prior = Prior { level_c: self.level_c, terms: parts.iter().flat_map(Part::terms).collect() };
+        let rig = self.rig.with_noise_times(noise_factor(&parts));
+        reconstruct(self.readings, &rig, &prior, Form::Filter).map_or(f64::INFINITY, |gas| -2.0 * gas.log_likelihood)
     }
 }

@@ -31,8 +31,8 @@ fn tracked(record: &Answer) -> Vec<TrackerState> {
     let readings =
         Readings::new(start(&record.time_s), [start(&record.t1_c), start(&record.t2_c)]).expect("good readings");
     let prior = learn(&readings, &rig).expect("long enough").prior;
-    let mut push = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
-    (0..SAMPLES).map(|k| push([Some(record.t1_c[k]), Some(record.t2_c[k])])).collect()
+    let mut tracker = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
+    (0..SAMPLES).map(|k| tracker.push([Some(record.t1_c[k]), Some(record.t2_c[k])])).collect()
 }
 
 /// A change that is smoother than a random walk is followed by one with a band that is too wide rather than too narrow. Its error is a
@@ -75,11 +75,42 @@ fn what_is_beyond_the_range_is_said() {
     assert!(all.iter().all(|now| now.gas_c.is_finite() && now.variance_k2 > 0.0 && now.log_variance > 0.0));
     let rig = Rig::new([Sensor::new(0.024, 0.1), Sensor::new(0.117, 0.1)]);
     let prior = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 10.0, corner_hz: 3.0 }] };
-    let mut push = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
-    let widths: Vec<f64> = (0..1000).map(|_| push([None, None]).log_variance).collect();
+    let mut all = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
+    let widths: Vec<f64> = (0..1000).map(|_| all.push([None, None]).log_variance).collect();
     assert!(widths[999] > widths[0] && widths.iter().all(|w| w.is_finite()));
     // One absurd reading does not end it.
-    push([Some(1e9), Some(300.0)]);
-    assert!(push([Some(300.0), Some(300.0)]).log_factor.is_finite());
+    all.push([Some(1e9), Some(300.0)]);
+    assert!(all.push([Some(300.0), Some(300.0)]).log_factor.is_finite());
     assert!(tracker(&Rig { delay_s: 0.01, ..rig }, &prior, PERIOD_S, CHANGE).is_none());
+}
+
+/// Samples without readings, skipped at once and one by one: the same but for rounding, 1e-13, which the likelihoods of readings that lie up
+/// to 30 standard deviations off multiply by some thousand; a sample too many changes a percent. Once all is forgotten, factors are as likely as each other: of 41 that are evenly apart the variance is 140 squares of what lies between two.
+#[test]
+fn samples_are_skipped_at_once_as_one_by_one() {
+    let rig = Rig::new([Sensor::new(0.024, 0.1), Sensor::new(0.117, 0.1)]);
+    let prior = Prior { level_c: 300.0, terms: vec![Term::Rough { std_k: 10.0, corner_hz: 3.0 }] };
+    let mut start = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
+    let numbers = |now: TrackerState| [now.gas_c, now.variance_k2, now.log_factor, now.log_variance, now.chance_beyond];
+    for missing in [1, 2, 7, 1000, 3001] {
+        let [mut slowly, mut at_once] = [0, 1].map(|_| {
+            let mut tracker = tracker(&rig, &prior, PERIOD_S, CHANGE).expect("no delay");
+            (0..50).for_each(|k| _ = tracker.push([0.3, 0.7].map(|by| Some(300.0 + 5.0 * (by * f64::from(k)).sin()))));
+            tracker
+        });
+        (0..missing).for_each(|_| _ = slowly.push([None, None]));
+        at_once.skip(missing);
+        for _ in 0..3 {
+            let [want, got] =
+                [&mut slowly, &mut at_once].map(|tracker| numbers(tracker.push([Some(303.0), Some(302.0)])));
+            for (want, got) in want.iter().zip(got) {
+                assert!((got - want).abs() < 1e-8 * want.abs().max(1.0), "{missing} missing: {got}, want {want}");
+            }
+        }
+    }
+    start.skip(u64::MAX);
+    let spacing = 2.0 * 2.5_f64.ln() / 40.0;
+    let forgotten = start.push([None, None]);
+    assert!((forgotten.log_variance / (spacing * spacing) - 140.0 - 1.0 / 12.0).abs() < 1e-6, "{forgotten:?}");
+    assert!((forgotten.gas_c - 300.0).abs() < 1e-6 && (forgotten.variance_k2 - 100.0).abs() < 1e-6, "{forgotten:?}");
 }

@@ -10,7 +10,7 @@ use twinlag_diagnose::{
     Diagnosis, Grade, Identifier, KnownTimeConstant, ModelError, Observations, Remark, Settings, Stretch, Verdict,
     diagnose, fit_with,
 };
-use twinlag_signal::{MultiTone, Noise, Sensor, Signal, Tone, Turbulence};
+use twinlag_signal::{Engine, MultiTone, Noise, Sensor, Signal, Tone, Turbulence};
 
 fn second_order(sensors: &mut [Sensor; 2]) {
     sensors[1].second_time_constant_s = Some(0.018);
@@ -79,6 +79,27 @@ fn a_given_value_that_the_record_contradicts_is_no_condition() {
     let d = given(TAU_S[0], Some(0.05 * TAU_S[0]));
     assert!(!d.remarks.iter().any(|r| matches!(r, Remark::Contradicted { .. })), "{:?}", d.remarks);
     assert_eq!(d.judgements.time_constants[1].grade, Grade::Conditional, "{:?}", d.judgements);
+}
+
+/// Pulses that hardly differ: two lags alone leave little more than noise of the second lag of T2, with a T1 that is a tenth of what it is.
+/// Failed: where T1 was given as it is, the record was said to contradict it by 40 and more standard deviations, though the second lag
+/// leaves less than they do, and no number was given. 1.96 standard errors are half an interval; four of these.
+#[test]
+fn a_given_value_that_an_effect_needs_is_not_contradicted() {
+    let pulses = Engine { amplitude_relative_std: 0.2, period_relative_std: 0.03, ..Engine::new(60.0, 8.0) };
+    let simulated = readings(SEED, Signal::Engine(pulses), second_order);
+    let observations = even(simulated.t1_c, simulated.t2_c).expect("finite and long");
+    for std_s in [None, Some(0.05 * TAU_S[0])] {
+        let known = vec![KnownTimeConstant { sensor: 0, value_s: TAU_S[0], std_s }];
+        let settings = Settings { known, ..Settings::default() };
+        let d = diagnose(&observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("a record");
+        assert_eq!(d.verdict, Verdict::Explained, "{}", told(&d));
+        assert!(d.effects.iter().any(|e| e.effect == Identifier::SECOND_ORDER), "{}", told(&d));
+        let [_, t2] = &d.last.time_constants;
+        let [low_s, high_s] = t2.interval_95_s.expect("an interval");
+        let value_s = t2.value_s.expect("a value");
+        assert!((value_s - TAU_S[1]).abs() < 4.0 / 1.96 * 0.5 * (high_s - low_s), "{value_s} [{low_s}, {high_s}]");
+    }
 }
 
 /// Two tones are four equations, two of which the time constants take.

@@ -25,15 +25,22 @@ class Answer:
     Not made by its constructor, but by the verbs.
     """
 
-    __slots__ = ("_fields", "_inner", "_series")
+    __slots__ = ("_fields", "_inner", "_pickled_model", "_series")
     _inner: _core.Answer | None
     _fields: dict[str, Any]
     _series: dict[str, Any]
+    _pickled_model: str | None
 
-    def __init__(self, inner: _core.Answer | None, fields: dict[str, Any], series: dict[str, Any]) -> None:
+    def __init__(
+        self, inner: _core.Answer | None, fields: dict[str, Any], series: dict[str, Any], pickled_model: str | None = None
+    ) -> None:
         self._inner = inner
         self._fields = fields
         self._series = series
+        self._pickled_model = pickled_model
+        for values in series.values():
+            if hasattr(values, "setflags"):
+                values.setflags(write=False)
 
     @classmethod
     def _of(cls, inner: _core.Answer) -> Any:
@@ -56,7 +63,7 @@ class Answer:
         return [*super().__dir__(), *self._fields, *self._model_fields]
 
     def __reduce__(self) -> Any:
-        return type(self), (None, self._fields, self._series)
+        return type(self), (None, self._fields, self._series, self._model_text())
 
     @property
     def status(self) -> str:
@@ -113,6 +120,9 @@ class Answer:
             raise ValueError("a characterisation has no page: a diagnosis has")
         with open(path, "w", encoding="utf-8") as file:
             file.write(page)
+
+    def _model_text(self) -> str | None:
+        return self._pickled_model if self._inner is None else self._inner.model()
 
     def _asked(self) -> _core.Answer:
         if self._inner is None:
@@ -200,7 +210,7 @@ class Diagnosis(Answer):
         """The model, to be used on other records of the rig."""
         from twinlag._model import Model
 
-        return Model(json.loads(self._asked().model() or "null"))
+        return Model(json.loads(self._model_text() or "null"))
 
     def plot(self, ax: Any = None) -> Any:
         """Draw both time constants with their intervals, before and after; returns the axes."""
@@ -282,7 +292,7 @@ class Compensation(_WithSeries):
         """The model that it rests on, with what the gas is like; ``None`` where there is no gas temperature."""
         from twinlag._model import Model
 
-        text = self._asked().model()
+        text = self._model_text()
         return None if text is None else Model(json.loads(text))
 
     def to_xarray(self) -> Any:

@@ -10,8 +10,21 @@ _Array = npt.NDArray[np.float64]
 _Column = tuple[str, str, Any]
 _Progress = Callable[[str, int, int], object] | None
 
-__all__ = ["VERSION", "Answer", "Live", "Record", "characterise", "compensate", "diagnose", "run_program", "simulate", "track"]
+__all__ = [
+    "TEMPERATURE_RANGE_C",
+    "VERSION",
+    "Answer",
+    "Live",
+    "Record",
+    "characterise",
+    "compensate",
+    "diagnose",
+    "run_program",
+    "simulate",
+    "track",
+]
 
+TEMPERATURE_RANGE_C: tuple[float, float]
 VERSION: str
 
 @final
@@ -54,7 +67,7 @@ class Live:
     def start(self) -> Answer: ...
     def push(
         self, t1_c: float | None, t2_c: float | None, time_s: float | None = None
-    ) -> tuple[float, float, float, tuple[float | None, float | None], Any, bool, float] | None: ...
+    ) -> tuple[float, float, float, tuple[float | None, float | None], Any, bool, float, bool] | None: ...
 
 def characterise(records: list[Record], asked: str, progress: _Progress = None) -> Answer: ...
 def diagnose(records: list[Record], asked: str, progress: _Progress = None) -> Answer: ...

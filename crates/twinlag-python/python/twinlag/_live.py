@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from twinlag import _core
 from twinlag._answers import Characterisation
 from twinlag._errors import RecordError
 from twinlag._model import Model
 from twinlag._record import Record
-from twinlag._verbs import _asked, _fields, _one, _options
+from twinlag._verbs import Options, _asked, _fields, _one, _options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Band = tuple[float, float]
-
-_RANGE_C = (-273.15, 5000.0)
-"""Between absolute zero and what no sensor survives, as of a record."""
 
 
 def _reading(value: float | None, name: str) -> float | None:
     if value is None or math.isnan(value):
         return None
-    low, high = _RANGE_C
+    low, high = _core.TEMPERATURE_RANGE_C
     if not low <= value <= high:
         raise RecordError(f"{name}: {value!r} °C is not between absolute zero and {high:g} °C; leave such a reading out as None")
     return float(value)
@@ -44,6 +44,8 @@ class LiveAnswer(NamedTuple):
     """Whether the time constants may have left the range that is tracked."""
     widened_by: float
     """What the bands were multiplied by, since readings of late are farther off than noise takes them."""
+    is_resumed: bool
+    """Whether there was a long pause before this row, or the clock was set."""
 
 
 class Live:
@@ -83,7 +85,7 @@ class Live:
         *,
         model: Model | None = None,
         change_per_root_s: float | None = None,
-        **options: Any,
+        **options: Unpack[Options],
     ) -> None:
         if change_per_root_s is not None and not change_per_root_s >= 0:
             raise ValueError(f"change_per_root_s: expected a share of zero or more, got {change_per_root_s!r}")
@@ -109,7 +111,8 @@ class Live:
         Returns
         -------
         LiveAnswer or None
-            ``None`` of a row that is not later than the last one, which is left out.
+            ``None`` of a row that is left out: one that is not later than the last one, and one that is 100 000 periods later or 100
+            earlier, unless the next row goes on from it, as after a pause or where the clock was set.
 
         Raises
         ------

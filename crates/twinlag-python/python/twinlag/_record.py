@@ -117,8 +117,8 @@ class Record:
         """A record of a data frame: pandas, polars, or an xarray dataset of one dimension.
 
         Columns are chosen by name, or by number from 1; those that are left out are guessed from names and units, as of a file, and
-        `notes` says how. An index with a name, and one of instants, is a column; a unit may stand in a name, ``T1 [K]``, in a level of
-        its own below the names, ``("T1", "K")``, or in the attribute ``units`` of a variable of xarray.
+        `notes` says how. An index with a name, of instants, or of decimals that rise, is a column. A unit may stand in a name,
+        ``T1 [K]``, in a level of its own below the names, ``("T1", "K")``, or in the attribute ``units`` of a variable of xarray.
 
         Parameters
         ----------
@@ -290,7 +290,9 @@ def _columns_of(frame: Any) -> list[Column]:
     columns: list[Column] = []
     index = getattr(frame, "index", None)
     if index is not None and not callable(index):
-        is_of_time = getattr(getattr(index, "dtype", None), "kind", "") in "mM" or getattr(index, "tz", None) is not None
+        kind = getattr(getattr(index, "dtype", None), "kind", None)
+        is_rising = kind == "f" and bool(getattr(index, "is_monotonic_increasing", False))
+        is_of_time = kind in {"m", "M"} or getattr(index, "tz", None) is not None or is_rising
         if index.name is not None or is_of_time:
             columns.append(_column(index.name if index.name is not None else "time", "", index))
     columns.extend(_column(_name(name), "", frame[name]) for name in frame.columns)

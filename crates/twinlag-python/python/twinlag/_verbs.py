@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import difflib
-import inspect
 import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from twinlag import _core
 from twinlag._answers import Characterisation, Compensation, Diagnosis, Track
@@ -16,11 +15,46 @@ from twinlag._model import Model
 from twinlag._progress import shown
 from twinlag._record import Record
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 Value = float | str | tuple[float, float]
 """What is known of a number: the number, the number with its standard deviation, or text with units."""
 
 
-def _options(channels: tuple[str, str], **given: Any) -> dict[str, Any]:
+class Options(TypedDict, total=False):
+    """What every verb may be given beside its own arguments."""
+
+    known: Mapping[str, Value]
+    """What is known beforehand, by sensor or parameter: ``{"T1": 0.5}``, ``{"T2": (2.0, 0.1)}`` with a standard deviation."""
+    free: Iterable[str]
+    """``"gain"`` and ``"offset"`` of sensor 2 relative to sensor 1, to be fitted."""
+    second_order: Iterable[str]
+    """Sensors with a second lag that is fitted, by name."""
+    noise_std_k: Sequence[float]
+    """Noise standard deviations of both sensors, K."""
+    noise_ratio: float
+    """Noise of sensor 2 over that of sensor 1."""
+    noise_colour: str
+    """``"white"`` or ``"autoregressive"``."""
+    quiet_s: Iterable[tuple[float, float]]
+    """Stretches ``(from, to)``, s, in which the gas is at rest."""
+    estimator: str
+    optimiser: str
+    hold: str
+    intervals: str
+    """``"auto"``, ``"profile"`` or ``"bootstrap"``."""
+    replicates: int
+    """Simulated records of the bootstrap."""
+    seed: int
+    """Of the bootstrap."""
+    discard: int
+    """Samples left out at the start, by the published family."""
+    best_effort: bool
+    """Give numbers that may not be used as well."""
+
+
+def _options(channels: tuple[str, str], **given: Unpack[Options]) -> dict[str, Any]:
     """The options in the form of the library.
 
     Raises
@@ -28,34 +62,12 @@ def _options(channels: tuple[str, str], **given: Any) -> dict[str, Any]:
     TypeError
         One of them is called otherwise.
     """
-    allowed = inspect.signature(_options_named).parameters
     for name in given:
-        if name not in allowed:
-            near = difflib.get_close_matches(name, allowed, n=1)
-            meant = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(list(allowed)[1:])}"
+        if name not in Options.__annotations__:
+            near = difflib.get_close_matches(name, Options.__annotations__, n=1)
+            meant = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(Options.__annotations__)}"
             raise TypeError(f"no option {name!r}; {meant}")
-    return _options_named(channels, **given)
-
-
-def _options_named(
-    channels: tuple[str, str],
-    *,
-    known: Mapping[str, Value] | None = None,
-    free: Iterable[str] = (),
-    second_order: Iterable[str] = (),
-    noise_std_k: Sequence[float] | None = None,
-    noise_ratio: float | None = None,
-    noise_colour: str | None = None,
-    quiet_s: Iterable[tuple[float, float]] = (),
-    estimator: str | None = None,
-    optimiser: str | None = None,
-    hold: str | None = None,
-    intervals: str | None = None,
-    discard: int | None = None,
-    best_effort: bool = False,
-) -> dict[str, Any]:
-    """The options in the form of the library."""
-    free, second_order = _names(free), _names(second_order)
+    free, second_order = _names(given.get("free", ())), _names(given.get("second_order", ()))
     _expect(free, ("gain", "offset"), "free")
     sensors = _places(channels)
     _expect(second_order, tuple(sensors), "second_order")
@@ -63,24 +75,23 @@ def _options_named(
         "free_gain": "gain" in free,
         "free_offset": "offset" in free,
         "second_order": [place in {sensors[name] for name in second_order} for place in (0, 1)],
-        "known": [_known(name, value, channels) for name, value in _mapping(known).items()],
-        "quiet_segments_s": [[float(start), float(end)] for start, end in quiet_s],
-        "best_effort": bool(best_effort),
+        "known": [_known(name, value, channels) for name, value in _mapping(given.get("known")).items()],
+        "quiet_segments_s": [[float(start), float(end)] for start, end in given.get("quiet_s", ())],
+        "best_effort": bool(given.get("best_effort", False)),
     }
+    noise_std_k = given.get("noise_std_k")
     if noise_std_k is not None:
         if not hasattr(noise_std_k, "__len__") or len(noise_std_k) != 2:
             raise ValueError(f"noise_std_k: expected the levels of both sensors, K, got {noise_std_k!r}")
         options["noise_std_k"] = [float(level) for level in noise_std_k]
-    given = {
-        "noise_ratio": noise_ratio,
-        "noise_colour": noise_colour,
-        "estimator": estimator,
-        "optimiser": optimiser,
-        "hold": hold,
-        "intervals": intervals,
-        "discard": discard,
-    }
-    options.update({name: value for name, value in given.items() if value is not None})
+    chosen = {name: value for name, value in given.items() if value is not None}
+    as_they_are = ("noise_ratio", "noise_colour", "estimator", "optimiser", "hold", "intervals", "discard")
+    options.update({name: chosen[name] for name in as_they_are if name in chosen})
+    of_bootstrap = {name: chosen[name] for name in ("replicates", "seed") if name in chosen}
+    if options.get("intervals") == "bootstrap":
+        options["intervals"] = {"bootstrap": of_bootstrap}
+    elif of_bootstrap:
+        raise ValueError(f"{' and '.join(of_bootstrap)}: of a bootstrap alone; intervals='bootstrap' asks for one")
     return options
 
 
@@ -150,7 +161,7 @@ def characterise(
     *,
     model: Model | None = None,
     progress: Any = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Characterisation:
     """Estimate both time constants blind, without knowing the gas temperature.
 
@@ -172,7 +183,7 @@ def characterise(
     quiet_s : iterable of pairs, optional
         Stretches ``(from, to)``, s, in which the gas is at rest: noise levels are taken from there.
     estimator, optimiser, hold, intervals, noise_colour : str, optional
-        As of the program.
+        As of the program. Of ``intervals="bootstrap"`` also `replicates`, 199, and `seed`, 1.
     discard : int, optional
         Samples left out at the start, by the published family.
     best_effort : bool
@@ -213,7 +224,7 @@ def diagnose(
     *,
     without: Iterable[str] = (),
     progress: Any = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Diagnosis:
     """Find what two first-order lags leave over, and which physical effects account for it.
 
@@ -248,7 +259,7 @@ def compensate(
     trust: str = "T1",
     without: Iterable[str] = (),
     progress: Any = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Compensation:
     """Reconstruct the gas temperature with its standard deviation.
 
@@ -296,7 +307,7 @@ def track(
     model: Model | None = None,
     window_s: float | None = None,
     progress: Any = None,
-    **options: Any,
+    **options: Unpack[Options],
 ) -> Track:
     """Estimate both time constants along a record, in flow that changes.
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use twinlag_compensate::{TrackerFn, learn, tracker};
+use twinlag_compensate::{AnyTracker, learn, tracker};
 use twinlag_cross_relation::Z_975;
 use twinlag_diagnose::{Grade, Identifier};
 use twinlag_estimate::spans_too_much;
@@ -17,8 +17,10 @@ use crate::verbs::with_model::with_model;
 /// sensor, where nothing is said.
 const CHANGE: f64 = 0.1;
 const CHANGE_OVER: f64 = 10.0;
-/// Missing samples of a gap that are gone through one by one; a row farther off is left out.
+/// Samples of a gap that a single row is believed to come after. One that is farther off may be wrong.
 const LONGEST_GAP: f64 = 100_000.0;
+/// Samples by which a row may come late, after those that were read later, and is no clock that was set back.
+const MOST_LATE: f64 = 100.0;
 /// Chance that the time constants are beyond the range in view, above which that is said.
 const LIKELY: f64 = 0.05;
 /// Rows over which it is watched whether readings are what the start led to expect, and by how many
@@ -58,19 +60,23 @@ pub struct LiveAnswer {
     /// What the bands were multiplied by, since readings of late are farther from what was expected
     /// of them than noise takes them: the gas is not what it was in the start.
     pub widened_by: f64,
+    /// Whether there was a long pause before this row, or the clock was set.
+    pub is_resumed: bool,
 }
 
 /// Tracks both sensors, reading by reading, after a start.
 pub struct Live {
     /// Characterisation of the start.
     pub start: Characterisation,
-    push: TrackerFn,
+    tracker: Box<dyn AnyTracker>,
     gain: f64,
     offset_k: f64,
     tau_s: [f64; 2],
     log_variance: [f64; 2],
     period_s: f64,
     last_s: Option<f64>,
+    /// Of a row that was left out, since it was far from the last one.
+    elsewhere_s: Option<f64>,
     /// Mean square of late of what is new in a reading, over its variance.
     energy: f64,
 }
@@ -142,18 +148,32 @@ impl Live {
             );
         }
         let period_s = record.sampling.period_s;
-        let push = tracker(&rig, &prior, period_s, change).ok_or(Error::LiveEffect { effect: "delay" })?;
+        let tracker = tracker(&rig, &prior, period_s, change).ok_or(Error::LiveEffect { effect: "delay" })?;
         let log_variance = [0, 1].map(|i| {
             let error_s = fit.time_constants[i].standard_error_s.unwrap_or(0.0);
             (error_s / tau_s[i]).powi(2)
         });
-        Ok(Self { start, push, gain, offset_k, tau_s, log_variance, period_s, last_s: None, energy: 1.0 })
+        Ok(Self {
+            start,
+            tracker,
+            gain,
+            offset_k,
+            tau_s,
+            log_variance,
+            period_s,
+            last_s: None,
+            elsewhere_s: None,
+            energy: 1.0,
+        })
     }
 
     /// What is known once a row is read: both readings, °C, `None` for one that is missing, at
-    /// `time_s`; a sample after the last one where that is not said. `None` for a row that is not
-    /// later than the last one, or 100 000 samples after it, which is left out. Samples that are
-    /// missing in a gap are gone through as such.
+    /// `time_s`; a sample after the last one where that is not said. `None` for a row that is left out, since it is not later
+    /// than the last one. Samples that are missing in a gap are gone through as such.
+    ///
+    /// A row that is 100 000 samples later, or more than 100 earlier, is left out as well, unless the next one goes on from it:
+    /// there was a pause, or the clock was set. Where it was set back, which does not show how long that took, all that the rows
+    /// before said of gas and time constants is forgotten.
     ///
     /// ```
     #[doc = include_str!("../example.txt")]
@@ -173,16 +193,9 @@ impl Live {
     pub fn push(&mut self, time_s: Option<f64>, reading_c: [Option<f64>; 2]) -> Option<LiveAnswer> {
         let next_s = self.last_s.map_or(0.0, |last_s| last_s + self.period_s);
         let time_s = time_s.filter(|t| t.is_finite()).unwrap_or(next_s);
-        let steps = self.last_s.map_or(1.0, |last_s| ((time_s - last_s) / self.period_s).round());
-        if !(1.0..=LONGEST_GAP).contains(&steps) {
-            return None;
-        }
-        for _ in 1..steps as u64 {
-            (self.push)([None, None]);
-        }
-        self.last_s = Some(time_s);
+        let is_resumed = self.come_to(time_s)?;
         let [first, second] = reading_c.map(|c| c.filter(|c| c.is_finite()));
-        let now = (self.push)([first, second.map(|c| (c - self.offset_k) / self.gain)]);
+        let now = self.tracker.push([first, second.map(|c| (c - self.offset_k) / self.gain)]);
         let count = reading_c.iter().flatten().filter(|c| c.is_finite()).count();
         if count > 0 {
             self.energy += (now.normalised_innovation_squared / count as f64 - self.energy) / WATCHED;
@@ -204,7 +217,27 @@ impl Live {
             tau_95_s,
             is_beyond: now.chance_beyond > LIKELY,
             widened_by,
+            is_resumed,
         })
+    }
+
+    /// Goes through what is missing between the last row and `time_s`, and says whether that was a long pause or another clock;
+    /// `None` where a row at `time_s` is to be left out.
+    fn come_to(&mut self, time_s: f64) -> Option<bool> {
+        let steps_from = |from_s: f64| ((time_s - from_s) / self.period_s).round();
+        let is_next = |steps: f64| (1.0..=LONGEST_GAP).contains(&steps);
+        let steps = self.last_s.map_or(1.0, steps_from);
+        let is_resumed = !is_next(steps);
+        if is_resumed {
+            let is_late = (-MOST_LATE..1.0).contains(&steps);
+            if is_late || !self.elsewhere_s.is_some_and(|from_s| is_next(steps_from(from_s))) {
+                self.elsewhere_s = Some(time_s).filter(|_| !is_late);
+                return None;
+            }
+        }
+        self.tracker.skip(if steps > 0.0 { steps as u64 - 1 } else { u64::MAX });
+        (self.last_s, self.elsewhere_s) = (Some(time_s), None);
+        Some(is_resumed)
     }
 }
 

@@ -26,14 +26,14 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         for i in 0..2 {
             let sensor = &mut out.sensors[i];
             if sensor.known && sensor.time_constant_s.is_some() {
-                sensor.judgement = Judgement::given();
+                sensor.judgement = Judgement::of_given(&basis);
             } else {
                 (sensor.judgement, sensor.interval_95_s) =
                     judged(sensor.time_constant_s, sensor.interval_95_s, of(&[(i, 1.0)]), true, most_s);
             }
             if let Some(lag) = &mut sensor.second_time_constant_s {
                 (lag.judgement, lag.interval_95) = if lag.known {
-                    (Judgement::given(), lag.interval_95)
+                    (Judgement::of_given(&basis), lag.interval_95)
                 } else {
                     judged(lag.value, lag.interval_95, of(&[(4 + i, 1.0)]), true, most_s)
                 };
