@@ -1,13 +1,15 @@
 //! Whether the record contradicts what was given of the time constants.
 //!
 //! What was given pulls the fit to it, and effects may be found that make up for a wrong value. So the record is fitted without it.
-//! Where two lags then leave only noise, and clearly less than effects with what was given, their numbers allowed for, the deviance
-//! that what was given costs two lags is a chi-square with as many degrees of freedom as there are values. Otherwise the last model is
-//! fitted without it in their place: its effects may be wrong, so numbers are conditional. Where that leaves more than noise as well,
+//! Where two lags then leave only noise, the deviance that what was given costs them is a chi-square with as many degrees of freedom as
+//! there are values. It speaks against what was given if effects with that leave clearly more than two lags without, their numbers
+//! allowed for; where they leave about as much, either may be. So it is with each model that has one effect less. Otherwise the last
+//! model is fitted without it in their place: its effects may be wrong, so numbers are conditional. Where that leaves more than noise as well,
 //! what is missing may account for the deviance. A fit that has then left behind what was given with a deviation may not be used.
 
 use twinlag_model::{
-    ChannelNoise, Effort, Fitted, KnownTimeConstant, ModelFit, Observations, Policy, Selection, Settings, summarise,
+    ChannelNoise, Effort, Fitted, Identifier, KnownTimeConstant, ModelFit, Observations, Policy, Selection, Settings,
+    summarise,
 };
 
 use crate::grade::{Grade, REJECTING_CHI2, Reason};
@@ -29,6 +31,9 @@ pub(crate) struct Contradiction {
     /// The time constants without what was given, for the reader, where they are to be had.
     instead: Option<String>,
     deviations: f64,
+    /// Effects that are not needed without what was given.
+    needless: Vec<Identifier>,
+    /// Of numbers that rest on what was given, as far as this goes.
     grade: Grade,
 }
 
@@ -50,32 +55,54 @@ impl Contradiction {
                 what: known.iter().map(given).collect::<Vec<_>>().join(" and "),
                 instead: Some(instead(settings, &fit, free)),
                 deviations: deviance.sqrt(),
+                needless: Vec::new(),
                 grade,
             })
         };
-        // Where two lags alone leave only noise, effects that were found make up for what was given.
+        // Against the last model, a model with fewer effects.
+        let instead_of_effects = |fewer: &Fitted, free: &Fitted, selection: &Selection, levels: &ChannelNoise| {
+            let grade = match lost_by_effects(with_effects, free, settings, observations, selection) {
+                Some(deviance) if deviance < 0.0 => return None,
+                Some(deviance) if deviance < CONTRADICTING_DEVIANCES[0] => Grade::Go,
+                _ => Grade::NoGo,
+            };
+            let kept: Vec<Identifier> = fewer.model.effects.iter().map(|effect| effect.identifier()).collect();
+            let all = with_effects.model.effects.iter().map(|effect| effect.identifier());
+            let needless = all.filter(|effect| !kept.contains(effect)).collect();
+            Some(Self { needless, ..of(fewer, free, selection, levels, grade)? })
+        };
+        // Where two lags alone leave only noise, effects that were found may make up for what was given.
         let two_lags = |selection: &Selection, levels: &ChannelNoise| {
             let model = state.base.model.clone().with_noise(levels.std_k);
             let alone = model.clone().knowing_nothing().fit_over_grid(&[], STARTS, observations, selection);
             let held = model.fit(&state.base.theta, observations, selection, Effort::Finish);
-            let lost = lost_by_effects(with_effects, &alone, settings, observations, selection);
-            let are_likelier = lost.is_some_and(|deviance| deviance < CONTRADICTING_DEVIANCES[0]);
-            of(&held, &alone, selection, levels, Grade::NoGo).filter(|_| !are_likelier)
+            instead_of_effects(&held, &alone, selection, levels)
         };
         let levels = &state.prepared.levels;
-        two_lags(everything, levels)
-            .or_else(|| {
-                // A fit that a wrong value spoils may have put what it leaves over into noise levels or weights.
-                let is_put = |entry: &Move| matches!(entry, Move::LowerNoise { .. } | Move::Reweigh { .. });
-                let (selection, levels) = state.moves.iter().any(is_put).then(|| state.prepared.before_residuals())?;
-                two_lags(&selection, levels)
-            })
-            .or_else(|| {
-                let free = with_effects.model.clone().knowing_nothing();
-                let free = free.fit(&with_effects.theta, observations, everything, Effort::Finish);
-                of(with_effects, &free, everything, levels, Grade::Conditional)
-            })
+        let of_two_lags = two_lags(everything, levels).or_else(|| {
+            // A fit that a wrong value spoils may have put what it leaves over into noise levels or weights.
+            let is_put = |entry: &Move| matches!(entry, Move::LowerNoise { .. } | Move::Reweigh { .. });
+            let (selection, levels) = state.moves.iter().any(is_put).then(|| state.prepared.before_residuals())?;
+            two_lags(&selection, levels)
+        });
+        let without = |index: usize| {
+            let (model, theta) = with_effects.without(index);
+            let free = model.clone().knowing_nothing().fit_over_grid(&theta[2..], STARTS, observations, everything);
+            let held = model.fit(&theta, observations, everything, Effort::Finish);
+            instead_of_effects(&held, &free, everything, levels)
+        };
+        // Beside a noise there is nothing to hold a model against, and of one effect two lags are what is left.
+        let effects = with_effects.model.effects.len();
+        let each = if effects > 1 && with_effects.model.noise().is_none() { 0..effects } else { 0..0 };
+        let of_fewer = of_two_lags.into_iter().chain(each.filter_map(without)).max_by_key(|found| found.grade);
+        if of_fewer.as_ref().is_some_and(Self::is_of_known) {
+            return of_fewer;
+        }
+        let free = with_effects.model.clone().knowing_nothing();
+        let free = free.fit(&with_effects.theta, observations, everything, Effort::Finish);
+        of(with_effects, &free, everything, levels, Grade::Conditional)
             .or_else(|| Self::left_behind(with_effects, settings))
+            .or(of_fewer)
     }
 
     /// What was given with a deviation, where the last model is far from it: what is missing drags the fit away.
@@ -85,36 +112,41 @@ impl Contradiction {
         let far = settings.known.iter().filter_map(|known| Some((known, deviations(known)?)));
         let (known, deviations) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let is_far = deviations > LEFT_BEHIND_DEVIATIONS;
-        is_far.then(|| Self { what: given(known), instead: None, deviations, grade: Grade::NoGo })
+        is_far.then(|| Self { what: given(known), instead: None, deviations, needless: Vec::new(), grade: Grade::NoGo })
     }
 
-    /// Whether what was given is wrong, and effects that were found make up for that.
+    /// Whether what was given is wrong, and effects that were found would make up for that.
     pub(crate) fn is_of_known(&self) -> bool {
         self.grade == Grade::NoGo
     }
 
-    /// The reason that each number has for it.
-    pub(crate) fn reason(&self) -> Reason {
-        let Self { what, deviations, grade, .. } = self;
-        if self.instead.is_none() {
-            return Reason::LeftBehind { what: what.clone(), deviations: *deviations };
+    /// The reason that each number has for it; `None` where numbers are no worse for it than for what was given.
+    pub(crate) fn reason(&self) -> Option<Reason> {
+        let (what, deviations, grade) = (self.what.clone(), self.deviations, self.grade);
+        match (&self.instead, grade) {
+            (None, _) => Some(Reason::LeftBehind { what, deviations }),
+            (Some(_), Grade::Go) => None,
+            (Some(_), _) => Some(Reason::Contradicted { what, deviations, grade }),
         }
-        Reason::Contradicted { what: what.clone(), deviations: *deviations, grade: *grade }
     }
 
     /// The remark that says it, where there are other time constants to name.
     pub(crate) fn remark(self) -> Option<Remark> {
-        let Self { what, instead, deviations, .. } = self;
-        Some(Remark::Contradicted { what, instead: instead?, deviations })
+        let Self { what, instead, deviations, needless, grade } = self;
+        let instead = instead?;
+        Some(match grade {
+            Grade::Go => Remark::EffectsOrGiven { what, instead, effects: needless },
+            _ => Remark::Contradicted { what, instead, deviations },
+        })
     }
 }
 
-/// The deviance that effects leave with what was given beyond that of two lags `alone` without it, by Schwarz's criterion: each number
+/// The deviance that effects leave with what was given beyond that of `fewer` without it, by Schwarz's criterion: each number
 /// that they have more costs the logarithm of the number of residuals. `None` where no effect was found, and beside a noise, whose
 /// likelihood is not that of the residual alone.
 fn lost_by_effects(
     with_effects: &Fitted,
-    alone: &Fitted,
+    fewer: &Fitted,
     settings: &Settings,
     observations: &Observations,
     selection: &Selection,
@@ -123,9 +155,9 @@ fn lost_by_effects(
     if model.effects.is_empty() || model.noise().is_some() {
         return None;
     }
-    let energy = model.clone().with_noise(alone.model.noise_std_k()).energy(theta, observations, selection);
-    let more = theta.len() as f64 - alone.theta.len() as f64 - settings.known.len() as f64;
-    Some((energy - alone.chi2) / alone.mean_energy().max(1.0) + more * alone.count.ln())
+    let energy = model.clone().with_noise(fewer.model.noise_std_k()).energy(theta, observations, selection);
+    let more = theta.len() as f64 - fewer.theta.len() as f64 - settings.known.len() as f64;
+    Some((energy - fewer.chi2) / fewer.mean_energy().max(1.0) + more * fewer.count.ln())
 }
 
 /// The time constants that the record gives without what was given, for the reader.

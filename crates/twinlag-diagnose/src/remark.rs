@@ -60,6 +60,15 @@ pub enum Remark {
         /// By how many standard deviations both differ.
         deviations: f64,
     },
+    /// Either effects are there, or what was given beforehand is wrong.
+    EffectsOrGiven {
+        /// What was given, as `T1 = 0.5 s`.
+        what: String,
+        /// What the record gives without these effects, as `T1 = 0.4 s`.
+        instead: String,
+        /// The effects.
+        effects: Vec<Identifier>,
+    },
     /// An effect was taken out since it does not help on records that had no part in finding it.
     DoesNotTransfer {
         /// The effect.
@@ -124,16 +133,17 @@ impl Remark {
             Self::SingleTone => 0,
             Self::Contradicted { .. } => 1,
             Self::LagAlone | Self::NotOneRig { .. } | Self::TwoSteadyFlows => 2,
-            Self::BiasUnknown { .. } => 3,
-            Self::VariesTooFast { .. } => 4,
-            Self::ModelErrorAsNoise => 5,
-            Self::Widened { .. } => 6,
-            Self::NoiseLowered => 7,
-            Self::Replaced { .. } => 8,
-            Self::OtherChannel { .. } => 9,
-            Self::Needless { .. } => 10,
-            Self::DoesNotTransfer { .. } => 11,
-            Self::SearchedInPieces { .. } => 12,
+            Self::EffectsOrGiven { .. } => 3,
+            Self::BiasUnknown { .. } => 4,
+            Self::VariesTooFast { .. } => 5,
+            Self::ModelErrorAsNoise => 6,
+            Self::Widened { .. } => 7,
+            Self::NoiseLowered => 8,
+            Self::Replaced { .. } => 9,
+            Self::OtherChannel { .. } => 10,
+            Self::Needless { .. } => 11,
+            Self::DoesNotTransfer { .. } => 12,
+            Self::SearchedInPieces { .. } => 13,
         }
     }
 }
@@ -146,6 +156,16 @@ fn yes() -> bool {
 pub(crate) fn to_digits_of(size: f64, number: f64) -> String {
     let decimals = (2.0 - size.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{number:.decimals$}")
+}
+
+fn effects_or_given(f: &mut fmt::Formatter<'_>, what: &str, instead: &str, effects: &[Identifier]) -> fmt::Result {
+    let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
+    write!(
+        f,
+        "the record is explained about as well without {}, and without {what}, as given, by {instead}: either that is wrong, or the \
+         effect is there. Check the value, its unit, and which channel is which",
+        names.join(" and ")
+    )
 }
 
 /// What it means for whoever wants to use the numbers, and what to do.
@@ -163,6 +183,7 @@ impl fmt::Display for Remark {
                  value, its unit, and which channel is which",
                 rounded(*deviations)
             ),
+            Self::EffectsOrGiven { what, instead, effects } => effects_or_given(f, what, instead, effects),
             Self::LagAlone => f.write_str(
                 "this record does not distinguish time constants from a delay: use the difference alone, which is the total \
                  delay of channel 2, τ2 − τ1 + delay, and the size of the delay only if you know that it is one. A known time \
@@ -265,6 +286,11 @@ mod tests {
             Remark::LagAlone,
             Remark::SingleTone,
             Remark::Contradicted { what: "T1 = 0.8 s".into(), instead: "T1 = 0.4 s".into(), deviations: 9.7 },
+            Remark::EffectsOrGiven {
+                what: "T1 = 0.8 s".into(),
+                instead: "T1 = 0.4 s".into(),
+                effects: vec![before, after],
+            },
             Remark::ModelErrorAsNoise,
             Remark::BiasUnknown { is_one_known: false },
             Remark::VariesTooFast { effect: Identifier::VARYING_TIME_CONSTANT, ends_s: [480.0, 504.6] },
