@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use twinlag_optimise::{Budget, Cost, Minimiser, Optimiser, Problem};
 
 use super::part::{self, Part};
+use super::whittle::noise_score;
 use super::{Search, noise_factor};
 use crate::prior::Prior;
 use crate::readings::Readings;
@@ -79,6 +80,8 @@ impl Cost for Exact<'_> {
         let parts = part::with(self.parts, x);
         let prior = Prior { level_c: self.level_c, terms: parts.iter().flat_map(Part::terms).collect() };
         let rig = self.rig.with_noise_times(noise_factor(&parts));
-        reconstruct(self.readings, &rig, &prior, Form::Filter).map_or(f64::INFINITY, |gas| -2.0 * gas.log_likelihood)
+        let of_noise: f64 = parts.iter().filter_map(Part::noise).map(noise_score).sum();
+        reconstruct(self.readings, &rig, &prior, Form::Filter)
+            .map_or(f64::INFINITY, |gas| of_noise - 2.0 * gas.log_likelihood)
     }
 }

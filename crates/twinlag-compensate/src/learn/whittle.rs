@@ -67,7 +67,7 @@ impl Periodogram {
     /// of the noise, with gradient and curvature.
     pub(super) fn of_factors(&self, factors: [f64; 2]) -> (f64, [f64; 2], [[f64; 2]; 2]) {
         let prior = BINS_PER_ONE / (LOG_STD * LOG_STD);
-        let mut value: f64 = factors.iter().map(|v| prior * v.ln().powi(2)).sum();
+        let mut value = BINS_PER_ONE * noise_score(factors);
         let mut gradient = factors.map(|v| 2.0 * prior * v.ln() / v);
         let mut curvature = [[2.0 * prior / factors[0].powi(2), 0.0], [0.0, 2.0 * prior / factors[1].powi(2)]];
         let skipped = self.bins.len() - self.disagreement.len();
@@ -86,6 +86,11 @@ impl Periodogram {
         }
         (value, gradient, curvature)
     }
+}
+
+/// Twice the logarithm of how much less probable factors of the noise are than ones, before there are readings.
+pub(super) fn noise_score(factors: [f64; 2]) -> f64 {
+    factors.iter().map(|factor| (factor.ln() / LOG_STD).powi(2)).sum()
 }
 
 fn add(sums: &mut [f64], terms: &[f64]) {
