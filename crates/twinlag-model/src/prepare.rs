@@ -53,6 +53,9 @@ pub struct Prepared {
     pub searched: Selection,
 }
 
+/// Least change of a channel, K: squares of what is a millionth of it are numbers still.
+const MIN_CHANGE_K: f64 = 1e-140;
+
 impl Prepared {
     /// The record with saturation and coarse steps dealt with.
     ///
@@ -64,8 +67,8 @@ impl Prepared {
         settings.check()?;
         let policy = settings.policy.clone();
         for i in 0..2 {
-            let first = observations.channel(i).next();
-            if observations.channel(i).all(|y| Some(y) == first) {
+            let first = observations.channel(i).next().unwrap_or_default();
+            if observations.channel(i).all(|y| (y - first).abs() < MIN_CHANGE_K) {
                 return Err(ModelError::Constant { channel: i + 1 });
             }
         }

@@ -31,6 +31,9 @@ pub(crate) const ABSOLUTE_ZERO_C: f64 = -273.15;
 /// What a temperature can be, °C: from absolute zero to what no thermocouple reaches; sentinels such as 9999 and 1e37 lie beyond.
 pub const TEMPERATURE_RANGE_C: RangeInclusive<f64> = ABSOLUTE_ZERO_C..=5000.0;
 
+/// Least change, K, of a channel that changes: a thousandth of what the best thermometers resolve.
+const MIN_CHANGE_K: f64 = 1e-9;
+
 /// Below this, in K, a reading calls for a question: colder than any gas but hydrogen and helium boils.
 /// Chosen; a note depends on it and no number.
 const COLD_K: f64 = 60.0;
@@ -318,7 +321,8 @@ impl Record {
         }
         for (values, column) in [(&t1_c, &origin.columns[0]), (&t2_c, &origin.columns[1])] {
             let mut used = segments.iter().cloned().flatten().map(|row| values[row]);
-            if let Some(value_c) = used.next().filter(|&first| used.all(|value| value == first)) {
+            let first_c = used.next();
+            if let Some(value_c) = first_c.filter(|first_c| used.all(|c| (c - first_c).abs() < MIN_CHANGE_K)) {
                 return Err(RecordError::Constant { file: file(), column: column.clone(), value_c });
             }
         }

@@ -139,6 +139,20 @@ fn a_constant_channel_is_refused() {
     bench.refuses(3, &FILE, &["run.csv", "3 'T2'", "20.5 °C in every sample", "choose another column"]);
 }
 
+/// Failed: of readings of 1e-300 °C `diagnose` ended in a panic, and `characterise` asked for "at least one start".
+#[test]
+fn readings_too_small_to_square_are_refused() {
+    let bench = spoiled("tiny", |lines| {
+        for line in lines.iter_mut().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            *line = format!("{},{}e-300,{}e-300", cells[0], cells[1], cells[2]);
+        }
+    });
+    for verb in ["characterise", "diagnose"] {
+        bench.refuses(3, &[verb, "run.csv"], &["run.csv", "2 'T1'", "in every sample", "choose another column"]);
+    }
+}
+
 #[test]
 fn a_column_that_is_not_there_is_refused_with_those_that_are() {
     let bench = good("wrong_name");

@@ -238,6 +238,14 @@ fn a_channel_that_never_changes_is_refused_at_any_level() {
     is_constant(300.1, 2);
 }
 
+/// Failed: squares of a change of 1e-298 K are zero, and so were bounds of the noise, which ended in a panic.
+#[test]
+fn a_change_too_small_to_square_is_none() {
+    let [t1_c, t2_c] = plain().map(|values| values.into_iter().map(|c| 1e-300 * c).collect());
+    let got = asked(&even(t1_c, t2_c).expect("finite and long")).map(|d| told(&d));
+    assert_eq!(got, Err(ModelError::Constant { channel: 1 }));
+}
+
 #[test]
 fn a_channel_that_never_changes_is_refused_with_known_effects_too() {
     let [t1_c, _] = plain();
