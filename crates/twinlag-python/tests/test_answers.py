@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import pickle
 
 import numpy as np
@@ -101,6 +102,23 @@ def test_a_model_goes_to_another_record(diagnosis, calibrated, tmp_path) -> None
     path.write_text("{}")
     with pytest.raises(ValueError, match="expected a model"):
         tl.load_model(path)
+
+
+def test_files_are_written_as_a_whole(diagnosis, tmp_path, monkeypatch) -> None:
+    path = tmp_path / "model.json"
+    path.write_text("old")
+    path.chmod(0o640)
+
+    def full(_: int) -> None:
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="no space"):
+        diagnosis.model.save(path)
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+    monkeypatch.undo()
+    diagnosis.model.save(path)
+    assert tl.load_model(path) == diagnosis.model and path.stat().st_mode & 0o777 == 0o640
 
 
 def test_forms_of_compensation(rig) -> None:

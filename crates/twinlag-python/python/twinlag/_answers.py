@@ -10,6 +10,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from twinlag import _core
+from twinlag._files import replace
 from twinlag._part import Effect, Part, Sensor, Sensors, part_of, quantity
 
 if TYPE_CHECKING:
@@ -118,8 +119,7 @@ class Answer:
         page = self._asked().page(now.strftime("%Y-%m-%d %H:%M %Z"), static, False)
         if page is None:
             raise ValueError("a characterisation has no page: a diagnosis has")
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(page)
+        replace(path, page)
 
     def _model_text(self) -> str | None:
         return self._pickled_model if self._inner is None else self._inner.model()

@@ -6,6 +6,7 @@ import json
 import os
 from typing import TYPE_CHECKING, Any
 
+from twinlag._files import replace
 from twinlag._part import Part
 
 if TYPE_CHECKING:
@@ -22,10 +23,8 @@ class Model(Part):
     __slots__ = ()
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write it as JSON, for `load_model` and for ``--model`` of the program."""
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump(self._fields, file, indent=2, ensure_ascii=False)
-            file.write("\n")
+        """Write it as JSON, for `load_model` and for ``--model`` of the program. A file that exists is overwritten."""
+        replace(path, json.dumps(self._fields, indent=2, ensure_ascii=False) + "\n")
 
     def compensate(self, record: Record, **options: Any) -> Compensation:
         """The gas temperature of another record of the rig; options as of `twinlag.compensate`."""
