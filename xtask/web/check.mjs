@@ -65,6 +65,9 @@ async function diagnosed(page) {
   await page.waitForFunction(() => document.getElementById("said").textContent !== "", null, { timeout: DIAGNOSED_MS });
   const said = await page.textContent("#said");
   if (said !== "Diagnosed.") throw new Error(said);
+  // Failed: from the second answer on the frame of the report was blank.
+  const box = await page.frameLocator("#answer-report").locator("h1").boundingBox();
+  if (!(box?.width > 0)) throw new Error("the report is blank");
 }
 
 function run(...details) {
@@ -122,7 +125,9 @@ async function columns(open) {
   if (await page.isVisible("#diagnose")) fail(where, "two sensors in one column are diagnosed");
   await page.selectOption("#t2", t2);
   await page.waitForSelector("#asking:not([hidden])");
-  await page.fill("#known", "0.12");
+  await diagnosed(page);
+  await page.fill("#known", "0.12 s");
+  if (await page.isVisible("#answer")) fail(where, "an answer stays that is not of what is asked");
   await diagnosed(page);
   const said = JSON.parse(await downloaded(page, "Answer as JSON"));
   const wanted = JSON.parse(run("diagnose", "first.csv", "--t1", JSON.parse(t1), "--t2", JSON.parse(t2), "--known", "T1=0.12s", "--json"));

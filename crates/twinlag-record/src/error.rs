@@ -149,7 +149,7 @@ pub enum RecordError {
     OpenQuote { file: String, line: usize },
     #[error(
         "{file}: {at}, column {column}: expected a number or a word for a missing one (empty, NaN, NA, null, ---, \
-         OL, OPEN, Over, inf), found '{cell}'; mend the cell or empty it"
+         OL, OPEN, Over, overload, inf), found '{cell}'; mend the cell or empty it"
     )]
     NotANumber { file: String, at: Place, column: String, cell: String },
     #[error(

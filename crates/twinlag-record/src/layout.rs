@@ -127,9 +127,8 @@ impl Layout {
             // such.
             first_line = head.get(bottom + 1).map_or(first_line, |line| line.0);
             for (_, _, cells) in &head[top + 1..=bottom] {
-                let row = cells.iter().map(|cell| if is_processing(cell) { Unit::Unstated } else { Unit::parse(cell) });
                 if units.is_empty() {
-                    units = row.collect();
+                    units = units_of(cells);
                 }
             }
             head.truncate(bottom + 1);
@@ -200,6 +199,15 @@ fn wrong_count(file: String, line: usize, expected: usize, found: usize, columns
 
 fn is_processing(cell: &str) -> bool {
     PROCESSING.iter().any(|word| cell.eq_ignore_ascii_case(word))
+}
+
+/// The units of a row below the names. `min` is a minimum beside another word of processing, else it is minutes.
+fn units_of(cells: &[Cow<'_, str>]) -> Vec<Unit> {
+    let is_minute = |cell: &str| cell.eq_ignore_ascii_case("min");
+    let is_word = |cell: &str| is_processing(cell) && cell.chars().any(char::is_alphabetic);
+    let is_of_processing = cells.iter().any(|cell| is_word(cell) && !is_minute(cell));
+    let is_unit = |cell: &str| !is_processing(cell) || (is_minute(cell) && !is_of_processing);
+    cells.iter().map(|cell| if is_unit(cell) { Unit::parse(cell) } else { Unit::Unstated }).collect()
 }
 
 fn is_unit_cell(cell: &str) -> bool {

@@ -40,15 +40,29 @@ pub(crate) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     std::str::from_utf8(buffer).ok()?.parse().ok()
 }
 
-/// Empty, NaN, NA, N/A, null, inf, OL, OPEN, Over, or two and more dashes, in any case and with any
+/// Empty, NaN, NA, N/A, null, inf, OL, OPEN, Over, overload, overrange, underrange, overflow, or two and more dashes, in any case and with any
 /// sign.
 pub(crate) fn is_missing(cell: &str) -> bool {
-    const WORDS: [&str; 9] = ["nan", "na", "n/a", "null", "inf", "infinity", "ol", "open", "over"];
+    const WORDS: [&str; 13] = [
+        "nan",
+        "na",
+        "n/a",
+        "null",
+        "inf",
+        "infinity",
+        "ol",
+        "open",
+        "over",
+        "overload",
+        "overrange",
+        "underrange",
+        "overflow",
+    ];
     if cell.is_empty() || (cell.len() > 1 && cell.bytes().all(|byte| byte == b'-')) {
         return true;
     }
     let word = cell.trim_start_matches(['+', '-']);
-    word.len() <= 8 && WORDS.iter().any(|known| word.eq_ignore_ascii_case(known))
+    word.len() <= 10 && WORDS.iter().any(|known| word.eq_ignore_ascii_case(known))
 }
 
 #[cfg(test)]
@@ -77,8 +91,24 @@ mod tests {
 
     #[test]
     fn the_words_for_missing_are_missing_and_no_others() {
-        for word in ["", "NaN", "nan", "NA", "n/a", "null", "---", "-----", "OL", "-OL", "OPEN", "Over", "inf", "-Inf"]
-        {
+        for word in [
+            "",
+            "NaN",
+            "nan",
+            "NA",
+            "n/a",
+            "null",
+            "---",
+            "-----",
+            "OL",
+            "-OL",
+            "OVERLOAD",
+            "Underrange",
+            "OPEN",
+            "Over",
+            "inf",
+            "-Inf",
+        ] {
             assert_eq!(read(word, Decimal::Point), Value::Missing, "{word}");
         }
         for word in ["abc", "-", "x", "error", "open?"] {

@@ -87,6 +87,7 @@
     const taken = [...list];
     if (taken.length === 0) return;
     const mine = ++generation;
+    byId("read").replaceChildren(element("p", "Reading …"));
     try {
       const read = await Promise.all(taken.map(async (file) => ({ name: file.name, bytes: await file.arrayBuffer() })));
       if (mine !== generation) return;
@@ -101,6 +102,12 @@
     }
   }
 
+  // What was answered is not of what is asked now.
+  function forgetAnswer() {
+    byId("answer").hidden = byId("gas").hidden = true;
+    say("");
+  }
+
   function forget() {
     chosen = {};
     for (const id of ["period", "time-unit"]) byId(id).value = "";
@@ -110,9 +117,11 @@
   async function readFiles() {
     if (files.length === 0) return;
     const mine = ++generation;
-    if (isWorking) await restart();
-    byId("answer").hidden = byId("gas").hidden = byId("asking").hidden = true;
-    say("");
+    const wasWorking = isWorking;
+    if (wasWorking) await restart();
+    byId("asking").hidden = true;
+    forgetAnswer();
+    if (wasWorking) say("Stopped, since the files or columns are others now.");
     try {
       await started;
       const known = groups ?? await ask("groups", { file: files[0] });
@@ -261,15 +270,20 @@
     links[section] = offered.map(({ text, type }) => URL.createObjectURL(new Blob([text], { type })));
     byId(`${section}-links`).replaceChildren(...offered.map(({ title, name }, index) =>
       Object.assign(element("a", title), { href: links[section][index], download: name })));
-    byId(`${section}-report`).srcdoc = report;
     byId(section).hidden = false;
+    // A frame of its own: one that was hidden and is shown again stays blank in Chromium.
+    const before = byId(`${section}-report`);
+    const frame = before.cloneNode(false);
+    frame.srcdoc = report;
+    before.replaceWith(frame);
+    byId(section).scrollIntoView({ block: "start" });
   }
 
   const JSON_TYPE = "application/json";
 
   async function diagnose() {
-    const known = decimal("known");
-    const answer = await work("diagnose", { options: JSON.stringify(known ? { known: [`T1=${known}s`] } : {}) });
+    const known = decimal("known").replace(/^t1\s*=/i, "").replace("±", "+-").replace(/\s/g, "");
+    const answer = await work("diagnose", { options: JSON.stringify(known ? { known: [`T1=${known}`] } : {}) });
     if (!answer) return;
     byId("gas").hidden = true;
     give("answer", answer.report, [
@@ -319,7 +333,12 @@
     readFiles();
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
-  byId("period").addEventListener("change", () => choose("period_s", decimal("period") ? Number(decimal("period")) : undefined));
+  byId("known").addEventListener("input", forgetAnswer);
+  byId("period").addEventListener("change", ({ target }) => {
+    const period_s = Number(decimal("period"));
+    target.setCustomValidity(period_s >= 0 ? "" : "expected a number of seconds, such as 0.01");
+    if (target.reportValidity()) choose("period_s", period_s > 0 ? period_s : undefined);
+  });
   // Anywhere: a file that misses its place would be opened instead of the page.
   addEventListener("dragover", (event) => { event.preventDefault(); byId("drop").classList.add("over"); });
   addEventListener("dragleave", () => byId("drop").classList.remove("over"));

@@ -213,7 +213,8 @@ fn making(added: &[Added], made_at: &str) -> Making {
 }
 
 fn parsed<T: DeserializeOwned>(json: &str) -> Result<T, SessionError> {
-    Ok(serde_json::from_str(json)?)
+    // Through a value: the place of what is wrong in a text that the page has written is nothing to its reader.
+    Ok(T::deserialize(serde_json::from_str::<serde_json::Value>(json)?)?)
 }
 
 fn csv(columns: &[(&str, &[f64])]) -> Result<String, RecordError> {

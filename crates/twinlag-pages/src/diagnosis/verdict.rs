@@ -121,6 +121,11 @@ impl Page<'_> {
                 },
                 rounded(100.0 * left.unwrap_or_default(), 2)
             ),
+            Verdict::Adequate if answer.last.sensors.iter().all(|sensor| sensor.time_constant_s.is_none()) => {
+                "What two first-order lags leave over cannot be distinguished from noise, but the record does not determine their time \
+                 constants."
+                    .into()
+            }
             Verdict::Adequate => {
                 "Two first-order lags explain this record: what they leave over cannot be distinguished \
                                   from noise."

@@ -445,3 +445,18 @@ fn vectors_make_the_same_record_as_their_file() {
     let got = Record::from_channels(channels, SamplingChoice::Auto).unwrap();
     assert_eq!((got.sampling, got.segments), (want.sampling, want.segments));
 }
+
+/// Failed: `min` below a name was always taken for a minimum, and time constants were 60 times too short where it means minutes.
+#[test]
+fn a_row_of_units_may_say_minutes() {
+    for (units, period_s) in [("min,degF,degF", 6.0), ("Min,°C,°C", 6.0), ("min,,", 6.0), ("TS,Min,Min", 0.1)] {
+        let rows = (0..50).map(|k| {
+            let t = 0.1 * f64::from(k);
+            format!("{t:.1},{:.3},{:.3}\n", 70.0 + t.sin(), 70.0 + (0.7 * t).cos())
+        });
+        let text = format!("Elapsed,Thin,Thick\n{units}\n{}", rows.collect::<String>());
+        let table = Table::from_reader(text.as_bytes(), "run.csv").expect("a table");
+        let record = Record::from_table(&table, &Selection::default()).expect("a record");
+        assert!((record.sampling.period_s / period_s - 1.0).abs() < 1e-9, "{units}: {}", record.sampling.period_s);
+    }
+}
