@@ -59,24 +59,23 @@ impl Contradiction {
                 grade,
             })
         };
-        // Against the last model, a model with fewer effects.
-        let instead_of_effects = |fewer: &Fitted, free: &Fitted, selection: &Selection, levels: &ChannelNoise| {
+        // Against the last model, a model without some of its effects.
+        let without = |needless: &[Identifier], fewer: [&Fitted; 2], selection: &Selection, levels: &ChannelNoise| {
+            let [held, free] = fewer;
             let grade = match lost_by_effects(with_effects, free, settings, observations, selection) {
                 Some(deviance) if deviance < 0.0 => return None,
                 Some(deviance) if deviance < CONTRADICTING_DEVIANCES[0] => Grade::Go,
                 _ => Grade::NoGo,
             };
-            let kept: Vec<Identifier> = fewer.model.effects.iter().map(|effect| effect.identifier()).collect();
-            let all = with_effects.model.effects.iter().map(|effect| effect.identifier());
-            let needless = all.filter(|effect| !kept.contains(effect)).collect();
-            Some(Self { needless, ..of(fewer, free, selection, levels, grade)? })
+            Some(Self { needless: needless.to_vec(), ..of(held, free, selection, levels, grade)? })
         };
+        let effects: Vec<Identifier> = with_effects.model.effects.iter().map(|effect| effect.identifier()).collect();
         // Where two lags alone leave only noise, effects that were found may make up for what was given.
         let two_lags = |selection: &Selection, levels: &ChannelNoise| {
             let model = state.base.model.clone().with_noise(levels.std_k);
             let alone = model.clone().knowing_nothing().fit_over_grid(&[], STARTS, observations, selection);
             let held = model.fit(&state.base.theta, observations, selection, Effort::Finish);
-            instead_of_effects(&held, &alone, selection, levels)
+            without(&effects, [&held, &alone], selection, levels)
         };
         let levels = &state.prepared.levels;
         let of_two_lags = two_lags(everything, levels).or_else(|| {
@@ -85,16 +84,16 @@ impl Contradiction {
             let (selection, levels) = state.moves.iter().any(is_put).then(|| state.prepared.before_residuals())?;
             two_lags(&selection, levels)
         });
-        let without = |index: usize| {
+        let without_one = |index: usize| {
             let (model, theta) = with_effects.without(index);
             let free = model.clone().knowing_nothing().fit_over_grid(&theta[2..], STARTS, observations, everything);
             let held = model.fit(&theta, observations, everything, Effort::Finish);
-            instead_of_effects(&held, &free, everything, levels)
+            without(&effects[index..=index], [&held, &free], everything, levels)
         };
         // Beside a noise there is nothing to hold a model against, and of one effect two lags are what is left.
-        let effects = with_effects.model.effects.len();
-        let each = if effects > 1 && with_effects.model.noise().is_none() { 0..effects } else { 0..0 };
-        let of_fewer = of_two_lags.into_iter().chain(each.filter_map(without)).max_by_key(|found| found.grade);
+        let count = effects.len();
+        let each = if count > 1 && with_effects.model.noise().is_none() { 0..count } else { 0..0 };
+        let of_fewer = of_two_lags.into_iter().chain(each.filter_map(without_one)).max_by_key(|found| found.grade);
         if of_fewer.as_ref().is_some_and(Self::is_of_known) {
             return of_fewer;
         }
