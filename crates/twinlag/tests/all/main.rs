@@ -6,6 +6,7 @@ mod grades;
 mod intervals;
 mod missing;
 mod noise_levels;
+mod properties;
 mod second_order;
 mod several_records;
 mod stream;
