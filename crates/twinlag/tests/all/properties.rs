@@ -28,7 +28,7 @@ fn channels(record: &Record) -> Channels {
     Channels {
         source: record.source.clone(),
         names: record.channels.clone(),
-        time_s: record.time_s.to_vec(),
+        time_s: record.time_s.clone(),
         t1_c: record.t1_c.to_vec(),
         t2_c: record.t2_c.to_vec(),
         reference_c: None,
