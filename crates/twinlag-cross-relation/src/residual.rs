@@ -75,6 +75,14 @@ pub struct ResidualTest {
     pub p_value: f64,
 }
 
+impl ResidualTest {
+    /// Whether it is of less energy than the noise has. Where the levels are from the data, these are too high, and nothing speaks
+    /// against the model.
+    pub fn is_of_less_energy(&self) -> bool {
+        self.test == TestName::TotalEnergy && self.statistic < 1.0
+    }
+}
+
 /// Tests of a whitened residual, `segments` in order of time.
 ///
 /// - `fitted`: number of parameters fitted to it

@@ -1,6 +1,5 @@
 //! What a model leaves over that is not noise: where in frequency and in time.
 
-use twinlag_cross_relation::{ResidualTest, TestName};
 use twinlag_model::{ModelFit, Policy};
 
 use crate::diagnosis::Unexplained;
@@ -11,8 +10,7 @@ const HALF_BAND_FACTOR: f64 = 1.090_871_211_463_571;
 /// What is left, if more than noise is.
 pub(crate) fn what_is_left(fit: &ModelFit, policy: &Policy) -> Option<Unexplained> {
     // Less than noise is no effect: the level of the noise is overestimated.
-    let is_less = |t: &ResidualTest| t.test == TestName::TotalEnergy && t.statistic < 1.0;
-    let fails = fit.tests.iter().filter(|t| t.p_value < policy.rejection_p_value() && !is_less(t));
+    let fails = fit.tests.iter().filter(|t| t.p_value < policy.rejection_p_value() && !t.is_of_less_energy());
     let names: Vec<&str> = fails.map(|t| t.test.name()).collect();
     if names.is_empty() {
         return None;

@@ -27,6 +27,13 @@ impl Packing {
         }
     }
 
+    /// With other limits and marks of missing values: what they are once they are stored as the values are.
+    pub(crate) fn with_marks(mut self, stored: impl Fn(f64) -> f64) -> Self {
+        let marks = self.missing.iter_mut().chain([&mut self.lowest, &mut self.highest]);
+        marks.for_each(|mark| *mark = stored(*mark));
+        self
+    }
+
     /// Makes values physical; missing ones become NaN.
     pub(crate) fn apply(&self, values: &mut [f64]) {
         for value in values {

@@ -124,7 +124,11 @@ fn members_of(dataset: &Dataset, attributes: &[Attribute], index: usize) -> Vec<
             shape: shape.to_vec(),
             obstacle,
         };
-        Member { dataset: index, field, packing: packing.clone(), variable }
+        let packing = packing.clone().with_marks(|mark| match field.map(|field| field.meaning) {
+            Some(Meaning::Number(Number::Single)) => f64::from(mark as f32),
+            _ => mark,
+        });
+        Member { dataset: index, field, packing, variable }
     };
     match dataset.dtype() {
         Datatype::Compound { fields, .. } => fields
@@ -153,7 +157,7 @@ fn number(datatype: &Datatype) -> Option<(Number, bool)> {
 /// The numbers of an attribute; none if it is text.
 fn numbers(attribute: &Attribute) -> Vec<f64> {
     let Some((number, is_big_endian)) = number(&attribute.datatype) else { return Vec::new() };
-    attribute.raw_data.chunks_exact(number.bytes()).map(|stored| number.value(stored, is_big_endian)).collect()
+    number.values(&attribute.raw_data, is_big_endian).collect()
 }
 
 /// Attributes that are one number each.

@@ -3,12 +3,15 @@
 //! Missing values, valid range, scale and offset are those of the attributes, and where no fill
 //! value is stated the usual ones are missing.
 
+use netcdf_reader::unpack::SignParams;
 use netcdf_reader::{Error, NcFile, NcFormat, NcGroup, NcType, NcVariable};
 
+use crate::cf::Packing;
 use crate::contents::{Channel, Group, name_apart};
 use crate::fault::Fault;
 use crate::format::Format;
 use crate::input::Input;
+use crate::records::Number;
 use crate::series::{Loaded, Opened, Series, Values, is_time};
 use crate::since::start_ns;
 
@@ -32,9 +35,12 @@ struct Member {
     unit: String,
     /// Length of its second dimension.
     columns: usize,
-    fill: Option<f64>,
+    /// How its numbers are stored; `None` where it is not read.
+    number: Option<Number>,
+    /// Whole numbers that are stored without their sign, or with one that is none.
+    sign: Option<SignParams>,
+    packing: Packing,
     is_time: bool,
-    is_read: bool,
 }
 
 pub(crate) fn open(input: Input, _: Format) -> Result<Box<dyn Opened>, Fault> {
@@ -75,12 +81,13 @@ fn describe(variable: &NcVariable, path: &str) -> (Member, Vec<Channel>) {
     let text =
         |name: &str| variable.attribute(name).and_then(|attribute| attribute.value.as_string()).unwrap_or_default();
     let unit = text("units").trim().to_owned();
-    let obstacle = match (variable.dimensions.len(), variable.dtype.is_primitive() && !is_text(&variable.dtype)) {
-        (_, false) => Some("its values are no numbers".to_owned()),
-        (1, true) => None,
-        (2, true) if variable.dimensions[1].size <= MAX_COLUMNS => None,
-        (2, true) => Some(format!("it has {} places along its second dimension", variable.dimensions[1].size)),
-        (sides, true) => Some(format!("it has {sides} dimensions")),
+    let number = number(&variable.dtype);
+    let obstacle = match variable.dimensions.len() {
+        _ if number.is_none() => Some("its values are no numbers".to_owned()),
+        1 => None,
+        2 if variable.dimensions[1].size <= MAX_COLUMNS => None,
+        2 => Some(format!("it has {} places along its second dimension", variable.dimensions[1].size)),
+        sides => Some(format!("it has {sides} dimensions")),
     };
     let columns = variable.dimensions.get(1).filter(|_| obstacle.is_none()).map_or(1, |second| second.size as usize);
     let title =
@@ -88,26 +95,54 @@ fn describe(variable: &NcVariable, path: &str) -> (Member, Vec<Channel>) {
     let channel = |column| Channel { name: title(column), unit: unit.clone(), obstacle: obstacle.clone() };
     let channels = (1..=columns).map(channel).collect();
     let is_coordinate = variable.is_coordinate_variable() || text("standard_name") == "time" || text("axis") == "T";
-    let fill = match variable.dtype {
+    let member = Member {
+        path: format!("{path}{}", variable.name),
+        is_time: is_coordinate && columns == 1 && is_time(&variable.name, &unit),
+        number: number.filter(|_| obstacle.is_none()),
+        sign: SignParams::from_variable(variable),
+        packing: packing(variable),
+        unit,
+        columns,
+    };
+    (member, channels)
+}
+
+/// How numbers of a type are stored; `None` of texts and types that a file defines.
+fn number(kind: &NcType) -> Option<Number> {
+    Some(match kind {
+        NcType::Byte => Number::Int(1),
+        NcType::Short => Number::Int(2),
+        NcType::Int => Number::Int(4),
+        NcType::Int64 => Number::Int(8),
+        NcType::UByte => Number::Unsigned(1),
+        NcType::UShort => Number::Unsigned(2),
+        NcType::UInt => Number::Unsigned(4),
+        NcType::UInt64 => Number::Unsigned(8),
+        NcType::Float => Number::Single,
+        NcType::Double => Number::Double,
+        _ => return None,
+    })
+}
+
+/// What the attributes of a variable say of its values; what was never written is missing.
+fn packing(variable: &NcVariable) -> Packing {
+    let usual_fill = match variable.dtype {
         _ if variable.attribute("_FillValue").is_some() => None,
         NcType::Float | NcType::Double => Some(USUAL_FILL),
         NcType::Short => Some(USUAL_FILL_SHORT),
         NcType::Int => Some(USUAL_FILL_INT),
         _ => None,
     };
-    let member = Member {
-        path: format!("{path}{}", variable.name),
-        is_time: is_coordinate && columns == 1 && is_time(&variable.name, &unit),
-        is_read: obstacle.is_none(),
-        unit,
-        columns,
-        fill,
+    let numbers = |name: &str| match variable.attribute(name) {
+        Some(attribute) => attribute.value.as_f64_vec(),
+        None => usual_fill.filter(|_| name == "_FillValue").map(|fill| vec![fill]),
     };
-    (member, channels)
-}
-
-fn is_text(kind: &NcType) -> bool {
-    matches!(kind, NcType::Char | NcType::String)
+    let sign = SignParams::from_variable(variable);
+    Packing::of(numbers).with_marks(|mark| match (&variable.dtype, &sign) {
+        (NcType::Float, _) => f64::from(mark as f32),
+        (_, Some(sign)) => sign.reinterpret(mark),
+        _ => mark,
+    })
 }
 
 impl Opened for NetCdf {
@@ -131,10 +166,12 @@ impl Opened for NetCdf {
         let mut titles = self.groups[group].channels.iter();
         for member in &self.members[group] {
             let names: Vec<&str> = titles.by_ref().take(member.columns).map(|channel| channel.name.as_str()).collect();
-            if !member.is_read {
-                continue;
+            let Some(number) = member.number else { continue };
+            let mut values = self.stored(member, number)?;
+            if let Some(sign) = member.sign {
+                values.iter_mut().for_each(|value| *value = sign.reinterpret(*value));
             }
-            let values = self.values(member)?;
+            member.packing.apply(&mut values);
             if member.is_time {
                 loaded.time = Some(loaded.series.len());
             }
@@ -152,23 +189,14 @@ impl Opened for NetCdf {
 }
 
 impl NetCdf {
-    fn values(&self, member: &Member) -> Result<Vec<f64>, Fault> {
-        // What was never written has to be told before scale and offset make it look like a value.
-        let never_written = match member.fill {
-            Some(fill) => {
-                let stored = self.file.read_variable_as_f64(&member.path).map_err(fault)?;
-                stored.iter().enumerate().filter(|(_, value)| **value == fill).map(|(at, _)| at).collect()
-            }
-            None => Vec::new(),
-        };
-        let array = self.file.read_variable_unpacked_masked(&member.path).map_err(fault)?;
-        let mut values = array.into_raw_vec_and_offset().0;
-        for at in never_written {
-            if let Some(value) = values.get_mut(at) {
-                *value = f64::NAN;
-            }
+    /// The numbers of a variable as they are stored. Bytes of version 4 take the same way as those of HDF5: a reader
+    /// for each type would be ten times the code, which the page for a browser has no room for.
+    fn stored(&self, member: &Member, number: Number) -> Result<Vec<f64>, Fault> {
+        if let Some(classic) = self.file.as_classic() {
+            return Ok(classic.read_variable_as_f64(&member.path).map_err(fault)?.into_raw_vec_and_offset().0);
         }
-        Ok(values)
+        let bytes = self.file.read_variable_native_bytes(&member.path).map_err(fault)?;
+        Ok(number.values(&bytes, cfg!(target_endian = "big")).collect())
     }
 }
 

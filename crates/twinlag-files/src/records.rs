@@ -41,6 +41,11 @@ impl Number {
         }
     }
 
+    /// Numbers that follow each other, as doubles.
+    pub(crate) fn values(self, stored: &[u8], is_big_endian: bool) -> impl Iterator<Item = f64> {
+        stored.chunks_exact(self.bytes()).map(move |stored| self.value(stored, is_big_endian))
+    }
+
     /// A whole number.
     pub(crate) fn whole(self, stored: &[u8], is_big_endian: bool) -> i64 {
         self.signed(self.raw(stored, is_big_endian))

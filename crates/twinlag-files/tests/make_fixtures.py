@@ -550,6 +550,30 @@ def netcdf():
         write(HERE / name, kind, unlimited)
         expect(name, read(HERE / name))
 
+    # Whole numbers that are stored as if they had a sign, and floats whose mark of missing ones is a double, big-endian; the
+    # last rows of one were never written.
+    for name, kind in [("marks.nc", "NETCDF3_CLASSIC"), ("marks4.nc", "NETCDF4")]:
+        with Dataset(HERE / name, "w", format=kind) as file:
+            file.createDimension("time", None)
+            file.createVariable("time", "f8", ("time",))[:] = 0.25 * np.arange(ROWS)
+            file["time"].units = "s"
+            t1 = file.createVariable("T1", "i2", ("time",), fill_value=np.int16(-1))
+            t1.setncatts({"units": "K", "scale_factor": 0.01, "_Unsigned": "true"})
+            t1.set_auto_maskandscale(False)
+            stored = np.round((warm(55) + 400) / 0.01).astype(np.uint16)
+            stored[[4, 9]] = 65535
+            t1[:] = stored.view(np.int16)
+            t2 = file.createVariable("T2", "f4", ("time",), endian="big" if kind == "NETCDF4" else "native")
+            t2.setncatts({"units": "K", "missing_value": 1e20})
+            t2.set_auto_maskandscale(False)
+            values = warm(56).astype(np.float32)
+            values[7] = 1e20
+            t2[:35] = values[:35]
+        # The library does not look for a mark of another type, which is none of a float to the bit; others do.
+        t1 = [None if v == 65535 else float(v) * 0.01 + 0.0 for v in stored]
+        t2 = masked(values, [k != 7 and k < 35 for k in range(ROWS)])
+        expect(name, [("time", "s", 0.25 * np.arange(ROWS)), ("T1", "K", t1), ("T2", "K", t2)])
+
     # Two dimensions, groups, and values that were never written.
     path = HERE / "stations.nc"
     with Dataset(path, "w") as file:

@@ -27,7 +27,7 @@ pub(crate) const MAX_TRANSFORMED_AS_IT_IS: usize = 1 << 19;
 pub struct ChannelNoise {
     /// White noise, K.
     pub std_k: [f64; 2],
-    /// Standard error of the logarithm.
+    /// Standard error of the logarithm; zero of levels that were given.
     pub log_error: [f64; 2],
     /// Step of each converter, where there is one, K.
     pub step_k: [Option<f64>; 2],
@@ -42,6 +42,11 @@ impl ChannelNoise {
     /// Step of each converter where it is coarse beside the noise, K.
     pub fn coarse_step_k(&self) -> [Option<f64>; 2] {
         [0, 1].map(|i| self.step_k[i].filter(|q| q / 12.0_f64.sqrt() > COARSE_STEP_NOISE_RATIO * self.std_k[i]))
+    }
+
+    /// Whether they were given, and not found in the record.
+    pub(crate) fn are_given(&self) -> bool {
+        self.log_error == [0.0; 2]
     }
 
     /// The larger standard error of the logarithm of a variance, of the two channels.

@@ -102,6 +102,27 @@ fn a_given_value_that_an_effect_needs_is_not_contradicted() {
     }
 }
 
+/// With a first time constant that is 30 % too long, a slow mode is found that makes up for it, and leaves no more than two lags do
+/// without it. Its number needs one more; by Schwarz's criterion neither is preferred clearly, so both are said.
+#[test]
+fn where_an_effect_or_what_was_given_may_be_wrong_both_are_said() {
+    let pulses = Engine { amplitude_relative_std: 0.2, period_relative_std: 0.03, ..Engine::new(60.0, 8.0) };
+    let simulated = readings(SEED, Signal::Engine(pulses), |_| ());
+    let observations = even(simulated.t1_c, simulated.t2_c).expect("finite and long");
+    let known = vec![KnownTimeConstant { sensor: 0, value_s: 1.3 * TAU_S[0], std_s: None }];
+    let settings = Settings { known, ..Settings::default() };
+    let d = diagnose(&observations, &settings, &|_, _, _| ControlFlow::Continue(())).expect("a record");
+    assert_eq!(d.effects.iter().map(|e| e.effect).collect::<Vec<_>>(), [Identifier::SLOW_MODE], "{}", told(&d));
+    let said = d.remarks.iter().find_map(|r| match r {
+        Remark::EffectsOrGiven { instead, effects, .. } => Some((instead.as_str(), &effects[..])),
+        _ => None,
+    });
+    let (instead, effects) = said.unwrap_or_else(|| panic!("{}", told(&d)));
+    assert!(instead.starts_with("T1 = 0.0120"), "{instead}");
+    assert_eq!(effects, [Identifier::SLOW_MODE]);
+    assert_eq!(d.judgements.time_constants[1].grade, Grade::Conditional, "{:?}", d.judgements);
+}
+
 /// Two tones are four equations, two of which the time constants take.
 #[test]
 fn what_few_tones_can_tell_is_counted() {

@@ -15,6 +15,14 @@ fn missing_and_invalid_values_and_scales_are_those_of_the_attributes() {
 }
 
 #[test]
+fn marks_of_missing_values_are_as_the_values_are_stored() {
+    for name in ["marks.nc", "marks4.nc"] {
+        let table = check(name, &Choice::default());
+        assert_eq!(table.columns().iter().map(Column::missing).collect::<Vec<_>>(), [0, 2, 6], "{name}");
+    }
+}
+
+#[test]
 fn places_along_a_second_dimension_are_channels_and_what_was_never_written_is_missing() {
     let table = check("stations.nc", &Choice::default());
     assert_eq!(table.columns()[1].missing(), 10);
@@ -22,14 +30,14 @@ fn places_along_a_second_dimension_are_channels_and_what_was_never_written_is_mi
 
 #[test]
 fn cut_off_files_are_refused() {
-    for name in ["classic.nc", "offset.nc", "four.nc", "stations.nc"] {
+    for name in ["classic.nc", "offset.nc", "four.nc", "marks4.nc", "stations.nc"] {
         assert_cuts_are_refused(name, &Choice::default());
     }
 }
 
 #[test]
 fn damaged_files_are_survived() {
-    for name in ["classic.nc", "four.nc", "stations.nc"] {
+    for name in ["classic.nc", "four.nc", "marks4.nc", "stations.nc"] {
         assert_flips_are_survived(name, &Choice::default());
     }
 }

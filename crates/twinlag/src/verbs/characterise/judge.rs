@@ -1,6 +1,6 @@
 //! Whether the numbers of a characterisation may be used.
 
-use twinlag_cross_relation::{Influences, PartScatter, TestName, sandwich};
+use twinlag_cross_relation::{Influences, PartScatter, sandwich};
 use twinlag_diagnose::{Basis, Grade, Judgement, Number, Policy, Reason};
 use twinlag_estimate::{Estimator, Known, REJECTION_P_VALUE};
 
@@ -57,11 +57,8 @@ impl<const P: usize> Conclusion<'_, '_, P> {
         let mut basis = Basis::default();
         let options = self.asked.options;
         if self.judged.is_rejected || out.status == Status::ModelRejected {
-            let is_of_energy = out
-                .residual
-                .tests
-                .iter()
-                .any(|t| t.test == TestName::TotalEnergy && t.p_value < REJECTION_P_VALUE && t.statistic < 1.0);
+            let is_of_energy =
+                out.residual.tests.iter().any(|t| t.is_of_less_energy() && t.p_value < REJECTION_P_VALUE);
             let energy = out.residual.chi2_per_dof.filter(|_| is_of_energy && options.noise_std_k.is_some());
             basis.reasons.push(match energy {
                 Some(energy) => {
