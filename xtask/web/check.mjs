@@ -112,7 +112,7 @@ async function answers(open, where, names) {
   console.log(`== ${where}: as the program`);
 }
 
-// A wrong choice is said, and a right one mends it; what is known is of the first sensor, whatever its column is called.
+// A wrong choice is said, and a right one mends it; what is known is of the first or the second sensor, whatever its column is called.
 async function columns(open) {
   const where = "columns";
   const page = await open(where);
@@ -126,12 +126,18 @@ async function columns(open) {
   await page.selectOption("#t2", t2);
   await page.waitForSelector("#asking:not([hidden])");
   await diagnosed(page);
-  await page.fill("#known", "0.12 s");
-  if (await page.isVisible("#answer")) fail(where, "an answer stays that is not of what is asked");
-  await diagnosed(page);
-  const said = JSON.parse(await downloaded(page, "Answer as JSON"));
-  const wanted = JSON.parse(run("diagnose", "first.csv", "--t1", JSON.parse(t1), "--t2", JSON.parse(t2), "--known", "T1=0.12s", "--json"));
-  differences(said, wanted).forEach((text) => fail(where, text));
+  const given = [
+    [{ "known-t1": "0.12 s" }, ["--known", "T1=0.12s"]],
+    [{ "known-t1": "", "known-t2": "120 ms ± 5 %", noise: "0,3 0,25" }, ["--known", "T2=0.12+-0.006", "--noise", "0.3,0.25"]],
+  ];
+  for (const [fields, options] of given) {
+    for (const [id, text] of Object.entries(fields)) await page.fill(`#${id}`, text);
+    if (await page.isVisible("#answer")) fail(where, "an answer stays that is not of what is asked");
+    await diagnosed(page);
+    const said = JSON.parse(await downloaded(page, "Answer as JSON"));
+    const wanted = JSON.parse(run("diagnose", "first.csv", "--t1", JSON.parse(t1), "--t2", JSON.parse(t2), ...options, "--json"));
+    differences(said, wanted).forEach((text) => fail(where, text));
+  }
   await page.close();
 }
 

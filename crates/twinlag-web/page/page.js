@@ -2,6 +2,7 @@
   "use strict";
   const byId = (id) => document.getElementById(id);
   const columnRoles = { time: "time", t1: "T1", t2: "T2" };
+  const knownOf = { T1: "known-t1", T2: "known-t2" };
   let files = [];                       // name and bytes of each
   let chosen = {};                      // what the user has said of columns and time; the rest is guessed
   let grouping = {};                    // and of groups of channels: a group's name, or that they are joined
@@ -95,7 +96,7 @@
       forget();
       grouping = {};
       groups = undefined;
-      byId("known").value = "";
+      for (const id of [...Object.values(knownOf), "noise"]) byId(id).value = "";
       await readFiles();
     } catch (error) {
       if (mine === generation) warn(`What was dropped cannot be read (${error.message}): drop files, not folders.`);
@@ -281,9 +282,19 @@
 
   const JSON_TYPE = "application/json";
 
+  // What is known beforehand.
+  function options() {
+    const of = ([sensor, id]) => [sensor, decimal(id).replace(/^t[12]\s*=/i, "").replace("±", "+-").replace(/\s/g, "")];
+    const known = Object.entries(knownOf).map(of).filter(([, value]) => value).map(([sensor, value]) => `${sensor}=${value}`);
+    const noise_std_k = noise();
+    return JSON.stringify({ ...(known.length > 0 && { known }), ...(noise_std_k.length > 0 && { noise_std_k }) });
+  }
+
+  const noise = () => byId("noise").value.trim().split(/[;\s]+/).filter(Boolean).map((level) => Number(level.replace(",", ".")));
+
   async function diagnose() {
-    const known = decimal("known").replace(/^t1\s*=/i, "").replace("±", "+-").replace(/\s/g, "");
-    const answer = await work("diagnose", { options: JSON.stringify(known ? { known: [`T1=${known}`] } : {}) });
+    if (!byId("noise").reportValidity()) return;
+    const answer = await work("diagnose", { options: options() });
     if (!answer) return;
     byId("gas").hidden = true;
     give("answer", answer.report, [
@@ -333,7 +344,11 @@
     readFiles();
   });
   byId("time-unit").addEventListener("change", ({ target }) => choose("time_unit", target.value || undefined));
-  byId("known").addEventListener("input", forgetAnswer);
+  for (const id of [...Object.values(knownOf), "noise"]) byId(id).addEventListener("input", forgetAnswer);
+  byId("noise").addEventListener("input", ({ target }) => {
+    const isOne = noise().length === 0 || (noise().length === 2 && noise().every((level) => level > 0));
+    target.setCustomValidity(isOne ? "" : "expected the noise of the first and of the second sensor, such as 0.1 0.15");
+  });
   byId("period").addEventListener("change", ({ target }) => {
     const period_s = Number(decimal("period"));
     target.setCustomValidity(period_s >= 0 ? "" : "expected a number of seconds, such as 0.01");
