@@ -20,12 +20,13 @@ use crate::smooth::Form;
 /// exponential of its own, fewer.
 const MAX_EVEN_SAMPLES: usize = 4096;
 const MAX_UNEVEN_SAMPLES: usize = 1024;
-/// Evaluations of it for each candidate.
+/// Evaluations of it for each candidate. Of 184 fits in the experiment `reconstruction-coverage` with three trials, 177 end before. The
+/// others, of combs with 12 and more numbers, would gain 4.4 of the deviance at most, of up to 143 that they gain altogether.
 const EVALUATIONS_PER_CANDIDATE: u64 = 240;
 /// Edge of the first simplex in the logarithm of each number, and the spread of scores below which a
 /// fit has ended: a tenth of the least gain that counts.
 const SIMPLEX_EDGE_LN: f64 = 0.25;
-const SPREAD_TOLERANCE_LN: f64 = 0.05;
+const SPREAD_TOLERANCE: f64 = 0.05;
 
 /// `found` and each kind of single part, their numbers fitted together with the noise of `found`, where that is one of its parts: with
 /// minus twice the logarithm of the probability of the readings, allowing for the count of the numbers. The likeliest is the first.
@@ -64,7 +65,9 @@ impl Exact<'_> {
         let values: Vec<f64> = self.parts.iter().flat_map(Part::values).collect();
         let variables = self.parts.iter().flat_map(|p| p.variables(&search.limits)).collect();
         let fit = Problem::new(self, variables).ok().and_then(|problem| {
-            let optimiser = Optimiser::NelderMead { spread_tolerance: SPREAD_TOLERANCE_LN, edge: SIMPLEX_EDGE_LN };
+            // An optimiser's tolerance is relative to the value at the start.
+            let spread_tolerance = SPREAD_TOLERANCE / self.value(&values).abs();
+            let optimiser = Optimiser::NelderMead { spread_tolerance, edge: SIMPLEX_EDGE_LN };
             let budget = Budget { evaluations: EVALUATIONS_PER_CANDIDATE, ..Budget::default() };
             optimiser.minimise(&problem, &values, &budget).ok()
         });
